@@ -1,0 +1,120 @@
+"""The kernel: many fronts down one track, read where the sensors are, with tangents if wanted.
+
+It knows no mechanism. A law is `Contributions`: which column of the coefficient table each
+strength enters and with which profile along the track (see `columns.py` for the equation).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skred.physics.columns import Column
+from skred.physics.compiled import compiled
+from skred.physics.inputs import cell_of
+from skred.physics.march import fill_steps, fill_table, march, march_tangents
+from skred.physics.reading import read, read_tangents
+
+_N_COLUMNS = len(Column)
+
+
+@compiled()
+def _cells_of(sensors, edge):  # type: ignore[no-untyped-def]
+    """Cell of each sensor's upper end."""
+    cells = np.zeros(sensors.shape[0], dtype=np.int64)
+    for j in range(sensors.shape[0]):
+        cells[j] = cell_of(edge, sensors[j, 1])
+    return cells
+
+
+@compiled()
+def _simulate(strengths, releases, path, law, sensors, readings, jacobian):  # type: ignore[no-untyped-def]
+    """Fill the readings run by run, and the jacobian unless its last axis is empty."""
+    # Unpacked once: reading an array out of a tuple costs as much as ten cells.
+    edge, ground, barriers, limits = path.edge, path.ground, path.barriers, path.limits
+    columns, profiles = law.columns, law.profiles
+    u_c, speed_terms = law.weakening_speed, law.speed_terms
+    n_cells, n_tangents = ground.shape[1], jacobian.shape[2]
+    table = np.zeros((_N_COLUMNS, n_cells))
+    keep, gain, v = np.empty(n_cells), np.empty(n_cells), np.empty(n_cells + 1)
+    dv = np.empty((n_cells + 1 if n_tangents > 0 else 0, n_tangents))
+    d_runout = np.zeros(n_tangents)
+    cells = _cells_of(sensors, edge)
+    for run in range(releases.size):
+        release = releases[run]
+        fill_table(strengths[run], columns, profiles, table)
+        fill_steps(edge, ground, table, keep, gain)
+        runout, last, first = march(
+            release, edge, ground, barriers, limits, u_c, speed_terms, table, keep, gain, v
+        )
+        read(
+            sensors, cells, release, runout, first, edge, ground, barriers, u_c, speed_terms,
+            table, v, readings[run],
+        )  # fmt: skip
+        if n_tangents > 0:
+            march_tangents(release, path, law, table, keep, v, last, first, dv, d_runout)
+            read_tangents(
+                sensors, cells, release, runout, first, edge, ground, barriers, law,
+                table, v, dv, d_runout, jacobian[run],
+            )  # fmt: skip
+
+
+@compiled()
+def simulate(strengths, releases, path, law, sensors):  # type: ignore[no-untyped-def]
+    """Readings of many fronts.
+
+    Parameters
+    ----------
+    strengths : (n_runs, n_strengths) array
+        Strength of each contribution in its own unit.
+    releases : (n_runs,) array, m
+        Where each front starts from rest.
+    path : Path
+    law : Contributions
+    sensors : (n_sensors, 3) array
+        Quantity (FRONT_VELOCITY or RUNOUT), s_from and s_to [m]; equal for a point.
+
+    Returns
+    -------
+    (n_runs, n_sensors) array, m/s or m
+        0 for a front velocity where the front does not come.
+
+    """
+    readings = np.empty((releases.size, sensors.shape[0]))
+    jacobian = np.empty((releases.size, sensors.shape[0], 0))
+    _simulate(strengths, releases, path, law, sensors, readings, jacobian)
+    return readings
+
+
+@compiled()
+def simulate_with_jacobian(strengths, releases, path, law, sensors):  # type: ignore[no-untyped-def]
+    """As `simulate`, with the derivatives by every strength and, last, by the release place.
+
+    Returns
+    -------
+    readings : (n_runs, n_sensors) array
+    jacobian : (n_runs, n_sensors, n_strengths + 1) array
+
+    """
+    readings = np.empty((releases.size, sensors.shape[0]))
+    jacobian = np.empty((releases.size, sensors.shape[0], strengths.shape[1] + 1))
+    _simulate(strengths, releases, path, law, sensors, readings, jacobian)
+    return readings, jacobian
+
+
+@compiled()
+def front_speeds(strengths, releases, path, law):  # type: ignore[no-untyped-def]
+    """Front speed U [m/s] at every cell edge, (n_runs, n_cells + 1); parameters as `simulate`."""
+    edge, ground, barriers, limits = path.edge, path.ground, path.barriers, path.limits
+    n_cells = ground.shape[1]
+    table = np.zeros((_N_COLUMNS, n_cells))
+    keep, gain = np.empty(n_cells), np.empty(n_cells)
+    speeds = np.empty((releases.size, n_cells + 1))
+    for run in range(releases.size):
+        fill_table(strengths[run], law.columns, law.profiles, table)
+        fill_steps(edge, ground, table, keep, gain)
+        march(
+            releases[run], edge, ground, barriers, limits, law.weakening_speed, law.speed_terms,
+            table, keep, gain, speeds[run],
+        )  # fmt: skip
+        speeds[run] = np.sqrt(speeds[run])
+    return speeds

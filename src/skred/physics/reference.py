@@ -1,0 +1,274 @@
+"""The front's equation of motion in plain Python: the second route beside the fast kernel.
+
+A run is a chain of pieces. In each the equation is linear in v = U^2,
+
+    dv/ds = forcing - decay v,
+
+with constant coefficients, so speeds, switches and stops follow in closed form. Retardation that
+depends on U itself (linear drag, weakening friction) is frozen at the piece's mean speed: second order.
+Everything is complex inside, so that one complex step in any input gives an exact derivative.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from skred.physics.columns import GRAVITY
+from skred.physics.terrain import Terrain
+
+Barrier = tuple[float, float, complex]
+"""Place [m], height [m], loss of those that pass [J/kg]."""
+Sensor = tuple[str, float, float]
+"""``"point"``, ``"span"`` or ``"runout"``; from and to [m] (equal for a point, unused for runout)."""
+
+
+class Cell(NamedTuple):
+    """One cell: slope, curvature [1/m] and its column of the coefficient table."""
+
+    sin_slope: float
+    cos_slope: float
+    curvature: float
+    constant: complex
+    linear: complex
+    quadratic: complex
+    friction: complex
+    weakening: complex
+    weakening_speed: float
+
+
+class Piece(NamedTuple):
+    """Part of a cell with constant coefficients: dv/ds = forcing - decay v from ``start_v``."""
+
+    start_s: complex
+    end_s: complex
+    start_v: complex
+    forcing: complex
+    decay: complex
+
+    def speed_squared(self, s: complex) -> complex:
+        """Return v [m2/s2] at ``s`` [m]."""
+        length = s - self.start_s
+        rate = self.forcing - self.decay * self.start_v
+        return self.start_v + rate * length * _mean_decay(self.decay * length)
+
+    def place_of(self, v: complex) -> complex:
+        """Return the place [m] at which the speed squared is ``v``."""
+        rate = self.forcing - self.decay * self.start_v
+        straight = (v - self.start_v) / rate
+        return self.start_s + straight * _log_ratio(self.decay * straight)
+
+
+@dataclass(frozen=True, eq=False)
+class FrontRun:
+    """One front's way down the track.
+
+    Attributes
+    ----------
+    edge_speed_squared : (n_cells + 1,) array, m2/s2
+        v at the cell edges, behind a barrier that stands there; 0 above the release and below the stop.
+    runout_s_m : float or complex, m
+        Place of the stop, or the end of the track.
+    left_track : bool
+        Whether the front was still moving there.
+    pieces : tuple of Piece
+        The run itself.
+
+    """
+
+    edge_speed_squared: NDArray[Any]
+    runout_s_m: Any
+    left_track: bool
+    pieces: tuple[Piece, ...]
+
+    def speed(self, s: float) -> complex:
+        """Return the speed [m/s] on arrival at ``s`` [m]; 0 where the front did not come."""
+        if not self.pieces or not self.pieces[0].start_s.real <= s <= self.runout_s_m.real:
+            return 0j
+        piece = next((p for p in self.pieces if p.end_s.real >= s), self.pieces[-1])
+        return _speed(piece.speed_squared(s))
+
+    def span_speed(self, s_from: float, s_to: float) -> complex:
+        """Return length over travel time [m/s]; 0 where the front did not cover the whole span."""
+        if not self.pieces or s_from < self.pieces[0].start_s.real or s_to > self.runout_s_m.real:
+            return 0j
+        time = 0j
+        for piece in self.pieces:
+            start = piece.start_s if piece.start_s.real > s_from else s_from
+            end = piece.end_s if piece.end_s.real < s_to else s_to
+            if end.real > start.real:
+                mean = (_speed(piece.speed_squared(start)) + _speed(piece.speed_squared(end))) / 2
+                time += (end - start) / mean
+        return (s_to - s_from) / time
+
+
+def run_front(
+    terrain: Terrain,
+    table: ArrayLike,
+    release_s_m: complex,
+    *,
+    weakening_speed: float = math.inf,
+    barriers: Sequence[Barrier] = (),
+) -> FrontRun:
+    """Send one front down the track from rest.
+
+    Parameters
+    ----------
+    terrain : Terrain
+        Cells with edges [m], slope and curvature [1/m].
+    table : (5, n_cells) array, real or complex
+        Coefficients in the order and units of ``Column``.
+    release_s_m : float or complex, m
+        Place of the front at rest. A barrier at or above it is not met.
+    weakening_speed : float, m/s
+        U_c of weakening friction.
+    barriers : sequence of (s [m], height [m], loss [J/kg]), sorted by s
+        A front with v < 2 g height, or no more than 2 loss, stops; others go on with v - 2 loss.
+
+    Returns
+    -------
+    FrontRun
+        Complex where the table, the release point or a loss is.
+
+    Raises
+    ------
+    ValueError
+        If the release point does not lie on the track.
+
+    """
+    coefficients = np.asarray(table)
+    dtype = np.result_type(coefficients, release_s_m, *(loss for _, _, loss in barriers), np.float64)
+    edge_v = np.zeros(len(terrain.edge_s_m), dtype=complex)
+    s, v, moving = complex(release_s_m), 0j, False
+    pieces: list[Piece] = []
+    for index, end_s, barrier in _sections(terrain.edge_s_m, s.real, barriers):
+        cell = _cell(terrain, coefficients, index, weakening_speed)
+        if not pieces and _coefficients(cell, True, 0j)[0].real <= 0:
+            break
+        pieces += _cross(cell, s, end_s, v)
+        s, v = pieces[-1].end_s, pieces[-1].speed_squared(pieces[-1].end_s)
+        moving = s == end_s and v.real > 0
+        if moving and barrier is not None:
+            _, height, loss = barrier
+            moving = v.real >= 2 * GRAVITY * height and (v - 2 * loss).real > 0
+            v -= 2 * loss
+        if not moving:
+            break
+        if end_s == terrain.edge_s_m[index + 1]:
+            edge_v[index + 1] = v
+    if dtype.kind == "c":
+        return FrontRun(edge_v, complex(s), moving, tuple(pieces))
+    return FrontRun(edge_v.real, s.real, moving, tuple(pieces))
+
+
+def read_front(
+    terrain: Terrain,
+    table: ArrayLike,
+    release_s_m: complex,
+    sensors: Sequence[Sensor],
+    *,
+    weakening_speed: float = math.inf,
+    barriers: Sequence[Barrier] = (),
+) -> NDArray[Any]:
+    """Run a front as `run_front` does and read it at the sensors.
+
+    Returns
+    -------
+    (n_sensors,) array
+        Speed at a point, mean speed over a span [m/s], or runout as s [m].
+
+    """
+    run = run_front(terrain, table, release_s_m, weakening_speed=weakening_speed, barriers=barriers)
+    readings = np.zeros(len(sensors), dtype=complex)
+    for index, (kind, s_from, s_to) in enumerate(sensors):
+        if kind == "runout":
+            readings[index] = run.runout_s_m
+        elif kind == "point":
+            readings[index] = run.speed(s_from)
+        elif kind == "span":
+            readings[index] = run.span_speed(s_from, s_to)
+        else:
+            raise ValueError(f"sensor {index}: expected point, span or runout, found {kind!r}")
+    return readings if isinstance(run.runout_s_m, complex) else readings.real
+
+
+def _sections(
+    edge_s: NDArray[np.float64], release_s: float, barriers: Sequence[Barrier]
+) -> Iterator[tuple[int, float, Barrier | None]]:
+    """Cell, lower end [m] and the barrier there, for every stretch between edges and barriers."""
+    if not edge_s[0] <= release_s <= edge_s[-1]:
+        raise ValueError(f"release at {release_s} m, but the track runs from {edge_s[0]} to {edge_s[-1]} m")
+    first = int(np.searchsorted(edge_s, release_s, side="right")) - 1
+    for index in range(first, len(edge_s) - 1):
+        upper, lower = max(release_s, edge_s[index]), float(edge_s[index + 1])
+        for barrier in barriers:
+            if upper < barrier[0] <= lower:
+                yield index, barrier[0], barrier
+        yield index, lower, None
+
+
+def _cell(terrain: Terrain, table: NDArray[Any], index: int, weakening_speed: float) -> Cell:
+    slope = (terrain.sin_slope[index], terrain.cos_slope[index], terrain.curvature[index])
+    return Cell(*map(float, slope), *map(complex, table[:, index]), weakening_speed)
+
+
+def _cross(cell: Cell, s: complex, end_s: complex, v: complex) -> list[Piece]:
+    """Cross the cell to ``end_s`` or to the stop, in two pieces where the normal force switches."""
+    contact = GRAVITY * cell.cos_slope + cell.curvature * v.real >= 0
+    piece = _piece(cell, contact, s, end_s, v)
+    pieces = [piece]
+    switch_v = -GRAVITY * cell.cos_slope / cell.curvature if cell.curvature < 0 else math.inf
+    if (piece.speed_squared(end_s).real > switch_v) == contact:
+        switch_s = piece.place_of(switch_v)
+        pieces = [piece._replace(end_s=switch_s), _piece(cell, not contact, switch_s, end_s, switch_v)]
+    if pieces[-1].speed_squared(end_s).real <= 0:
+        pieces[-1] = pieces[-1]._replace(end_s=pieces[-1].place_of(0j))
+    return pieces
+
+
+def _piece(cell: Cell, contact: bool, s: complex, end_s: complex, v: complex) -> Piece:
+    """Freeze the terms in U at the speed at the start (predictor), then at the mean (corrector)."""
+    predicted = Piece(s, end_s, v, *_coefficients(cell, contact, _speed(v)))
+    mean_speed = _mean_speed(v, predicted.speed_squared(end_s))
+    return Piece(s, end_s, v, *_coefficients(cell, contact, mean_speed))
+
+
+def _coefficients(cell: Cell, contact: bool, speed: complex) -> tuple[complex, complex]:
+    """Return forcing [m/s2] and decay [1/m] of dv/ds = forcing - decay v at the given U [m/s]."""
+    weakened = cell.weakening / (1 + speed / cell.weakening_speed)
+    friction = cell.friction if contact else 0.0
+    driving = GRAVITY * cell.sin_slope - cell.constant - cell.linear * speed
+    retarding = (friction + weakened) * GRAVITY * cell.cos_slope
+    return 2 * (driving - retarding), 2 * (cell.quadratic + friction * cell.curvature)
+
+
+def _speed(v: complex) -> complex:
+    return cmath.sqrt(v) if v.real > 0 else 0j
+
+
+def _mean_speed(start_v: complex, end_v: complex) -> complex:
+    """Mean of U over a length in which v changes linearly (to 0 where it would become negative)."""
+    start, end = _speed(start_v), _speed(end_v)
+    if start + end == 0:
+        return 0j
+    return 2 / 3 * (start**2 + start * end + end**2) / (start + end)
+
+
+def _mean_decay(z: complex) -> complex:
+    """(1 - exp(-z)) / z, by its series where the difference would cancel."""
+    if abs(z) > 0.1:
+        return (1 - cmath.exp(-z)) / z
+    return sum((-z) ** k / math.factorial(k + 1) for k in range(12))
+
+
+def _log_ratio(z: complex) -> complex:
+    """-log(1 - z) / z, by its series where the quotient would cancel."""
+    if abs(z) > 0.1:
+        return -cmath.log(1 - z) / z
+    return sum(z**k / (k + 1) for k in range(18))
