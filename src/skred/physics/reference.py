@@ -214,8 +214,9 @@ def _sections(
 
 
 def _cell(terrain: Terrain, table: NDArray[Any], index: int, weakening_speed: float) -> Cell:
-    slope = (terrain.sin_slope[index], terrain.cos_slope[index], terrain.curvature[index])
-    return Cell(*map(float, slope), *map(complex, table[:, index]), weakening_speed)
+    sin_slope, cos_slope, curvature = terrain.sin_slope[index], terrain.cos_slope[index], terrain.curvature[index]
+    b, c, d, mu, w = (complex(value) for value in table[:, index])
+    return Cell(float(sin_slope), float(cos_slope), float(curvature), b, c, d, mu, w, weakening_speed)
 
 
 def _cross(cell: Cell, s: complex, end_s: complex, v: complex) -> list[Piece]:
@@ -264,7 +265,10 @@ def _mean_decay(z: complex) -> complex:
     """(1 - exp(-z)) / z, by its series where the difference would cancel."""
     if abs(z) > 0.1:
         return (1 - cmath.exp(-z)) / z
-    return sum((-z) ** k / math.factorial(k + 1) for k in range(12))
+    value = 1 + 0j
+    for k in range(12, 1, -1):
+        value = 1 - z / k * value
+    return value
 
 
 def _log_ratio(z: complex) -> complex:

@@ -1,0 +1,1 @@
+"""Ring 2, inference: the Op around the kernel, likelihoods, sampling, comparison."""

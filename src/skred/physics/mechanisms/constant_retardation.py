@@ -1,0 +1,23 @@
+"""Speed-independent shear strength: the same retardation everywhere."""
+
+from skred.physics.columns import Column
+from skred.physics.mechanisms.spec import Mechanism, Strength, everywhere
+
+MECHANISM = Mechanism(
+    id="constant_retardation",
+    title="constant retardation",
+    strength=Strength(
+        name="retardation",
+        symbol="b",
+        paper_symbol="a3",
+        unit="m s-2",
+        prior_scale=5.0,
+        prior_reason="a front moves only while b < g sin(phi) < 9.8 m/s2; 95 % of the prior below that",
+    ),
+    equation="-b",
+    mark="the loss of U^2/2 between two places is the same for every event",
+    reference="Gauer and others (2008), Cold Regions Science and Technology 51, 193-203",
+    doi="10.1016/j.coldregions.2007.05.002",
+    column=Column.CONSTANT,
+    profile=everywhere,
+)

@@ -1,0 +1,24 @@
+"""Drag quadratic in speed, along the whole track."""
+
+from skred.physics.columns import Column
+from skred.physics.mechanisms.spec import Mechanism, Strength, everywhere
+
+MECHANISM = Mechanism(
+    id="turbulent_drag",
+    title="drag quadratic in speed",
+    strength=Strength(
+        name="turbulent_drag",
+        symbol="D",
+        paper_symbol="a2",
+        unit="m-1",
+        prior_scale=0.01,
+        prior_reason="1/D is the distance over which drag alone takes 63 % of v/2; 95 % of D below "
+        "0.02 1/m, which on 30 degrees without friction allows no more than 16 m/s",
+    ),
+    equation="-D U^2",
+    mark="fast fronts retard more than slow ones at the same place; speed tends to a limit",
+    reference="Voellmy (1955); Perla, Cheng and McClung (1980), Journal of Glaciology 26(94), 197-207",
+    doi="10.3189/S002214300001073X",
+    column=Column.QUADRATIC,
+    profile=everywhere,
+)
