@@ -1,0 +1,123 @@
+"""What is wrong with a campaign, said so that its owner can put it right."""
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+
+SHOWN_CHARACTERS = 60
+SHOWN_PROBLEMS_PER_FILE = 20
+
+
+def shown(text: str, longest: int = SHOWN_CHARACTERS) -> str:
+    r"""Text from a stranger's file as it may be shown in a terminal.
+
+    Characters that do not print (control and escape sequences, direction marks) appear as ``\x1b`` and the
+    like, because a terminal would obey them.
+
+    Parameters
+    ----------
+    text : str
+        Anything.
+    longest : int
+        Longer text is cut, and an ellipsis says so.
+
+    Returns
+    -------
+    str
+        Printable text.
+    """
+    cut = text[:longest]
+    printable = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in cut)
+    return printable + ("…" if len(text) > longest else "")
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One thing that is wrong, where it is, and what to do about it.
+
+    Parameters
+    ----------
+    file : str
+        Name of the file in the campaign's folder.
+    row : int or None
+        Line of the file, the first line being 1; None where the whole file is meant.
+    column : str or None
+        Name of the column, or of the key in ``campaign.toml``; None where the whole row is meant.
+    found : str or None
+        What stands there, safe to show in a terminal; None where there is nothing to show.
+    message : str
+        What was expected and what to do.
+    """
+
+    file: str
+    row: int | None
+    column: str | None
+    found: str | None
+    message: str
+
+    def __post_init__(self) -> None:
+        """Make everything that came from the file safe to show."""
+        object.__setattr__(self, "file", shown(self.file))
+        if self.column is not None:
+            object.__setattr__(self, "column", shown(self.column))
+        if self.found is not None:
+            object.__setattr__(self, "found", shown(self.found))
+
+    def __str__(self) -> str:
+        """Return the problem as one line."""
+        place = [self.file]
+        if self.row is not None:
+            place.append(f"row {self.row}")
+        if self.column is not None:
+            place.append(f"column {self.column}" if self.file.endswith(".csv") else f"key {self.column}")
+        found = "" if self.found is None else f"found '{self.found}': "
+        return f"{', '.join(place)}: {found}{self.message}"
+
+    def as_dict(self) -> dict[str, str | int | None]:
+        """Return the problem as plain data, for JSON."""
+        return asdict(self)
+
+
+class CampaignError(ValueError):
+    """A campaign that cannot be read, written or found; carries every problem, not only the first.
+
+    Parameters
+    ----------
+    problems : iterable of Problem
+        At least one.
+    """
+
+    problems: tuple[Problem, ...]
+
+    def __init__(self, problems: Iterable[Problem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__(self.problems)
+
+    def __str__(self) -> str:
+        """Return the problems, one a line, the longest lists cut short."""
+        return "\n".join(problem_lines(self.problems))
+
+
+def problem_lines(problems: Iterable[Problem], per_file: int = SHOWN_PROBLEMS_PER_FILE) -> list[str]:
+    """List the problems as lines of text, by file.
+
+    Parameters
+    ----------
+    problems : iterable of Problem
+        In any order.
+    per_file : int
+        So many are shown of each file; a last line says how many more there are.
+
+    Returns
+    -------
+    list of str
+        One line for each problem shown.
+    """
+    by_file: dict[str, list[Problem]] = {}
+    for problem in problems:
+        by_file.setdefault(problem.file, []).append(problem)
+    lines: list[str] = []
+    for file, of_file in by_file.items():
+        lines += [str(problem) for problem in of_file[:per_file]]
+        if len(of_file) > per_file:
+            lines.append(f"{file}: … and {len(of_file) - per_file} more problems in this file")
+    return lines

@@ -1,0 +1,235 @@
+"""The rules of the campaign format that concern more than one cell.
+
+Each function is one table's rules and returns the problems it finds. A cell that could not be read was
+reported where it was read; rules that need it pass over its row, so that one mistake is told once.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from math import hypot
+
+from skred.campaign.problems import Problem
+from skred.campaign.records import Sensor
+from skred.campaign.tables import MOST_PROBLEMS, Row
+
+# Others compute the same arc length in another order of additions.
+ROUNDING_M = 1e-6
+FEWEST_TRACK_POINTS = 3
+TRACK, SENSORS, EVENTS, RECORDINGS = "track.csv", "sensors.csv", "events.csv", "recordings.csv"
+
+
+def track_problems(rows: Sequence[Row]) -> list[Problem]:
+    """Check that the track has enough points, in downhill order."""
+    if len(rows) < FEWEST_TRACK_POINTS:
+        message = f"the track has {len(rows)} points; give at least {FEWEST_TRACK_POINTS}"
+        return [Problem(TRACK, None, None, None, message)]
+    problems = []
+    points = [row for row in rows if row.has("x_m", "z_m")]
+    s_m = 0.0
+    for before, row in zip(points, points[1:], strict=False):
+        dx_m = row.number("x_m") - before.number("x_m")
+        step_m = hypot(dx_m, row.number("z_m") - before.number("z_m"))
+        if dx_m <= 0 or s_m + step_m == s_m:
+            message = (
+                f"x_m must be greater than in row {before.line} ({before.number('x_m'):g}); "
+                "order the points downhill and remove those that appear twice"
+            )
+            problems.append(_at(TRACK, row, "x_m", message))
+        s_m += max(step_m, 0.0)
+    if points and points[-1].number("z_m") >= points[0].number("z_m"):
+        start = f"{points[0].number('z_m'):g} m"
+        message = f"the track ends no lower than it starts ({start}); order the points downhill"
+        problems.append(_at(TRACK, points[-1], "z_m", message))
+    return problems
+
+
+def sensor_problems(rows: Sequence[Row], length_m: float | None) -> list[Problem]:
+    """Check the sensors' ids and places; without a length, not whether these lie on the track."""
+    problems = _empty(SENSORS, rows) + _repeated(SENSORS, "sensor", rows)
+    for row in rows:
+        if not row.has("quantity", "s_from_m", "s_to_m"):
+            continue
+        places = {column: row.number_or_none(column) for column in ("s_from_m", "s_to_m")}
+        if row.word("quantity") == "runout":
+            for column, s_m in places.items():
+                if s_m is not None:
+                    message = "a runout sensor has no place; leave the cell empty"
+                    problems.append(_at(SENSORS, row, column, message))
+            continue
+        for column, s_m in places.items():
+            if s_m is None:
+                message = "a velocity needs a place; write its arc length, for a point the same one twice"
+                problems.append(_at(SENSORS, row, column, message))
+            else:
+                problems += _off_track(SENSORS, row, column, s_m, length_m)
+        s_from_m, s_to_m = places.values()
+        if s_from_m is not None and s_to_m is not None and s_from_m > s_to_m:
+            message = f"s_to_m lies above s_from_m ({s_from_m:g}); exchange them"
+            problems.append(_at(SENSORS, row, "s_to_m", message))
+    return problems
+
+
+def event_problems(rows: Sequence[Row], length_m: float | None) -> list[Problem]:
+    """Check the events' ids and release points; without a length, not whether these lie on the track."""
+    problems = _empty(EVENTS, rows) + _repeated(EVENTS, "event", rows)
+    for row in rows:
+        if row.has("release_s_m"):
+            problems += _off_track(EVENTS, row, "release_s_m", row.number("release_s_m"), length_m)
+    return problems
+
+
+def recording_problems(
+    rows: Sequence[Row],
+    event_ids: frozenset[str] | None,
+    sensor_ids: frozenset[str] | None,
+    sensors: Mapping[str, Sensor],
+    length_m: float | None,
+) -> list[Problem]:
+    """Check each reading by itself.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+        The readings.
+    event_ids, sensor_ids : frozenset of str or None
+        What readings may name; None where the file with these ids could not be read.
+    sensors : mapping of str to Sensor
+        The sensors without a problem.
+    length_m : float or None
+        Length of the track, m; None where it has a problem.
+
+    Returns
+    -------
+    list of Problem
+        In the order of the rows.
+    """
+    problems: list[Problem] = []
+    first_line: dict[tuple[str, str], int] = {}
+    for row in rows:
+        if len(problems) > MOST_PROBLEMS:
+            break
+        for column, known, file in (("event", event_ids, EVENTS), ("sensor", sensor_ids, SENSORS)):
+            if known is not None and row.has(column) and row.word(column) not in known:
+                message = f"not an id of {file}; correct it or add it there"
+                problems.append(_at(RECORDINGS, row, column, message))
+        if row.has("event", "sensor"):
+            key = (row.word("event"), row.word("sensor"))
+            if key in first_line:
+                message = f"this event and sensor have a reading in row {first_line[key]}; remove one of them"
+                problems.append(_at(RECORDINGS, row, "sensor", message))
+            first_line.setdefault(key, row.line)
+        if row.has("value", "status"):
+            sensor = sensors.get(row.word("sensor")) if row.has("sensor") else None
+            problems += _reading_problems(row, sensor, length_m)
+    return problems
+
+
+def _reading_problems(row: Row, sensor: Sensor | None, length_m: float | None) -> list[Problem]:
+    """Check that value, status and standard deviation of one reading go together."""
+    value, status = row.number_or_none("value"), row.word("status")
+    if status == "not_reached" and sensor is not None and sensor.is_runout:
+        message = "every avalanche has a runout; write 'missing' if it is not known"
+        return [_at(RECORDINGS, row, "status", message)]
+    if status != "observed":
+        if value is None:
+            return []
+        message = f"a reading with status '{status}' carries no value; remove it or correct the status"
+        return [_at(RECORDINGS, row, "value", message)]
+    if value is None:
+        message = "an observed reading needs a value; write it, or the status 'missing' or 'not_reached'"
+        return [_at(RECORDINGS, row, "value", message)]
+    if sensor is None:
+        return []
+    problems = []
+    if sensor.is_runout:
+        problems += _off_track(RECORDINGS, row, "value", value, length_m)
+    elif value < 0:
+        problems.append(_at(RECORDINGS, row, "value", "a front velocity is not negative; correct it"))
+    stated = row.number_or_none("sd")
+    by_sensor = hypot(sensor.relative_sd * value, sensor.absolute_sd)
+    if stated is None and by_sensor == 0 and "sd" not in row.unreadable:
+        message = (
+            f"the reading's standard deviation is 0; state one, or give sensor '{sensor.id}' an absolute_sd"
+        )
+        problems.append(Problem(RECORDINGS, row.line, "sd", None, message))
+    return problems
+
+
+def not_reached_problems(rows: Sequence[Row], sensors: Mapping[str, Sensor]) -> list[Problem]:
+    """Check that no event has a positive velocity below a sensor that it did not reach.
+
+    The front stopped above that sensor (a span: above its ``s_to_m``), so nothing that starts there or
+    further down can have seen it.
+    """
+    uppermost: dict[str, tuple[float, Row]] = {}
+    for row in rows:
+        sensor = _velocity_sensor(row, sensors)
+        if sensor is not None and row.word("status") == "not_reached":
+            known = uppermost.get(row.word("event"))
+            if known is None or sensor.s_to_m < known[0]:
+                uppermost[row.word("event")] = (sensor.s_to_m, row)
+    problems = []
+    for row in rows:
+        sensor = _velocity_sensor(row, sensors)
+        if sensor is None or row.word("event") not in uppermost or row.word("status") != "observed":
+            continue
+        stop_m, not_reached = uppermost[row.word("event")]
+        value = row.number_or_none("value") if row.has("value") else None
+        if value is not None and value > 0 and sensor.s_from_m >= stop_m:
+            message = (
+                f"event '{row.word('event')}' did not reach sensor '{not_reached.word('sensor')}' (row "
+                f"{not_reached.line}), so it has no speed here, further down; correct one of the two"
+            )
+            problems.append(_at(RECORDINGS, row, "value", message))
+    return problems
+
+
+def _velocity_sensor(row: Row, sensors: Mapping[str, Sensor]) -> Sensor | None:
+    """Return a reading's sensor if it records velocity and the reading's cells could be read."""
+    if not row.has("event", "sensor", "status"):
+        return None
+    sensor = sensors.get(row.word("sensor"))
+    return None if sensor is None or sensor.is_runout else sensor
+
+
+def reference_problems(reference_s_m: float | None, row: int | None, length_m: float | None) -> list[Problem]:
+    """Check that the zero for reports lies on the track."""
+    if reference_s_m is None or length_m is None or _is_on_track(reference_s_m, length_m):
+        return []
+    message = f"expected an arc length on the track, 0 to {length_m:.2f} m; correct it or remove the key"
+    return [Problem("campaign.toml", row, "reference_s_m", f"{reference_s_m:g}", message)]
+
+
+def _empty(file: str, rows: Sequence[Row]) -> list[Problem]:
+    """Check that a table has rows."""
+    return [] if rows else [Problem(file, None, None, None, "the table has no rows; write at least one")]
+
+
+def _repeated(file: str, column: str, rows: Iterable[Row]) -> list[Problem]:
+    """Check that ids are unique."""
+    problems = []
+    first_line: dict[str, int] = {}
+    for row in rows:
+        if row.has(column):
+            line = first_line.setdefault(row.word(column), row.line)
+            if line != row.line:
+                message = f"the id already stands in row {line}; give each its own"
+                problems.append(_at(file, row, column, message))
+    return problems
+
+
+def _is_on_track(s_m: float, length_m: float) -> bool:
+    return -ROUNDING_M <= s_m <= length_m + ROUNDING_M
+
+
+def _off_track(file: str, row: Row, column: str, s_m: float, length_m: float | None) -> list[Problem]:
+    """Check that a place lies on the track."""
+    if length_m is None or _is_on_track(s_m, length_m):
+        return []
+    return [_at(file, row, column, f"expected an arc length on the track, 0 to {length_m:.2f} m; correct it")]
+
+
+def _at(file: str, row: Row, column: str, message: str) -> Problem:
+    """Return a problem with a cell that could be read."""
+    value = row.cells[column]
+    found = value if isinstance(value, str) else "" if value is None else repr(value)
+    return Problem(file, row.line, column, found, message)

@@ -1,0 +1,239 @@
+"""Each rule of the format is told with its file, row and column."""
+
+import re
+
+import pytest
+
+from skred.campaign import CampaignError, read_campaign
+
+# file, text in the good file, what replaces it; row, column and words of the problem
+# fmt: off
+BROKEN = {
+    # campaign.toml
+    "format is a later version": ("campaign.toml", "format = 1", "format = 2", 1, "format", "integer 1"),
+    "format is a boolean": ("campaign.toml", "format = 1", "format = true", 1, "format", "integer 1"),
+    "format is no integer": ("campaign.toml", "format = 1", "format = 1.0", 1, "format", "integer 1"),
+    "format is text": ("campaign.toml", "format = 1", 'format = "1"', 1, "format", "integer 1"),
+    "format is missing": ("campaign.toml", "format = 1\n", "", None, "format", "missing"),
+    "name is missing": ("campaign.toml", 'name = "small"\n', "", None, "name", "missing"),
+    "name is empty": ("campaign.toml", '"small"', '""', 2, "name", "empty"),
+    "name is a number": ("campaign.toml", '"small"', "3", 2, "name", "text in quotes"),
+    "name holds an escape": ("campaign.toml", '"small"', '"\\u001b[31m"', 2, "name", "printable"),
+    "source is missing": ("campaign.toml", 'source = "made up"\n', "", None, "source", "missing"),
+    "source holds an escape": ("campaign.toml", "made up", "made\\u001bup", 4, "source", "control"),
+    "origin is unknown": (
+        "campaign.toml", '"simulated"', '"guessed"', 5, "origin", "'measured' or 'simulated'",
+    ),
+    "unknown key": ("campaign.toml", "reference_s_m", "refrence_s_m", 6, "refrence_s_m", "unknown key"),
+    "a table for a value": (
+        "campaign.toml", "reference_s_m = 100.0", "[reference_s_m]", 6, "reference_s_m", "number",
+    ),
+    "reference is text": ("campaign.toml", "100.0", '"100"', 6, "reference_s_m", "number"),
+    "reference is a boolean": ("campaign.toml", "100.0", "true", 6, "reference_s_m", "number"),
+    "reference is infinite": ("campaign.toml", "100.0", "inf", 6, "reference_s_m", "finite"),
+    "reference is nan": ("campaign.toml", "100.0", "nan", 6, "reference_s_m", "finite"),
+    "reference is off the track": ("campaign.toml", "100.0", "-1", 6, "reference_s_m", "on the track"),
+    "not TOML": ("campaign.toml", '"made up"', "made up", 4, None, "TOML"),
+    "nested deeply": ("campaign.toml", "100.0", "[" * 5000, None, None, "nested"),
+    "a key twice": ("campaign.toml", "format = 1\n", "format = 1\nformat = 1\n", 2, None, "TOML"),
+    "deep key": ("campaign.toml", "format = 1\n", "a." * 45000 + "a = 1\nformat = 1\n", None, None, "nested"),
+    "hexadecimal digits": ("campaign.toml", "100.0", "0x" + "f" * 5000, 6, "reference_s_m", "number"),
+    "thousands of digits": ("campaign.toml", "100.0", "1" * 5000, None, None, "TOML"),
+    # track.csv
+    "two track points": ("track.csv", "120,140,15\n180,110,20\n300,100,30\n", "", None, None, "at least 3"),
+    "x does not increase": ("track.csv", "120,140", "60,140", 4, "x_m", "greater than in row 3"),
+    "points too close to tell apart": (
+        "track.csv", "120,140", "60.00000000000001,220", 4, "x_m", "greater than",
+    ),
+    "uphill order": ("track.csv", "0,300,10", "0,50,10", 6, "z_m", "downhill"),
+    "width is zero": ("track.csv", "180,110,20", "180,110,0", 5, "width_m", "greater than 0"),
+    "width is empty": ("track.csv", "180,110,20", "180,110,", 5, "width_m", "empty"),
+    "x is empty": ("track.csv", "60,220", ",220", 3, "x_m", "empty"),
+    "no x column": ("track.csv", "x_m,", "x,", 1, "x", "unknown column"),
+    "column twice": ("track.csv", "x_m,z_m,width_m", "x_m,z_m,x_m", 1, "x_m", "twice"),
+    "column without a name": ("track.csv", "z_m,width_m", "z_m,", 1, "", "no name"),
+    "semicolons": ("track.csv", "x_m,z_m,width_m", "x_m;z_m;width_m", 1, None, "commas"),
+    # sensors.csv
+    "sensor twice": (
+        "sensors.csv", "0,10\n", "0,10\nstop,runout,,,0,10\n", 6, "sensor", "already stands in row 5",
+    ),
+    "unknown quantity": (
+        "sensors.csv", "lower,front_velocity", "lower,speed", 4, "quantity", "'front_velocity'",
+    ),
+    "unknown sensor column": ("sensors.csv", "relative_sd,", "rel_sd,", 1, "rel_sd", "unknown column"),
+    "span upside down": ("sensors.csv", "120,200", "200,120", 3, "s_to_m", "exchange"),
+    "velocity without a place": ("sensors.csv", "100,100", ",100", 2, "s_from_m", "needs a place"),
+    "velocity with half a place": ("sensors.csv", "100,100", "100,", 2, "s_to_m", "needs a place"),
+    "runout with a place": ("sensors.csv", "runout,,", "runout,,5", 5, "s_to_m", "has no place"),
+    "sensor above the track": ("sensors.csv", "100,100", "-5,100", 2, "s_from_m", "on the track"),
+    "sensor below the track": ("sensors.csv", "250,250", "250,900", 4, "s_to_m", "on the track"),
+    "relative sd is negative": ("sensors.csv", "100,0.1,1", "100,-0.1,1", 2, "relative_sd", "0 or a greater"),
+    "absolute sd is negative": ("sensors.csv", "100,0.1,1", "100,0.1,-1", 2, "absolute_sd", "0 or a greater"),
+    "relative sd is empty": ("sensors.csv", "100,0.1,1", "100,,1", 2, "relative_sd", "empty"),
+    # events.csv
+    "event twice": ("events.csv", "third,5,2.5,-8,\n", "third,5,2.5,-8,\nfirst,0,,,\n", 5, "event", "row 2"),
+    "release above the track": ("events.csv", "first,0", "first,-1", 2, "release_s_m", "on the track"),
+    "release below the track": ("events.csv", "first,0", "first,1e4", 2, "release_s_m", "on the track"),
+    "release is empty": ("events.csv", "first,0", "first,", 2, "release_s_m", "empty"),
+    "release sd is zero": ("events.csv", "first,0,5", "first,0,0", 2, "release_sd_m", "greater than 0"),
+    "text in a column with a unit": (
+        "events.csv", "-3.5", "cold", 2, "snow_temperature_degC", "ends in a unit",
+    ),
+    "number without a unit": ("events.csv", "wet", "2", 3, "snow_type", "without a unit"),
+    "nan without a unit": ("events.csv", "wet", "1_000", 3, "snow_type", "without a unit"),
+    "no release column": ("events.csv", "release_s_m", "release_m", 1, "release_s_m", "missing"),
+    # recordings.csv
+    "unknown event": (
+        "recordings.csv", "third,upper", "fourth,upper", 10, "event", "not an id of events.csv",
+    ),
+    "unknown sensor": (
+        "recordings.csv", "third,upper", "third,top", 10, "sensor", "not an id of sensors.csv",
+    ),
+    "reading twice": ("recordings.csv", "third,stop", "third,upper", 11, "sensor", "row 10"),
+    "unknown reading column": ("recordings.csv", ",sd,", ",sds,", 1, "sds", "unknown column"),
+    "unknown status": ("recordings.csv", "30,,observed", "30,,Observed", 2, "status", "'observed'"),
+    "status is empty": ("recordings.csv", "30,,observed", "30,,", 2, "status", "'observed'"),
+    "observed without a value": ("recordings.csv", "30,,observed", ",,observed", 2, "value", "needs a value"),
+    "not reached with a value": (
+        "recordings.csv", "second,span,,", "second,span,0,", 7, "value", "carries no value",
+    ),
+    "missing with a value": (
+        "recordings.csv", "third,upper,,", "third,upper,3,", 10, "value", "carries no value",
+    ),
+    "negative velocity": ("recordings.csv", "upper,30", "upper,-30", 2, "value", "not negative"),
+    "runout off the track": ("recordings.csv", "stop,320", "stop,900", 5, "value", "on the track"),
+    "runout not reached": (
+        "recordings.csv", "third,stop,,,missing", "third,stop,,,not_reached", 11, "status", "runout",
+    ),
+    "sd is zero": ("recordings.csv", "span,25,3", "span,25,0", 3, "sd", "greater than 0"),
+    "sd is negative": ("recordings.csv", "span,25,3", "span,25,-3", 3, "sd", "greater than 0"),
+    "sd comes out as zero": ("recordings.csv", "lower,10", "lower,0", 4, "sd", "standard deviation is 0"),
+    "speed below a sensor not reached": (
+        "recordings.csv", "lower,,,not_reached", "lower,4,,observed", 8, "value",
+        "did not reach sensor 'span'",
+    ),
+    "ragged row": ("recordings.csv", "upper,30,,observed", "upper,30,5,,observed", 2, None, "6 cells"),
+    "short row": ("recordings.csv", "upper,30,,observed", "upper,30,observed", 2, None, "4 cells"),
+    "open quote": ("recordings.csv", "third,stop", '"third,stop', 11, None, "cannot be read"),
+}
+# fmt: on
+
+BAD_NUMBERS = {
+    "nan": "finite",
+    "-inf": "finite",
+    "1e400": "at most",
+    "2e12": "at most",
+    "1e-400": "too small",
+    '"1,000"': "thousands",
+    "1 000": "thousands",
+    "1'000": "thousands",
+    '"12,5"': "decimal point",
+    "1_0": "thousands",
+    "true": "digits",
+    "0x10": "digits",
+    "1e": "digits",
+    "1.2.3": "digits",
+    "--1": "digits",
+    "12 m": "digits",
+    "١٢": "digits",
+    "1\u202f000": "thousands",
+    "\x1b[31m1": "digits",
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_each_rule_names_file_row_and_column(case, texts, folder_with):
+    file, good, bad, row, column, words = BROKEN[case]
+    assert good in texts[file]
+    with pytest.raises(CampaignError) as caught:
+        read_campaign(folder_with({file: texts[file].replace(good, bad, 1)}))
+    found = [
+        problem
+        for problem in caught.value.problems
+        if (problem.file, problem.row, problem.column) == (file, row, column) and words in problem.message
+    ]
+    assert len(found) == 1, str(caught.value)
+    if "column" not in case:
+        assert len(caught.value.problems) == 1, "one mistake is told once"
+
+
+@pytest.mark.parametrize("bad", BAD_NUMBERS)
+def test_what_is_no_number_is_refused_with_advice(bad, texts, folder_with):
+    broken = texts["recordings.csv"].replace("upper,30,", f"upper,{bad},", 1)
+    with pytest.raises(CampaignError) as caught:
+        read_campaign(folder_with({"recordings.csv": broken}))
+    (problem,) = caught.value.problems
+    assert (problem.file, problem.row, problem.column) == ("recordings.csv", 2, "value")
+    assert BAD_NUMBERS[bad] in problem.message
+    assert str(problem).isprintable()
+
+
+def test_the_span_rule_looks_at_the_span_s_upper_end(texts, folder_with):
+    # Not reached at 250 m; the span 120-200 m lies above, so its speed stands.
+    text = texts["recordings.csv"].replace("second,span,,,not_reached", "second,span,5,,observed")
+    assert read_campaign(folder_with({"recordings.csv": text})).values[1, 1] == 5
+    # A span that starts above the sensor not reached may hold a speed, one that starts at it may not.
+    at_sensor = texts["sensors.csv"].replace("250,250", "200,250")
+    text = texts["recordings.csv"].replace("second,lower,,,not_reached", "second,lower,5,,observed")
+    with pytest.raises(CampaignError, match="row 8, column value"):
+        read_campaign(folder_with({"sensors.csv": at_sensor, "recordings.csv": text}))
+    overlapping = texts["sensors.csv"].replace("250,250", "199,250")
+    assert read_campaign(folder_with({"sensors.csv": overlapping, "recordings.csv": text})).n_events == 3
+
+
+def test_a_speed_of_zero_below_a_sensor_not_reached_is_consistent(texts, folder_with):
+    text = texts["recordings.csv"].replace("second,lower,,,not_reached", "second,lower,0,1,observed")
+    assert read_campaign(folder_with({"recordings.csv": text})).values[1, 2] == 0
+
+
+def test_all_problems_of_all_files_are_told_at_once(texts, folder_with):
+    folder = folder_with(
+        {
+            "campaign.toml": texts["campaign.toml"].replace("format = 1", "format = 3"),
+            "track.csv": texts["track.csv"].replace("60,220", "sixty,220"),
+            "sensors.csv": texts["sensors.csv"].replace("120,200", "200,120"),
+            "events.csv": texts["events.csv"].replace("first,0", "first,zero"),
+            "recordings.csv": texts["recordings.csv"]
+            .replace("upper,30", "upper,-30")
+            .replace("stop,180", "stop,x"),
+        }
+    )
+    with pytest.raises(CampaignError) as caught:
+        read_campaign(folder)
+    places = [(problem.file, problem.row) for problem in caught.value.problems]
+    assert places == [
+        ("campaign.toml", 1),
+        ("track.csv", 3),
+        ("sensors.csv", 3),
+        ("events.csv", 2),
+        ("recordings.csv", 2),
+        ("recordings.csv", 9),
+    ]
+
+
+def test_a_bad_row_does_not_make_its_id_unknown(texts, folder_with):
+    folder = folder_with({"sensors.csv": texts["sensors.csv"].replace("100,0.1,1", "100,0.1")})
+    with pytest.raises(CampaignError) as caught:
+        read_campaign(folder)
+    assert [problem.file for problem in caught.value.problems] == ["sensors.csv"]
+
+
+def test_long_lists_are_cut_when_shown_and_bounded_when_collected(texts, folder_with):
+    lines = "".join(f"e{i},upper,1,,observed\n" for i in range(50))
+    with pytest.raises(CampaignError) as caught:
+        read_campaign(folder_with({"recordings.csv": texts["recordings.csv"] + lines}))
+    assert len(caught.value.problems) == 50
+    assert "and 30 more problems" in str(caught.value)
+    lines = "".join(f"first,upper,x{i},,observed\n" for i in range(3000))
+    with pytest.raises(CampaignError) as caught:
+        read_campaign(folder_with({"recordings.csv": texts["recordings.csv"] + lines}))
+    assert len(caught.value.problems) == 1001
+    assert "list ends here" in caught.value.problems[-1].message
+
+
+def test_every_message_says_what_to_do(texts, folder_with):
+    advice = re.compile(r"[;:,] (?:\w|')|correct|write|remove")
+    for file, good, bad, *_ in BROKEN.values():
+        with pytest.raises(CampaignError) as caught:
+            read_campaign(folder_with({file: texts[file].replace(good, bad, 1)}))
+        assert all(advice.search(problem.message) for problem in caught.value.problems)
