@@ -214,9 +214,9 @@ def _sections(
 
 
 def _cell(terrain: Terrain, table: NDArray[Any], index: int, weakening_speed: float) -> Cell:
-    sin_slope, cos_slope, curvature = terrain.sin_slope[index], terrain.cos_slope[index], terrain.curvature[index]
+    sin_slope, cos_slope = float(terrain.sin_slope[index]), float(terrain.cos_slope[index])
     b, c, d, mu, w = (complex(value) for value in table[:, index])
-    return Cell(float(sin_slope), float(cos_slope), float(curvature), b, c, d, mu, w, weakening_speed)
+    return Cell(sin_slope, cos_slope, float(terrain.curvature[index]), b, c, d, mu, w, weakening_speed)
 
 
 def _cross(cell: Cell, s: complex, end_s: complex, v: complex) -> list[Piece]:

@@ -1,0 +1,228 @@
+"""The pooled log density in numba: one value per event, missing readings out, stops as information.
+
+For every event the observed readings are whitened by the Cholesky factor of their own block of
+Sigma. Sensors it did not reach add the probability that their latent readings, given the observed
+ones, are all at most 0.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.special import roots_legendre
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+MAX_NOT_REACHED = 4
+"""Sensors an event may have missed; each beyond the first multiplies the work by the nodes."""
+
+_NODE, _WEIGHT = (np.ascontiguousarray(a) for a in roots_legendre(24))
+_SQRT_HALF = math.sqrt(0.5)
+_INV_SQRT_2PI = 1.0 / math.sqrt(2.0 * math.pi)
+DENSITY_VERSION = 1
+"""Bump when a compiled function of this file changes: PyTensor caches its callers under it."""
+
+
+class PooledArrays(NamedTuple):
+    """What the density needs to know of the recordings, made by `pooled_arrays`.
+
+    Attributes
+    ----------
+    release_of_event : (n_events,) integer array
+        Row of the mean response that an event is compared with.
+    readings : (n_events, n_sensors) array, m/s or m
+        0 where there is none.
+    whiten : (n_events, n_sensors, n_sensors) array
+        Inverse Cholesky factor of Sigma over the observed readings, zero elsewhere.
+    constant : (n_events,) array
+        Log determinant and powers of 2 pi.
+    n_stopped : (n_events,) integer array
+        How many sensors the event did not reach.
+    stopped : (n_events, MAX_NOT_REACHED) integer array
+        Which ones.
+    regression : (n_events, MAX_NOT_REACHED, n_sensors) array
+        Of their latent readings on the residuals of the observed ones.
+    factor : (n_events, MAX_NOT_REACHED, MAX_NOT_REACHED) array
+        Cholesky factor of their covariance given the observed ones.
+    """
+
+    release_of_event: NDArray[np.int64]
+    readings: FloatArray
+    whiten: FloatArray
+    constant: FloatArray
+    n_stopped: NDArray[np.int64]
+    stopped: NDArray[np.int64]
+    regression: FloatArray
+    factor: FloatArray
+
+
+def pooled_arrays(
+    values: FloatArray,
+    observed: BoolArray,
+    not_reached: BoolArray,
+    release_of_event: NDArray[np.int64],
+    covariance: FloatArray,
+) -> PooledArrays:
+    """Arrays of the density for one pattern of gaps; arguments as in `PooledProblem`.
+
+    Raises
+    ------
+    ValueError
+        If an event did not reach more than `MAX_NOT_REACHED` sensors.
+    """
+    n_events, n_sensors = values.shape
+    whiten = np.zeros((n_events, n_sensors, n_sensors))
+    constant = np.zeros(n_events)
+    stopped = np.zeros((n_events, MAX_NOT_REACHED), dtype=np.int64)
+    regression = np.zeros((n_events, MAX_NOT_REACHED, n_sensors))
+    factor = np.zeros((n_events, MAX_NOT_REACHED, MAX_NOT_REACHED))
+    n_stopped = not_reached.sum(axis=1).astype(np.int64)
+    if n_stopped.max(initial=0) > MAX_NOT_REACHED:
+        raise ValueError(
+            f"event number {int(n_stopped.argmax()) + 1} did not reach {n_stopped.max()} sensors; the pooled"
+            f" likelihood takes up to {MAX_NOT_REACHED}: leave out some of the lower sensors"
+        )
+    for event in range(n_events):
+        seen, missed = np.flatnonzero(observed[event]), np.flatnonzero(not_reached[event])
+        own = np.linalg.cholesky(covariance[np.ix_(seen, seen)])
+        inverse = np.linalg.inv(own)
+        whiten[event][np.ix_(np.arange(len(seen)), seen)] = inverse
+        constant[event] = -np.log(np.diag(own)).sum() - 0.5 * len(seen) * np.log(2.0 * np.pi)
+        across = inverse @ covariance[np.ix_(seen, missed)]
+        conditional = covariance[np.ix_(missed, missed)] - across.T @ across
+        stopped[event, : len(missed)] = missed
+        regression[event][np.ix_(np.arange(len(missed)), seen)] = across.T @ inverse
+        factor[event, : len(missed), : len(missed)] = np.linalg.cholesky(conditional)
+    readings = np.where(observed, values, 0.0)
+    return PooledArrays(
+        np.asarray(release_of_event, dtype=np.int64),
+        readings,
+        whiten,
+        constant,
+        n_stopped,
+        stopped,
+        regression,
+        factor,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def _normal_cdf(x):  # type: ignore[no-untyped-def]
+    return 0.5 * math.erfc(-x * _SQRT_HALF)
+
+
+@njit(cache=True, error_model="numpy")
+def _orthant(level, size, mean, factor, z):  # type: ignore[no-untyped-def]
+    """P(x_level <= 0, ..., x_(size-1) <= 0 | z_0 ... z_(level-1)) for x = mean + factor z.
+
+    Gauss-Legendre over z_level on the stretch below its bound that holds the probability down to
+    e^-36 of its largest density, so that it works in the far tail as well.
+    """
+    bound = -mean[level]
+    for j in range(level):
+        bound -= factor[level, j] * z[j]
+    bound /= factor[level, level]
+    if level == size - 1:
+        return _normal_cdf(bound)
+    upper = min(bound, 8.5)
+    width = upper + 8.5 if upper > 0.0 else upper + math.sqrt(upper * upper + 72.0)
+    total = 0.0
+    for k in range(_NODE.size):
+        z[level] = upper - 0.5 * width * (1.0 - _NODE[k])
+        inner = _orthant(level + 1, size, mean, factor, z)
+        total += _WEIGHT[k] * math.exp(-0.5 * z[level] * z[level]) * inner
+    return 0.5 * width * _INV_SQRT_2PI * total
+
+
+@njit(cache=True, error_model="numpy")
+def _latent_mean(event, response, data, mean):  # type: ignore[no-untyped-def]
+    """Mean of the latent readings at the sensors not reached, given the observed ones."""
+    row = response[data.release_of_event[event]]
+    for k in range(data.n_stopped[event]):
+        mean[k] = row[data.stopped[event, k]]
+        for j in range(row.size):
+            mean[k] += data.regression[event, k, j] * (data.readings[event, j] - row[j])
+
+
+@njit(cache=True, error_model="numpy")
+def pooled_log_density(response, data):  # type: ignore[no-untyped-def]
+    """Log density of each event's readings.
+
+    Parameters
+    ----------
+    response : (n_releases, n_sensors) array, m/s or m
+    data : PooledArrays
+
+    Returns
+    -------
+    (n_events,) array
+    """
+    n_events, n_sensors = data.readings.shape
+    density = data.constant.copy()
+    mean, z = np.zeros(MAX_NOT_REACHED), np.zeros(MAX_NOT_REACHED)
+    for event in range(n_events):
+        row = response[data.release_of_event[event]]
+        for i in range(n_sensors):
+            whitened = 0.0
+            for j in range(n_sensors):
+                whitened += data.whiten[event, i, j] * (data.readings[event, j] - row[j])
+            density[event] -= 0.5 * whitened * whitened
+        size = data.n_stopped[event]
+        if size > 0:
+            _latent_mean(event, response, data, mean)
+            density[event] += math.log(_orthant(0, size, mean, data.factor[event], z))
+    return density
+
+
+@njit(cache=True, error_model="numpy")
+def _orthant_slopes(size, mean, factor, slopes):  # type: ignore[no-untyped-def]
+    """Derivatives of log P(x <= 0) by the mean: the density at x_j = 0 times the rest given that."""
+    covariance = factor[:size, :size] @ factor[:size, :size].T
+    z = np.zeros(MAX_NOT_REACHED)
+    probability = _orthant(0, size, mean, factor, z)
+    for j in range(size):
+        variance = covariance[j, j]
+        density = math.exp(-0.5 * mean[j] * mean[j] / variance) * _INV_SQRT_2PI / math.sqrt(variance)
+        rest = 1.0
+        if size > 1:
+            others = np.array([k for k in range(size) if k != j])
+            conditional = np.empty((size - 1, size - 1))
+            shifted = np.empty(size - 1)
+            for a in range(size - 1):
+                shifted[a] = mean[others[a]] - covariance[others[a], j] / variance * mean[j]
+                for b in range(size - 1):
+                    product = covariance[others[a], j] * covariance[j, others[b]]
+                    conditional[a, b] = covariance[others[a], others[b]] - product / variance
+            rest = _orthant(0, size - 1, shifted, np.linalg.cholesky(conditional), z)
+        slopes[j] = -density * rest / probability
+
+
+@njit(cache=True, error_model="numpy")
+def pooled_log_density_pullback(cotangent, response, data):  # type: ignore[no-untyped-def]
+    """Cotangent of the response, (n_releases, n_sensors), from that of the densities, (n_events,)."""
+    n_events, n_sensors = data.readings.shape
+    pulled = np.zeros(response.shape)
+    mean, slopes = np.zeros(MAX_NOT_REACHED), np.zeros(MAX_NOT_REACHED)
+    for event in range(n_events):
+        release = data.release_of_event[event]
+        for i in range(n_sensors):
+            whitened = 0.0
+            for j in range(n_sensors):
+                residual = data.readings[event, j] - response[release, j]
+                whitened += data.whiten[event, i, j] * residual
+            for j in range(n_sensors):
+                pulled[release, j] += cotangent[event] * whitened * data.whiten[event, i, j]
+        size = data.n_stopped[event]
+        if size > 0:
+            _latent_mean(event, response, data, mean)
+            _orthant_slopes(size, mean, data.factor[event], slopes)
+            for k in range(size):
+                slope = cotangent[event] * slopes[k]
+                pulled[release, data.stopped[event, k]] += slope
+                for j in range(n_sensors):
+                    pulled[release, j] -= slope * data.regression[event, k, j]
+    return pulled

@@ -1,0 +1,143 @@
+"""What a pooled calibration starts from: recordings, their covariance, and the path."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.campaign import Campaign, Status
+from skred.inference.density import PooledArrays, pooled_arrays, pooled_log_density
+from skred.inference.recordings_covariance import recordings_covariance
+from skred.physics.geometry import contributions_of, path_of, sensor_table
+from skred.physics.inputs import Contributions, Path
+from skred.physics.kernel import front_speeds, simulate
+from skred.physics.mechanisms.spec import Mechanism
+from skred.physics.terrain import CELL_M, SMOOTHING_M, Terrain, build_terrain
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class PooledProblem:
+    """One parameter vector for the path: y_e ~ N(m(theta), Sigma) for each event's readings.
+
+    Attributes
+    ----------
+    campaign : Campaign
+    terrain : Terrain
+    covariance : (n_sensors, n_sensors) array
+        Sigma, the covariance of the recordings across events; fixed, the same for all laws. It
+        contains the event-to-event spread, so the posterior is that of the mean response.
+    recorded_mean : (n_sensors,) array
+        The recordings' mean, from the same estimate.
+    """
+
+    campaign: Campaign
+    terrain: Terrain
+    covariance: FloatArray
+    recorded_mean: FloatArray
+
+    @cached_property
+    def values(self) -> FloatArray:
+        """Readings, NaN where none, (n_events, n_sensors)."""
+        return np.where(self.observed, self.campaign.values, np.nan)
+
+    @cached_property
+    def observed(self) -> NDArray[np.bool_]:
+        """Where there is a reading, (n_events, n_sensors)."""
+        return np.asarray(self.campaign.status == Status.OBSERVED)
+
+    @cached_property
+    def not_reached(self) -> NDArray[np.bool_]:
+        """Where the front stopped above the sensor, (n_events, n_sensors)."""
+        return np.asarray(self.campaign.status == Status.NOT_REACHED)
+
+    @cached_property
+    def _unique_releases(self) -> tuple[FloatArray, NDArray[np.int64]]:
+        places = np.array([event.release_s_m for event in self.campaign.events])
+        releases, of_event = np.unique(places, return_inverse=True)
+        return releases, of_event
+
+    @property
+    def releases(self) -> FloatArray:
+        """The different release places [m]: one front each, however many events share it."""
+        return self._unique_releases[0]
+
+    @property
+    def release_of_event(self) -> NDArray[np.int64]:
+        """Which of `releases` each event starts from."""
+        return self._unique_releases[1]
+
+    @cached_property
+    def path(self) -> Path:
+        """The track as the kernel reads it."""
+        return path_of(self.terrain)
+
+    @cached_property
+    def sensors(self) -> FloatArray:
+        """The sensors as the kernel reads them."""
+        return sensor_table(
+            [None if sensor.is_runout else (sensor.s_from_m, sensor.s_to_m) for sensor in self.campaign.sensors]
+        )
+
+    @cached_property
+    def arrays(self) -> PooledArrays:
+        """The recordings as the log density reads them."""
+        return pooled_arrays(
+            self.values, self.observed, self.not_reached, self.release_of_event, self.covariance
+        )
+
+    @property
+    def coords(self) -> dict[str, Any]:
+        """Coordinates of the models' named dims."""
+        return {"event": list(self.campaign.event_ids), "sensor": list(self.campaign.sensor_ids)}
+
+    def contributions(self, mechanisms: Sequence[Mechanism]) -> Contributions:
+        """How the strengths of a law's mechanisms enter the equation of motion on this terrain."""
+        return contributions_of(mechanisms, self.terrain)
+
+    def simulate(self, mechanisms: Sequence[Mechanism], strengths: FloatArray) -> FloatArray:
+        """Mean response for many strengths: (n, n_strengths) to (n, n_events, n_sensors)."""
+        n, n_releases = len(strengths), len(self.releases)
+        runs = np.repeat(np.asarray(strengths, float), n_releases, axis=0)
+        law = self.contributions(mechanisms)
+        readings = simulate(runs, np.tile(self.releases, n), self.path, law, self.sensors)
+        return readings.reshape(n, n_releases, -1)[:, self.release_of_event]
+
+    def log_density(self, mechanisms: Sequence[Mechanism], strengths: FloatArray) -> FloatArray:
+        """Log density of each event for many strengths: (n, n_strengths) to (n, n_events)."""
+        n, n_releases = len(strengths), len(self.releases)
+        runs = np.repeat(np.asarray(strengths, float), n_releases, axis=0)
+        law = self.contributions(mechanisms)
+        readings = simulate(runs, np.tile(self.releases, n), self.path, law, self.sensors)
+        rows = readings.reshape(n, n_releases, -1)
+        return np.array([pooled_log_density(row, self.arrays) for row in rows])
+
+    def speeds(self, mechanisms: Sequence[Mechanism], strengths: FloatArray, release_s_m: float) -> FloatArray:
+        """Front speed [m/s] at the cell edges: (n, n_strengths) to (n, n_cells + 1)."""
+        releases = np.full(len(strengths), float(release_s_m))
+        law = self.contributions(mechanisms)
+        speeds: FloatArray = front_speeds(np.asarray(strengths, float), releases, self.path, law)
+        return speeds
+
+
+def pooled_problem(
+    campaign: Campaign, *, smoothing_m: float = SMOOTHING_M, cell_m: float = CELL_M
+) -> PooledProblem:
+    """Problem of a campaign, with the covariance of its recordings.
+
+    Raises
+    ------
+    ValueError
+        If the recordings do not determine their covariance.
+    """
+    terrain = build_terrain(campaign.track.x_m, campaign.track.z_m, smoothing_m=smoothing_m, cell_m=cell_m)
+    not_reached = campaign.status == Status.NOT_REACHED
+    values = np.where(campaign.status == Status.OBSERVED, campaign.values, np.nan)
+    mean, covariance = recordings_covariance(values, not_reached)
+    return PooledProblem(campaign, terrain, covariance, mean)
