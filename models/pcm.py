@@ -7,7 +7,7 @@ mu [-] is the paper's a0, D [1/m] its a2. Run it: ``python -m models.pcm``.
 
 from typing import Any
 
-from skred.physics.law import Law
+from skred.physics.law import Law, parameter_of
 from skred.physics.mechanisms import coulomb_friction, turbulent_drag
 
 DRY = coulomb_friction.MECHANISM
@@ -35,9 +35,9 @@ LAW = Law(
     id="pcm",
     title="M2: PCM, dry friction and turbulent drag",
     mechanisms=(DRY, DRAG),
+    parameters=(parameter_of(DRY.strength), parameter_of(DRAG.strength)),
     build=build,
     reference="Perla, Cheng and McClung (1980), doi 10.3189/S002214300001073X",
-    parameters=(("dry_friction", "mu", "1"), ("turbulent_drag", "D", "m-1")),
 )
 
 if __name__ == "__main__":

@@ -116,26 +116,49 @@ def _normal_cdf(x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _orthant(level, size, mean, factor, z):  # type: ignore[no-untyped-def]
-    """P(x_level <= 0, ..., x_(size-1) <= 0 | z_0 ... z_(level-1)) for x = mean + factor z.
-
-    Gauss-Legendre over z_level on the stretch below its bound that holds the probability down to
-    e^-36 of its largest density, so that it works in the far tail as well.
-    """
+def _bound(level, mean, factor, z):  # type: ignore[no-untyped-def]
+    """Largest z_level with x_level <= 0, given the z above it."""
     bound = -mean[level]
     for j in range(level):
         bound -= factor[level, j] * z[j]
-    bound /= factor[level, level]
-    if level == size - 1:
-        return _normal_cdf(bound)
+    return bound / factor[level, level]
+
+
+@njit(cache=True, error_model="numpy")
+def _stretch(bound):  # type: ignore[no-untyped-def]
+    """Upper end and width of the stretch below a bound that holds its probability to e^-36."""
     upper = min(bound, 8.5)
-    width = upper + 8.5 if upper > 0.0 else upper + math.sqrt(upper * upper + 72.0)
-    total = 0.0
-    for k in range(_NODE.size):
-        z[level] = upper - 0.5 * width * (1.0 - _NODE[k])
-        inner = _orthant(level + 1, size, mean, factor, z)
-        total += _WEIGHT[k] * math.exp(-0.5 * z[level] * z[level]) * inner
-    return 0.5 * width * _INV_SQRT_2PI * total
+    return upper, (upper + 8.5 if upper > 0.0 else upper + math.sqrt(upper * upper + 72.0))
+
+
+@njit(cache=True, error_model="numpy")
+def _orthant(size, mean, factor):  # type: ignore[no-untyped-def]
+    """P(x_1 <= 0, ..., x_size <= 0) for x = mean + factor z.
+
+    Nested Gauss-Legendre over all z but the last, each on the stretch that holds the probability,
+    so that it works in the far tail as well. A loop over levels: numba cannot cache a recursion.
+    """
+    last = size - 1
+    z, upper, width = np.zeros(size), np.zeros(size), np.zeros(size)
+    total, node = np.zeros(size), np.zeros(size, dtype=np.int64)
+    level = 0
+    upper[0], width[0] = _stretch(_bound(0, mean, factor, z))
+    while True:
+        if level == last:
+            value = _normal_cdf(_bound(last, mean, factor, z))
+        elif node[level] < _NODE.size:
+            z[level] = upper[level] - 0.5 * width[level] * (1.0 - _NODE[node[level]])
+            level += 1
+            node[level], total[level] = 0, 0.0
+            upper[level], width[level] = _stretch(_bound(level, mean, factor, z))
+            continue
+        else:
+            value = 0.5 * width[level] * _INV_SQRT_2PI * total[level]
+        if level == 0:
+            return value
+        level -= 1
+        total[level] += _WEIGHT[node[level]] * math.exp(-0.5 * z[level] * z[level]) * value
+        node[level] += 1
 
 
 @njit(cache=True, error_model="numpy")
@@ -163,7 +186,7 @@ def pooled_log_density(response, data):  # type: ignore[no-untyped-def]
     """
     n_events, n_sensors = data.readings.shape
     density = data.constant.copy()
-    mean, z = np.zeros(MAX_NOT_REACHED), np.zeros(MAX_NOT_REACHED)
+    mean = np.zeros(MAX_NOT_REACHED)
     for event in range(n_events):
         row = response[data.release_of_event[event]]
         for i in range(n_sensors):
@@ -174,7 +197,7 @@ def pooled_log_density(response, data):  # type: ignore[no-untyped-def]
         size = data.n_stopped[event]
         if size > 0:
             _latent_mean(event, response, data, mean)
-            density[event] += math.log(_orthant(0, size, mean, data.factor[event], z))
+            density[event] += math.log(_orthant(size, mean, data.factor[event]))
     return density
 
 
@@ -182,8 +205,7 @@ def pooled_log_density(response, data):  # type: ignore[no-untyped-def]
 def _orthant_slopes(size, mean, factor, slopes):  # type: ignore[no-untyped-def]
     """Derivatives of log P(x <= 0) by the mean: the density at x_j = 0 times the rest given that."""
     covariance = factor[:size, :size] @ factor[:size, :size].T
-    z = np.zeros(MAX_NOT_REACHED)
-    probability = _orthant(0, size, mean, factor, z)
+    probability = _orthant(size, mean, factor)
     for j in range(size):
         variance = covariance[j, j]
         density = math.exp(-0.5 * mean[j] * mean[j] / variance) * _INV_SQRT_2PI / math.sqrt(variance)
@@ -197,7 +219,7 @@ def _orthant_slopes(size, mean, factor, slopes):  # type: ignore[no-untyped-def]
                 for b in range(size - 1):
                     product = covariance[others[a], j] * covariance[j, others[b]]
                     conditional[a, b] = covariance[others[a], others[b]] - product / variance
-            rest = _orthant(0, size - 1, shifted, np.linalg.cholesky(conditional), z)
+            rest = _orthant(size - 1, shifted, np.linalg.cholesky(conditional))
         slopes[j] = -density * rest / probability
 
 

@@ -1,12 +1,42 @@
-"""A friction law: a sum of mechanisms."""
+"""A friction law: a sum of mechanisms, with the parameters a person thinks in."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from skred.physics.mechanisms.spec import Mechanism
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.physics.mechanisms.spec import Mechanism, Strength
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A free random variable of a law's model.
+
+    Attributes
+    ----------
+    name, symbol, unit : str
+        In models and files, in equations, and its SI unit (``1`` where there is none).
+    paper_symbol : str
+        In the Ryggfonn calibration paper, empty where it has none.
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    paper_symbol: str = ""
+
+
+def parameter_of(strength: Strength) -> Parameter:
+    """The parameter that is a mechanism's strength itself."""
+    return Parameter(strength.name, strength.symbol, strength.unit, strength.paper_symbol)
+
+
+def _as_they_are(*parameters: Any) -> tuple[Any, ...]:
+    return parameters
 
 
 @dataclass(frozen=True)
@@ -18,24 +48,37 @@ class Law:
     id, title : str
         Short name (command line, files) and name in plain words.
     mechanisms : tuple of Mechanism
-        Its summands, in the order of the kernel's strengths.
+        Its summands.
+    parameters : tuple of Parameter
+        The free random variables of its model.
     build : callable
-        ``build(problem) -> pymc.Model``, see `skred.inference.pooled.PooledProblem`.
+        ``build(problem) -> pymc.Model``, see `skred.inference.problem.PooledProblem`.
     reference : str
         Where the law comes from.
-    parameters : tuple of (name, symbol, unit)
-        The free random variables of its model.
+    strengths : callable
+        Parameters, in order, to the strengths of the mechanisms, in order.
     """
 
     id: str
     title: str
     mechanisms: tuple[Mechanism, ...]
+    parameters: tuple[Parameter, ...]
     build: Callable[[Any], Any]
     reference: str
-    parameters: tuple[tuple[str, str, str], ...]
+    strengths: Callable[..., tuple[Any, ...]] = _as_they_are
 
     @property
     def equation(self) -> str:
         """Its equation of motion."""
-        terms = " ".join(mechanism.equation for mechanism in self.mechanisms)
+        terms = " ".join(f"- {mechanism.equation.removeprefix('-')}" for mechanism in self.mechanisms)
         return f"dU^2/(2 ds) = g sin(phi) {terms}"
+
+    @property
+    def parameter_names(self) -> list[str]:
+        """Names of the free random variables."""
+        return [parameter.name for parameter in self.parameters]
+
+    def strength_rows(self, samples: Mapping[str, Any]) -> NDArray[np.float64]:
+        """Strengths of many parameter vectors: arrays by name to (n, n_mechanisms)."""
+        columns = [np.asarray(samples[name], dtype=float).ravel() for name in self.parameter_names]
+        return np.column_stack(self.strengths(*columns))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline, make_smoothing_spline
 
 FloatArray = NDArray[np.float64]
 
@@ -110,8 +111,8 @@ def build_terrain(
         raise ValueError(f"the track needs {n_cells} cells of {cell_m} m; choose longer cells")
     edge_s = np.linspace(0.0, polyline_s[-1], n_cells + 1)
     edge_x = np.interp(edge_s, polyline_s, x_m)
-    spline = _smoothing_spline(np.asarray(x_m, float), np.asarray(z_m, float), smoothing_m)
-    elevation, gradient = spline(edge_x), spline.derivative()(edge_x)
+    spline, derivative = _smoothing_spline(np.asarray(x_m, float), np.asarray(z_m, float), smoothing_m)
+    elevation, gradient = spline(edge_x), derivative(edge_x)
     length = np.diff(edge_s)
     sin_slope = np.clip(-np.diff(elevation) / length, -1.0, 1.0)
     return Terrain(
@@ -123,11 +124,17 @@ def build_terrain(
     )
 
 
-def _smoothing_spline(x: FloatArray, z: FloatArray, smoothing_m: float) -> BSpline:
-    """Natural cubic spline minimising sum (z - f)^2 + smoothing^4 / spacing * int f''^2."""
+def _smoothing_spline(
+    x: FloatArray, z: FloatArray, smoothing_m: float
+) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """Natural cubic spline minimising sum (z - f)^2 + smoothing^4 / spacing * int f''^2, and f'."""
+    # Here, because laws and their command lines import this module and scipy takes half a second.
+    from scipy.interpolate import make_smoothing_spline
+
     if len(x) < 5:
         # The penalised spline needs five points; a campaign may have three.
         dense = np.linspace(x[0], x[-1], 5)
         x, z = dense, np.interp(dense, x, z)
     spacing = float(np.mean(np.diff(x)))
-    return make_smoothing_spline(x, z, lam=smoothing_m**4 / spacing)
+    spline = make_smoothing_spline(x, z, lam=smoothing_m**4 / spacing)
+    return spline, spline.derivative()

@@ -1,0 +1,40 @@
+"""M3, constant retardation: the same shear strength everywhere.
+
+    dU^2/(2 ds) = g sin(phi) - b
+
+b [m/s2] is the paper's a3. Run it: ``python -m models.constant``.
+"""
+
+from typing import Any
+
+from skred.physics.law import Law, parameter_of
+from skred.physics.mechanisms import constant_retardation
+
+RETARDATION = constant_retardation.MECHANISM
+
+
+def build(problem: Any) -> Any:
+    """PyMC model of the pooled calibration, with a vague half-normal prior."""
+    import pymc as pm
+
+    from skred.inference.pooled import mean_response, observe
+
+    with pm.Model(coords=problem.coords) as model:
+        b = pm.HalfNormal("retardation", sigma=RETARDATION.strength.prior_scale)
+        observe(problem, mean_response(problem, LAW.mechanisms, [b]))
+    return model
+
+
+LAW = Law(
+    id="constant",
+    title="M3: constant retardation",
+    mechanisms=(RETARDATION,),
+    parameters=(parameter_of(RETARDATION.strength),),
+    build=build,
+    reference="Gauer and others (2008), doi 10.1016/j.coldregions.2007.05.002",
+)
+
+if __name__ == "__main__":
+    from skred.cli import run_model
+
+    run_model("constant")

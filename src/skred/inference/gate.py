@@ -1,0 +1,80 @@
+"""The gate: whether the chains of a calibration can be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import arviz as az
+import numpy as np
+import xarray as xr
+
+R_HAT_LIMIT = 1.01
+ESS_LIMIT = 400.0
+
+
+@dataclass(frozen=True)
+class Gate:
+    """Diagnostics over all parameters of a posterior.
+
+    Attributes
+    ----------
+    r_hat_max : float
+        Largest rank-normalised split r-hat (Vehtari and others, 2021, doi 10.1214/20-BA1221).
+    ess_bulk_min, ess_tail_min : float
+        Smallest effective sample sizes.
+    divergences : int
+        Of NUTS; 0 for other samplers.
+    problems : tuple of str
+        What failed and what to do; empty if the gate is passed.
+    """
+
+    r_hat_max: float
+    ess_bulk_min: float
+    ess_tail_min: float
+    divergences: int
+    problems: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether the result may be used."""
+        return not self.problems
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for files."""
+        return {"passed": self.passed, **asdict(self), "problems": list(self.problems)}
+
+
+def check_gate(tree: xr.DataTree, parameters: Sequence[str]) -> Gate:
+    """Diagnose a posterior.
+
+    Parameters
+    ----------
+    tree : DataTree
+        With a posterior, and sample_stats where the sampler has them.
+    parameters : sequence of str
+        The free random variables.
+    """
+    posterior = tree["posterior"].to_dataset()[list(parameters)]
+    r_hat = _extreme(az.rhat(posterior), max)
+    ess_bulk = _extreme(az.ess(posterior, method="bulk"), min)
+    ess_tail = _extreme(az.ess(posterior, method="tail"), min)
+    stats = tree["sample_stats"].to_dataset() if "sample_stats" in tree.children else xr.Dataset()
+    divergences = int(stats["diverging"].sum()) if "diverging" in stats else 0
+    problems = []
+    # Written so that NaN, as from chains that never moved, fails too.
+    if not r_hat <= R_HAT_LIMIT:
+        problems.append(f"r-hat {r_hat:.3f} exceeds {R_HAT_LIMIT}: more --tune, or look at the trace for modes")
+    for name, size in (("bulk", ess_bulk), ("tail", ess_tail)):
+        if not size >= ESS_LIMIT:
+            problems.append(f"{name} effective sample size {size:.0f} below {ESS_LIMIT:.0f}: more --draws")
+    if divergences:
+        problems.append(f"{divergences} divergent transitions: use --sampler metropolis")
+    return Gate(r_hat, ess_bulk, ess_tail, divergences, tuple(problems))
+
+
+def _extreme(dataset: xr.Dataset, choose: Any) -> float:
+    """Largest or smallest over all variables; NaN if any is."""
+    values = np.concatenate([np.ravel(variable.values) for variable in dataset.data_vars.values()])
+    return float("nan") if np.isnan(values).any() else float(choose(values))

@@ -1,0 +1,109 @@
+"""Drawing from the posterior of a law."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pymc as pm
+import xarray as xr
+
+from skred.inference.joint_metropolis import JointMetropolis
+from skred.inference.problem import PooledProblem
+from skred.physics.law import Law
+
+Sampler = Literal["metropolis", "nuts", "smc"]
+PRIOR_DRAWS = 1000
+_STARTS_PER_CHAIN = 20
+
+
+@dataclass(frozen=True)
+class SamplerSettings:
+    """How to sample.
+
+    Attributes
+    ----------
+    sampler : {"metropolis", "nuts", "smc"}
+    draws, tune, chains : int
+        Draws kept per chain, adaptation draws before them, number of chains.
+    seed : int
+    """
+
+    sampler: Sampler = "metropolis"
+    draws: int = 1000
+    tune: int = 500
+    chains: int = 4
+    seed: int = 0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for files."""
+        return asdict(self)
+
+
+def sample_prior(model: pm.Model, law: Law, seed: int, draws: int = PRIOR_DRAWS) -> xr.Dataset:
+    """Prior draws of the free random variables, (chain, draw)."""
+    with _quiet_pymc():
+        tree = pm.sample_prior_predictive(draws, model, var_names=law.parameter_names, random_seed=seed)
+    return tree["prior"].to_dataset()
+
+
+def sample_posterior(
+    model: pm.Model,
+    law: Law,
+    problem: PooledProblem,
+    prior: xr.Dataset,
+    settings: SamplerSettings,
+    *,
+    progress: bool = False,
+) -> xr.DataTree:
+    """Posterior and sample_stats of a law's model.
+
+    Chains of Metropolis and NUTS start from prior draws: each from the most likely of twenty of
+    its own, so that starts are overdispersed and yet not on the plateau where no front moves.
+    """
+    with model, _quiet_pymc():
+        if settings.sampler == "smc":
+            return pm.sample_smc(
+                draws=settings.draws,
+                chains=settings.chains,
+                cores=1,
+                random_seed=settings.seed,
+                progressbar=progress,
+                compute_convergence_checks=False,
+            )
+        step = JointMetropolis(model=model) if settings.sampler == "metropolis" else pm.NUTS(model=model)
+        return pm.sample(
+            draws=settings.draws,
+            tune=settings.tune,
+            chains=settings.chains,
+            cores=1,  # a chain takes less time than starting a process
+            step=step,
+            initvals=_starts(law, problem, prior, settings.chains),
+            random_seed=settings.seed,
+            progressbar=progress,
+            compute_convergence_checks=False,
+        )
+
+
+def _starts(law: Law, problem: PooledProblem, prior: xr.Dataset, chains: int) -> list[dict[str, Any]]:
+    """One starting point for each chain."""
+    samples = {name: prior[name].values.ravel() for name in law.parameter_names}
+    n = min(_STARTS_PER_CHAIN, len(samples[law.parameter_names[0]]) // chains)
+    rows = law.strength_rows({name: values[: n * chains] for name, values in samples.items()})
+    log_density = problem.log_density(law.mechanisms, rows).sum(axis=1).reshape(chains, n)
+    best = np.nan_to_num(log_density, nan=-np.inf).argmax(axis=1) + n * np.arange(chains)
+    return [{name: samples[name][i] for name in samples} for i in best]
+
+
+class _quiet_pymc:
+    """PyMC logs every stage; the commands say in their own words what goes on."""
+
+    def __enter__(self) -> None:
+        self._logger = logging.getLogger("pymc")
+        self._level = self._logger.level
+        self._logger.setLevel(logging.ERROR)
+
+    def __exit__(self, *error: object) -> None:
+        self._logger.setLevel(self._level)
