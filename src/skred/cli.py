@@ -8,14 +8,19 @@ import json
 import os
 import sys
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Annotated, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError, Parameter, validators
+
+from skred.errors import InputError
 
 if TYPE_CHECKING:
     from skred.campaign import Campaign, CampaignError
+    from skred.inference.problem import PooledProblem
+    from skred.physics.law import Law
 
-DONE, BAD_INPUT, INTERRUPTED = 0, 2, 130
+DONE, GATE_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
 app = App(
     name="skred",
@@ -26,6 +31,11 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 
+Force = Annotated[bool, Parameter(name="--force", negative="")]
+Positive = Annotated[int, Parameter(validator=validators.Number(gte=1, lte=1_000_000))]
+Chains = Annotated[int, Parameter(validator=validators.Number(gte=2, lte=100))]
+Seed = Annotated[int, Parameter(validator=validators.Number(gte=0, lt=2**31))]
+NotNegative = Annotated[float, Parameter(validator=validators.Number(gte=0.0, lte=1000.0))]
 Quiet = Annotated[bool, Parameter(name="--quiet", negative="")]
 Json = Annotated[bool, Parameter(name="--json", negative="")]
 
@@ -41,13 +51,76 @@ def main(arguments: list[str] | None = None) -> None:
     sys.exit(run(sys.argv[1:] if arguments is None else arguments))
 
 
-def run(arguments: list[str]) -> int:
+def run_model(law_id: str) -> None:
+    """Run a law of the pack as a program: ``python -m models.pcm``."""
+    from skred.laws import load_law
+
+    program = App(
+        name=f"python -m models.{law_id}",
+        help=f"Calibrate a law: {load_law(law_id).title}.",
+        version=lambda: version("skred"),
+        result_action="return_value",
+        suppress_keyboard_interrupt=False,
+    )
+
+    def calibrate_law(
+        *,
+        campaign: str = "ryggfonn",
+        sampler: Literal["metropolis", "nuts", "smc"] = "metropolis",
+        draws: Positive = 1000,
+        tune: Positive = 500,
+        chains: Chains = 4,
+        seed: Seed = 0,
+        smoothing: NotNegative = 10.0,
+        out: Path | None = None,
+        force: Force = False,
+        as_json: Json = False,
+        quiet: Quiet = False,
+    ) -> int:
+        """Sample the posterior, check it, and write summary.json, posterior.nc and figures.
+
+        Parameters
+        ----------
+        campaign
+            A folder, or the name of an embedded campaign.
+        sampler
+            PyMC's Metropolis with a joint adapted proposal, NUTS, or sequential Monte Carlo.
+        draws
+            Draws kept per chain.
+        tune
+            Adaptation draws before them.
+        chains
+            Number of chains.
+        seed
+            Seed of all randomness.
+        smoothing
+            Smoothing length of the terrain, m.
+        out
+            Folder for the results: new, empty, or with --force; by default a fresh one under skred-out.
+        force
+            Use a folder that holds files.
+        as_json
+            Write the summary as JSON to stdout.
+        quiet
+            Write nothing but errors.
+        """
+        settings = {"sampler": sampler, "draws": draws, "tune": tune, "chains": chains, "seed": seed}
+        return _calibrate(law_id, campaign, settings, smoothing, out, force, as_json, quiet)
+
+    program.default(calibrate_law)
+    sys.exit(run(sys.argv[1:], program))
+
+
+def run(arguments: list[str], program: App = app) -> int:
     """Run one command and return its exit code; what is wrong with the input is told on stderr."""
     try:
-        code = app(arguments, exit_on_error=False)
+        code = program(arguments, exit_on_error=False)
         sys.stdout.flush()
     except CycloptsError:
         return BAD_INPUT  # cyclopts has told what is wrong
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return BAD_INPUT
     except ValueError as error:
         from skred.campaign.problems import CampaignError
 
@@ -95,6 +168,148 @@ def validate(campaign: str, /, *, as_json: Json = False, quiet: Quiet = False) -
     elif not quiet:
         _show_summary(_summary(checked))
     return DONE
+
+
+@app.command
+def compare(
+    campaign: str = "ryggfonn",
+    /,
+    *,
+    models: str = "coulomb,pcm,constant,voellmy",
+    draws: Positive = 1000,
+    tune: Positive = 500,
+    chains: Chains = 4,
+    seed: Seed = 0,
+    smoothing: NotNegative = 10.0,
+    out: Path | None = None,
+    force: Force = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Calibrate several laws and say which one the recordings prefer, and by how much.
+
+    Parameters
+    ----------
+    campaign
+        A folder, or the name of an embedded campaign.
+    models
+        Laws, separated by commas.
+    draws
+        Draws kept per chain.
+    tune
+        Adaptation draws before them.
+    chains
+        Number of chains.
+    seed
+        Seed of all randomness.
+    smoothing
+        Smoothing length of the terrain, m.
+    out
+        Folder for the results: new, empty, or with --force; by default a fresh one under skred-out.
+    force
+        Use a folder that holds files.
+    as_json
+        Write the comparison as JSON to stdout.
+    quiet
+        Write nothing but errors.
+    """
+    from skred.work.output import output_folder, plain
+
+    laws = _laws(models)
+    problem = _problem(campaign, smoothing)
+    folder = output_folder(out, "compare", force=force)
+
+    from skred.inference.sampling import SamplerSettings
+    from skred.report.tables import comparison_table
+    from skred.work.compare import compare as compare_laws
+
+    settings = SamplerSettings("metropolis", draws, tune, chains, seed)
+    comparison = compare_laws(problem, laws, settings, folder, _teller(quiet or as_json))
+    if as_json:
+        _write_json(plain(comparison))
+    elif not quiet:
+        _show(comparison_table(comparison), comparison["statement"], folder / "report.html")
+    return DONE if all(model["gate"]["passed"] for model in comparison["models"]) else GATE_FAILED
+
+
+def _calibrate(
+    law_id: str,
+    campaign: str,
+    settings: dict[str, Any],
+    smoothing: float,
+    out: Path | None,
+    force: bool,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Calibrate one law and tell what came out."""
+    from skred.laws import load_law
+    from skred.work.output import output_folder, plain
+
+    law = load_law(law_id)
+    problem = _problem(campaign, smoothing)
+    folder = output_folder(out, law_id, force=force)
+    tell = _teller(quiet or as_json)
+    tell(f"{law_id}: sampling")
+
+    from skred.inference.sampling import SamplerSettings
+    from skred.report.tables import summary_table
+    from skred.work.calibrate import calibrate, write_calibration
+
+    progress = sys.stderr.isatty() and not (quiet or as_json)
+    calibration = calibrate(problem, law, SamplerSettings(**settings), progress=progress)
+    tell(f"{law_id}: writing {folder}")
+    write_calibration(calibration, folder)
+    entry, gate = calibration.entry(), calibration.gate
+    if as_json:
+        _write_json(plain(entry))
+    elif not quiet:
+        verdict = "the chains can be trusted" if gate.passed else "THE GATE FAILED: do not use this result"
+        measured = f"r-hat at most {gate.r_hat_max:.3f}, effective draws at least {gate.ess_bulk_min:.0f}"
+        _show(summary_table(entry), [f"{verdict} ({measured})", *gate.problems], folder)
+    return DONE if gate.passed else GATE_FAILED
+
+
+def _laws(names: str) -> "list[Law]":
+    """Laws from a list of names; each once."""
+    from skred.laws import load_law
+
+    wanted = list(dict.fromkeys(name.strip() for name in names.split(",") if name.strip()))
+    if not wanted:
+        raise InputError("--models: expected names of laws separated by commas, found none")
+    return [load_law(name) for name in wanted]
+
+
+def _problem(campaign: str, smoothing: float) -> "PooledProblem":
+    """The pooled problem of a campaign, or what is wrong with it."""
+    from skred.campaign import find_campaign, read_campaign
+
+    checked = read_campaign(find_campaign(campaign))
+    from skred.inference.problem import pooled_problem
+
+    try:
+        problem = pooled_problem(checked, smoothing_m=smoothing)
+        _ = problem.arrays
+    except ValueError as error:
+        raise InputError(f"campaign {checked.name}: {error}") from error
+    return problem
+
+
+def _teller(silent: bool) -> Any:
+    """One line for each stage, on stderr."""
+    return (lambda line: None) if silent else (lambda line: print(line, file=sys.stderr, flush=True))
+
+
+def _show(table: Any, sentences: list[str], where: Path) -> None:
+    """A table, what it says, and where the rest is."""
+    from rich.console import Console
+    from rich.text import Text
+
+    console = Console()
+    console.print(table)
+    for sentence in sentences:
+        console.print(Text(sentence))
+    console.print(Text(f"\nwritten: {where}"), soft_wrap=True)
 
 
 def _discard_output() -> None:

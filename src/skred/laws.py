@@ -5,13 +5,15 @@ from __future__ import annotations
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING
 
+from skred.errors import InputError
+
 if TYPE_CHECKING:
     from skred.physics.law import Law
 
 GROUP = "skred.laws"
 
 
-class UnknownLawError(ValueError):
+class UnknownLawError(InputError):
     """A law was asked for that no installed pack provides."""
 
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pymc as pm
+import pytensor.tensor as pt
 from numba import njit
 from numpy.typing import NDArray
 from pymc.blocking import RaveledVars
@@ -32,27 +33,46 @@ _FORGET_UNTIL = 10
 
 
 @njit(error_model="numpy")
-def _run_moves(density, q, log_density, factor, normals, log_uniforms):  # type: ignore[no-untyped-def]
-    """Metropolis moves in place; returns (log density, moves accepted, mean acceptance)."""
-    n_moves, n = normals.shape
-    accepted = 0
-    acceptance = 0.0
+def _log_density(density, q, weights):  # type: ignore[no-untyped-def]
+    """Log density of the model with every pointwise term weighted; NaN becomes -inf."""
+    rest, pointwise = density(q)
+    total = rest.item()
+    for i in range(weights.size):
+        if weights[i] != 0.0:
+            total += weights[i] * pointwise[i]
+    return -np.inf if np.isnan(total) else total
+
+
+@njit(error_model="numpy")
+def _run_chain(density, weights, q, factor, normals, log_uniforms, draws, terms):  # type: ignore[no-untyped-def]
+    """Metropolis moves, (n_draws, n_moves) of them; returns the shares accepted and acceptable.
+
+    `q` is left at the last state; the state after each n_moves is stored in `draws`, and the
+    pointwise terms there in `terms` unless that is empty.
+    """
+    n_draws, n_moves, n = normals.shape
+    accepted, acceptance = 0, 0.0
     proposal = np.empty(n)
-    for move in range(n_moves):
-        for i in range(n):
-            proposal[i] = q[i]
-            for j in range(i + 1):
-                proposal[i] += factor[i, j] * normals[move, j]
-        proposed = density(proposal)[0].item()
-        difference = proposed - log_density
-        if np.isnan(difference):
-            difference = -np.inf
-        acceptance += np.exp(min(difference, 0.0))
-        if log_uniforms[move] < difference:
-            q[:] = proposal
-            log_density = proposed
-            accepted += 1
-    return log_density, accepted, acceptance / n_moves
+    current = _log_density(density, q, weights)
+    for draw in range(n_draws):
+        for move in range(n_moves):
+            for i in range(n):
+                proposal[i] = q[i]
+                for j in range(i + 1):
+                    proposal[i] += factor[i, j] * normals[draw, move, j]
+            proposed = _log_density(density, proposal, weights)
+            # Both -inf: accept, so that a chain can leave a place of no density.
+            difference = proposed - current if proposed > -np.inf or current > -np.inf else 0.0
+            acceptance += np.exp(min(difference, 0.0))
+            if log_uniforms[draw, move] < difference:
+                q[:] = proposal
+                current = proposed
+                accepted += 1
+        draws[draw] = q
+        if terms.size > 0:
+            terms[draw] = density(q)[1]
+    n_all = n_draws * n_moves
+    return accepted / n_all, acceptance / n_all
 
 
 @dataclass_state
@@ -74,8 +94,16 @@ class JointMetropolis(pm.Metropolis):  # type: ignore[misc]
         Variables to sample; all continuous ones by default.
     moves_per_draw : int
         Metropolis moves between two draws.
+    pointwise : str, optional
+        Observed variable whose terms can be weighted one by one through `weights`, as exact
+        leave-one-out needs; all weights are 1 to begin with.
     model, rng, initial_point :
         As in `pymc.Metropolis`.
+
+    Raises
+    ------
+    ValueError
+        For discrete variables.
     """
 
     name = "joint_metropolis"
@@ -87,6 +115,7 @@ class JointMetropolis(pm.Metropolis):  # type: ignore[misc]
         vars: list[Any] | None = None,
         *,
         moves_per_draw: int = MOVES_PER_DRAW,
+        pointwise: str | None = None,
         model: pm.Model | None = None,
         rng: Any = None,
         initial_point: dict[str, Any] | None = None,
@@ -101,19 +130,23 @@ class JointMetropolis(pm.Metropolis):  # type: ignore[misc]
             raise ValueError("JointMetropolis samples continuous variables only")
         self.elemwise_update = False
         self.moves_per_draw = moves_per_draw
-        self._density = self._compile_density(model, initial_point)
+        self._density = self._compile_density(model, initial_point, pointwise)
         size = sum(int(np.prod(initial_point[v.name].shape)) for v in self.vars)
+        self.weights = np.ones(len(self._density(np.zeros(size))[1]))
         self._start = 0.1 * np.eye(size)
         self.reset_tuning()
 
-    def _compile_density(self, model: pm.Model, point: dict[str, Any]) -> Callable[..., Any]:
-        """Compiled log density of the raveled variables, callable from numba."""
-        shared = {}
-        [log_density], raveled = join_nonshared_inputs(
-            point=point, outputs=[model.logp()], inputs=self.vars, shared_inputs=shared
+    def _compile_density(
+        self, model: pm.Model, point: dict[str, Any], pointwise: str | None
+    ) -> Callable[..., Any]:
+        """(log density without the pointwise terms, those terms) of the raveled variables, in numba."""
+        observed = model[pointwise] if pointwise else None
+        rest = model.logp(vars=[v for v in model.basic_RVs if v is not observed])
+        terms = model.logp(vars=observed, sum=False)[0].ravel() if pointwise else pt.zeros(0)
+        outputs, raveled = join_nonshared_inputs(
+            point=point, outputs=[rest, terms], inputs=self.vars, shared_inputs=self.shared
         )
-        function = compile_pytensor([raveled], log_density, mode="NUMBA")
-        density: Callable[..., Any] = function.vm.jit_fn
+        density: Callable[..., Any] = compile_pytensor([raveled], outputs, mode="NUMBA").vm.jit_fn
         return density
 
     def reset_tuning(self) -> None:
@@ -127,21 +160,51 @@ class JointMetropolis(pm.Metropolis):  # type: ignore[misc]
     def astep(self, q0: RaveledVars) -> tuple[RaveledVars, list[dict[str, float]]]:
         """One draw: some moves and, while tuning, one step of adaptation."""
         q = np.array(q0.data, dtype=float)
-        size = len(q)
-        normals = self.rng.standard_normal((self.moves_per_draw, size))
-        log_uniforms = np.log(self.rng.random(self.moves_per_draw))
-        factor = np.exp(self.log_scale) * self._factor
-        log_density, accepted, acceptance = _run_moves(
-            self._density, q, float(self._density(q)[0]), factor, normals, log_uniforms
-        )
+        _, _, accepted, acceptance = self._run(q, 1, self.rng, with_terms=False)
         if self.tune:
             self._adapt(q, acceptance)
-        stats = {
-            "scaling": float(np.exp(self.log_scale)),
-            "accept": acceptance,
-            "accepted": accepted / self.moves_per_draw,
-        }
+        stats = {"scaling": float(np.exp(self.log_scale)), "accept": acceptance, "accepted": accepted}
         return RaveledVars(q, q0.point_map_info), [stats]
+
+    def adapt(self, q: FloatArray, n_draws: int, rng: np.random.Generator) -> None:
+        """Forget, then adapt over `n_draws` draws from `q`, which is changed in place."""
+        self.reset_tuning()
+        for _ in range(n_draws):
+            acceptance = self._run(q, 1, rng, with_terms=False)[-1]
+            self._adapt(q, acceptance)
+
+    def run(
+        self, q: FloatArray, n_draws: int, rng: np.random.Generator
+    ) -> tuple[FloatArray, FloatArray]:
+        """Draw with the present proposal and weights, without adapting.
+
+        Parameters
+        ----------
+        q : (n,) array, changed in place
+            Raveled values of the (transformed) variables.
+        n_draws : int
+        rng : numpy Generator
+
+        Returns
+        -------
+        draws : (n_draws, n) array
+        terms : (n_draws, n_terms) array
+            The pointwise log densities, unweighted.
+        """
+        return self._run(q, n_draws, rng, with_terms=True)[:2]
+
+    def _run(
+        self, q: FloatArray, n_draws: int, rng: np.random.Generator, *, with_terms: bool
+    ) -> tuple[FloatArray, FloatArray, float, float]:
+        shape = (n_draws, self.moves_per_draw)
+        normals, log_uniforms = rng.standard_normal((*shape, len(q))), np.log(rng.random(shape))
+        draws = np.empty((n_draws, len(q)))
+        terms = np.empty((n_draws if with_terms else 0, len(self.weights)))
+        factor = np.exp(self.log_scale) * self._factor
+        accepted, acceptance = _run_chain(
+            self._density, self.weights, q, factor, normals, log_uniforms, draws, terms
+        )
+        return draws, terms, accepted, acceptance
 
     def _adapt(self, q: FloatArray, acceptance: float) -> None:
         """Recursive covariance, and Robbins-Monro on the scale."""

@@ -44,7 +44,7 @@ class SamplerSettings:
 
 def sample_prior(model: pm.Model, law: Law, seed: int, draws: int = PRIOR_DRAWS) -> xr.Dataset:
     """Prior draws of the free random variables, (chain, draw)."""
-    with _quiet_pymc():
+    with quiet_pymc():
         tree = pm.sample_prior_predictive(draws, model, var_names=law.parameter_names, random_seed=seed)
     return tree["prior"].to_dataset()
 
@@ -56,14 +56,16 @@ def sample_posterior(
     prior: xr.Dataset,
     settings: SamplerSettings,
     *,
+    step: JointMetropolis | None = None,
     progress: bool = False,
 ) -> xr.DataTree:
     """Posterior and sample_stats of a law's model.
 
     Chains of Metropolis and NUTS start from prior draws: each from the most likely of twenty of
     its own, so that starts are overdispersed and yet not on the plateau where no front moves.
+    `step` is for Metropolis, if there is one compiled already.
     """
-    with model, _quiet_pymc():
+    with model, quiet_pymc():
         if settings.sampler == "smc":
             return pm.sample_smc(
                 draws=settings.draws,
@@ -73,13 +75,14 @@ def sample_posterior(
                 progressbar=progress,
                 compute_convergence_checks=False,
             )
-        step = JointMetropolis(model=model) if settings.sampler == "metropolis" else pm.NUTS(model=model)
+        if settings.sampler == "nuts":
+            step = pm.NUTS(model=model)
         return pm.sample(
             draws=settings.draws,
             tune=settings.tune,
             chains=settings.chains,
             cores=1,  # a chain takes less time than starting a process
-            step=step,
+            step=step or JointMetropolis(model=model),
             initvals=_starts(law, problem, prior, settings.chains),
             random_seed=settings.seed,
             progressbar=progress,
@@ -97,7 +100,7 @@ def _starts(law: Law, problem: PooledProblem, prior: xr.Dataset, chains: int) ->
     return [{name: samples[name][i] for name in samples} for i in best]
 
 
-class _quiet_pymc:
+class quiet_pymc:
     """PyMC logs every stage; the commands say in their own words what goes on."""
 
     def __enter__(self) -> None:

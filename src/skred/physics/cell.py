@@ -3,7 +3,11 @@
 Within a cell the coefficients are constant, so the equation of motion is autonomous and v = U^2
 is monotone along it: the normal force switches off or on at most once, and v reaches zero at most
 once. All cases that the vectorised recursion of the kernel cannot take go through `cross`:
-the release, the stop, the switch of the normal force, barriers, sensors, and terms in U.
+the release, the stop, the switch of the normal force, barriers, and terms in U.
+
+Terms in U are frozen at the mean speed of a stretch. That mean is solved for, not predicted: an explicit
+predictor overshoots where such a term limits the speed within the first cell, and the front would
+seem to stop at its release.
 """
 
 from __future__ import annotations
@@ -37,6 +41,8 @@ COVERED, SWITCHED, STOPPED = 0, 1, 2
 """How a phase ended: the length covered, the normal force switched, or the front at rest."""
 SERIES_LIMIT = 0.5
 """Largest exponent for which twelve terms of the series reach double precision."""
+_MAX_ITERATIONS = 60
+_ACCURACY = 1e-15
 
 
 @compiled(fastmath={"contract"}, inline="always")
@@ -91,12 +97,14 @@ def psi(x):  # type: ignore[no-untyped-def]
 
 @compiled()
 def distance_to(v, target, a, b):  # type: ignore[no-untyped-def]
-    """Distance [m] at which dv/ds = a - b v carries v to `target`."""
+    """Distance [m] at which dv/ds = a - b v carries v to `target`; inf where it never does."""
+    if v == target:
+        return 0.0
     first_order = (target - v) / (a - b * v)
     y = b * first_order
     if abs(y) < 1e-8:
         return first_order * (1.0 + 0.5 * y)
-    return -np.log1p(-y) / b
+    return -np.log1p(-y) / b if y < 1.0 else np.inf
 
 
 @compiled()
@@ -115,12 +123,6 @@ def mean_speed_slope(u0, u1):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _half_tangent(tangent, u):  # type: ignore[no-untyped-def]
-    """DU from dv; a front at rest has no tangent in U."""
-    return 0.5 * tangent / u if u > 0.0 else 0.0
-
-
-@compiled(inline="always")
 def cell_at(i, ground, table, weakening_speed, speed_terms):  # type: ignore[no-untyped-def]
     """Gather the scalars of cell i."""
     return Cell(
@@ -135,14 +137,6 @@ def cell_at(i, ground, table, weakening_speed, speed_terms):  # type: ignore[no-
         weakening_speed,
         speed_terms,
     )
-
-
-@compiled()
-def slope_of_v(v, cell):  # type: ignore[no-untyped-def]
-    """dv/ds [m s-2]."""
-    retardation = cell.constant + cell.quadratic * v
-    retardation += cell.friction * max(0.0, GRAVITY * cell.cosine + cell.kappa * v)
-    return 2.0 * (GRAVITY * cell.sine - retardation) + _speed_part(cell, np.sqrt(v))
 
 
 @compiled()
@@ -175,39 +169,83 @@ def step_v(v, length, a, b):  # type: ignore[no-untyped-def]
 
 
 @compiled()
+def _end_speed(v, length, a, b, cell):  # type: ignore[no-untyped-def]
+    """Speed at the end of a stretch that fits the terms in U frozen at the stretch's mean speed.
+
+    Newton's method, kept between two speeds that enclose the solution; 0 for a front that stops.
+    """
+    u0 = np.sqrt(v)
+    per_source = length * phi1(b * length)
+    carried = v + (a - b * v) * per_source
+    if a - b * v + _speed_part(cell, u0) > 0.0:
+        low, high = u0, np.sqrt(carried)
+    elif carried + per_source * _speed_part(cell, mean_speed(u0, 0.0)) > 0.0:
+        low, high = 0.0, u0
+    else:
+        return 0.0
+    u1 = high
+    for _ in range(_MAX_ITERATIONS):
+        mean = mean_speed(u0, u1)
+        speed_part = per_source * _speed_part(cell, mean)
+        excess = carried + speed_part - u1 * u1
+        if abs(excess) <= _ACCURACY * (abs(carried) + abs(speed_part)):
+            break
+        if excess > 0.0:
+            low = u1
+        else:
+            high = u1
+        by_mean = per_source * _speed_part_slope(cell, mean)
+        u1 -= excess / (by_mean * mean_speed_slope(u1, u0) - 2.0 * u1)
+        if not low <= u1 <= high:
+            u1 = 0.5 * (low + high)
+    return u1
+
+
+@compiled()
+def _coefficients(v, section, cell, on):  # type: ignore[no-untyped-def]
+    """Source and decay of one phase, the terms in U frozen over the rest of the section."""
+    a, b = _linear_part(cell, on)
+    if cell.speed_terms:
+        u1 = _end_speed(v, section, a, b, cell)
+        a += _speed_part(cell, mean_speed(np.sqrt(v), u1))
+    return a, b
+
+
+@compiled()
+def _threshold(cell):  # type: ignore[no-untyped-def]
+    """Squared speed above which a convex cell's normal force vanishes."""
+    return -GRAVITY * cell.cosine / cell.kappa if cell.kappa < 0.0 else np.inf
+
+
+@compiled()
 def _end_of_phase(v, length, a, b, threshold, on):  # type: ignore[no-untyped-def]
     """Follow dv/ds = a - b v until something ends it: returns (v, distance, how it ended)."""
     end = step_v(v, length, a, b)
-    if end <= 0.0:
-        distance = min(distance_to(v, 0.0, a, b), length) if v > 0.0 else 0.0
-        return 0.0, distance, STOPPED
+    # The switch first: a front above the ground cannot stop before it is back on it.
     if (on and end > threshold) or (not on and end < threshold):
-        distance = min(distance_to(v, threshold, a, b), length) if v != threshold else 0.0
-        return threshold, distance, SWITCHED
+        return threshold, min(distance_to(v, threshold, a, b), length), SWITCHED
+    if end <= 0.0:
+        return 0.0, min(distance_to(v, 0.0, a, b), length), STOPPED
     return end, length, COVERED
 
 
 @compiled()
-def _freeze_speed(v, length, cell, on):  # type: ignore[no-untyped-def]
-    """Speed at the end by a predictor, and the mean speed at which terms in U are frozen."""
-    a, b = _linear_part(cell, on)
-    u0 = np.sqrt(v)
-    u1 = np.sqrt(max(step_v(v, length, a + _speed_part(cell, u0), b), 0.0))
-    return u1, mean_speed(u0, u1)
+def _second_phase(v, length, a, b):  # type: ignore[no-untyped-def]
+    """As `_end_of_phase` after a switch; there is no second one."""
+    return _end_of_phase(v, length, a, b, np.inf, True)
 
 
 @compiled()
-def _phase(v, length, cell, on):  # type: ignore[no-untyped-def]
-    """One phase of the normal force: returns (v, distance, how it ended)."""
-    a, b = _linear_part(cell, on)
-    if cell.speed_terms:
-        a += _speed_part(cell, _freeze_speed(v, length, cell, on)[1])
-    threshold = -GRAVITY * cell.cosine / cell.kappa if cell.kappa < 0.0 else np.inf
-    return _end_of_phase(v, length, a, b, threshold, on)
+def _duration(v, end, distance, skip, a, b):  # type: ignore[no-untyped-def]
+    """Time [s] over a phase from `skip` metres on: length over the mean of the speeds at its ends."""
+    length = distance - skip
+    if length <= 0.0:
+        return 0.0
+    return 2.0 * length / (np.sqrt(max(step_v(v, skip, a, b), 0.0)) + np.sqrt(end))
 
 
 @compiled()
-def cross(v, length, cell):  # type: ignore[no-untyped-def]
+def cross(v, length, section, clock, cell):  # type: ignore[no-untyped-def]
     """Carry a front over `length` metres of one cell.
 
     Parameters
@@ -216,26 +254,31 @@ def cross(v, length, cell):  # type: ignore[no-untyped-def]
         Squared front speed at the start; 0 for a front at rest that may start.
     length : float, m
         How far to go inside the cell.
+    section : float, m
+        Length over which terms in U are frozen, at least `length`: to the next edge or barrier.
+    clock : float, m
+        Distance from which on time is counted; inf for not at all.
     cell : Cell
 
     Returns
     -------
-    v, distance, stopped : float, float, bool
-        Squared speed at the end [m2 s-2], distance covered [m], whether the front stopped.
+    v, distance, stopped, time : float, float, bool, float
+        Squared speed at the end [m2 s-2], distance covered [m], whether the front stopped, time [s].
 
     """
     on = GRAVITY * cell.cosine + cell.kappa * v >= 0.0
-    covered = 0.0
+    a, b = _coefficients(v, section, cell, on)
+    end, distance, ended = _end_of_phase(v, length, a, b, _threshold(cell), on)
+    time = _duration(v, end, distance, clock, a, b) if clock < length else 0.0
+    if ended != SWITCHED:
+        return end, distance, ended == STOPPED, time
     # At most two phases: v is monotone within a cell.
-    for _ in range(2):
-        v, distance, ended = _phase(v, length - covered, cell, on)
-        covered += distance
-        if ended == STOPPED:
-            return 0.0, covered, True
-        if ended == COVERED:
-            break
-        on = not on
-    return v, length, False
+    a, b = _coefficients(end, section - distance, cell, not on)
+    v, switch = end, distance
+    end, distance, ended = _second_phase(v, length - switch, a, b)
+    if clock < length:
+        time = max(time, 0.0) + _duration(v, end, distance, max(clock - switch, 0.0), a, b)
+    return end, switch + distance, ended == STOPPED, time
 
 
 @compiled()
@@ -271,61 +314,95 @@ def _step_tangent(v, length, a, b, dv, da, db):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _phase_tangents(v, length, distance, cell, on, law, i, tangents):  # type: ignore[no-untyped-def]
-    """Tangents over the phase that `_phase` followed for `distance`; returns dv/ds at its end."""
-    a, b = _linear_part(cell, on)
-    u0, u1, frozen = np.sqrt(v), 0.0, 0.0
-    a0 = a
-    if cell.speed_terms:
-        u1, frozen = _freeze_speed(v, length, cell, on)
-        a0 = a + _speed_part(cell, u0)
-        a += _speed_part(cell, frozen)
-    for k in range(tangents.size):
-        incoming, da, db = tangents[k], 0.0, 0.0
-        in_law = k < law.columns.size
-        if in_law:
-            da = _source_change(law.columns[k], law.profiles[k, i], cell, frozen, on)
-            db = _decay_change(law.columns[k], law.profiles[k, i], cell, on)
-        if cell.speed_terms and u0 + u1 > 0.0:
-            du0 = 0.5 * incoming / u0 if u0 > 0.0 else 0.0
-            du1 = 0.0
-            if u1 > 0.0:
-                da0 = _speed_part_slope(cell, u0) * du0
-                if in_law:
-                    da0 += _source_change(law.columns[k], law.profiles[k, i], cell, u0, on)
-                du1 = 0.5 * _step_tangent(v, length, a0, b, incoming, da0, db) / u1
-            d_frozen = mean_speed_slope(u0, u1) * du0 + mean_speed_slope(u1, u0) * du1
-            da += _speed_part_slope(cell, frozen) * d_frozen
-        tangents[k] = _step_tangent(v, distance, a, b, incoming, da, db)
-    return a - b * step_v(v, distance, a, b)
+def _frozen_change(v, section, cell, on, a, b, u1, dv, da, db, shift):  # type: ignore[no-untyped-def]
+    """Tangent of the frozen part of the source: how the mean speed of the section changes."""
+    u0 = np.sqrt(v)
+    if u0 + u1 <= 0.0:
+        return 0.0
+    du0 = 0.5 * dv / u0 if u0 > 0.0 else 0.0
+    by_mean = _speed_part_slope(cell, mean_speed(u0, u1))
+    known = by_mean * mean_speed_slope(u0, u1) * du0
+    if u1 <= 0.0:
+        return known
+    dv1 = _step_tangent(v, section, a, b, dv, da + known, db)
+    dv1 -= (a - b * step_v(v, section, a, b)) * shift
+    by_end = by_mean * mean_speed_slope(u1, u0)
+    return known + by_end * dv1 / (2.0 * u1 - section * phi1(b * section) * by_end)
 
 
 @compiled()
-def cross_tangents(v, length, cell, law, i, tangents):  # type: ignore[no-untyped-def]
-    """As `cross`, and carry the tangents along, in place.
+def _duration_change(u0, u1, length, du0, du1, d_length):  # type: ignore[no-untyped-def]
+    """Tangent of the time over a stretch."""
+    total = u0 + u1
+    return 2.0 * (d_length - length * (du0 + du1) / total) / total
+
+
+@compiled()
+def _phase_tangents(  # type: ignore[no-untyped-def]
+    v, end, section, distance, ended, skip, a, b, cell, on, columns, profiles, i, dv, shift, d_time
+):
+    """Tangents over one phase, in place; see `cross_tangents`."""
+    u1 = _end_speed(v, section, *_linear_part(cell, on), cell) if cell.speed_terms else 0.0
+    frozen = mean_speed(np.sqrt(v), u1)
+    slope = a - b * end
+    v_clock = step_v(v, skip, a, b) if skip < distance else 0.0
+    u_clock, u_end = np.sqrt(max(v_clock, 0.0)), np.sqrt(end)
+    for k in range(dv.size):
+        da, db = 0.0, 0.0
+        if k < columns.size:
+            da = _source_change(columns[k], profiles[k, i], cell, frozen, on)
+            db = _decay_change(columns[k], profiles[k, i], cell, on)
+        if cell.speed_terms:
+            da += _frozen_change(v, section, cell, on, a, b, u1, dv[k], da, db, shift[k])
+        at_end = _step_tangent(v, distance, a, b, dv[k], da, db) - slope * shift[k]
+        moved = 0.0
+        if ended != COVERED:
+            moved = -at_end / slope if slope != 0.0 else 0.0
+            at_end = 0.0
+        if skip < distance:
+            d_length, at_clock = moved - shift[k], dv[k]
+            if skip > 0.0:
+                d_length = moved
+                at_clock = _step_tangent(v, skip, a, b, dv[k], da, db) - (a - b * v_clock) * shift[k]
+            du_clock = 0.5 * at_clock / u_clock if u_clock > 0.0 else 0.0
+            du_end = 0.5 * at_end / u_end if u_end > 0.0 else 0.0
+            d_time[k] += _duration_change(u_clock, u_end, distance - skip, du_clock, du_end, d_length)
+        dv[k], shift[k] = at_end, moved
+
+
+@compiled()
+def cross_tangents(  # type: ignore[no-untyped-def]
+    v, length, section, clock, cell, columns, profiles, i, dv, shift, d_time
+):
+    """As `cross`, and carry tangents along, in place: by each strength and then by anything else.
 
     Parameters
     ----------
-    law : Contributions
+    columns, profiles : arrays
+        Of the law, see `Contributions`.
     i : int
         Index of the cell.
-    tangents : (n,) array, changed in place
-        dv at the start on entry, by each strength of the law and then by anything else. On return
-        dv at the end, at fixed place; where the front stops, the derivative of that place instead.
+    dv : (n,) array
+        Tangents of v at the start; on return at the end, at fixed place (0 where the front stops).
+    shift : (n,) array
+        Tangents of the place of the start; on return 0, or of the stop.
+    d_time : (n,) array
+        Tangents of the time are added to it.
 
     """
     on = GRAVITY * cell.cosine + cell.kappa * v >= 0.0
-    covered = 0.0
-    for _ in range(2):
-        end, distance, ended = _phase(v, length - covered, cell, on)
-        slope = _phase_tangents(v, length - covered, distance, cell, on, law, i, tangents)
-        v = end
-        covered += distance
-        if ended == STOPPED:
-            for k in range(tangents.size):
-                tangents[k] = -tangents[k] / slope if slope < 0.0 else 0.0
-            return 0.0, covered, True
-        if ended == COVERED:
-            break
-        on = not on
-    return v, length, False
+    a, b = _coefficients(v, section, cell, on)
+    end, distance, ended = _end_of_phase(v, length, a, b, _threshold(cell), on)
+    _phase_tangents(
+        v, end, section, distance, ended, clock, a, b, cell, on, columns, profiles, i, dv, shift, d_time
+    )
+    if ended != SWITCHED:
+        return end, distance, ended == STOPPED
+    a, b = _coefficients(end, section - distance, cell, not on)
+    v, switch = end, distance
+    end, distance, ended = _second_phase(v, length - switch, a, b)
+    _phase_tangents(
+        v, end, section - switch, distance, ended, max(clock - switch, 0.0), a, b, cell, not on,
+        columns, profiles, i, dv, shift, d_time,
+    )  # fmt: skip
+    return end, switch + distance, ended == STOPPED

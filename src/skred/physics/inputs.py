@@ -60,7 +60,7 @@ class Contributions(NamedTuple):
     speed_terms: bool
 
 
-@compiled(inline="always")
+@compiled()
 def cell_of(edge, s):  # type: ignore[no-untyped-def]
     """Index of the cell that holds the place s (the lower one at an edge)."""
     return min(max(np.searchsorted(edge, s, side="right") - 1, 0), edge.size - 2)

@@ -11,7 +11,7 @@ import numpy as np
 from skred.physics.columns import Column
 from skred.physics.compiled import compiled
 from skred.physics.inputs import cell_of
-from skred.physics.march import fill_steps, fill_table, march, march_tangents
+from skred.physics.march import fill_increments, fill_steps, fill_table, march, march_tangents, scale_ground
 from skred.physics.reading import read, read_tangents
 
 _N_COLUMNS = len(Column)
@@ -34,27 +34,37 @@ def _simulate(strengths, releases, path, law, sensors, readings, jacobian):  # t
     columns, profiles = law.columns, law.profiles
     u_c, speed_terms = law.weakening_speed, law.speed_terms
     n_cells, n_tangents = ground.shape[1], jacobian.shape[2]
+    scaled, cells = scale_ground(edge, ground), _cells_of(sensors, edge)
     table = np.zeros((_N_COLUMNS, n_cells))
     keep, gain, v = np.empty(n_cells), np.empty(n_cells), np.empty(n_cells + 1)
-    dv = np.empty((n_cells + 1 if n_tangents > 0 else 0, n_tangents))
-    d_runout = np.zeros(n_tangents)
-    cells = _cells_of(sensors, edge)
+    # All that only tangents need is empty without them.
+    n_rows = n_cells if n_tangents > 0 else 0
+    increment, dv = np.zeros((n_tangents, n_rows)), np.zeros((n_tangents, n_rows + 1))
+    by_source, by_decay = np.empty(n_rows), np.empty(n_rows)
+    step, shift = np.zeros(n_tangents), np.zeros(n_tangents)
+    d_time, d_runout = np.zeros(n_tangents), np.zeros(n_tangents)
     for run in range(releases.size):
         release = releases[run]
-        fill_table(strengths[run], columns, profiles, table)
-        fill_steps(edge, ground, table, keep, gain)
+        fill_table(run, strengths, columns, profiles, table)
+        halvings = fill_steps(scaled, table, keep, gain)
         runout, last, first = march(
             release, edge, ground, barriers, limits, u_c, speed_terms, table, keep, gain, v
         )
         read(
-            sensors, cells, release, runout, first, edge, ground, barriers, u_c, speed_terms,
-            table, v, readings[run],
+            run, sensors, cells, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms,
+            table, v, readings,
         )  # fmt: skip
         if n_tangents > 0:
-            march_tangents(release, path, law, table, keep, v, last, first, dv, d_runout)
+            fill_increments(
+                halvings, scaled, table, keep, v, columns, profiles, by_source, by_decay, increment
+            )
+            march_tangents(
+                release, last, first, edge, ground, barriers, limits, columns, profiles, u_c, speed_terms,
+                table, keep, v, increment, dv, step, shift, d_time, d_runout,
+            )  # fmt: skip
             read_tangents(
-                sensors, cells, release, runout, first, edge, ground, barriers, law,
-                table, v, dv, d_runout, jacobian[run],
+                run, sensors, cells, release, runout, first, edge, ground, barriers, limits, columns,
+                profiles, u_c, speed_terms, table, v, dv, step, shift, d_time, d_runout, readings, jacobian,
             )  # fmt: skip
 
 
@@ -106,12 +116,12 @@ def front_speeds(strengths, releases, path, law):  # type: ignore[no-untyped-def
     """Front speed U [m/s] at every cell edge, (n_runs, n_cells + 1); parameters as `simulate`."""
     edge, ground, barriers, limits = path.edge, path.ground, path.barriers, path.limits
     n_cells = ground.shape[1]
-    table = np.zeros((_N_COLUMNS, n_cells))
+    scaled, table = scale_ground(edge, ground), np.zeros((_N_COLUMNS, n_cells))
     keep, gain = np.empty(n_cells), np.empty(n_cells)
     speeds = np.empty((releases.size, n_cells + 1))
     for run in range(releases.size):
-        fill_table(strengths[run], law.columns, law.profiles, table)
-        fill_steps(edge, ground, table, keep, gain)
+        fill_table(run, strengths, law.columns, law.profiles, table)
+        fill_steps(scaled, table, keep, gain)
         march(
             releases[run], edge, ground, barriers, limits, law.weakening_speed, law.speed_terms,
             table, keep, gain, speeds[run],

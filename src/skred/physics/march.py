@@ -5,6 +5,8 @@ increment of the exact step v1 = keep v0 + gain, by a short series that vectoris
 bare multiply-add recursion, two cells at a time to halve the chain of dependent operations. Every
 cell in which something happens (release, stop, switch of the normal force, barrier, terms in U) is
 left to `cell.cross`.
+
+Indices are unsigned in the loops that matter: a signed one costs a test for wrap-around per access.
 """
 
 from __future__ import annotations
@@ -19,103 +21,152 @@ from skred.physics.cell import (
     cell_at,
     cross,
     cross_tangents,
-    phi1,
     phi1_series,
-    psi,
-    slope_of_v,
+    psi_series,
 )
 from skred.physics.columns import GRAVITY
 from skred.physics.compiled import compiled
 from skred.physics.inputs import cell_of
 
 _FAST = {"contract", "nsz", "arcp", "nnan"}
+_MAX_HALVINGS = 10
+DRIVE, WEIGHT, BEND, DOUBLE = 0, 1, 2, 3
+"""Rows of the scaled ground: 2 g sin(phi), 2 g cos(phi), 2 kappa and 2, times the cell's length."""
+_ONE, _TWO = np.uint64(1), np.uint64(2)
+
+
+@compiled()
+def scale_ground(edge, ground):  # type: ignore[no-untyped-def]
+    """What the equation of motion makes of the ground, times length: the same for all runs."""
+    scaled = np.empty((4, ground.shape[1]))
+    for i in range(ground.shape[1]):
+        double = 2.0 * (edge[i + 1] - edge[i])
+        scaled[DRIVE, i] = double * GRAVITY * ground[0, i]
+        scaled[WEIGHT, i] = double * GRAVITY * ground[1, i]
+        scaled[BEND, i] = double * ground[2, i]
+        scaled[DOUBLE, i] = double
+    return scaled
 
 
 @compiled(fastmath=_FAST)
-def fill_table(strengths, columns, profiles, table):  # type: ignore[no-untyped-def]
+def fill_table(run, strengths, columns, profiles, table):  # type: ignore[no-untyped-def]
     """Sum of strength times profile in the columns that are used; the others must be zero."""
-    n_cells = table.shape[1]
-    for k in range(strengths.size):
-        column = columns[k]
-        for i in range(n_cells):
-            table[column, i] = 0.0
-    for k in range(strengths.size):
-        strength, column = strengths[k], columns[k]
-        for i in range(n_cells):
-            table[column, i] += strength * profiles[k, i]
+    for k in range(columns.size):
+        strength, column = strengths[run, k], columns[k]
+        first_of_column = True
+        for earlier in range(k):
+            first_of_column &= columns[earlier] != column
+        if first_of_column:
+            for i in range(table.shape[1]):
+                table[column, i] = strength * profiles[k, i]
+        else:
+            for i in range(table.shape[1]):
+                table[column, i] += strength * profiles[k, i]
 
 
 @compiled(fastmath=_FAST)
-def fill_steps(edge, ground, table, keep, gain):  # type: ignore[no-untyped-def]
-    """First pass: over a whole cell v becomes keep * v + gain, the normal force on."""
-    sine, cosine, kappa = ground[0], ground[1], ground[2]
+def fill_steps(scaled, table, keep, gain):  # type: ignore[no-untyped-def]
+    """First pass: over a whole cell v becomes keep * v + gain, the normal force on.
+
+    Returns how often the exponents had to be halved to lie within reach of the series.
+    """
+    drive, weight, bend, double = scaled[DRIVE], scaled[WEIGHT], scaled[BEND], scaled[DOUBLE]
     constant, quadratic, friction = table[CONSTANT], table[QUADRATIC], table[FRICTION]
     beyond_series = 0
     for i in range(keep.size):
-        length = edge[i + 1] - edge[i]
-        x = 2.0 * (quadratic[i] + friction[i] * kappa[i]) * length
-        a = 2.0 * (GRAVITY * (sine[i] - friction[i] * cosine[i]) - constant[i])
+        x = double[i] * quadratic[i] + bend[i] * friction[i]
         p = phi1_series(x)
         keep[i] = 1.0 - x * p
-        gain[i] = a * length * p
+        gain[i] = (drive[i] - weight[i] * friction[i] - double[i] * constant[i]) * p
         beyond_series += abs(x) > SERIES_LIMIT
     if beyond_series == 0:
-        return
+        return 0
+    halvings = _halvings(double, bend, quadratic, friction)
+    part = 0.5**halvings
     for i in range(keep.size):
-        length = edge[i + 1] - edge[i]
-        x = 2.0 * (quadratic[i] + friction[i] * kappa[i]) * length
-        if abs(x) > SERIES_LIMIT:
-            a = 2.0 * (GRAVITY * (sine[i] - friction[i] * cosine[i]) - constant[i])
-            keep[i] = np.exp(-x)
-            gain[i] = a * length * phi1(x)
+        x = part * (double[i] * quadratic[i] + bend[i] * friction[i])
+        keep[i], gain[i] = x, phi1_series(x)
+    for _ in range(halvings):
+        # phi1(2 x) = phi1(x) (1 + exp(-x)) / 2
+        for i in range(keep.size):
+            gain[i] *= 1.0 - 0.5 * keep[i] * gain[i]
+            keep[i] *= 2.0
+    for i in range(keep.size):
+        keep[i] = 1.0 - keep[i] * gain[i]
+        gain[i] *= drive[i] - weight[i] * friction[i] - double[i] * constant[i]
+    return halvings
 
 
 @compiled()
-def _next_barrier(barriers, s_from, s_to):  # type: ignore[no-untyped-def]
-    """Index of the first barrier in [s_from, s_to), or -1."""
-    for j in range(barriers.shape[0]):
-        if s_from <= barriers[j, 0] < s_to:
-            return j
-    return -1
+def _halvings(double, bend, quadratic, friction):  # type: ignore[no-untyped-def]
+    """How often to halve the largest exponent until the series holds."""
+    largest = 0.0
+    for i in range(double.size):
+        largest = max(largest, abs(double[i] * quadratic[i] + bend[i] * friction[i]))
+    halvings = 0
+    while largest > SERIES_LIMIT and halvings < _MAX_HALVINGS:
+        largest *= 0.5
+        halvings += 1
+    return halvings
 
 
 @compiled()
-def travel(v, s_from, s_to, cell, barriers):  # type: ignore[no-untyped-def]
-    """From one place of a cell to another, barriers included: returns (v, s, stopped).
+def travel(v, s_from, s_to, s_end, clock, cell, barriers):  # type: ignore[no-untyped-def]
+    """From one place of a cell to another, barriers included: returns (v, s, stopped, time).
 
-    A barrier at the far end is not yet met: the speed there is that of arriving.
+    A barrier at the far end is not yet met: the speed there is that of arriving. Nor is one at
+    the very place where a front starts from rest. Time [s] is counted from the place `clock` on;
+    `s_end` is the cell's lower edge.
     """
-    for j in range(max(_next_barrier(barriers, s_from, s_to), 0), barriers.shape[0]):
+    time = 0.0
+    for j in range(barriers.shape[0]):
         place, height, loss = barriers[j, 0], barriers[j, 1], barriers[j, 2]
-        if not s_from <= place < s_to:
+        if place < s_from or (place == s_from and v == 0.0):
+            continue
+        if place >= s_to:
+            s_end = min(s_end, place)
             break
-        v, distance, stopped = cross(v, place - s_from, cell)
-        if stopped and distance < place - s_from:
-            return 0.0, s_from + distance, True
+        length = place - s_from
+        v, distance, stopped, more = cross(v, length, length, max(clock - s_from, 0.0), cell)
+        time += more
+        if stopped and distance < length:
+            return 0.0, s_from + distance, True, time
         if v < 2.0 * GRAVITY * height or v <= 2.0 * loss:
-            return 0.0, place, True
+            return 0.0, place, True, time
         v -= 2.0 * loss
         s_from = place
-    v, distance, stopped = cross(v, s_to - s_from, cell)
-    return v, s_from + distance, stopped
+    v, distance, stopped, more = cross(v, s_to - s_from, s_end - s_from, max(clock - s_from, 0.0), cell)
+    return v, s_from + distance, stopped, time + more
 
 
 @compiled()
-def travel_tangents(v, s_from, s_to, cell, barriers, law, i, tangents):  # type: ignore[no-untyped-def]
+def travel_tangents(  # type: ignore[no-untyped-def]
+    v, s_from, s_to, s_end, clock, cell, barriers, columns, profiles, i, dv, shift, d_time
+):
     """As `travel`, with tangents as in `cross_tangents`; a barrier's own strength has none."""
-    for j in range(max(_next_barrier(barriers, s_from, s_to), 0), barriers.shape[0]):
+    for j in range(barriers.shape[0]):
         place, height, loss = barriers[j, 0], barriers[j, 1], barriers[j, 2]
-        if not s_from <= place < s_to:
+        if place < s_from or (place == s_from and v == 0.0):
+            continue
+        if place >= s_to:
+            s_end = min(s_end, place)
             break
-        v, distance, stopped = cross_tangents(v, place - s_from, cell, law, i, tangents)
-        if stopped and distance < place - s_from:
+        length = place - s_from
+        v, distance, stopped = cross_tangents(
+            v, length, length, max(clock - s_from, 0.0), cell, columns, profiles, i, dv, shift, d_time
+        )
+        if stopped and distance < length:
             return 0.0, s_from + distance, True
         if v < 2.0 * GRAVITY * height or v <= 2.0 * loss:
-            tangents[:] = 0.0
+            for k in range(dv.size):
+                dv[k] = shift[k] = 0.0
             return 0.0, place, True
         v -= 2.0 * loss
         s_from = place
-    v, distance, stopped = cross_tangents(v, s_to - s_from, cell, law, i, tangents)
+    v, distance, stopped = cross_tangents(
+        v, s_to - s_from, s_end - s_from, max(clock - s_from, 0.0), cell, columns, profiles, i,
+        dv, shift, d_time,
+    )  # fmt: skip
     return v, s_from + distance, stopped
 
 
@@ -125,19 +176,23 @@ def _recur(first, keep, gain, limits, v):  # type: ignore[no-untyped-def]
     speed = v[first]
     if not speed <= limits[first]:
         return first
-    # Unsigned indices: signed ones cost a wrap-around test per access, half of the loop's time.
-    one, two = np.uint64(1), np.uint64(2)
-    for pair in range((keep.size - first) // 2):
-        i = np.uint64(first + 2 * pair)
+    i, n_cells = np.uint64(first), np.uint64(keep.size)
+    while i + _ONE < n_cells:
         half = keep[i] * speed + gain[i]
         # Not through `half`: one multiply-add per two cells on the critical path.
-        ahead = (keep[i + one] * keep[i]) * speed + (keep[i + one] * gain[i] + gain[i + one])
-        if not (0.0 < half <= limits[i + one] and 0.0 < ahead <= limits[i + two]):
-            return first + 2 * pair
-        v[i + one] = half
-        v[i + two] = ahead
+        ahead = (keep[i + _ONE] * keep[i]) * speed + (keep[i + _ONE] * gain[i] + gain[i + _ONE])
+        if not (0.0 < half <= limits[i + _ONE] and 0.0 < ahead <= limits[i + _TWO]):
+            break
+        v[i + _ONE] = half
+        v[i + _TWO] = ahead
         speed = ahead
-    return first + 2 * ((keep.size - first) // 2)
+        i += _TWO
+    if i < n_cells:
+        half = keep[i] * speed + gain[i]
+        if 0.0 < half <= limits[i + _ONE]:
+            v[i + _ONE] = half
+            i += _ONE
+    return np.int64(i)
 
 
 @compiled()
@@ -149,63 +204,142 @@ def march(  # type: ignore[no-untyped-def]
     first = cell_of(edge, release)
     for edge_above in range(first + 1):
         v[edge_above] = 0.0
-    cell = cell_at(first, ground, table, u_c, speed_terms)
-    v[first + 1], s, stopped = travel(0.0, release, edge[first + 1], cell, barriers)
-    i = first + 1
+    i, start, stopped, s = first, release, False, release
     while not stopped and i < n_cells:
-        if not speed_terms:
+        if i > first and not speed_terms:
             i = _recur(i, keep, gain, limits, v)
             if i == n_cells:
                 break
+            start = edge[i]
+        elif i > first:
+            start = edge[i]
         cell = cell_at(i, ground, table, u_c, speed_terms)
-        v[i + 1], s, stopped = travel(v[i], edge[i], edge[i + 1], cell, barriers)
+        end = edge[i + 1]
+        v[i + 1], s, stopped, _ = travel(v[i], start, end, end, np.inf, cell, barriers)
         i += 1
     for edge_below in range(i + 1, n_cells + 1):
         v[edge_below] = 0.0
     return (s if stopped else edge[n_cells]), i - 1, first
 
 
+@compiled()
+def is_regular(i, first, limits, speed_terms, v):  # type: ignore[no-untyped-def]
+    """Whether nothing happens in cell i: it is crossed whole, in contact, in closed form."""
+    if i <= first or speed_terms:
+        return False
+    return v[i] <= limits[i] and 0.0 < v[i + 1] <= limits[i + 1]
+
+
+@compiled(fastmath=_FAST)
+def fill_changes(halvings, scaled, table, keep, v, by_source, by_decay):  # type: ignore[no-untyped-def]
+    """Change of v over each whole cell per unit of source and of decay, divided by its length.
+
+    The tangents of the exact step: phi1, and keep v + (a length) psi, which is minus by_decay.
+    """
+    drive, weight, bend, double = scaled[DRIVE], scaled[WEIGHT], scaled[BEND], scaled[DOUBLE]
+    constant, quadratic, friction = table[CONSTANT], table[QUADRATIC], table[FRICTION]
+    part = 0.5**halvings
+    for i in range(keep.size):
+        x = part * (double[i] * quadratic[i] + bend[i] * friction[i])
+        by_source[i], by_decay[i] = phi1_series(x), psi_series(x)
+    for _ in range(halvings):
+        for i in range(keep.size):
+            x, p = part * (double[i] * quadratic[i] + bend[i] * friction[i]), by_source[i]
+            # Derivative of phi1(2 x) = phi1(x) (1 - x phi1(x) / 2)
+            by_decay[i] = 0.5 * (by_decay[i] * (1.0 - x * p) + 0.5 * p * p)
+            by_source[i] = p * (1.0 - 0.5 * x * p)
+        part *= 2.0
+    for i in range(keep.size):
+        impulse = drive[i] - weight[i] * friction[i] - double[i] * constant[i]
+        by_decay[i] = -(keep[i] * v[i] + impulse * by_decay[i])
+
+
+@compiled(fastmath=_FAST)
+def _fill_increment(column, profile, scaled, by_source, by_decay, increment):  # type: ignore[no-untyped-def]
+    """What each whole cell adds to the tangent of v by one strength."""
+    weight, bend, double = scaled[WEIGHT], scaled[BEND], scaled[DOUBLE]
+    if column == CONSTANT:
+        for i in range(increment.size):
+            increment[i] = -double[i] * by_source[i] * profile[i]
+    elif column == QUADRATIC:
+        for i in range(increment.size):
+            increment[i] = double[i] * by_decay[i] * profile[i]
+    else:
+        for i in range(increment.size):
+            increment[i] = (bend[i] * by_decay[i] - weight[i] * by_source[i]) * profile[i]
+
+
 @compiled(fastmath={"contract"})
-def march_tangents(release, path, law, table, keep, v, last, first, dv, d_runout):  # type: ignore[no-untyped-def]
-    """Fill dv at every edge and d_runout: by each strength and, last, by the release place."""
-    edge, ground, barriers, limits = path.edge, path.ground, path.barriers, path.limits
-    columns, profiles = law.columns, law.profiles
-    u_c, speed_terms = law.weakening_speed, law.speed_terms
-    n_strengths = columns.size
-    step = np.zeros(d_runout.size)
-    dv[:] = 0.0
+def _recur_tangent(k, first, last, keep, increment, dv):  # type: ignore[no-untyped-def]
+    """Tangent from edge `first` to edge `last`, two cells at a time as in `_recur`."""
+    i, end, row = np.uint64(first), np.uint64(last), np.uint64(k)
+    tangent = dv[row, i]
+    while i + _ONE < end:
+        dv[row, i + _ONE] = keep[i] * tangent + increment[row, i]
+        tangent = (keep[i + _ONE] * keep[i]) * tangent + (
+            keep[i + _ONE] * increment[row, i] + increment[row, i + _ONE]
+        )
+        dv[row, i + _TWO] = tangent
+        i += _TWO
+    if i < end:
+        dv[row, i + _ONE] = keep[i] * tangent + increment[row, i]
+
+
+@compiled()
+def march_tangents(  # type: ignore[no-untyped-def]
+    release, last, first, edge, ground, barriers, limits, columns, profiles, u_c, speed_terms,
+    table, keep, v, increment, dv, step, shift, d_time, d_runout,
+):  # fmt: skip
+    """Fill dv (n_tangents, n_cells + 1) and d_runout: by each strength and, last, by the release.
+
+    `increment` (n_tangents, n_cells) holds what regular cells add; edges above the release or
+    below the stop are left alone.
+    """
+    n_tangents = d_runout.size
     d_runout[:] = 0.0
-    for i in range(first, last + 1):
-        cell = cell_at(i, ground, table, u_c, speed_terms)
-        regular = i > first and not speed_terms
-        if regular and v[i] <= limits[i] and 0.0 < v[i + 1] <= limits[i + 1]:
-            length = edge[i + 1] - edge[i]
-            b = 2.0 * (cell.quadratic + cell.friction * cell.kappa)
-            a = 2.0 * (GRAVITY * (cell.sine - cell.friction * cell.cosine) - cell.constant)
-            by_source = 2.0 * length * phi1(b * length)
-            by_decay = -2.0 * length * (keep[i] * v[i] + a * length * psi(b * length))
-            by_friction = by_decay * cell.kappa - by_source * GRAVITY * cell.cosine
-            for k in range(n_strengths):
-                by_column = by_friction
-                if columns[k] == CONSTANT:
-                    by_column = -by_source
-                elif columns[k] == QUADRATIC:
-                    by_column = by_decay
-                dv[i + 1, k] = keep[i] * dv[i, k] + by_column * profiles[k, i]
-            dv[i + 1, n_strengths] = keep[i] * dv[i, n_strengths]
+    i = first
+    while i <= last:
+        regular_to = i
+        while regular_to <= last and is_regular(regular_to, first, limits, speed_terms, v):
+            regular_to += 1
+        if regular_to > i:
+            for k in range(n_tangents):
+                _recur_tangent(k, i, regular_to, keep, increment, dv)
+            i = regular_to
             continue
-        step[:] = dv[i]
-        start = edge[i]
-        if i == first:
-            start = release
-            step[n_strengths] = -slope_of_v(0.0, cell)
-        ahead, s, stopped = travel_tangents(v[i], start, edge[i + 1], cell, barriers, law, i, step)
+        start = start_tangents(i, first, release, edge, dv, step, shift)
+        cell, end = cell_at(i, ground, table, u_c, speed_terms), edge[i + 1]
+        _, s, stopped = travel_tangents(
+            v[i], start, end, end, np.inf, cell, barriers, columns, profiles, i, step, shift, d_time
+        )
         if stopped:
-            d_runout[:] = step
+            d_runout[:] = shift
             if s <= release:
-                d_runout[n_strengths] = 1.0
+                d_runout[:] = 0.0
+                d_runout[-1] = 1.0
             return
-        if i == first and speed_terms:
-            # U has no tangent at rest; v has one cell further on, to the order of the scheme.
-            step[n_strengths] = -slope_of_v(ahead, cell)
-        dv[i + 1] = step
+        for k in range(n_tangents):
+            dv[k, i + 1] = step[k]
+        i += 1
+
+
+@compiled()
+def start_tangents(i, first, release, edge, dv, step, shift):  # type: ignore[no-untyped-def]
+    """Tangents of v and of the place at which a front enters cell i; returns that place."""
+    for k in range(step.size):
+        step[k] = 0.0 if i == first else dv[k, i]
+        shift[k] = 0.0
+    if i > first:
+        return edge[i]
+    shift[-1] = 1.0
+    return release
+
+
+@compiled(fastmath=_FAST)
+def fill_increments(  # type: ignore[no-untyped-def]
+    halvings, scaled, table, keep, v, columns, profiles, by_source, by_decay, increment
+):
+    """What regular cells add to the tangents of v: rows as the strengths, and 0 for the release."""
+    fill_changes(halvings, scaled, table, keep, v, by_source, by_decay)
+    for k in range(columns.size):
+        _fill_increment(columns[k], profiles[k], scaled, by_source, by_decay, increment[k])

@@ -4,144 +4,151 @@ from __future__ import annotations
 
 import numpy as np
 
-from skred.physics.cell import cell_at, slope_of_v
+from skred.physics.cell import CONSTANT, FRICTION, QUADRATIC, cell_at, phi1, psi
+from skred.physics.columns import GRAVITY
 from skred.physics.compiled import compiled
 from skred.physics.inputs import RUNOUT
-from skred.physics.march import travel, travel_tangents
+from skred.physics.march import is_regular, start_tangents, travel, travel_tangents
 
 
 @compiled()
-def _comes_by(place, release, runout, edge, v):  # type: ignore[no-untyped-def]
-    """Whether the front passes a place with speed; it may do so at the very end of the track."""
-    return release < place < runout or (place == edge[-1] and v[-1] > 0.0)
+def _contact_law(i, ground, table):  # type: ignore[no-untyped-def]
+    """Source and decay of cell i, the normal force on, no terms in U."""
+    mu = table[FRICTION, i]
+    a = 2.0 * (GRAVITY * (ground[0, i] - mu * ground[1, i]) - table[CONSTANT, i])
+    return a, 2.0 * (table[QUADRATIC, i] + mu * ground[2, i])
 
 
 @compiled()
 def speed_at(  # type: ignore[no-untyped-def]
-    place, i, release, runout, first, edge, ground, barriers, u_c, speed_terms, table, v
+    place, i, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms, table, v
 ):
-    """Front speed [m/s] at a place in cell i; 0 where the front does not come."""
-    if not _comes_by(place, release, runout, edge, v):
+    """Front speed [m/s] on arrival at a place in cell i; 0 where the front does not come."""
+    if not release < place <= runout:
         return 0.0
+    if is_regular(i, first, limits, speed_terms, v):
+        a, b = _contact_law(i, ground, table)
+        length = place - edge[i]
+        return np.sqrt(v[i] + (a - b * v[i]) * length * phi1(b * length))
     cell = cell_at(i, ground, table, u_c, speed_terms)
     start = release if i == first else edge[i]
-    return np.sqrt(travel(v[i], start, place, cell, barriers)[0])
+    return np.sqrt(travel(v[i], start, place, edge[i + 1], np.inf, cell, barriers)[0])
 
 
 @compiled()
-def speed_tangents_at(  # type: ignore[no-untyped-def]
-    place, i, release, runout, first, edge, ground, barriers, law, table, v, dv, step
+def span_speed(  # type: ignore[no-untyped-def]
+    s_from, s_to, i, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms, table, v
 ):
-    """As `speed_at`, with the tangents of the speed in `step`."""
-    step[:] = 0.0
-    if not _comes_by(place, release, runout, edge, v):
+    """Mean speed [m/s]: length over travel time; 0 where the front stops before the lower end.
+
+    The time over a cell, or the part of one in which nothing changes, is its length over the mean
+    of the speeds at its ends: exact for a constant retardation, second order otherwise.
+    """
+    if s_from < release or s_to > runout:
         return 0.0
-    cell = cell_at(i, ground, table, law.weakening_speed, law.speed_terms)
-    start = release if i == first else edge[i]
-    step[:] = dv[i]
-    if i == first:
-        step[-1] = -slope_of_v(0.0, cell)
-    end, _, _ = travel_tangents(v[i], start, place, cell, barriers, law, i, step)
-    if i == first and law.speed_terms:
-        step[-1] = -slope_of_v(end, cell)
-    speed = np.sqrt(end)
-    for k in range(step.size):
-        step[k] = 0.5 * step[k] / speed if speed > 0.0 else 0.0
-    return speed
+    time = 0.0
+    while i < edge.size - 1 and edge[i] < s_to:
+        if s_from <= edge[i] and edge[i + 1] <= s_to and is_regular(i, first, limits, speed_terms, v):
+            time += 2.0 * (edge[i + 1] - edge[i]) / (np.sqrt(v[i]) + np.sqrt(v[i + 1]))
+        else:
+            cell = cell_at(i, ground, table, u_c, speed_terms)
+            start = release if i == first else edge[i]
+            ahead = min(edge[i + 1], s_to)
+            time += travel(v[i], start, ahead, edge[i + 1], s_from, cell, barriers)[3]
+        i += 1
+    return (s_to - s_from) / time
 
 
 @compiled()
 def read(  # type: ignore[no-untyped-def]
-    sensors,
-    cells,
-    release,
-    runout,
-    first,
-    edge,
-    ground,
-    barriers,
-    u_c,
-    speed_terms,
-    table,
-    v,
-    readings,
-):
-    """All readings [m/s or m] of one front.
-
-    A span reads its length over the travel time, or 0 where the front stops before its lower end.
-    The time over a cell is its length over the mean of the speeds at its ends: exact for a
-    constant retardation, second order otherwise.
-    """
+    run, sensors, cells, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms,
+    table, v, readings,
+):  # fmt: skip
+    """All readings [m/s or m] of one front, into one row."""
     for j in range(sensors.shape[0]):
         s_from, s_to, i = sensors[j, 1], sensors[j, 2], cells[j]
         if sensors[j, 0] == RUNOUT:
-            readings[j] = runout
-            continue
-        upper = speed_at(
-            s_from, i, release, runout, first, edge, ground, barriers, u_c, speed_terms, table, v
-        )
-        readings[j] = upper
-        if s_from == s_to:
-            continue
-        place, time = s_from, 0.0
-        reached = s_from >= release and s_to <= runout
-        while reached and place < s_to:
-            ahead = min(edge[i + 1], s_to)
-            lower = speed_at(
-                ahead, i, release, runout, first, edge, ground, barriers, u_c, speed_terms, table, v
+            readings[run, j] = runout
+        elif s_from == s_to:
+            readings[run, j] = speed_at(
+                s_from, i, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms, table, v
             )
-            time += 2.0 * (ahead - place) / (upper + lower)
-            upper, place = lower, ahead
-            i += 1
-        readings[j] = (s_to - s_from) / time if reached else 0.0
+        else:
+            readings[run, j] = span_speed(
+                s_from, s_to, i, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms,
+                table, v,
+            )  # fmt: skip
+
+
+@compiled()
+def _regular_speed_tangents(  # type: ignore[no-untyped-def]
+    length, i, ground, table, columns, profiles, v, dv, tangents
+):
+    """Tangents of the speed `length` metres into a cell in which nothing happens."""
+    a, b = _contact_law(i, ground, table)
+    x = b * length
+    by_source = 2.0 * length * phi1(x)
+    keep = 1.0 - 0.5 * b * by_source
+    by_decay = 2.0 * length * (keep * v[i] + a * length * psi(x))
+    halved = 0.5 / np.sqrt(v[i] + 0.5 * (a - b * v[i]) * by_source)
+    for k in range(tangents.size):
+        change = keep * dv[k, i]
+        if k < columns.size:
+            if columns[k] == CONSTANT:
+                change -= by_source * profiles[k, i]
+            elif columns[k] == QUADRATIC:
+                change -= by_decay * profiles[k, i]
+            else:
+                friction = GRAVITY * ground[1, i] * by_source + ground[2, i] * by_decay
+                change -= friction * profiles[k, i]
+        tangents[k] = halved * change
+
+
+@compiled()
+def _span_tangents(  # type: ignore[no-untyped-def]
+    s_from, s_to, i, speed, release, first, edge, ground, barriers, u_c, speed_terms, columns, profiles,
+    table, v, dv, step, shift, d_time, tangents,
+):  # fmt: skip
+    """Tangents of a span's mean speed, which is `speed`."""
+    d_time[:] = 0.0
+    while i < edge.size - 1 and edge[i] < s_to:
+        start = start_tangents(i, first, release, edge, dv, step, shift)
+        cell, ahead = cell_at(i, ground, table, u_c, speed_terms), min(edge[i + 1], s_to)
+        travel_tangents(
+            v[i], start, ahead, edge[i + 1], s_from, cell, barriers, columns, profiles, i,
+            step, shift, d_time,
+        )  # fmt: skip
+        i += 1
+    for k in range(tangents.size):
+        tangents[k] = -speed * speed / (s_to - s_from) * d_time[k]
 
 
 @compiled()
 def read_tangents(  # type: ignore[no-untyped-def]
-    sensors,
-    cells,
-    release,
-    runout,
-    first,
-    edge,
-    ground,
-    barriers,
-    law,
-    table,
-    v,
-    dv,
-    d_runout,
-    tangents,
-):
-    """Tangents of all readings of one front, (n_sensors, n_tangents); see `read`."""
-    step, d_upper = np.zeros(d_runout.size), np.zeros(d_runout.size)
-    d_time = np.zeros(d_runout.size)
+    run, sensors, cells, release, runout, first, edge, ground, barriers, limits, columns, profiles,
+    u_c, speed_terms, table, v, dv, step, shift, d_time, d_runout, readings, jacobian,
+):  # fmt: skip
+    """Tangents of all readings of one front, into jacobian[run] (n_sensors, n_tangents)."""
     for j in range(sensors.shape[0]):
-        s_from, s_to, i = sensors[j, 1], sensors[j, 2], cells[j]
+        s_from, s_to, i, tangents = sensors[j, 1], sensors[j, 2], cells[j], jacobian[run, j]
+        speed = readings[run, j]
         if sensors[j, 0] == RUNOUT:
-            tangents[j] = d_runout
-            continue
-        upper = speed_tangents_at(
-            s_from, i, release, runout, first, edge, ground, barriers, law, table, v, dv, step
-        )
-        tangents[j] = step
-        if s_from == s_to:
-            continue
-        tangents[j] = 0.0
-        d_upper[:] = step
-        d_time[:] = 0.0
-        place, time = s_from, 0.0
-        reached = s_from >= release and s_to <= runout
-        while reached and place < s_to:
-            ahead = min(edge[i + 1], s_to)
-            lower = speed_tangents_at(
-                ahead, i, release, runout, first, edge, ground, barriers, law, table, v, dv, step
-            )
-            both, length = upper + lower, ahead - place
-            time += 2.0 * length / both
-            d_time -= 2.0 * length * (d_upper + step) / (both * both)
-            d_upper[:] = step
-            upper, place = lower, ahead
-            i += 1
-        if reached:
-            tangents[j] = -(s_to - s_from) * d_time / (time * time)
+            tangents[:] = d_runout
+        elif not speed > 0.0:
+            tangents[:] = 0.0
+        elif s_from < s_to:
+            _span_tangents(
+                s_from, s_to, i, speed, release, first, edge, ground, barriers, u_c, speed_terms,
+                columns, profiles, table, v, dv, step, shift, d_time, tangents,
+            )  # fmt: skip
+        elif is_regular(i, first, limits, speed_terms, v):
+            _regular_speed_tangents(s_from - edge[i], i, ground, table, columns, profiles, v, dv, tangents)
+        else:
+            start = start_tangents(i, first, release, edge, dv, step, shift)
+            cell = cell_at(i, ground, table, u_c, speed_terms)
+            travel_tangents(
+                v[i], start, s_from, edge[i + 1], np.inf, cell, barriers, columns, profiles, i,
+                step, shift, d_time,
+            )  # fmt: skip
+            for k in range(tangents.size):
+                tangents[k] = 0.5 * step[k] / speed

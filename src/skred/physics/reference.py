@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -234,10 +234,35 @@ def _cross(cell: Cell, s: complex, end_s: complex, v: complex) -> list[Piece]:
 
 
 def _piece(cell: Cell, contact: bool, s: complex, end_s: complex, v: complex) -> Piece:
-    """Freeze the terms in U at the speed at the start (predictor), then at the mean (corrector)."""
-    predicted = Piece(s, end_s, v, *_coefficients(cell, contact, _speed(v)))
-    mean_speed = _mean_speed(v, predicted.speed_squared(end_s))
-    return Piece(s, end_s, v, *_coefficients(cell, contact, mean_speed))
+    """Freeze the terms in U at the mean speed of the piece, which depends on them in turn."""
+
+    def excess(end: complex) -> complex:
+        frozen = Piece(s, end_s, v, *_coefficients(cell, contact, _mean_speed(v, end**2)))
+        return frozen.speed_squared(end_s) - end**2
+
+    end = _end_speed(cell, contact, v, excess)
+    return Piece(s, end_s, v, *_coefficients(cell, contact, _mean_speed(v, end**2)))
+
+
+def _end_speed(cell: Cell, contact: bool, v: complex, excess: Callable[[complex], complex]) -> complex:
+    """Return the end speed [m/s] without excess, 0 for a front that stops: bisection, then Newton's step."""
+    start = _speed(v)
+    if cell.linear == 0 and cell.weakening == 0:
+        return start
+    forcing, decay = _coefficients(cell, contact, start)
+    low, high = 0.0, start.real
+    if (forcing - decay * v).real > 0:
+        low, high = high, high + 1.0
+        while excess(high).real > 0:
+            high = 2 * high
+    elif excess(0j).real <= 0:
+        return 0j
+    for _ in range(100):
+        middle = (low + high) / 2
+        low, high = (middle, high) if excess(middle).real > 0 else (low, middle)
+    step = 1e-6 * high
+    slope = (excess(high + step) - excess(high - step)).real / (2 * step)
+    return high - excess(high) / slope
 
 
 def _coefficients(cell: Cell, contact: bool, speed: complex) -> tuple[complex, complex]:

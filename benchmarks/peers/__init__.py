@@ -1,0 +1,1 @@
+"""Peers of skred's sampler and likelihood, one a file; see ``benchmarks/logp.py`` and ``sampling.py``."""

@@ -1,0 +1,13 @@
+"""PyMC's own NUTS, with gradients through the Op's tangent-linear jacobian."""
+
+from __future__ import annotations
+
+from peers import pymc_run
+from peers.common import Drawn
+from skred.inference.problem import PooledProblem
+
+
+def sample(problem: PooledProblem, seed: int, *, draws: int, tune: int) -> Drawn:
+    """Four chains with PyMC's defaults (jitter+adapt_diag, target acceptance 0.8)."""
+    # Named, because PyMC prefers nutpie where it is installed; that is a peer of its own.
+    return pymc_run.run(problem, seed, lambda: None, draws=draws, tune=tune, nuts_sampler="pymc")

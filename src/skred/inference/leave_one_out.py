@@ -1,0 +1,114 @@
+"""Exact leave-one-event-out: the posterior refitted without each event in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import arviz as az
+import numpy as np
+import pymc as pm
+import xarray as xr
+from numpy.typing import NDArray
+from pymc.blocking import DictToArrayBijection
+from scipy.special import logsumexp
+
+from skred.inference.gate import R_HAT_LIMIT
+from skred.inference.joint_metropolis import JointMetropolis
+
+FloatArray = NDArray[np.float64]
+REFIT_CHAINS, REFIT_DRAWS, REFIT_BURN = 4, 500, 100
+_ADAPTATION = 500
+_BATCHES = 5
+
+
+@dataclass(frozen=True)
+class ExactLoo:
+    """Expected log predictive density of each event from the posterior without it.
+
+    Attributes
+    ----------
+    pointwise : (n_events,) array
+    mcse : float
+        Monte Carlo standard error of the sum.
+    failed : tuple of str
+        Events whose refit did not converge; a comparison must not hang on them.
+    """
+
+    pointwise: FloatArray
+    mcse: float
+    failed: tuple[str, ...]
+
+    @property
+    def elpd(self) -> float:
+        """Sum over events."""
+        return float(self.pointwise.sum())
+
+    @property
+    def se(self) -> float:
+        """Standard error of the sum over events like these."""
+        return float(np.sqrt(len(self.pointwise) * np.var(self.pointwise, ddof=1)))
+
+
+def exact_leave_one_out(
+    model: pm.Model,
+    step: JointMetropolis,
+    events: Sequence[str],
+    seed: int,
+    tell: Callable[[int, int], None] = lambda done, of: None,
+) -> ExactLoo:
+    """Refit without each event and predict it.
+
+    Parameters
+    ----------
+    model : pymc.Model
+    step : JointMetropolis
+        Made with ``pointwise="recordings"``; its weights are restored.
+    events : sequence of str
+        Ids, in the order of the pointwise terms.
+    seed : int
+    tell : callable, optional
+        Told the number of refits done and of all.
+    """
+    rng = np.random.default_rng([seed, 2])
+    start = DictToArrayBijection.map(model.initial_point()).data.astype(float)
+    step.weights[:] = 1.0
+    step.adapt(start, _ADAPTATION, rng)
+    draws, terms = [], []
+    try:
+        for number in range(len(events)):
+            step.weights[:] = 1.0
+            step.weights[number] = 0.0
+            chains = [_refit(step, start.copy(), rng) for _ in range(REFIT_CHAINS)]
+            draws.append([chain[0] for chain in chains])
+            terms.append([chain[1][:, number] for chain in chains])
+            tell(number + 1, len(events))
+    finally:
+        step.weights[:] = 1.0
+    r_hat = _r_hat(np.array(draws))
+    failed = tuple(event for event, value in zip(events, r_hat, strict=True) if not value <= R_HAT_LIMIT)
+    densities = np.array(terms)
+    pointwise = logsumexp(densities, axis=(1, 2)) - np.log(densities[0].size)
+    return ExactLoo(pointwise, float(np.sqrt(np.sum(_mcse(densities) ** 2))), failed)
+
+
+def _refit(step: JointMetropolis, q: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    step.run(q, REFIT_BURN, rng)
+    return step.run(q, REFIT_DRAWS, rng)
+
+
+def _r_hat(draws: FloatArray) -> FloatArray:
+    """Largest r-hat over parameters of (event, chain, draw, parameter) draws, for each event."""
+    array = xr.DataArray(draws, dims=("refit", "chain", "draw", "q"), name="q_value")
+    r_hat: FloatArray = az.rhat(array.to_dataset())["q_value"].max("q").values
+    return r_hat
+
+
+def _mcse(densities: FloatArray) -> FloatArray:
+    """Standard error of each event's log mean density, from batches of its chains."""
+    relative = np.exp(densities - densities.max(axis=(1, 2), keepdims=True))
+    batches = np.array(np.split(relative, _BATCHES, axis=2)).mean(axis=3)
+    n_batches = _BATCHES * densities.shape[1]
+    spread = batches.std(axis=(0, 2), ddof=1) / np.sqrt(n_batches)
+    error: FloatArray = spread / batches.mean(axis=(0, 2))
+    return error

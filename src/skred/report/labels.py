@@ -1,0 +1,55 @@
+"""Words for figures and tables; what comes from a file is shown, never interpreted."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_GREEK = {"mu": "μ", "xi": "ξ", "kappa": "κ", "phi": "φ", "alpha": "α", "beta": "β", "sigma": "σ", "tau": "τ"}
+
+
+def printable(text: Any) -> str:
+    """Text without control characters, such as those that steer a terminal."""
+    return "".join(c if c.isprintable() else "�" for c in str(text))
+
+
+def shortened(text: Any, length: int = 40) -> str:
+    """Printable text with its middle left out where it is longer than `length`."""
+    shown = printable(text)
+    if len(shown) <= length:
+        return shown
+    head = (length - 1 + 1) // 2
+    return f"{shown[:head]}…{shown[len(shown) - (length - 1 - head) :]}"
+
+
+def figure_text(text: Any, length: int = 40) -> str:
+    """Shortened text in which matplotlib finds no formula."""
+    return shortened(text, length).replace("$", r"\$")
+
+
+def unit_text(unit: Any) -> str:
+    """A unit with superscripts: ``m s-1`` as m s⁻¹, ``1`` as -."""
+    shown = printable(unit)
+    if shown == "1":
+        return "-"
+    return re.sub(r"(?<=[A-Za-z])-?\d+", lambda match: match[0].translate(_SUPERSCRIPT), shown)
+
+
+def symbol_text(symbol: Any) -> str:
+    """A symbol with its Greek letters: ``xi h`` as ξ h."""
+    return " ".join(_GREEK.get(word, word) for word in printable(symbol).split())
+
+
+def name_text(name: Any) -> str:
+    """A parameter's name in plain words."""
+    return printable(name).replace("_", " ")
+
+
+def parameter_label(parameter: Any) -> str:
+    """Name, symbol, the paper's symbol and unit of a law's parameter, for an axis."""
+    symbol = symbol_text(parameter.symbol)
+    name = name_text(parameter.name)
+    shown = symbol if name == printable(parameter.symbol) else f"{name} {symbol}"
+    paper = f" (paper: {printable(parameter.paper_symbol)})" if parameter.paper_symbol else ""
+    return f"{figure_text(shown + paper, 60)} [{figure_text(unit_text(parameter.unit), 20)}]"

@@ -1,0 +1,1 @@
+"""Ring 3, work: what a person asks for."""

@@ -1,0 +1,78 @@
+"""What a comparison says, in plain sentences."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def statement(comparison: dict[str, Any]) -> list[str]:
+    """Sentences on which law the recordings prefer, by how much, and how far to trust it."""
+    models = comparison["models"]
+    valid = [model for model in models if model["gate"]["passed"]]
+    failed = [model for model in models if not model["gate"]["passed"]]
+    sentences = []
+    if not valid:
+        sentences.append("No law passed the gate of convergence: there is nothing to compare.")
+    else:
+        sentences += _preference(valid, comparison["campaign"]["n_events"])
+        sentences += _agreement(valid)
+    for model in failed:
+        sentences.append(
+            f"{model['title']} failed the gate and is not compared: {'; '.join(model['gate']['problems'])}."
+        )
+    return sentences
+
+
+def _preference(valid: list[dict[str, Any]], n_events: int) -> list[str]:
+    best, others = valid[0], valid[1:]
+    if not others:
+        return [f"Only {best['title']} was calibrated: elpd {best['exact']['elpd']:.2f}."]
+    sentences = []
+    clear = [model for model in others if model["difference"]["practical"]]
+    close = [model for model in others if not model["difference"]["practical"]]
+    verb = "prefer" if len(clear) == len(others) else "rank first"
+    sentences.append(
+        f"By exact leave-one-event-out over {n_events} avalanches the recordings {verb} {best['title']}"
+        f" (elpd {best['exact']['elpd']:.2f})."
+    )
+    for model in clear:
+        sentences.append(f"{model['title']} predicts worse by {_by(model)}.")
+    for model in close:
+        sentences.append(
+            f"{model['title']} is behind by {_by(model)}: no practical difference by the rule of at least 4"
+            " and more than twice the standard error."
+        )
+    if n_events < 100:
+        sentences.append(
+            "With fewer than 100 events these standard errors are optimistic; they are doubled in the rule."
+        )
+    return sentences
+
+
+def _by(model: dict[str, Any]) -> str:
+    difference = model["difference"]
+    return f"{-difference['elpd']:.2f} (standard error {difference['se']:.2f})"
+
+
+def _agreement(valid: list[dict[str, Any]]) -> list[str]:
+    """Whether evidence agrees, and what the diagnostics of the scores say."""
+    sentences = []
+    by_evidence = max(valid, key=lambda model: model["evidence"]["mean"])
+    if len(valid) > 1:
+        agrees = "agrees" if by_evidence is valid[0] else f"prefers {by_evidence['title']} instead"
+        spread = max(model["evidence"]["spread"] for model in valid)
+        sentences.append(
+            f"Evidence by sequential Monte Carlo {agrees}; its seeds differ by at most {spread:.2f}."
+        )
+    for model in valid:
+        if model["loo"]["n_bad"]:
+            sentences.append(
+                f"Importance sampling is unreliable for {model['loo']['n_bad']} events of {model['title']}"
+                f" (Pareto k up to {model['loo']['pareto_k_max']:.2f}); the ranking rests on exact refits."
+            )
+        if model["exact"]["failed_refits"]:
+            sentences.append(
+                f"{len(model['exact']['failed_refits'])} refits of {model['title']} did not converge:"
+                " do not build on its place in the ranking."
+            )
+    return sentences
