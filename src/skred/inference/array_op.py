@@ -18,7 +18,7 @@ ArrayInput = tuple[str, int, str]
 """Name, number of dimensions and dtype of an input."""
 
 
-class ArrayOp(Op):  # type: ignore[misc]
+class ArrayOp(Op):
     """Base of the Ops around compiled functions."""
 
     __props__ = ()

@@ -83,7 +83,16 @@ def _funcify_density(op: PooledLogDensity, node: Any = None, **kwargs: Any) -> A
 def _funcify_pullback(op: PooledLogDensityPullback, node: Any = None, **kwargs: Any) -> Any:
     @numba_njit
     def pooled_density_pullback(  # type: ignore[no-untyped-def]
-        cotangent, response, release_of_event, readings, whiten, constant, n_stopped, stopped, regression, factor
+        cotangent,
+        response,
+        release_of_event,
+        readings,
+        whiten,
+        constant,
+        n_stopped,
+        stopped,
+        regression,
+        factor,
     ):
         data = PooledArrays(
             release_of_event, readings, whiten, constant, n_stopped, stopped, regression, factor

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pymc as pm
+from numpy.typing import NDArray
 
 from skred.inference.sampling import quiet_pymc
 
@@ -54,7 +56,7 @@ def evidence(model: pm.Model, seeds: Sequence[int], draws: int = SMC_DRAWS) -> E
     return Evidence(tuple(estimates))
 
 
-def _log_evidence(values: np.ndarray) -> float:  # type: ignore[type-arg]
+def _log_evidence(values: NDArray[Any]) -> float:
     """Last finite value of each chain (PyMC pads an array of objects), averaged as evidence."""
     chains = []
     for chain in values:

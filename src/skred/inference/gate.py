@@ -65,7 +65,9 @@ def check_gate(tree: xr.DataTree, parameters: Sequence[str]) -> Gate:
     problems = []
     # Written so that NaN, as from chains that never moved, fails too.
     if not r_hat <= R_HAT_LIMIT:
-        problems.append(f"r-hat {r_hat:.3f} exceeds {R_HAT_LIMIT}: more --tune, or look at the trace for modes")
+        problems.append(
+            f"r-hat {r_hat:.3f} exceeds {R_HAT_LIMIT}: more --tune, or look at the trace for modes"
+        )
     for name, size in (("bulk", ess_bulk), ("tail", ess_tail)):
         if not size >= ESS_LIMIT:
             problems.append(f"{name} effective sample size {size:.0f} below {ESS_LIMIT:.0f}: more --draws")

@@ -85,7 +85,7 @@ class JointMetropolisState(MetropolisState):
     log_scale: float
 
 
-class JointMetropolis(pm.Metropolis):  # type: ignore[misc]
+class JointMetropolis(pm.Metropolis):
     """Random-walk Metropolis on all variables at once.
 
     Parameters
@@ -173,9 +173,7 @@ class JointMetropolis(pm.Metropolis):  # type: ignore[misc]
             acceptance = self._run(q, 1, rng, with_terms=False)[-1]
             self._adapt(q, acceptance)
 
-    def run(
-        self, q: FloatArray, n_draws: int, rng: np.random.Generator
-    ) -> tuple[FloatArray, FloatArray]:
+    def run(self, q: FloatArray, n_draws: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
         """Draw with the present proposal and weights, without adapting.
 
         Parameters

@@ -82,7 +82,10 @@ class PooledProblem:
     def sensors(self) -> FloatArray:
         """The sensors as the kernel reads them."""
         return sensor_table(
-            [None if sensor.is_runout else (sensor.s_from_m, sensor.s_to_m) for sensor in self.campaign.sensors]
+            [
+                None if sensor.is_runout else (sensor.s_from_m, sensor.s_to_m)
+                for sensor in self.campaign.sensors
+            ]
         )
 
     @cached_property
@@ -118,7 +121,9 @@ class PooledProblem:
         rows = readings.reshape(n, n_releases, -1)
         return np.array([pooled_log_density(row, self.arrays) for row in rows])
 
-    def speeds(self, mechanisms: Sequence[Mechanism], strengths: FloatArray, release_s_m: float) -> FloatArray:
+    def speeds(
+        self, mechanisms: Sequence[Mechanism], strengths: FloatArray, release_s_m: float
+    ) -> FloatArray:
         """Front speed [m/s] at the cell edges: (n, n_strengths) to (n, n_cells + 1)."""
         releases = np.full(len(strengths), float(release_s_m))
         law = self.contributions(mechanisms)

@@ -91,7 +91,9 @@ def _response(problem: PooledProblem, law: Law, parameters: xr.Dataset) -> xr.Da
     """Mean response, (chain, draw, release, sensor)."""
     rows = law.strength_rows(_flat(parameters, law))
     of_event = problem.simulate(law.mechanisms, rows)
-    first_event = [int(np.flatnonzero(problem.release_of_event == k)[0]) for k in range(len(problem.releases))]
+    first_event = [
+        int(np.flatnonzero(problem.release_of_event == k)[0]) for k in range(len(problem.releases))
+    ]
     sizes = (parameters.sizes["chain"], parameters.sizes["draw"])
     return xr.DataArray(
         of_event[:, first_event].reshape(*sizes, len(first_event), -1),
@@ -161,9 +163,7 @@ def _last_finite(value: Any) -> float:
     return float(finite[-1]) if len(finite) else float("nan")
 
 
-def _attributes(
-    problem: PooledProblem, law: Law, gate: Gate, settings: SamplerSettings
-) -> dict[str, Any]:
+def _attributes(problem: PooledProblem, law: Law, gate: Gate, settings: SamplerSettings) -> dict[str, Any]:
     campaign = problem.campaign
     return {
         "title": f"{law.title}, pooled calibration on {campaign.name}",

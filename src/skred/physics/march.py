@@ -225,9 +225,7 @@ def march(  # type: ignore[no-untyped-def]
 @compiled()
 def is_regular(i, first, limits, speed_terms, v):  # type: ignore[no-untyped-def]
     """Whether nothing happens in cell i: it is crossed whole, in contact, in closed form."""
-    if i <= first or speed_terms:
-        return False
-    return v[i] <= limits[i] and 0.0 < v[i + 1] <= limits[i + 1]
+    return i > first and not speed_terms and _regular_until(i, i + 1, limits, v) > i
 
 
 @compiled(fastmath=_FAST)
@@ -269,6 +267,15 @@ def _fill_increment(column, profile, scaled, by_source, by_decay, increment):  #
             increment[i] = (bend[i] * by_decay[i] - weight[i] * by_source[i]) * profile[i]
 
 
+@compiled()
+def _regular_until(first, end, limits, v):  # type: ignore[no-untyped-def]
+    """First cell from `first` on, or `end`, in which something happens; see `is_regular`."""
+    i, stop = np.uint64(first), np.uint64(end)
+    while i < stop and v[i] <= limits[i] and 0.0 < v[i + _ONE] <= limits[i + _ONE]:
+        i += _ONE
+    return np.int64(i)
+
+
 @compiled(fastmath={"contract"})
 def _recur_tangent(k, first, last, keep, increment, dv):  # type: ignore[no-untyped-def]
     """Tangent from edge `first` to edge `last`, two cells at a time as in `_recur`."""
@@ -299,9 +306,7 @@ def march_tangents(  # type: ignore[no-untyped-def]
     d_runout[:] = 0.0
     i = first
     while i <= last:
-        regular_to = i
-        while regular_to <= last and is_regular(regular_to, first, limits, speed_terms, v):
-            regular_to += 1
+        regular_to = i if i == first or speed_terms else _regular_until(i, last + 1, limits, v)
         if regular_to > i:
             for k in range(n_tangents):
                 _recur_tangent(k, i, regular_to, keep, increment, dv)

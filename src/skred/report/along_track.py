@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from skred.report.draws import chains_of, spread
 from skred.report.labels import figure_text, unit_text
-from skred.report.style import GREY, INK, RECORDED, law_colours, new_figure, styled
+from skred.report.style import GREY, INK, RECORDED, law_colours, legend_below, new_figure, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,7 +34,7 @@ def along_track_figure(tree: xr.DataTree, law: Law, problem: PooledProblem) -> F
     The whole track at the left, and the part with recordings enlarged at the right where it is short.
     """
     release = float(np.median([event.release_s_m for event in problem.campaign.events]))
-    figure = new_figure(5.7, f"Front speed along the track, and what was recorded\n{figure_text(law.title, 60)}")
+    figure = new_figure(5.7, f"Front speed along the track, and what was recorded\n{figure_text(law.title, 80)}")
     windows = _windows(problem, release)
     layout: dict[str, Any] = {"height_ratios": [2.1, 1]}
     panels = figure.subplots(2, len(windows), sharex="col", sharey="row", squeeze=False, gridspec_kw=layout)
@@ -53,9 +53,9 @@ def along_track_figure(tree: xr.DataTree, law: Law, problem: PooledProblem) -> F
     panels[0, 0].set_ylabel(f"front speed [{unit_text('m s-1')}]")
     panels[0, 0].set_ylim(0, _top(speeds, problem))
     panels[1, 0].set_ylabel("elevation [m]")
-    figure.supxlabel(_axis_label(problem, release), fontsize=8.5)
-    handles, labels = panels[0, -1].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower left", ncols=2)
+    panels[1, -1].set_xlabel("s, the part with recordings [m]")
+    panels[1, 0].set_xlabel(f"s [m], {_release_text(problem, release)}")
+    legend_below(figure, panels[0], columns=2)
     return figure
 
 
@@ -79,10 +79,10 @@ def _windows(problem: PooledProblem, release: float) -> list[tuple[float, float]
     return [whole, (low, high)] if high - low < _ZOOM_BELOW * (length - whole[0]) else [whole]
 
 
-def _axis_label(problem: PooledProblem, release: float) -> str:
+def _release_text(problem: PooledProblem, release: float) -> str:
     n_releases = len(problem.releases)
     which = f", the median of {n_releases} places" if n_releases > 1 else ""
-    return f"s along the track [m]; release at s = {release:.0f} m{which}"
+    return f"release at s = {release:.0f} m{which}"
 
 
 def _speeds(tree: xr.DataTree, law: Law, problem: PooledProblem, release: float) -> FloatArray:
@@ -142,7 +142,7 @@ def _half_width(places: list[float], length: float) -> float:
 
 def _means(axes: Axes, problem: PooledProblem) -> None:
     """Mean and sd as the calibration uses them: events without a reading count for what they say."""
-    label: str | None = "mean and sd of the recordings, as calibrated on"
+    label: str | None = "recorded mean and sd across events (not reached counted in)"
     for column, sensor, middle in _placed(problem):
         mean, sd = float(problem.recorded_mean[column]), float(np.sqrt(problem.covariance[column, column]))
         if sensor.is_span:

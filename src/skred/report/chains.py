@@ -36,7 +36,7 @@ def trace_figure(tree: xr.DataTree, law: Law) -> Figure:
     """
     n = len(law.parameters)
     title = "Chains: traces that overlap and ranks that are level have mixed"
-    figure = new_figure(0.9 + 1.75 * n, f"{title}\n{figure_text(law.title, 60)}\n{gate_text(tree)}")
+    figure = new_figure(0.9 + 1.75 * n, f"{title}\n{figure_text(law.title, 80)}\n{gate_text(tree)}")
     panels = figure.subplots(n, 2, squeeze=False, gridspec_kw={"width_ratios": [1.7, 1]})
     for row, parameter in zip(panels, law.parameters, strict=True):
         chains = chains_of(tree, parameter.name)
@@ -89,6 +89,7 @@ def joint_figure(tree: xr.DataTree, law: Law) -> Figure:
                 axes.remove()
             elif i == j:
                 axes.hist(draws[i], bins=50, color=colour, alpha=0.8)
+                axes.locator_params(axis="x", nbins=5)
                 bare(axes)
             else:
                 _pair(axes, draws[j], draws[i], colour)
@@ -100,7 +101,7 @@ def joint_figure(tree: xr.DataTree, law: Law) -> Figure:
 
 
 def _joint_title(law: Law, draws: list[FloatArray]) -> str:
-    title = f"Joint posterior\n{figure_text(law.title, 60)}"
+    title = f"Joint posterior\n{figure_text(law.title, 80)}"
     if len(draws) == 2 and all(np.ptp(values) > 0 for values in draws):
         first, second = (figure_text(symbol_text(p.symbol)) for p in law.parameters)
         title += f"\ncorrelation of {first} and {second}: {np.corrcoef(draws)[0, 1]:+.2f}; + is the mean"
@@ -111,6 +112,7 @@ def _joint_title(law: Law, draws: list[FloatArray]) -> str:
 
 def _pair(axes: Axes, x: FloatArray, y: FloatArray, colour: str) -> None:
     axes.hist2d(x, y, bins=50, cmap=shade_map(colour))
+    axes.locator_params(nbins=5)
     axes.plot(x.mean(), y.mean(), marker="+", color=INK, markersize=11)
 
 
@@ -120,7 +122,7 @@ def marginals_figure(tree: xr.DataTree, law: Law) -> Figure:
     n = len(law.parameters)
     columns = min(n, 2)
     rows = -(-n // columns)
-    title = f"What the recordings say of each parameter, against the prior\n{figure_text(law.title, 60)}"
+    title = f"What the recordings say of each parameter, against the prior\n{figure_text(law.title, 80)}"
     figure = new_figure(0.9 + 2.4 * rows, title)
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes, parameter in zip(panels, law.parameters, strict=False):
@@ -152,5 +154,6 @@ def _marginal(axes: Axes, draws: FloatArray, prior: FloatArray, colour: str) -> 
     axes.axvline(high, ymax=_LINES, color=INK, linewidth=0.9, linestyle="--")
     axes.set_xlim(grid[0], grid[-1])
     axes.set_ylim(0, axes.get_ylim()[1] / _LINES)
+    axes.locator_params(axis="x", nbins=6)
     axes.legend(loc="upper left", fontsize=7.5)
     bare(axes)

@@ -7,6 +7,14 @@ from typing import TYPE_CHECKING
 
 from skred.report.along_track import along_track_figure
 from skred.report.chains import joint_figure, marginals_figure, trace_figure
+from skred.report.comparing import (
+    elpd_figure,
+    evidence_figure,
+    pareto_k_figure,
+    pointwise_figure,
+    predictions_figure,
+    save_comparison_figures,
+)
 from skred.report.predictive import predictive_figure
 from skred.report.style import write_png
 
@@ -18,9 +26,15 @@ if TYPE_CHECKING:
 
 __all__ = [
     "along_track_figure",
+    "elpd_figure",
+    "evidence_figure",
     "joint_figure",
     "marginals_figure",
+    "pareto_k_figure",
+    "pointwise_figure",
+    "predictions_figure",
     "predictive_figure",
+    "save_comparison_figures",
     "save_model_figures",
     "trace_figure",
 ]

@@ -17,7 +17,7 @@ from skred.report.draws import (
     shown_sensors,
 )
 from skred.report.labels import figure_text
-from skred.report.style import GREY, RECORDED, bare, law_colours, new_figure, styled
+from skred.report.style import GREY, RECORDED, bare, law_colours, legend_below, new_figure, styled
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -39,15 +39,14 @@ def predictive_figure(tree: xr.DataTree, law: Law, problem: PooledProblem) -> Fi
     sensors = shown_sensors(problem.campaign)
     columns = 1 if len(sensors) == 1 else 2 if len(sensors) <= 4 else 3
     rows = -(-len(sensors) // columns)
-    title = f"Predicted against recorded{left_out(problem.campaign)}\n{figure_text(law.title, 60)}"
+    title = f"Predicted against recorded{left_out(problem.campaign)}\n{figure_text(law.title, 80)}"
     figure = new_figure(1.0 + 2.15 * rows, title)
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes, sensor in zip(panels, sensors, strict=False):
         _panel(axes, sensor_draws(tree, problem, sensor), law_colours([law.id])[law.id], small=columns > 2)
     for axes in panels[len(sensors) :]:
         axes.remove()
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower left", ncols=2)
+    legend_below(figure, panels[: len(sensors)], columns=2)
     return figure
 
 
@@ -97,7 +96,7 @@ def _counts(draws: SensorDraws) -> str:
     parts = [f"{len(draws.recorded)} recorded"]
     zeros = int(np.sum(draws.recorded + draws.offset == 0))
     if zeros and not draws.sensor.is_runout:
-        parts[0] += f" ({zeros} of 0)"
+        parts[0] += f" ({zeros} of them 0)"
     if draws.n_not_reached:
         parts.append(f"{draws.n_not_reached} not reached")
     if draws.n_missing:

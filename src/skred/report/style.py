@@ -133,6 +133,15 @@ def bare(axes: Axes) -> None:
     axes.spines["left"].set_visible(False)
 
 
+def legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
+    """One legend for all panels, below them; an entry that several panels have stands once."""
+    entries: dict[str, Any] = {}
+    for axes in panels:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            entries.setdefault(str(label), handle)
+    figure.legend(list(entries.values()), list(entries), loc="outside lower left", ncols=columns)
+
+
 @styled
 def write_png(figure: Figure, file: Path) -> Path:
     """Write a figure as PNG, whole or not at all."""

@@ -129,11 +129,11 @@ def _parameter_rows(tree: xr.DataTree, law: Law) -> list[dict[str, Any]]:
 
 def _response_rows(tree: xr.DataTree, problem: PooledProblem) -> list[dict[str, Any]]:
     """Mean response at each sensor, averaged over the events, beside the recordings' mean."""
-    response = tree["posterior_predictive"]["mean_response"].isel(release=problem.release_of_event)
-    mean_over_events = response.mean("release")
+    response = tree["posterior_predictive"].to_dataset()["mean_response"]
+    mean_over_events = response.isel(release=problem.release_of_event).mean("release")
     rows = []
     for number, sensor in enumerate(problem.campaign.sensors):
-        values = mean_over_events.isel(sensor=number).values
+        values = np.asarray(mean_over_events.isel(sensor=number).to_numpy(), dtype=float)
         low, high = _interval(values)
         recorded = int(problem.observed[:, number].sum())
         rows.append(

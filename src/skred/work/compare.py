@@ -12,7 +12,7 @@ import arviz as az
 import numpy as np
 
 from skred.campaign import Status
-from skred.inference.alpha_beta import alpha_beta
+from skred.inference.alpha_beta import ALPHA_SD_DEG, alpha_beta
 from skred.inference.evidence import evidence
 from skred.inference.leave_one_out import ExactLoo, exact_leave_one_out
 from skred.inference.problem import PooledProblem
@@ -76,14 +76,13 @@ def compare(
         law_folder = folder / law.id
         law_folder.mkdir(exist_ok=True)
         save(calibration.tree, law_folder / "posterior.nc")
-        for file in save_model_figures(calibration.tree, law, problem, law_folder):
-            figures[f"{law.id}/{file.stem}"] = file
+        drawn = save_model_figures(calibration.tree, law, problem, law_folder)
+        figures |= {f"{law.id}/{figure.stem}": figure for figure in drawn}
     comparison = _document(problem, settings, calibration, rank(entries, trees))
     comparison["statement"] = statement(comparison)
     comparison["seconds"] = time.monotonic() - started
     tell("writing the report")
-    for file in save_comparison_figures(comparison, folder):
-        figures[file.stem] = file
+    figures |= {figure.stem: figure for figure in save_comparison_figures(comparison, folder)}
     write_json(folder / "compare.json", comparison)
     write_text(folder / "report.html", render_comparison(comparison, figures))
     return comparison
@@ -177,9 +176,7 @@ def _document(
             "n_events": campaign.n_events,
             "n_sensors": campaign.n_sensors,
             "reference_s_m": campaign.reference_s_m,
-            "readings": {
-                status.name.lower(): int((campaign.status == status).sum()) for status in Status
-            },
+            "readings": {status.name.lower(): int((campaign.status == status).sum()) for status in Status},
         },
         "settings": {
             **settings.as_dict(),
@@ -213,7 +210,7 @@ def alpha_beta_entry(problem: PooledProblem) -> dict[str, Any]:
         "beta_deg": model.beta_deg,
         "alpha_deg": model.alpha_deg,
         "runout_m": model.runout_s_m(reference_s_m=zero),
-        "runout_minus_1sd_m": model.runout_s_m(model.alpha_deg - model.sd_deg, reference_s_m=zero),
+        "runout_minus_1sd_m": model.runout_s_m(model.alpha_deg - ALPHA_SD_DEG, reference_s_m=zero),
         "note": "runouts relative to the campaign's reference" if zero else "runouts as arc length",
     }
     if runouts and np.isfinite(problem.values[:, runouts]).any():

@@ -1,0 +1,251 @@
+"""Figures that set laws side by side, made from the comparison document alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from skred.report.document import PRACTICAL_DIFFERENCE, Document, get, listed, pareto_k_limit, ranked
+from skred.report.draws import MAX_SENSORS
+from skred.report.labels import figure_text, unit_text
+from skred.report.numbers import fixed, floats, is_number
+from skred.report.style import (
+    GREY,
+    INK,
+    PALE,
+    RECORDED,
+    WIDTH,
+    law_colours,
+    law_markers,
+    legend_below,
+    new_figure,
+    styled,
+    write_png,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_MAX_NAMED_EVENTS = 45
+_LOWEST_K = -0.5
+
+
+def save_comparison_figures(comparison: Document, folder: Path) -> dict[str, Path]:
+    """Write the figures that the comparison has numbers for, as PNG.
+
+    Returns
+    -------
+    dict of Path
+        By name: comparison_elpd, pointwise, pareto_k, predictions, evidence.
+    """
+    makers = {
+        "comparison_elpd": elpd_figure,
+        "pointwise": pointwise_figure,
+        "pareto_k": pareto_k_figure,
+        "predictions": predictions_figure,
+        "evidence": evidence_figure,
+    }
+    files = {}
+    for name, make in makers.items():
+        figure = make(comparison)
+        if figure is not None:
+            files[name] = write_png(figure, folder / f"{name}.png")
+    return files
+
+
+def _law_axis(axes: Axes, laws: list[Document]) -> None:
+    """One row per law, best at the top."""
+    axes.set_yticks(range(len(laws)), [figure_text(law["id"], 24) for law in laws])
+    axes.set_ylim(len(laws) - 0.5, -0.5)
+    axes.spines["left"].set_visible(False)
+    axes.tick_params(axis="y", length=0)
+
+
+def _styles(comparison: Document) -> tuple[dict[str, str], dict[str, str]]:
+    ids = [str(law["id"]) for law in listed(comparison, "models")]
+    return law_colours(ids), law_markers(ids)
+
+
+def _typeset(number: float) -> str:
+    """Two decimals, with the minus sign of the axes."""
+    return fixed(number).replace("-", "\N{MINUS SIGN}")
+
+
+@styled
+def elpd_figure(comparison: Document) -> Figure | None:
+    """Differences of elpd to the best law, with their standard errors as given and doubled."""
+    laws = [law for law in ranked(comparison) if is_number(get(law, "difference", "elpd"))]
+    if not laws:
+        return None
+    colours, markers = _styles(comparison)
+    best = figure_text(laws[0]["id"])
+    title = f"How much worse each law predicts an avalanche left out, against {best}"
+    figure = new_figure(1.65 + 0.36 * len(laws), title)
+    axes = figure.subplots()
+    label = f"no practical difference: less than {PRACTICAL_DIFFERENCE:.0f}"
+    axes.axvspan(-PRACTICAL_DIFFERENCE, PRACTICAL_DIFFERENCE, color=PALE, alpha=0.7, linewidth=0, label=label)
+    axes.axvline(0, color=GREY, linewidth=0.8)
+    for row, law in enumerate(laws):
+        difference, se, doubled = floats([get(law, "difference", k) for k in ("elpd", "se", "se_doubled")])
+        colour = colours[law["id"]]
+        axes.hlines(row, difference - doubled, difference + doubled, color=colour, linewidth=1.2)
+        axes.hlines(row, difference - se, difference + se, color=colour, linewidth=4, alpha=0.55)
+        axes.plot(difference, row, marker=markers[law["id"]], color=colour, markersize=6)
+        place = (difference, row)
+        axes.annotate(
+            _typeset(difference), place, (0, 7), textcoords="offset points", ha="center", fontsize=7.5
+        )
+    axes.plot([], [], color=GREY, linewidth=4, alpha=0.55, label="standard error")
+    axes.plot([], [], color=GREY, linewidth=1.2, label="doubled standard error")
+    _law_axis(axes, laws)
+    axes.set_ylim(len(laws) - 0.5, -0.75)
+    axes.set_xlabel("difference of elpd (exact leave-one-event-out) to the best law [nats]")
+    legend_below(figure, [axes], columns=3)
+    return figure
+
+
+@styled
+def pointwise_figure(comparison: Document) -> Figure | None:
+    """Elpd of each event under each law, less that under the best law."""
+    events = listed(comparison, "event_ids")
+    laws = [law for law in ranked(comparison) if len(listed(law, "exact", "pointwise")) == len(events)]
+    if len(laws) < 2 or not events:
+        return None
+    colours, markers = _styles(comparison)
+    best = floats(listed(laws[0], "exact", "pointwise"))
+    title = "Which avalanches decide: below 0 the best law predicted the avalanche better"
+    figure = new_figure(4.0, title)
+    axes = figure.subplots()
+    axes.axhline(0, color=colours[laws[0]["id"]], linewidth=1.2, label=f"{figure_text(laws[0]['id'], 24)} (best)")
+    width = 0.5 if len(events) <= _MAX_NAMED_EVENTS else 0.0
+    for k, law in enumerate(laws[1:]):
+        difference = floats(listed(law, "exact", "pointwise")) - best
+        x = np.arange(len(events)) + width * ((k + 0.5) / (len(laws) - 1) - 0.5)
+        colour, failed = colours[law["id"]], set(map(str, listed(law, "exact", "failed_refits")))
+        axes.vlines(x, 0, difference, color=colour, linewidth=1.0, alpha=0.7)
+        filled = [colour if str(event) not in failed else "#ffffff" for event in events]
+        axes.scatter(x, difference, s=20, c=filled, marker=markers[law["id"]], edgecolors=colour, zorder=3)
+        total = _typeset(float(np.nansum(difference)))
+        axes.scatter([], [], s=20, c=colour, marker=markers[law["id"]], label=f"{figure_text(law['id'], 24)}: sum {total}")
+    if any(listed(law, "exact", "failed_refits") for law in laws):
+        axes.scatter([], [], s=20, c="#ffffff", edgecolors=GREY, label="hollow: the refit failed the gate")
+    _event_axis(axes, events)
+    axes.set_ylabel("elpd of the event\nless that of the best law [nats]")
+    legend_below(figure, [axes], columns=4)
+    return figure
+
+
+def _event_axis(axes: Axes, events: list[Any]) -> None:
+    """Events by name; of many only some are named."""
+    step = -(-len(events) // _MAX_NAMED_EVENTS)
+    places = range(0, len(events), step)
+    axes.set_xticks(places, [figure_text(events[k], 14) for k in places], rotation=90, fontsize=7)
+    axes.set_xlim(-0.7, len(events) - 0.3)
+    axes.set_xlabel("event" if step == 1 else f"event (every {step}th named)")
+    axes.grid(axis="x")
+
+
+@styled
+def pareto_k_figure(comparison: Document) -> Figure | None:
+    """Pareto k of each event under each law: where importance sampling cannot be trusted."""
+    events = listed(comparison, "event_ids")
+    laws = [law for law in ranked(comparison) if len(listed(law, "loo", "pareto_k")) == len(events)]
+    if not laws or not events:
+        return None
+    colours, markers = _styles(comparison)
+    limit = pareto_k_limit(comparison)
+    figure = new_figure(3.5, "Pareto k: avalanches above the line need an exact refit")
+    axes = figure.subplots()
+    axes.axhline(limit, color=INK, linewidth=1.0, linestyle="--", label=f"limit {limit:.2f}")
+    for law in laws:
+        k = np.maximum(floats(listed(law, "loo", "pareto_k")), _LOWEST_K)
+        label = figure_text(law["id"], 24)
+        axes.scatter(
+            np.arange(len(events)), k, s=18, c=colours[law["id"]], marker=markers[law["id"]], label=label, alpha=0.85
+        )
+    axes.set_ylim(_LOWEST_K - 0.06, max(axes.get_ylim()[1], limit + 0.15))
+    _event_axis(axes, events)
+    axes.set_ylabel(f"Pareto k (below {_LOWEST_K} drawn there)")
+    legend_below(figure, [axes], columns=5)
+    return figure
+
+
+@styled
+def predictions_figure(comparison: Document) -> Figure | None:
+    """Interval of each law's mean response at each sensor, against the recorded mean."""
+    laws = [law for law in ranked(comparison) if listed(law, "response")]
+    if not laws:
+        return None
+    sensors = [(entry["sensor"], entry["unit"]) for entry in listed(laws[0], "response")]
+    shown = sensors[:MAX_SENSORS]
+    columns = 1 if len(shown) == 1 else 2 if len(shown) <= 4 else 3
+    rows = -(-len(shown) // columns)
+    more = f" (the first {MAX_SENSORS} of {len(sensors)} sensors)" if len(shown) < len(sensors) else ""
+    title = f"Mean response of each law against the recorded mean{more}"
+    figure = new_figure(0.9 + rows * (0.75 + 0.24 * len(laws)), title, width=WIDTH)
+    panels = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
+    for axes, (sensor, unit) in zip(panels, shown, strict=False):
+        _responses(axes, comparison, laws, sensor, unit)
+    for axes in panels[len(shown) :]:
+        axes.remove()
+    legend_below(figure, panels[: len(shown)], columns=3)
+    return figure
+
+
+def _responses(axes: Axes, comparison: Document, laws: list[Document], sensor: str, unit: str) -> None:
+    colours, markers = _styles(comparison)
+    reference = get(comparison, "campaign", "reference_s_m")
+    from_reference = unit == "m" and is_number(reference)
+    offset = float(reference) if from_reference else 0.0
+    percent = 100 * (get(comparison, "interval", "probability") or 0.9)
+    keys = ("mean", "low", "high", "recorded_mean", "recorded_se")
+    for row, law in enumerate(laws):
+        found = [entry for entry in listed(law, "response") if entry["sensor"] == sensor]
+        mean, low, high, recorded, se = floats([get(found[0], key) for key in keys] if found else [None] * 5)
+        if row == 0 and np.isfinite(recorded):
+            axes.axvline(recorded - offset, color=RECORDED, linewidth=1.2, label="recorded mean")
+            if np.isfinite(se):
+                left, right = recorded - se - offset, recorded + se - offset
+                axes.axvspan(left, right, color=GREY, alpha=0.25, linewidth=0, label="its standard error")
+        colour = colours[law["id"]]
+        axes.hlines(row, low - offset, high - offset, color=colour, linewidth=2.2)
+        axes.plot(mean - offset, row, marker=markers[law["id"]], color=colour, markersize=5)
+    axes.plot([], [], color=GREY, linewidth=2.2, label=f"mean response, {percent:.0f} % interval")
+    _law_axis(axes, laws)
+    axes.locator_params(axis="x", nbins=6)
+    axes.set_title(figure_text(sensor, 30))
+    quantity = "relative to the reference " if from_reference else ""
+    axes.set_xlabel(f"{quantity}[{figure_text(unit_text(unit), 20)}]")
+
+
+@styled
+def evidence_figure(comparison: Document) -> Figure | None:
+    """Log evidence of each law, each seed a point."""
+    laws = [law for law in ranked(comparison) if is_number(get(law, "evidence", "mean"))]
+    if not laws:
+        return None
+    colours, markers = _styles(comparison)
+    title = "Evidence: how well each law with its prior foretold the recordings (right is better)"
+    figure = new_figure(1.3 + 0.34 * len(laws), title)
+    axes = figure.subplots()
+    for row, law in enumerate(laws):
+        seeds = floats(listed(law, "evidence", "log_evidence"))
+        mean = float(get(law, "evidence", "mean"))
+        colour = colours[law["id"]]
+        axes.scatter(
+            seeds, np.full(len(seeds), row), s=26, facecolors="none", edgecolors=colour, marker=markers[law["id"]]
+        )
+        axes.plot([mean, mean], [row - 0.28, row + 0.28], color=colour, linewidth=1.6)
+        axes.annotate(_typeset(mean), (mean, row - 0.3), ha="center", va="bottom", fontsize=7.5)
+    axes.scatter([], [], s=26, facecolors="none", edgecolors=GREY, label="one seed of SMC")
+    axes.plot([], [], color=GREY, linewidth=1.6, label="mean over the seeds")
+    _law_axis(axes, laws)
+    axes.set_ylim(len(laws) - 0.5, -0.85)
+    axes.margins(x=0.08)
+    axes.set_xlabel("log evidence [nats]")
+    axes.ticklabel_format(axis="x", useOffset=False)
+    legend_below(figure, [axes], columns=2)
+    return figure
