@@ -77,7 +77,7 @@ def sample_posterior(
             )
         if settings.sampler == "nuts":
             step = pm.NUTS(model=model)
-        return pm.sample(
+        tree = pm.sample(
             draws=settings.draws,
             tune=settings.tune,
             chains=settings.chains,
@@ -88,6 +88,10 @@ def sample_posterior(
             progressbar=progress,
             compute_convergence_checks=False,
         )
+    sizes = tree["posterior"].sizes
+    if (sizes["chain"], sizes["draw"]) != (settings.chains, settings.draws):
+        raise KeyboardInterrupt  # PyMC swallows it and hands over what there is, as if it were whole
+    return tree
 
 
 def _starts(law: Law, problem: PooledProblem, prior: xr.Dataset, chains: int) -> list[dict[str, Any]]:

@@ -24,14 +24,14 @@ def comparison_table(comparison: doc.Document) -> Table:
     table = _table(
         _text(f"{shortened(doc.get(comparison, 'campaign', 'name'), 60)}: laws compared by leave-one-event-out"),
         left=("law",),
-        right=("exact elpd", "difference", "se", "doubled", "counts", "LOO", "max k", "WAIC", "log evidence", "weight"),
+        right=("exact\nelpd", "differ-\nence", "2 se", "counts", "LOO", "max\nk", "WAIC", "log evi-\ndence", "weight"),
     )
     ranked = doc.ranked(comparison)
     for place, model in enumerate(ranked):
         table.add_row(*_ranked_row(model, best=place == 0))
     failed = doc.failed(comparison)
     for model in failed:
-        table.add_row(_text(shortened(doc.get(model, "id"))), _text("gate failed", "red"), *["-"] * 9)
+        table.add_row(_text(shortened(doc.get(model, "id"))), _text("gate failed", "red"), *["-"] * 8)
     table.caption = _text("\n".join([_explanation(comparison), *map(_failure, failed)]))
     table.caption_justify = "left"
     return table
@@ -49,8 +49,8 @@ def summary_table(model: doc.Document, *, probability: float = 0.9) -> Table:
     """
     table = _table(
         _text(shortened(doc.get(model, "title") or doc.get(model, "id") or "", 76)),
-        left=("parameter", "symbol", "unit"),
-        right=("mean", "sd", f"{100 * probability:.0f} % interval", "ESS bulk", "ESS tail", "r-hat"),
+        left=("parameter", "symbol\n(paper)", "unit"),
+        right=("mean", "sd", f"{100 * probability:.0f} % interval", "ESS\nbulk", "ESS\ntail", "r-hat"),
     )
     for parameter in doc.listed(model, "parameters"):
         table.add_row(*_parameter_row(parameter))
@@ -64,11 +64,11 @@ def _table(title: Text, left: tuple[str, ...], right: tuple[str, ...]) -> Table:
     from rich import box
     from rich.table import Table
 
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
     for name in left:
         table.add_column(name, overflow="fold")
     for name in right:
-        table.add_column(name, justify="right")
+        table.add_column(name, justify="right", no_wrap=True)  # a number cut short is a wrong number
     return table
 
 
@@ -84,9 +84,8 @@ def _ranked_row(model: doc.Document, *, best: bool) -> list[Any]:
     counts = "best" if best else {True: "yes", False: "no"}.get(practical, "n/a")
     return [
         _text(shortened(doc.get(model, "id"))),
-        f"{fixed(doc.get(model, 'exact', 'elpd'))} ± {fixed(doc.get(model, 'exact', 'se'))}",
+        fixed(doc.get(model, "exact", "elpd")),
         fixed(doc.get(model, "difference", "elpd")),
-        fixed(doc.get(model, "difference", "se")),
         fixed(doc.get(model, "difference", "se_doubled")),
         counts,
         fixed(doc.get(model, "loo", "elpd")),
@@ -102,8 +101,9 @@ def _explanation(comparison: doc.Document) -> str:
     few = f" with {whole(n_events)} events" if is_number(n_events) and n_events < 100 else ""
     limit = f"{doc.PRACTICAL_DIFFERENCE:.0f}"
     return (
-        f"elpd in nats, larger is better. A difference counts if it is at least {limit} and exceeds its doubled "
-        f"standard error (the plain one is optimistic{few}). Weight: stacking, a share."
+        f"elpd in nats, larger is better; exact: refitted without each event. 2 se: doubled standard error of the "
+        f"difference (the plain one is optimistic{few}). A difference counts if it is at least {limit} and "
+        "exceeds 2 se. Weight: stacking, a share."
     )
 
 
@@ -116,7 +116,7 @@ def _parameter_row(parameter: doc.Document) -> list[Any]:
     sd = doc.get(parameter, "sd")
     by_sd, by_both = decimals_for(sd), decimals_for(sd, doc.get(parameter, "mcse_mean"))
     paper = doc.get(parameter, "paper_symbol")
-    symbol = f"{doc.get(parameter, 'symbol')}" + (f" (paper: {paper})" if paper else "")
+    symbol = f"{doc.get(parameter, 'symbol')}" + (f" ({paper})" if paper else "")
     low, high = (rounded(doc.get(parameter, key), by_sd) for key in ("low", "high"))
     return [
         _text(shortened(doc.get(parameter, "name"))),
@@ -127,7 +127,7 @@ def _parameter_row(parameter: doc.Document) -> list[Any]:
         f"{low} to {high}",
         whole(doc.get(parameter, "ess_bulk")),
         whole(doc.get(parameter, "ess_tail")),
-        fixed(doc.get(parameter, "r_hat"), 4),
+        fixed(doc.get(parameter, "r_hat"), 3),
     ]
 
 
