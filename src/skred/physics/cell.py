@@ -219,7 +219,10 @@ def _threshold(cell):  # type: ignore[no-untyped-def]
 
 @compiled()
 def _end_of_phase(v, length, a, b, threshold, on):  # type: ignore[no-untyped-def]
-    """Follow dv/ds = a - b v until something ends it: returns (v, distance, how it ended)."""
+    """Follow dv/ds = a - b v until something ends it: returns (v, distance, how it ended).
+
+    After a switch the threshold is inf: there is no second one.
+    """
     end = step_v(v, length, a, b)
     # The switch first: a front above the ground cannot stop before it is back on it.
     if (on and end > threshold) or (not on and end < threshold):
@@ -227,12 +230,6 @@ def _end_of_phase(v, length, a, b, threshold, on):  # type: ignore[no-untyped-de
     if end <= 0.0:
         return 0.0, min(distance_to(v, 0.0, a, b), length), STOPPED
     return end, length, COVERED
-
-
-@compiled()
-def _second_phase(v, length, a, b):  # type: ignore[no-untyped-def]
-    """As `_end_of_phase` after a switch; there is no second one."""
-    return _end_of_phase(v, length, a, b, np.inf, True)
 
 
 @compiled()
@@ -275,9 +272,9 @@ def cross(v, length, section, clock, cell):  # type: ignore[no-untyped-def]
     # At most two phases: v is monotone within a cell.
     a, b = _coefficients(end, section - distance, cell, not on)
     v, switch = end, distance
-    end, distance, ended = _second_phase(v, length - switch, a, b)
+    end, distance, ended = _end_of_phase(v, length - switch, a, b, np.inf, True)
     if clock < length:
-        time = max(time, 0.0) + _duration(v, end, distance, max(clock - switch, 0.0), a, b)
+        time += _duration(v, end, distance, max(clock - switch, 0.0), a, b)
     return end, switch + distance, ended == STOPPED, time
 
 
@@ -400,7 +397,7 @@ def cross_tangents(  # type: ignore[no-untyped-def]
         return end, distance, ended == STOPPED
     a, b = _coefficients(end, section - distance, cell, not on)
     v, switch = end, distance
-    end, distance, ended = _second_phase(v, length - switch, a, b)
+    end, distance, ended = _end_of_phase(v, length - switch, a, b, np.inf, True)
     _phase_tangents(
         v, end, section - switch, distance, ended, max(clock - switch, 0.0), a, b, cell, not on,
         columns, profiles, i, dv, shift, d_time,

@@ -29,7 +29,7 @@ from skred.physics.compiled import compiled
 from skred.physics.inputs import cell_of
 
 _FAST = {"contract", "nsz", "arcp", "nnan"}
-_MAX_HALVINGS = 10
+_MAX_HALVINGS = 60
 DRIVE, WEIGHT, BEND, DOUBLE = 0, 1, 2, 3
 """Rows of the scaled ground: 2 g sin(phi), 2 g cos(phi), 2 kappa and 2, times the cell's length."""
 _ONE, _TWO = np.uint64(1), np.uint64(2)
@@ -206,12 +206,10 @@ def march(  # type: ignore[no-untyped-def]
         v[edge_above] = 0.0
     i, start, stopped, s = first, release, False, release
     while not stopped and i < n_cells:
-        if i > first and not speed_terms:
-            i = _recur(i, keep, gain, limits, v)
+        if i > first:
+            i = i if speed_terms else _recur(i, keep, gain, limits, v)
             if i == n_cells:
                 break
-            start = edge[i]
-        elif i > first:
             start = edge[i]
         cell = cell_at(i, ground, table, u_c, speed_terms)
         end = edge[i + 1]

@@ -20,16 +20,19 @@ def _contact_law(i, ground, table):  # type: ignore[no-untyped-def]
 
 
 @compiled()
+def _regular_speed(length, i, ground, table, v):  # type: ignore[no-untyped-def]
+    """Front speed [m/s] `length` metres into a cell in which nothing happens."""
+    a, b = _contact_law(i, ground, table)
+    return np.sqrt(max(v[i] + (a - b * v[i]) * length * phi1(b * length), 0.0))
+
+
+@compiled()
 def speed_at(  # type: ignore[no-untyped-def]
-    place, i, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms, table, v
+    place, i, release, runout, first, edge, ground, barriers, u_c, speed_terms, table, v
 ):
     """Front speed [m/s] on arrival at a place in cell i; 0 where the front does not come."""
     if not release < place <= runout:
         return 0.0
-    if is_regular(i, first, limits, speed_terms, v):
-        a, b = _contact_law(i, ground, table)
-        length = place - edge[i]
-        return np.sqrt(v[i] + (a - b * v[i]) * length * phi1(b * length))
     cell = cell_at(i, ground, table, u_c, speed_terms)
     start = release if i == first else edge[i]
     return np.sqrt(travel(v[i], start, place, edge[i + 1], np.inf, cell, barriers)[0])
@@ -69,9 +72,12 @@ def read(  # type: ignore[no-untyped-def]
         s_from, s_to, i = sensors[j, 1], sensors[j, 2], cells[j]
         if sensors[j, 0] == RUNOUT:
             readings[run, j] = runout
+        elif s_from == s_to and s_from <= runout and is_regular(i, first, limits, speed_terms, v):
+            # Apart from the general case, whose handling of arrays would cost as much again.
+            readings[run, j] = _regular_speed(s_from - edge[i], i, ground, table, v)
         elif s_from == s_to:
             readings[run, j] = speed_at(
-                s_from, i, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms, table, v
+                s_from, i, release, runout, first, edge, ground, barriers, u_c, speed_terms, table, v
             )
         else:
             readings[run, j] = span_speed(
@@ -82,15 +88,14 @@ def read(  # type: ignore[no-untyped-def]
 
 @compiled()
 def _regular_speed_tangents(  # type: ignore[no-untyped-def]
-    length, i, ground, table, columns, profiles, v, dv, tangents
+    speed, length, i, ground, table, columns, profiles, v, dv, tangents
 ):
-    """Tangents of the speed `length` metres into a cell in which nothing happens."""
+    """Tangents of `speed`, `length` metres into a cell in which nothing happens."""
     a, b = _contact_law(i, ground, table)
     x = b * length
     by_source = 2.0 * length * phi1(x)
     keep = 1.0 - 0.5 * b * by_source
     by_decay = 2.0 * length * (keep * v[i] + a * length * psi(x))
-    halved = 0.5 / np.sqrt(v[i] + 0.5 * (a - b * v[i]) * by_source)
     for k in range(tangents.size):
         change = keep * dv[k, i]
         if k < columns.size:
@@ -101,7 +106,7 @@ def _regular_speed_tangents(  # type: ignore[no-untyped-def]
             else:
                 friction = GRAVITY * ground[1, i] * by_source + ground[2, i] * by_decay
                 change -= friction * profiles[k, i]
-        tangents[k] = halved * change
+        tangents[k] = 0.5 * change / speed
 
 
 @compiled()
@@ -142,7 +147,9 @@ def read_tangents(  # type: ignore[no-untyped-def]
                 columns, profiles, table, v, dv, step, shift, d_time, tangents,
             )  # fmt: skip
         elif is_regular(i, first, limits, speed_terms, v):
-            _regular_speed_tangents(s_from - edge[i], i, ground, table, columns, profiles, v, dv, tangents)
+            _regular_speed_tangents(
+                speed, s_from - edge[i], i, ground, table, columns, profiles, v, dv, tangents
+            )
         else:
             start = start_tangents(i, first, release, edge, dv, step, shift)
             cell = cell_at(i, ground, table, u_c, speed_terms)

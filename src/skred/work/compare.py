@@ -82,7 +82,7 @@ def compare(
     comparison["statement"] = statement(comparison)
     comparison["seconds"] = time.monotonic() - started
     tell("writing the report")
-    figures |= {figure.stem: figure for figure in save_comparison_figures(comparison, folder)}
+    figures |= save_comparison_figures(comparison, folder)
     write_json(folder / "compare.json", comparison)
     write_text(folder / "report.html", render_comparison(comparison, figures))
     return comparison

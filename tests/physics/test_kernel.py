@@ -1,0 +1,292 @@
+"""The kernel against the plain reference: the same scheme, written twice.
+
+Also terms in U agree to rounding, because both freeze them over the same stretch: from edge to edge, cut at
+the release, at barriers and where the normal force switches. Both agree with the equation of motion itself
+only to second order there (`test_reference.py` holds the reference against an integrator in time).
+"""
+
+from __future__ import annotations
+
+import inspect
+import shutil
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from numba.core.caching import CacheImpl
+from numpy.testing import assert_allclose
+from test_reference import counter_slope, plane, roll_over_slope, terrain_from_slope
+
+from skred.campaign import find_campaign, read_campaign
+from skred.physics import compiled
+from skred.physics.columns import GRAVITY, Column
+from skred.physics.geometry import path_of, sensor_table
+from skred.physics.inputs import make_contributions
+from skred.physics.kernel import front_speeds, simulate, simulate_with_jacobian
+from skred.physics.reference import read_front, run_front
+from skred.physics.terrain import Terrain, build_terrain
+
+WEAKENING_SPEED = 8.0
+COLUMNS = np.arange(len(Column))
+
+
+def _ryggfonn() -> Terrain:
+    track = read_campaign(find_campaign("ryggfonn")).track
+    return build_terrain(track.x_m, track.z_m)
+
+
+def _rough() -> Terrain:
+    """Random slopes and curvatures far beyond any track's: the normal force goes off and on again."""
+    rng = np.random.default_rng(8)
+    edges = np.concatenate([[0.0], np.cumsum(rng.uniform(0.5, 20.0, 80))])
+    phi = np.radians(rng.uniform(-25.0, 70.0, 80))
+    return Terrain(edges, np.sin(phi), np.cos(phi), rng.normal(0.0, 0.05, 80))
+
+
+TERRAINS = {
+    "ryggfonn": _ryggfonn(),
+    "roll over": terrain_from_slope(roll_over_slope, 900.0, 90),
+    "counter slope": terrain_from_slope(counter_slope, 1200.0, 100),
+    "rough": _rough(),
+    "plane of one cell": plane(30.0, 100.0, 1),
+}
+POINTS = np.array([0.0, 0.02, 0.11, 0.25, 0.371, 0.5, 0.6, 0.77, 0.86, 0.999, 1.0])
+
+
+@dataclass(frozen=True)
+class Case:
+    """A front: five strengths in the order of `Column`, its release, and barriers."""
+
+    terrain: str
+    strengths: tuple[float, ...]
+    release_s_m: float
+    barriers: tuple[tuple[float, float, float], ...] = ()
+    sensors: tuple[tuple[str, float, float], ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Points and spans over the whole track, at edges and inside cells, and the runout."""
+        edges = TERRAINS[self.terrain].edge_s_m
+        places = np.sort(np.concatenate([POINTS * edges[-1], edges[[0, len(edges) // 2, -1]]]))
+        places = np.unique(np.append(places, [self.release_s_m, *(place for place, _, _ in self.barriers)]))
+        points = [("point", s, s) for s in places]
+        spans = [
+            ("span", s, t) for s, t in zip(places[:-2], places[2:], strict=True) if s != self.release_s_m
+        ]
+        object.__setattr__(self, "sensors", (*points, *spans, ("runout", 0.0, 0.0)))
+
+    def kernel(self) -> tuple[np.ndarray, np.ndarray]:
+        """Readings and jacobian."""
+        terrain = TERRAINS[self.terrain]
+        law = make_contributions(COLUMNS, np.ones((5, terrain.n_cells)), WEAKENING_SPEED)
+        if self.strengths[Column.LINEAR] == self.strengths[Column.WEAKENING] == 0:
+            law = law._replace(speed_terms=False)
+        table = sensor_table([None if kind == "runout" else (s, t) for kind, s, t in self.sensors])
+        arguments = (
+            np.array([self.strengths]),
+            np.array([self.release_s_m]),
+            path_of(terrain, self.barriers),
+            law,
+            table,
+        )
+        readings, jacobian = simulate_with_jacobian(*arguments)
+        np.testing.assert_array_equal(simulate(*arguments), readings)
+        return readings[0], jacobian[0]
+
+    def reference(self, along: int | None = None) -> np.ndarray:
+        """Readings, or their derivative by a strength (or the release, number 5) by a complex step."""
+        step = 0.0 if along is None else 1e-40j
+        strengths = [value + step * (k == along) for k, value in enumerate(self.strengths)]
+        readings = read_front(
+            TERRAINS[self.terrain],
+            np.repeat(np.array(strengths)[:, None], TERRAINS[self.terrain].n_cells, axis=1),
+            self.release_s_m + step * (along == 5),
+            self.sensors,
+            weakening_speed=WEAKENING_SPEED,
+            barriers=self.barriers,
+        )
+        return readings if along is None else readings.imag / 1e-40
+
+    def settled(self) -> np.ndarray:
+        """Readings for which rounding decides nothing: not within a millimetre of the stop."""
+        runout = run_front(
+            TERRAINS[self.terrain],
+            np.repeat(np.array(self.strengths)[:, None], TERRAINS[self.terrain].n_cells, axis=1),
+            self.release_s_m,
+            weakening_speed=WEAKENING_SPEED,
+            barriers=self.barriers,
+        ).runout_s_m
+        at_barrier = [place for place, _, _ in self.barriers]
+        ends = np.array([t for _, _, t in self.sensors])
+        return (abs(ends - runout) > 1e-3) | np.isin(ends, at_barrier) | (ends == runout)
+
+
+@st.composite
+def cases(draw: st.DrawFn, speed_terms: bool = True) -> Case:
+    """Fronts over the prior range, with releases and barriers anywhere, at edges and ends as well."""
+    name = draw(st.sampled_from(sorted(TERRAINS)))
+    edges = TERRAINS[name].edge_s_m.tolist()
+    place = st.one_of(st.sampled_from(edges), st.floats(0.0, edges[-1]))
+
+    def strength(largest: float) -> float:
+        return draw(st.one_of(st.just(0.0), st.floats(0.0, largest / 10), st.floats(0.0, largest)))
+
+    largest = (12.0, 0.3 * speed_terms, 0.04, 1.5, 0.5 * speed_terms)
+    strengths = tuple(strength(value) if value > 0 else 0.0 for value in largest)
+    barrier = st.tuples(place, st.floats(0.0, 20.0), st.sampled_from([0.0, 10.0, 60.0]))
+    release = draw(st.one_of(st.sampled_from([0.0, edges[-1]]), place))
+    return Case(name, strengths, release, tuple(sorted(draw(st.lists(barrier, max_size=3)))))
+
+
+SLIPPERY = (0.0, 0.0, 0.0, 0.05, 0.0)
+BARRIER_AT_RELEASE = Case("counter slope", SLIPPERY, 60.0, ((60.0, 5.0, 1.0), (600.0, 2.0, 10.0)))
+
+
+def compare(case: Case) -> None:
+    expected, (readings, jacobian) = case.reference(), case.kernel()
+    assert np.all(np.isfinite(readings)) and np.all(np.isfinite(jacobian))
+    settled = case.settled()
+    assert_allclose(readings[settled], expected[settled], rtol=1e-10, atol=1e-9)
+
+
+@settings(max_examples=250, deadline=None, derandomize=True)
+@given(cases(speed_terms=False))
+@example(BARRIER_AT_RELEASE)
+def test_closed_forms_agree_with_the_reference(case: Case) -> None:
+    compare(case)
+
+
+@settings(max_examples=80, deadline=None, derandomize=True)
+@given(cases())
+def test_terms_in_speed_agree_with_the_reference(case: Case) -> None:
+    compare(case)
+
+
+def directed(terrain: str, release: float, barriers: tuple = (), **columns: float) -> Case:
+    return Case(terrain, tuple(columns.get(c.name.lower(), 0.0) for c in Column), release, barriers)
+
+
+DIRECTED = {
+    "pcm": directed("ryggfonn", 0.0, friction=0.26, quadratic=3e-3),
+    "all terms": directed(
+        "ryggfonn", 3.3, constant=0.5, linear=0.02, quadratic=1e-3, friction=0.15, weakening=0.1
+    ),
+    "viscous": directed("ryggfonn", 0.0, friction=0.25, linear=0.05),
+    "weakening": directed("ryggfonn", 17.0, friction=0.15, weakening=0.2, quadratic=1e-3),
+    "ballistic on a real track": directed("ryggfonn", 0.0, friction=0.15),
+    "beyond the series": directed("ryggfonn", 0.0, friction=0.2, quadratic=0.3),
+    "far beyond the series": directed("ryggfonn", 0.0, quadratic=80.0),
+    "switch": directed("roll over", 11.0, friction=0.2),
+    "switch with terms in U": directed("roll over", 11.0, friction=0.2, linear=0.02, weakening=0.05),
+    "switch within cells": directed("rough", 3.0, friction=0.3, quadratic=2e-3),
+    "stop on the counter slope": directed("counter slope", 7.0, friction=0.1),
+    "barrier passed": directed("counter slope", 7.0, ((303.0, 3.0, 20.0),), friction=0.1, linear=0.01),
+    "several in one cell": directed(
+        "counter slope", 7.0, ((303.0, 3.0, 20.0), (303.0, 3.0, 10.0), (305.0, 2.0, 5.0)), friction=0.1
+    ),
+    "barrier in the cell of release": directed(
+        "counter slope", 61.0, ((62.0, 0.1, 0.5),), friction=0.05, linear=0.05
+    ),
+    "barrier at an edge": directed("counter slope", 7.0, ((300.0, 3.0, 20.0),), friction=0.1),
+    "barrier that stops": directed("counter slope", 7.0, ((300.0, 80.0, 0.0),), friction=0.1),
+    "barrier beyond the stop": directed("counter slope", 7.0, ((1150.0, 3.0, 20.0),), friction=0.25),
+    "barrier at the end": directed("roll over", 7.0, ((900.0, 1.0, 2.0),), friction=0.1),
+    "never starts": directed("ryggfonn", 100.0, friction=1.5),
+    "one cell": directed("plane of one cell", 12.0, friction=0.2, quadratic=2e-3, linear=0.1),
+}
+
+
+@pytest.mark.parametrize("name", DIRECTED)
+def test_readings_and_jacobian_agree_with_the_reference(name: str) -> None:
+    case = DIRECTED[name]
+    compare(case)
+    jacobian, settled = case.kernel()[1], case.settled()
+    # A span that starts at the release has an infinite derivative by it, a point there none.
+    settled &= [case.release_s_m not in (s, t) for _, s, t in case.sensors]
+    speed_terms = case.strengths[Column.LINEAR] + case.strengths[Column.WEAKENING] > 0
+    for k in range(6):
+        if k in (Column.LINEAR, Column.WEAKENING) and not speed_terms:
+            continue
+        expected = case.reference(k)[settled]
+        scale = np.abs(expected).max(initial=0.0)
+        assert_allclose(jacobian[settled, k], expected, rtol=1e-8, atol=1e-9 * scale + 1e-30)
+
+
+@settings(max_examples=100, deadline=None, derandomize=True)
+@given(cases(speed_terms=False))
+def test_jacobian_agrees_with_a_complex_step_of_the_reference(case: Case) -> None:
+    jacobian, settled = case.kernel()[1], case.settled()
+    settled &= [case.release_s_m not in (s, t) for _, s, t in case.sensors]
+    for k in (Column.CONSTANT, Column.QUADRATIC, Column.FRICTION, 5):
+        expected = case.reference(k)[settled]
+        scale = max(np.abs(expected).max(initial=0.0), 1e-3)
+        assert_allclose(jacobian[settled, k], expected, rtol=1e-7, atol=1e-8 * scale)
+
+
+def test_front_speeds_are_those_of_the_reference() -> None:
+    case = DIRECTED["switch"]
+    terrain = TERRAINS[case.terrain]
+    law = make_contributions(COLUMNS, np.ones((5, terrain.n_cells)), WEAKENING_SPEED)
+    path = path_of(terrain)
+    speeds = front_speeds(np.array([case.strengths]), np.array([case.release_s_m]), path, law)[0]
+    table = np.repeat(np.array(case.strengths)[:, None], terrain.n_cells, axis=1)
+    run = run_front(terrain, table, case.release_s_m)
+    assert_allclose(speeds, np.sqrt(run.edge_speed_squared), rtol=1e-10)
+    airborne = GRAVITY * terrain.cos_slope + terrain.curvature * speeds[:-1] ** 2 < 0
+    assert 0 < airborne.sum() < np.count_nonzero(speeds)
+
+
+def test_profiles_of_one_column_add_up() -> None:
+    terrain = TERRAINS["ryggfonn"]
+    ramp = np.linspace(0.0, 1.0, terrain.n_cells)
+    law = make_contributions(np.array([3, 2, 3]), np.array([ramp, ramp, 1 - ramp]), WEAKENING_SPEED)
+    strengths, sensors = np.array([[0.3, 2e-3, 0.2]]), sensor_table([(1650.0, 1650.0), None])
+    readings, jacobian = simulate_with_jacobian(strengths, np.zeros(1), path_of(terrain), law, sensors)
+
+    def reference(step: np.ndarray) -> np.ndarray:
+        a, d, b = strengths[0] + step
+        table = np.zeros((5, terrain.n_cells), dtype=complex)
+        table[Column.QUADRATIC], table[Column.FRICTION] = d * ramp, a * ramp + b * (1 - ramp)
+        return read_front(terrain, table, 0.0, [("point", 1650.0, 1650.0), ("runout", 0.0, 0.0)])
+
+    assert_allclose(readings[0], reference(np.zeros(3)).real, rtol=1e-11)
+    derivatives = np.array([reference(row).imag for row in np.eye(3) * 1e-40j]).T / 1e-40
+    assert_allclose(jacobian[0, :, :3], derivatives, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", TERRAINS)
+def test_the_far_corner_of_the_prior_is_finite(name: str) -> None:
+    terrain = TERRAINS[name]
+    rng = np.random.default_rng(4)
+    strengths = 10.0 ** rng.uniform(-6.0, 3.0, (300, 5))
+    strengths[rng.random(strengths.shape) < 0.4] = 0.0
+    releases = rng.uniform(0.0, terrain.length_m, 300)
+    law = make_contributions(COLUMNS, np.ones((5, terrain.n_cells)), WEAKENING_SPEED)
+    end = terrain.length_m
+    sensors = sensor_table([(0.5 * end, 0.5 * end), (0.3 * end, 0.9 * end), None])
+    for speed_terms in (True, False):
+        readings, jacobian = simulate_with_jacobian(
+            strengths, releases, path_of(terrain), law._replace(speed_terms=speed_terms), sensors
+        )
+        assert np.all(np.isfinite(readings)) and np.all(np.isfinite(jacobian))
+        assert np.all(readings >= 0.0) and np.all(readings[:, 2] >= releases)
+        assert np.all(readings[:, 2] <= end)
+
+
+def test_compiled_code_is_cached_under_the_source_of_the_whole_ring(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Numba stamps a function with its own file only: a change in a callee's file would go unnoticed."""
+    file = inspect.getsourcefile(simulate.py_func)
+    locators = (kind.from_function(simulate.py_func, file) for kind in CacheImpl._locator_classes)
+    chosen = next(locator for locator in locators if locator is not None)
+    assert chosen.get_source_stamp() == compiled.KERNEL_FINGERPRINT
+    for source in compiled._FOLDER.glob("*.py"):
+        shutil.copy(source, tmp_path)
+    monkeypatch.setattr(compiled, "_FOLDER", tmp_path)
+    assert compiled._fingerprint() == compiled.KERNEL_FINGERPRINT
+    with open(tmp_path / "cell.py", "a") as callee:
+        callee.write("# changed\n")
+    assert compiled._fingerprint() != compiled.KERNEL_FINGERPRINT
