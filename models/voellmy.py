@@ -48,6 +48,7 @@ LAW = Law(
     build=build,
     reference="Voellmy (1955); Salm (1993), Annals of Glaciology 18, 221-226",
     strengths=strengths,
+    relation="D = g / (xi h)",
 )
 
 if __name__ == "__main__":

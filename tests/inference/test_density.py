@@ -131,7 +131,6 @@ def test_too_many_sensors_not_reached_are_refused() -> None:
         pooled_arrays(values, np.isfinite(values), not_reached, np.zeros(2, dtype=np.int64), COVARIANCE)
 
 
-@pytest.mark.xfail(strict=True, reason="the quadrature does not take the tightest bound first")
 def test_tightest_bound_last() -> None:
     """A sensor whose latent reading is far above zero, below others that are nearly at it."""
     values = np.where([True, False, False, False, False, False], READINGS, np.nan)[None]

@@ -58,7 +58,7 @@ class ArrayOp(Op):
         """Evaluate without PyTensor's numba backend."""
         output_storage[0][0] = self.evaluate(inputs)
 
-    def infer_shape(self, fgraph: Any, node: Apply, input_shapes: Any) -> list[tuple[Any, ...]]:
+    def infer_shape(self, node: Apply, input_shapes: Any) -> list[tuple[Any, ...]]:
         """Shape without evaluating."""
         return [self.output_shape(input_shapes)]
 

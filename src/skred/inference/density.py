@@ -8,6 +8,8 @@ ones, are all at most 0.
 from __future__ import annotations
 
 import math
+from hashlib import sha256
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -23,8 +25,8 @@ MAX_NOT_REACHED = 4
 _NODE, _WEIGHT = (np.ascontiguousarray(a) for a in roots_legendre(24))
 _SQRT_HALF = math.sqrt(0.5)
 _INV_SQRT_2PI = 1.0 / math.sqrt(2.0 * math.pi)
-DENSITY_VERSION = 1
-"""Bump when a compiled function of this file changes: PyTensor caches its callers under it."""
+DENSITY_CACHE_KEY = int(sha256(Path(__file__).read_bytes()).hexdigest()[:12], 16)
+"""From this file's content: PyTensor caches compiled callers of its functions under it."""
 
 
 class PooledArrays(NamedTuple):
@@ -46,8 +48,8 @@ class PooledArrays(NamedTuple):
         Which ones.
     regression : (n_events, MAX_NOT_REACHED, n_sensors) array
         Of their latent readings on the residuals of the observed ones.
-    factor : (n_events, MAX_NOT_REACHED, MAX_NOT_REACHED) array
-        Cholesky factor of their covariance given the observed ones.
+    conditional : (n_events, MAX_NOT_REACHED, MAX_NOT_REACHED) array
+        Their covariance given the observed ones.
     """
 
     release_of_event: NDArray[np.int64]
@@ -57,7 +59,7 @@ class PooledArrays(NamedTuple):
     n_stopped: NDArray[np.int64]
     stopped: NDArray[np.int64]
     regression: FloatArray
-    factor: FloatArray
+    conditional: FloatArray
 
 
 def pooled_arrays(
@@ -79,7 +81,7 @@ def pooled_arrays(
     constant = np.zeros(n_events)
     stopped = np.zeros((n_events, MAX_NOT_REACHED), dtype=np.int64)
     regression = np.zeros((n_events, MAX_NOT_REACHED, n_sensors))
-    factor = np.zeros((n_events, MAX_NOT_REACHED, MAX_NOT_REACHED))
+    conditional = np.zeros((n_events, MAX_NOT_REACHED, MAX_NOT_REACHED))
     n_stopped = not_reached.sum(axis=1).astype(np.int64)
     if n_stopped.max(initial=0) > MAX_NOT_REACHED:
         raise ValueError(
@@ -93,10 +95,11 @@ def pooled_arrays(
         whiten[event][np.ix_(np.arange(len(seen)), seen)] = inverse
         constant[event] = -np.log(np.diag(own)).sum() - 0.5 * len(seen) * np.log(2.0 * np.pi)
         across = inverse @ covariance[np.ix_(seen, missed)]
-        conditional = covariance[np.ix_(missed, missed)] - across.T @ across
         stopped[event, : len(missed)] = missed
         regression[event][np.ix_(np.arange(len(missed)), seen)] = across.T @ inverse
-        factor[event, : len(missed), : len(missed)] = np.linalg.cholesky(conditional)
+        conditional[event, : len(missed), : len(missed)] = (
+            covariance[np.ix_(missed, missed)] - across.T @ across
+        )
     readings = np.where(observed, values, 0.0)
     return PooledArrays(
         np.asarray(release_of_event, dtype=np.int64),
@@ -106,7 +109,7 @@ def pooled_arrays(
         n_stopped,
         stopped,
         regression,
-        factor,
+        conditional,
     )
 
 
@@ -132,12 +135,38 @@ def _stretch(bound):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _orthant(size, mean, factor):  # type: ignore[no-untyped-def]
-    """P(x_1 <= 0, ..., x_size <= 0) for x = mean + factor z.
+def _tightest_first(size, mean, covariance):  # type: ignore[no-untyped-def]
+    """Mean and Cholesky factor with the largest mean in standard deviations first.
+
+    The nodes then lie where the probability is, also in the far tail.
+    """
+    left = np.empty(size, dtype=np.int64)
+    for k in range(size):
+        left[k] = k
+    for k in range(size):
+        for other in range(k + 1, size):
+            a, b = left[k], left[other]
+            if mean[b] / math.sqrt(covariance[b, b]) > mean[a] / math.sqrt(covariance[a, a]):
+                left[k], left[other] = b, a
+    ordered, factor = np.empty(size), np.zeros((size, size))
+    for i in range(size):
+        ordered[i] = mean[left[i]]
+        for j in range(i + 1):
+            rest = covariance[left[i], left[j]]
+            for k in range(j):
+                rest -= factor[i, k] * factor[j, k]
+            factor[i, j] = math.sqrt(rest) if i == j else rest / factor[j, j]
+    return ordered, factor
+
+
+@njit(cache=True, error_model="numpy")
+def _orthant(size, unordered, covariance):  # type: ignore[no-untyped-def]
+    """P(x_1 <= 0, ..., x_size <= 0) for x ~ N(unordered, covariance).
 
     Nested Gauss-Legendre over all z but the last, each on the stretch that holds the probability,
     so that it works in the far tail as well. A loop over levels: numba cannot cache a recursion.
     """
+    mean, factor = _tightest_first(size, unordered, covariance)
     last = size - 1
     z, upper, width = np.zeros(size), np.zeros(size), np.zeros(size)
     total, node = np.zeros(size), np.zeros(size, dtype=np.int64)
@@ -197,15 +226,14 @@ def pooled_log_density(response, data):  # type: ignore[no-untyped-def]
         size = data.n_stopped[event]
         if size > 0:
             _latent_mean(event, response, data, mean)
-            density[event] += math.log(_orthant(size, mean, data.factor[event]))
+            density[event] += math.log(_orthant(size, mean, data.conditional[event]))
     return density
 
 
 @njit(cache=True, error_model="numpy")
-def _orthant_slopes(size, mean, factor, slopes):  # type: ignore[no-untyped-def]
+def _orthant_slopes(size, mean, covariance, slopes):  # type: ignore[no-untyped-def]
     """Derivatives of log P(x <= 0) by the mean: the density at x_j = 0 times the rest given that."""
-    covariance = factor[:size, :size] @ factor[:size, :size].T
-    probability = _orthant(size, mean, factor)
+    probability = _orthant(size, mean, covariance)
     for j in range(size):
         variance = covariance[j, j]
         density = math.exp(-0.5 * mean[j] * mean[j] / variance) * _INV_SQRT_2PI / math.sqrt(variance)
@@ -219,7 +247,7 @@ def _orthant_slopes(size, mean, factor, slopes):  # type: ignore[no-untyped-def]
                 for b in range(size - 1):
                     product = covariance[others[a], j] * covariance[j, others[b]]
                     conditional[a, b] = covariance[others[a], others[b]] - product / variance
-            rest = _orthant(size - 1, shifted, np.linalg.cholesky(conditional))
+            rest = _orthant(size - 1, shifted, conditional)
         slopes[j] = -density * rest / probability
 
 
@@ -241,7 +269,7 @@ def pooled_log_density_pullback(cotangent, response, data):  # type: ignore[no-u
         size = data.n_stopped[event]
         if size > 0:
             _latent_mean(event, response, data, mean)
-            _orthant_slopes(size, mean, data.factor[event], slopes)
+            _orthant_slopes(size, mean, data.conditional[event], slopes)
             for k in range(size):
                 slope = cotangent[event] * slopes[k]
                 pulled[release, data.stopped[event, k]] += slope

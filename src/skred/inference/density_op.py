@@ -11,7 +11,7 @@ from pytensor.link.numba.dispatch.basic import numba_njit, register_funcify_defa
 
 from skred.inference.array_op import ArrayOp
 from skred.inference.density import (
-    DENSITY_VERSION,
+    DENSITY_CACHE_KEY,
     PooledArrays,
     pooled_log_density,
     pooled_log_density_pullback,
@@ -25,7 +25,7 @@ _DATA = (
     ("n_stopped", 1, "int64"),
     ("stopped", 2, "int64"),
     ("regression", 3, "float64"),
-    ("factor", 3, "float64"),
+    ("conditional", 3, "float64"),
 )
 
 
@@ -69,14 +69,14 @@ class PooledLogDensityPullback(ArrayOp):
 def _funcify_density(op: PooledLogDensity, node: Any = None, **kwargs: Any) -> Any:
     @numba_njit
     def pooled_density(  # type: ignore[no-untyped-def]
-        response, release_of_event, readings, whiten, constant, n_stopped, stopped, regression, factor
+        response, release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional
     ):
         data = PooledArrays(
-            release_of_event, readings, whiten, constant, n_stopped, stopped, regression, factor
+            release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional
         )
         return pooled_log_density(response, data)
 
-    return pooled_density, DENSITY_VERSION
+    return pooled_density, DENSITY_CACHE_KEY
 
 
 @register_funcify_default_op_cache_key(PooledLogDensityPullback)
@@ -92,11 +92,11 @@ def _funcify_pullback(op: PooledLogDensityPullback, node: Any = None, **kwargs: 
         n_stopped,
         stopped,
         regression,
-        factor,
+        conditional,
     ):
         data = PooledArrays(
-            release_of_event, readings, whiten, constant, n_stopped, stopped, regression, factor
+            release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional
         )
         return pooled_log_density_pullback(cotangent, response, data)
 
-    return pooled_density_pullback, DENSITY_VERSION
+    return pooled_density_pullback, DENSITY_CACHE_KEY

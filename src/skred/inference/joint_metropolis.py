@@ -10,12 +10,13 @@ scale driven to the acceptance that is best in few dimensions (Roberts and Rosen
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pymc as pm
 import pytensor.tensor as pt
-from numba import njit
+from numba import njit, typeof, types
 from numpy.typing import NDArray
 from pymc.blocking import RaveledVars
 from pymc.pytensorf import compile as compile_pytensor
@@ -32,10 +33,9 @@ _FORGET_UNTIL = 10
 """Adaptation steps after which the chain's past counts in full (the start is forgotten)."""
 
 
-@njit(error_model="numpy")
-def _log_density(density, q, weights):  # type: ignore[no-untyped-def]
+@njit(error_model="numpy", cache=True)
+def _weighted_sum(rest, pointwise, weights):  # type: ignore[no-untyped-def]
     """Log density of the model with every pointwise term weighted; NaN becomes -inf."""
-    rest, pointwise = density(q)
     total = rest.item()
     for i in range(weights.size):
         if weights[i] != 0.0:
@@ -43,8 +43,7 @@ def _log_density(density, q, weights):  # type: ignore[no-untyped-def]
     return -np.inf if np.isnan(total) else total
 
 
-@njit(error_model="numpy")
-def _run_chain(density, weights, q, factor, normals, log_uniforms, draws, terms):  # type: ignore[no-untyped-def]
+def _run_chain(density, data, weights, q, factor, normals, log_uniforms, draws, terms):  # type: ignore[no-untyped-def]
     """Metropolis moves, (n_draws, n_moves) of them; returns the shares accepted and acceptable.
 
     `q` is left at the last state; the state after each n_moves is stored in `draws`, and the
@@ -53,14 +52,16 @@ def _run_chain(density, weights, q, factor, normals, log_uniforms, draws, terms)
     n_draws, n_moves, n = normals.shape
     accepted, acceptance = 0, 0.0
     proposal = np.empty(n)
-    current = _log_density(density, q, weights)
+    rest, pointwise = density((q, *data))
+    current = _weighted_sum(rest, pointwise, weights)
     for draw in range(n_draws):
         for move in range(n_moves):
             for i in range(n):
                 proposal[i] = q[i]
                 for j in range(i + 1):
                     proposal[i] += factor[i, j] * normals[draw, move, j]
-            proposed = _log_density(density, proposal, weights)
+            rest, pointwise = density((proposal, *data))
+            proposed = _weighted_sum(rest, pointwise, weights)
             # Both -inf: accept, so that a chain can leave a place of no density.
             difference = proposed - current if proposed > -np.inf or current > -np.inf else 0.0
             acceptance += np.exp(min(difference, 0.0))
@@ -70,9 +71,22 @@ def _run_chain(density, weights, q, factor, normals, log_uniforms, draws, terms)
                 accepted += 1
         draws[draw] = q
         if terms.size > 0:
-            terms[draw] = density(q)[1]
+            terms[draw] = density((q, *data))[1]
     n_all = n_draws * n_moves
     return accepted / n_all, acceptance / n_all
+
+
+@cache
+def _chain_for(density: types.FunctionType, data: types.BaseTuple) -> Callable[..., tuple[float, float]]:
+    """`_run_chain` for densities of a signature, which it calls through a pointer.
+
+    Given the density itself numba would compile chain and kernel into one, 5 to 10 s for each model
+    and no faster to run.
+    """
+    scalar, vector, matrix, cube = (types.Array(types.float64, n, "C") for n in range(4))
+    signature = (density, data, vector, vector, matrix, cube, matrix, matrix, matrix)
+    chain: Callable[..., tuple[float, float]] = njit(signature, error_model="numpy", cache=True)(_run_chain)
+    return chain
 
 
 @dataclass_state
@@ -130,24 +144,34 @@ class JointMetropolis(pm.Metropolis):
             raise ValueError("JointMetropolis samples continuous variables only")
         self.elemwise_update = False
         self.moves_per_draw = moves_per_draw
-        self._density = self._compile_density(model, initial_point, pointwise)
+        self._density, self._data = self._compile_density(model, initial_point, pointwise)
         size = sum(int(np.prod(initial_point[v.name].shape)) for v in self.vars)
-        self.weights = np.ones(len(self._density(np.zeros(size))[1]))
+        data = self._data_values()
+        self.weights = np.ones(len(self._density(np.zeros(size), *data)[1]))
+        [signature] = self._density.nopython_signatures
+        self._chain = _chain_for(types.FunctionType(signature), typeof(data))
         self._start = 0.1 * np.eye(size)
         self.reset_tuning()
 
     def _compile_density(
         self, model: pm.Model, point: dict[str, Any], pointwise: str | None
-    ) -> Callable[..., Any]:
-        """(log density without the pointwise terms, those terms) of the raveled variables, in numba."""
+    ) -> tuple[Any, list[Any]]:
+        """(log density without the pointwise terms, those terms) of the raveled variables, in numba.
+
+        And the containers of its further arguments: variables that another step samples, and data
+        that may be set anew (`pymc.Data`).
+        """
         observed = model[pointwise] if pointwise else None
         rest = model.logp(vars=[v for v in model.basic_RVs if v is not observed])
         terms = model.logp(vars=observed, sum=False)[0].ravel() if pointwise else pt.zeros(0)
         outputs, raveled = join_nonshared_inputs(
             point=point, outputs=[rest, terms], inputs=self.vars, shared_inputs=self.shared
         )
-        density: Callable[..., Any] = compile_pytensor([raveled], outputs, mode="NUMBA").vm.jit_fn
-        return density
+        function = compile_pytensor([raveled], outputs, mode="NUMBA")
+        return function.vm.jit_fn, function.input_storage[1:]
+
+    def _data_values(self) -> tuple[Any, ...]:
+        return tuple(np.array(container.storage[0], order="C") for container in self._data)
 
     def reset_tuning(self) -> None:
         """Forget what was learnt."""
@@ -199,8 +223,16 @@ class JointMetropolis(pm.Metropolis):
         draws = np.empty((n_draws, len(q)))
         terms = np.empty((n_draws if with_terms else 0, len(self.weights)))
         factor = np.exp(self.log_scale) * self._factor
-        accepted, acceptance = _run_chain(
-            self._density, self.weights, q, factor, normals, log_uniforms, draws, terms
+        accepted, acceptance = self._chain(
+            self._density,
+            self._data_values(),
+            self.weights,
+            q,
+            factor,
+            normals,
+            log_uniforms,
+            draws,
+            terms,
         )
         return draws, terms, accepted, acceptance
 

@@ -33,7 +33,7 @@ KERNEL_FINGERPRINT = _fingerprint()
 def _stamped(locator: type) -> type:
     """A numba cache locator for this folder whose source stamp is that of the ring."""
 
-    class RingLocator(locator):  # type: ignore[valid-type, misc]
+    class RingLocator(locator):
         def get_source_stamp(self) -> str:
             return KERNEL_FINGERPRINT
 

@@ -53,7 +53,5 @@ def contributions_of(
 
 def sensor_table(places: Sequence[tuple[float, float] | None]) -> FloatArray:
     """Sensors as the kernel reads them: (s_from, s_to) in m for a front velocity, None for runout."""
-    rows = [
-        (RUNOUT, 0.0, 0.0) if place is None else (FRONT_VELOCITY, place[0], place[1]) for place in places
-    ]
+    rows = [(RUNOUT, 0.0, 0.0) if place is None else (FRONT_VELOCITY, place[0], place[1]) for place in places]
     return np.array(rows, dtype=float).reshape(-1, 3)

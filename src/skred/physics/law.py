@@ -57,6 +57,8 @@ class Law:
         Where the law comes from.
     strengths : callable
         Parameters, in order, to the strengths of the mechanisms, in order.
+    relation : str
+        The same in words of an equation, where they are not the parameters themselves.
     """
 
     id: str
@@ -66,12 +68,14 @@ class Law:
     build: Callable[[Any], Any]
     reference: str
     strengths: Callable[..., tuple[Any, ...]] = _as_they_are
+    relation: str = ""
 
     @property
     def equation(self) -> str:
         """Its equation of motion."""
         terms = " ".join(f"- {mechanism.equation.removeprefix('-')}" for mechanism in self.mechanisms)
-        return f"dU^2/(2 ds) = g sin(phi) {terms}"
+        relation = f", {self.relation}" if self.relation else ""
+        return f"dU^2/(2 ds) = g sin(phi) {terms}{relation}"
 
     @property
     def parameter_names(self) -> list[str]:

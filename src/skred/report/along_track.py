@@ -34,7 +34,9 @@ def along_track_figure(tree: xr.DataTree, law: Law, problem: PooledProblem) -> F
     The whole track at the left, and the part with recordings enlarged at the right where it is short.
     """
     release = float(np.median([event.release_s_m for event in problem.campaign.events]))
-    figure = new_figure(5.7, f"Front speed along the track, and what was recorded\n{figure_text(law.title, 80)}")
+    figure = new_figure(
+        5.7, f"Front speed along the track, and what was recorded\n{figure_text(law.title, 80)}"
+    )
     windows = _windows(problem, release)
     layout: dict[str, Any] = {"height_ratios": [2.1, 1]}
     panels = figure.subplots(2, len(windows), sharex="col", sharey="row", squeeze=False, gridspec_kw=layout)
@@ -114,7 +116,7 @@ def _bands(axes: Axes, s_m: FloatArray, speeds: FloatArray, colour: str) -> None
 
 
 def _readings(axes: Axes, problem: PooledProblem) -> None:
-    """Each reading with its error; spread sideways in the order of its value, or else they hide each other."""
+    """Each reading with its error; spread sideways in order, or else they hide each other."""
     sd = problem.campaign.reading_sd()
     placed = _placed(problem)
     half = _half_width([middle for _, _, middle in placed], problem.terrain.length_m)
@@ -164,14 +166,13 @@ def _means(axes: Axes, problem: PooledProblem) -> None:
 
 def _runouts(axes: Axes, problem: PooledProblem) -> None:
     """Rug of the recorded runouts at the foot of the panel."""
-    label: str | None = "recorded runouts"
+    label = "recorded runouts"
     for column, sensor in enumerate(problem.campaign.sensors):
         values = problem.values[problem.observed[:, column], column]
         if sensor.is_runout and len(values):
-            # A tick is centred on its place: half of it below the axis would collide with the panel beneath.
-            place = axes.get_xaxis_transform()
-            axes.vlines(values, 0, 0.045, transform=place, color=RECORDED, linewidth=1.2, label=label)
-            label = None
+            foot = axes.get_xaxis_transform()
+            axes.vlines(values, 0, 0.045, transform=foot, color=RECORDED, linewidth=1.2, label=label)
+            label = "_not in the legend"
 
 
 def _profile(axes: Axes, problem: PooledProblem, window: tuple[float, float], *, named: bool) -> None:
@@ -187,29 +188,28 @@ def _profile(axes: Axes, problem: PooledProblem, window: tuple[float, float], *,
             axes.plot(span, np.interp(span, s_m, z_m), color=INK, linewidth=3.5, solid_capstyle="butt")
         axes.plot(middle, float(np.interp(middle, s_m, z_m)), marker="o", markersize=3.5, color=INK)
     if named:
-        _names(axes, problem, window, height)
+        _names(axes, problem, window)
     axes.set_ylim(z_m.min() - 0.08 * height, z_m.max() + 0.05 * height)
 
 
-def _names(axes: Axes, problem: PooledProblem, window: tuple[float, float], height: float) -> None:
-    """Names of the sensors above them, moved apart where they would overlap."""
+def _names(axes: Axes, problem: PooledProblem, window: tuple[float, float]) -> None:
+    """Names of the sensors above the panel, moved apart where they would overlap."""
     placed = _placed(problem)[:_MAX_NAMED]
     track = problem.campaign.track
     gap = 0.045 * (window[1] - window[0])
     middles = np.array([middle for _, _, middle in placed])
     for (_, sensor, middle), x in zip(placed, spread(middles, gap), strict=True):
         z = float(np.interp(middle, track.s_m, track.z_m))
-        # Names of a steep track's upper sensors hang below it: above they would leave the panel.
-        above = z + 0.5 * height < float(np.max(track.z_m))
         axes.annotate(
             figure_text(sensor.id, 14),
             (middle, z),
-            (float(x), z + (0.2 if above else -0.2) * height),
+            (float(x), 1.02),
+            textcoords=axes.get_xaxis_transform(),
             rotation=90,
             ha="center",
-            va="bottom" if above else "top",
+            va="bottom",
             fontsize=7.5,
-            arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.6, "shrinkB": 3},
+            arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkB": 3},
         )
 
 

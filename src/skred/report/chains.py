@@ -78,8 +78,7 @@ def joint_figure(tree: xr.DataTree, law: Law) -> Figure:
     parameters = law.parameters[:_MAX_JOINT]
     draws = [chains_of(tree, parameter.name).ravel() for parameter in parameters]
     n = len(parameters)
-    size = min(WIDTH, 2.6 * n + 0.4)
-    figure = new_figure(size + 0.3, _joint_title(law, draws), width=size)
+    figure = new_figure(min(WIDTH, 1.2 + 2.2 * n), _joint_title(law, draws))
     panels = figure.subplots(n, n, sharex="col", squeeze=False)
     colour = law_colours([law.id])[law.id]
     for i in range(n):
@@ -104,7 +103,8 @@ def _joint_title(law: Law, draws: list[FloatArray]) -> str:
     title = f"Joint posterior\n{figure_text(law.title, 80)}"
     if len(draws) == 2 and all(np.ptp(values) > 0 for values in draws):
         first, second = (figure_text(symbol_text(p.symbol)) for p in law.parameters)
-        title += f"\ncorrelation of {first} and {second}: {np.corrcoef(draws)[0, 1]:+.2f}; + is the mean"
+        correlation = float(np.corrcoef(draws[0], draws[1])[0, 1])
+        title += f"\ncorrelation of {first} and {second}: {correlation:+.2f}; + is the mean"
     elif len(law.parameters) > len(draws):
         title += f"\nthe first {len(draws)} of {len(law.parameters)} parameters"
     return title
@@ -148,7 +148,9 @@ def _marginal(axes: Axes, draws: FloatArray, prior: FloatArray, colour: str) -> 
     lower = 0.0 if prior.min() >= 0 else None
     inside = grid if lower is None else grid[grid >= lower]
     axes.plot(inside, density(prior, inside, lower=lower), color=GREY, linewidth=1.2, label=prior_label)
-    interval_label = f"{percent} interval (equal-tailed) {rounded(low, decimals)} to {rounded(high, decimals)}"
+    interval_label = (
+        f"{percent} interval (equal-tailed) {rounded(low, decimals)} to {rounded(high, decimals)}"
+    )
     axes.axvline(mean, ymax=_LINES, color=INK, linewidth=1.2, label=f"mean {rounded(mean, decimals)}")
     axes.axvline(low, ymax=_LINES, color=INK, linewidth=0.9, linestyle="--", label=interval_label)
     axes.axvline(high, ymax=_LINES, color=INK, linewidth=0.9, linestyle="--")

@@ -119,7 +119,9 @@ def pointwise_figure(comparison: Document) -> Figure | None:
     title = "Which avalanches decide: below 0 the best law predicted the avalanche better"
     figure = new_figure(4.0, title)
     axes = figure.subplots()
-    axes.axhline(0, color=colours[laws[0]["id"]], linewidth=1.2, label=f"{figure_text(laws[0]['id'], 24)} (best)")
+    axes.axhline(
+        0, color=colours[laws[0]["id"]], linewidth=1.2, label=f"{figure_text(laws[0]['id'], 24)} (best)"
+    )
     width = 0.5 if len(events) <= _MAX_NAMED_EVENTS else 0.0
     for k, law in enumerate(laws[1:]):
         difference = floats(listed(law, "exact", "pointwise")) - best
@@ -129,7 +131,14 @@ def pointwise_figure(comparison: Document) -> Figure | None:
         filled = [colour if str(event) not in failed else "#ffffff" for event in events]
         axes.scatter(x, difference, s=20, c=filled, marker=markers[law["id"]], edgecolors=colour, zorder=3)
         total = _typeset(float(np.nansum(difference)))
-        axes.scatter([], [], s=20, c=colour, marker=markers[law["id"]], label=f"{figure_text(law['id'], 24)}: sum {total}")
+        axes.scatter(
+            [],
+            [],
+            s=20,
+            c=colour,
+            marker=markers[law["id"]],
+            label=f"{figure_text(law['id'], 24)}: sum {total}",
+        )
     if any(listed(law, "exact", "failed_refits") for law in laws):
         axes.scatter([], [], s=20, c="#ffffff", edgecolors=GREY, label="hollow: the refit failed the gate")
     _event_axis(axes, events)
@@ -144,7 +153,7 @@ def _event_axis(axes: Axes, events: list[Any]) -> None:
     places = range(0, len(events), step)
     axes.set_xticks(places, [figure_text(events[k], 14) for k in places], rotation=90, fontsize=7)
     axes.set_xlim(-0.7, len(events) - 0.3)
-    axes.set_xlabel("event" if step == 1 else f"event (every {step}th named)")
+    axes.set_xlabel("event" if step == 1 else f"event (one in {step} is named)")
     axes.grid(axis="x")
 
 
@@ -157,18 +166,25 @@ def pareto_k_figure(comparison: Document) -> Figure | None:
         return None
     colours, markers = _styles(comparison)
     limit = pareto_k_limit(comparison)
-    figure = new_figure(3.5, "Pareto k: avalanches above the line need an exact refit")
+    title = "Pareto k: avalanches above the line need an exact refit"
+    figure = new_figure(3.6, f"{title}\n(values below {_typeset(_LOWEST_K)} are drawn there)")
     axes = figure.subplots()
     axes.axhline(limit, color=INK, linewidth=1.0, linestyle="--", label=f"limit {limit:.2f}")
     for law in laws:
         k = np.maximum(floats(listed(law, "loo", "pareto_k")), _LOWEST_K)
         label = figure_text(law["id"], 24)
         axes.scatter(
-            np.arange(len(events)), k, s=18, c=colours[law["id"]], marker=markers[law["id"]], label=label, alpha=0.85
+            np.arange(len(events)),
+            k,
+            s=18,
+            c=colours[law["id"]],
+            marker=markers[law["id"]],
+            label=label,
+            alpha=0.85,
         )
     axes.set_ylim(_LOWEST_K - 0.06, max(axes.get_ylim()[1], limit + 0.15))
     _event_axis(axes, events)
-    axes.set_ylabel(f"Pareto k (below {_LOWEST_K} drawn there)")
+    axes.set_ylabel("Pareto k")
     legend_below(figure, [axes], columns=5)
     return figure
 
@@ -236,7 +252,12 @@ def evidence_figure(comparison: Document) -> Figure | None:
         mean = float(get(law, "evidence", "mean"))
         colour = colours[law["id"]]
         axes.scatter(
-            seeds, np.full(len(seeds), row), s=26, facecolors="none", edgecolors=colour, marker=markers[law["id"]]
+            seeds,
+            np.full(len(seeds), row),
+            s=26,
+            facecolors="none",
+            edgecolors=colour,
+            marker=markers[law["id"]],
         )
         axes.plot([mean, mean], [row - 0.28, row + 0.28], color=colour, linewidth=1.6)
         axes.annotate(_typeset(mean), (mean, row - 0.3), ha="center", va="bottom", fontsize=7.5)

@@ -139,7 +139,10 @@ def sensor_draws(tree: xr.DataTree, problem: PooledProblem, sensor: Sensor) -> S
         n_not_reached=int(not_reached.sum()),
         n_missing=int((~observed & ~not_reached).sum()),
         response=np.average(response, axis=-1, weights=events_per_release).ravel() - offset,
-        reading=predictive["reading"].transpose("chain", "draw", "event", "sensor").values[..., column].ravel()
+        reading=predictive["reading"]
+        .transpose("chain", "draw", "event", "sensor")
+        .values[..., column]
+        .ravel()
         - offset,
     )
 

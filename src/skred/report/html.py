@@ -40,9 +40,9 @@ def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> 
         ``response`` are arc lengths, shown relative to the campaign's reference where it has one. Where
         ``alpha_beta`` is null, ``alpha_beta_reason`` says why.
     figures : mapping of str to Path
-        PNG files: ``comparison_elpd``, ``pointwise``, ``pareto_k``, ``predictions``, ``evidence``, and those of
-        one law as ``<law id>/trace``, ``/joint``, ``/marginals``, ``/predictive``, ``/along_track``. What is
-        missing is left out.
+        PNG files: ``comparison_elpd``, ``pointwise``, ``pareto_k``, ``predictions``, ``evidence``, and those
+        of one law as ``<law id>/trace``, ``/joint``, ``/marginals``, ``/predictive``, ``/along_track``.
+        What is missing is left out.
 
     Returns
     -------
@@ -60,6 +60,7 @@ def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> 
             ranked=doc.ranked(comparison),
             failed=doc.failed(comparison),
             figures={name: _data_uri(file) for name, file in figures.items()},
+            sensors=_sensors(comparison),
             titles=_TITLES,
             of_a_law=_OF_A_LAW,
             k_limit=doc.pareto_k_limit(comparison),
@@ -68,6 +69,12 @@ def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> 
             ess_limit=ESS_LIMIT,
         )
     )
+
+
+def _sensors(comparison: doc.Document) -> list[Any]:
+    """Sensors of all laws' responses, in their order."""
+    names = (doc.get(entry, "sensor") for m in doc.models(comparison) for entry in doc.listed(m, "response"))
+    return list(dict.fromkeys(names))
 
 
 def _data_uri(file: Path) -> str:
@@ -96,7 +103,6 @@ def _environment() -> Environment:
         symbol=symbol_text,
         name=name_text,
         difference=_difference,
-        place=_place,
     )
     environment.globals.update(get=doc.get, listed=doc.listed, decimals_for=decimals_for, is_number=is_number)
     environment.globals.update(relative=relative_response)
@@ -115,11 +121,6 @@ def _shown(value: Any) -> str:
 def _difference(value: Any) -> str:
     """Whether a difference matters in practice, in words."""
     return {True: "yes", False: "no"}.get(value, "n/a")
-
-
-def _place(value: Any, reference: Any) -> str:
-    """An arc length relative to the reference [m]."""
-    return fixed(value - reference, 0, signed=True) if is_number(value) and is_number(reference) else whole(value)
 
 
 def relative_response(comparison: doc.Document, entry: doc.Document) -> dict[str, Any]:

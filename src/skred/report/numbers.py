@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 ABSENT = "n/a"
 """What stands where a number is not available."""
+_MOST_DIGITS = 7
 
 
 def is_number(value: Any) -> bool:
@@ -79,6 +80,8 @@ def rounded(value: Any, decimals: int | None) -> str:
         return "0"
     if decimals is None:
         decimals = 2 - _magnitude(value)
+    # Draws that are all alike have an sd of rounding errors: it supports no digits.
+    decimals = min(decimals, _MOST_DIGITS - 1 - _magnitude(value))
     if decimals > 7:
         return f"{value:.{max(0, decimals + _magnitude(value))}e}"
     return fixed(round(float(value), decimals), max(0, decimals))

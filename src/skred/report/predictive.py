@@ -40,7 +40,7 @@ def predictive_figure(tree: xr.DataTree, law: Law, problem: PooledProblem) -> Fi
     columns = 1 if len(sensors) == 1 else 2 if len(sensors) <= 4 else 3
     rows = -(-len(sensors) // columns)
     title = f"Predicted against recorded{left_out(problem.campaign)}\n{figure_text(law.title, 80)}"
-    figure = new_figure(1.0 + 2.15 * rows, title)
+    figure = new_figure(1.0 + (2.4 if columns > 2 else 2.15) * rows, title)
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes, sensor in zip(panels, sensors, strict=False):
         _panel(axes, sensor_draws(tree, problem, sensor), law_colours([law.id])[law.id], small=columns > 2)
@@ -64,10 +64,15 @@ def _panel(axes: Axes, draws: SensorDraws, colour: str, *, small: bool) -> None:
     peak *= _RESPONSE_HEIGHT * top / peak.max()
     axes.plot(grid, peak, color=colour, linewidth=1.3, label="mean response (posterior; height not to scale)")
     if low < 0 and not draws.sensor.is_runout:
-        axes.axvline(0, color=GREY, linewidth=0.8, linestyle=":", label="left of 0: would not reach the sensor")
+        axes.axvline(
+            0, color=GREY, linewidth=0.8, linestyle=":", label="left of 0: would not reach the sensor"
+        )
     axes.set_xlim(grid[0], grid[-1])
     axes.set_ylim(-0.09 * top, 1.4 * top)
-    axes.set_title(f"{_wrapped(sensor_title(draws.sensor), small)}\n{_counts(draws)}", fontsize=8)
+    title, counts = sensor_title(draws.sensor), _counts(draws)
+    if small:
+        title, counts = title.replace(": ", "\n", 1), counts.replace(", ", "\n", 1)
+    axes.set_title(f"{title}\n{counts}", fontsize=7.5 if small else 8)
     axes.set_xlabel(draws.axis_label)
     bare(axes)
 
@@ -102,7 +107,3 @@ def _counts(draws: SensorDraws) -> str:
     if draws.n_missing:
         parts.append(f"{draws.n_missing} missing")
     return ", ".join(parts)
-
-
-def _wrapped(title: str, small: bool) -> str:
-    return title.replace(": ", "\n", 1) if small else title

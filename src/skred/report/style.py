@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Iterable
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DPI = 150
+_LEGEND_WIDTH = 122
 WIDTH = 7.6
 """Width of a figure in inches: the report's column."""
 INK, GREY, PALE = "#222222", "#767676", "#e4e4e4"
@@ -27,8 +28,8 @@ RECORDED = "#111111"
 
 # Okabe and Ito (2008): told apart with any colour vision; the yellow is too pale for lines.
 _PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#5E4B3C")
-_MARKERS = ("o", "s", "D", "^", "v", "P", "X")
-_RC: dict[str, Any] = {
+_MARKERS = ("o", "s", "D", "^", "v", "P")  # one fewer than colours: together they repeat late
+_RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 8.5,
     "axes.titlesize": 9,
@@ -57,18 +58,15 @@ _RC: dict[str, Any] = {
     "savefig.dpi": DPI,
 }
 
-P = ParamSpec("P")
-R = TypeVar("R")
 
-
-def styled(make: Callable[P, R]) -> Callable[P, R]:
+def styled[**P, R](make: Callable[P, R]) -> Callable[P, R]:
     """Run a figure function in the report's style, whatever the user's own settings are."""
 
     @wraps(make)
     def wrapper(*args: P.args, **kwargs: P.kwargs) -> R:
         import matplotlib
 
-        # Dates apart, the defaults of matplotlib: a user's matplotlibrc may ask for LaTeX.
+        # Matplotlib's own defaults first: a user's matplotlibrc may ask for LaTeX.
         with matplotlib.rc_context():
             matplotlib.rcdefaults()
             matplotlib.rcParams.update(_RC)
@@ -139,7 +137,16 @@ def legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(str(label), handle)
+    columns = next((n for n in range(columns, 1, -1) if _legend_width(list(entries), n) <= _LEGEND_WIDTH), 1)
     figure.legend(list(entries.values()), list(entries), loc="outside lower left", ncols=columns)
+
+
+def _legend_width(labels: list[str], columns: int) -> int:
+    """Characters in a row of a legend, its handles counted as eight."""
+    size, more = divmod(len(labels), columns)
+    starts = [k * size + min(k, more) for k in range(columns + 1)]
+    parts = [labels[start:end] for start, end in zip(starts, starts[1:], strict=False)]
+    return sum(8 + max(map(len, part)) for part in parts if part)
 
 
 @styled

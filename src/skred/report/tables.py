@@ -22,9 +22,21 @@ def comparison_table(comparison: doc.Document) -> Table:
         As `skred.report.html.render_comparison` takes it.
     """
     table = _table(
-        _text(f"{shortened(doc.get(comparison, 'campaign', 'name'), 60)}: laws compared by leave-one-event-out"),
+        _text(
+            f"{shortened(doc.get(comparison, 'campaign', 'name'), 60)}: laws compared by leave-one-event-out"
+        ),
         left=("law",),
-        right=("exact\nelpd", "differ-\nence", "2 se", "counts", "LOO", "max\nk", "WAIC", "log evi-\ndence", "weight"),
+        right=(
+            "exact\nelpd",
+            "differ-\nence",
+            "2 se",
+            "counts",
+            "LOO",
+            "max\nk",
+            "WAIC",
+            "log evi-\ndence",
+            "weight",
+        ),
     )
     ranked = doc.ranked(comparison)
     for place, model in enumerate(ranked):
@@ -64,7 +76,8 @@ def _table(title: Text, left: tuple[str, ...], right: tuple[str, ...]) -> Table:
     from rich import box
     from rich.table import Table
 
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False, collapse_padding=True)
+    # Tight, because eight numbers to two decimals must fit a terminal of 80 characters.
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, show_edge=False, padding=0)
     for name in left:
         table.add_column(name, overflow="fold")
     for name in right:
@@ -101,9 +114,9 @@ def _explanation(comparison: doc.Document) -> str:
     few = f" with {whole(n_events)} events" if is_number(n_events) and n_events < 100 else ""
     limit = f"{doc.PRACTICAL_DIFFERENCE:.0f}"
     return (
-        f"elpd in nats, larger is better; exact: refitted without each event. 2 se: doubled standard error of the "
-        f"difference (the plain one is optimistic{few}). A difference counts if it is at least {limit} and "
-        "exceeds 2 se. Weight: stacking, a share."
+        "elpd in nats, larger is better; exact: refitted without each event. 2 se: doubled standard "
+        f"error of the difference (the plain one is optimistic{few}). A difference counts if it is at least "
+        f"{limit} and exceeds 2 se. Weight: stacking, a share."
     )
 
 

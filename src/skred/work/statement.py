@@ -30,7 +30,7 @@ def _preference(valid: list[dict[str, Any]], n_events: int) -> list[str]:
     sentences = []
     clear = [model for model in others if model["difference"]["practical"]]
     close = [model for model in others if not model["difference"]["practical"]]
-    verb = "prefer" if len(clear) == len(others) else "rank first"
+    verb = "prefer" if len(clear) == len(others) else "put first"
     sentences.append(
         f"By exact leave-one-event-out over {n_events} avalanches the recordings {verb} {best['title']}"
         f" (elpd {best['exact']['elpd']:.2f})."
