@@ -4,25 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from skred.physics.cell import CONSTANT, FRICTION, QUADRATIC, cell_at, phi1, psi
+from skred.physics.cell import CONSTANT, QUADRATIC, cell_at, phi1, psi
 from skred.physics.columns import GRAVITY
 from skred.physics.compiled import compiled
 from skred.physics.inputs import RUNOUT
-from skred.physics.march import is_regular, start_tangents, travel, travel_tangents
-
-
-@compiled()
-def _contact_law(i, ground, table):  # type: ignore[no-untyped-def]
-    """Source and decay of cell i, the normal force on, no terms in U."""
-    mu = table[FRICTION, i]
-    a = 2.0 * (GRAVITY * (ground[0, i] - mu * ground[1, i]) - table[CONSTANT, i])
-    return a, 2.0 * (table[QUADRATIC, i] + mu * ground[2, i])
+from skred.physics.march import contact_law, is_regular, start_tangents, travel, travel_tangents
 
 
 @compiled()
 def _regular_speed(length, i, ground, table, v):  # type: ignore[no-untyped-def]
     """Front speed [m/s] `length` metres into a cell in which nothing happens."""
-    a, b = _contact_law(i, ground, table)
+    a, b = contact_law(i, ground, table)
     return np.sqrt(max(v[i] + (a - b * v[i]) * length * phi1(b * length), 0.0))
 
 
@@ -91,7 +83,7 @@ def _regular_speed_tangents(  # type: ignore[no-untyped-def]
     speed, length, i, ground, table, columns, profiles, v, dv, tangents
 ):
     """Tangents of `speed`, `length` metres into a cell in which nothing happens."""
-    a, b = _contact_law(i, ground, table)
+    a, b = contact_law(i, ground, table)
     x = b * length
     by_source = 2.0 * length * phi1(x)
     keep = 1.0 - 0.5 * b * by_source
