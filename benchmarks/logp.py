@@ -27,7 +27,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import pytensor
-from cyclopts import Parameter, run
+from cyclopts import App, Parameter
 from numpy.typing import NDArray
 from pymc.pytensorf import join_nonshared_inputs
 from rich.console import Console
@@ -174,9 +174,7 @@ def measure(problem: PooledProblem, gradient: bool, quick: bool) -> list[Timing]
         values = np.array([flat(function(point.copy())) for point in points])
         if not timings:
             reference = values
-        timing = Timing(
-            way.name, gradient, compile_s, 1e6 * seconds_per_call(function, points[:8], rounds)
-        )
+        timing = Timing(way.name, gradient, compile_s, 1e6 * seconds_per_call(function, points[:8], rounds))
         timing.largest_difference = largest_difference(values, reference, gradient)
         timings.append(timing)
         timing.ratio = timing.call_us / timings[0].call_us
@@ -206,9 +204,11 @@ def table_of(timings: list[Timing]) -> Table:
     return table
 
 
-def main(
-    *, quick: bool = False, json_file: Annotated[Path | None, Parameter(name="--json")] = None
-) -> int:
+app = App(result_action="return_value")
+
+
+@app.default
+def main(*, quick: bool = False, json_file: Annotated[Path | None, Parameter(name="--json")] = None) -> int:
     """Time the pooled M2 log density.
 
     Parameters
@@ -233,4 +233,4 @@ def main(
 
 
 if __name__ == "__main__":
-    raise SystemExit(run(main))
+    raise SystemExit(app())

@@ -57,9 +57,11 @@ def check_gate(tree: xr.DataTree, parameters: Sequence[str]) -> Gate:
         The free random variables.
     """
     posterior = tree["posterior"].to_dataset()[list(parameters)]
-    r_hat = _extreme(az.rhat(posterior), max)
-    ess_bulk = _extreme(az.ess(posterior, method="bulk"), min)
-    ess_tail = _extreme(az.ess(posterior, method="tail"), min)
+    # Chains that never moved have no variance to divide by: NaN, which fails below.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        r_hat = _extreme(az.rhat(posterior), max)
+        ess_bulk = _extreme(az.ess(posterior, method="bulk"), min)
+        ess_tail = _extreme(az.ess(posterior, method="tail"), min)
     stats = tree["sample_stats"].to_dataset() if "sample_stats" in tree.children else xr.Dataset()
     divergences = int(stats["diverging"].sum()) if "diverging" in stats else 0
     problems = []

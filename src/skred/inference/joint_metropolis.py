@@ -95,6 +95,7 @@ class JointMetropolisState(MetropolisState):
 
     mean: np.ndarray
     covariance: np.ndarray
+    factor: np.ndarray
     adaptations: int
     log_scale: float
 
@@ -162,10 +163,12 @@ class JointMetropolis(pm.Metropolis):
         that may be set anew (`pymc.Data`).
         """
         observed = model[pointwise] if pointwise else None
-        rest = model.logp(vars=[v for v in model.basic_RVs if v is not observed])
+        others = [v for v in model.basic_RVs if v is not observed]
+        rest = model.logp(vars=[*others, *model.potentials])
         terms = model.logp(vars=observed, sum=False)[0].ravel() if pointwise else pt.zeros(0)
+        elsewhere = {v: self.shared[v.name] for v in model.value_vars if v.name in self.shared}
         outputs, raveled = join_nonshared_inputs(
-            point=point, outputs=[rest, terms], inputs=self.vars, shared_inputs=self.shared
+            point=point, outputs=[rest, terms], inputs=self.vars, shared_inputs=elsewhere
         )
         function = compile_pytensor([raveled], outputs, mode="NUMBA")
         return function.vm.jit_fn, function.input_storage[1:]
@@ -179,7 +182,7 @@ class JointMetropolis(pm.Metropolis):
         if hasattr(self, "_start"):
             self.mean, self.covariance = np.zeros(len(self._start)), self._start.copy()
             self.adaptations, self.log_scale = 0, 0.0
-            self._factor = np.linalg.cholesky(self.covariance)
+            self.factor = np.linalg.cholesky(self.covariance)
 
     def astep(self, q0: RaveledVars) -> tuple[RaveledVars, list[dict[str, float]]]:
         """One draw: some moves and, while tuning, one step of adaptation."""
@@ -222,7 +225,7 @@ class JointMetropolis(pm.Metropolis):
         normals, log_uniforms = rng.standard_normal((*shape, len(q))), np.log(rng.random(shape))
         draws = np.empty((n_draws, len(q)))
         terms = np.empty((n_draws if with_terms else 0, len(self.weights)))
-        factor = np.exp(self.log_scale) * self._factor
+        factor = np.exp(self.log_scale) * self.factor
         accepted, acceptance = self._chain(
             self._density,
             self._data_values(),
@@ -248,4 +251,4 @@ class JointMetropolis(pm.Metropolis):
         self.covariance = (1 - weight) * (self.covariance + weight * np.outer(deviation, deviation))
         self.log_scale += (acceptance - TARGET_ACCEPTANCE.get(size, _TARGET_ELSE)) / self.adaptations**0.6
         proposal = 2.38**2 / size * self.covariance + 1e-10 * np.trace(self.covariance) * np.eye(size)
-        self._factor = np.linalg.cholesky(proposal)
+        self.factor = np.linalg.cholesky(proposal)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Sequence
 
 import numpy as np
@@ -43,7 +44,19 @@ def page(study: Study, *, command: str, seed: int, versions: dict[str, str], sec
         _retardations(study),
         _correlations(study),
     ]
-    return "\n\n".join(sections) + "\n"
+    return reflowed("\n\n".join(sections)) + "\n"
+
+
+def reflowed(text: str) -> str:
+    """Paragraphs filled to one width; headings, tables, figures and indented blocks as they are."""
+    kept = ("#", "|", "!", "    ")
+    blocks = [
+        block
+        if block.startswith(kept)
+        else textwrap.fill(block, 110, break_long_words=False, break_on_hyphens=False)
+        for block in text.split("\n\n")
+    ]
+    return "\n\n".join(blocks)
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -296,14 +309,16 @@ def _retardations(study: Study) -> str:
     for up, low, text in ((0, 0, ""), (0, -20, "CD 20 m up"), (0, 20, "CD 20 m down")):
         rows.append(_retardation_row(f"LC to CD{', ' + text if text else ''}", "LC", "CD", study, up, low))
     rows.append(_retardation_row("CD to b", "CD", "b", study, 0, 0))
+    spread, errors = "mean ± sd over events [m/s2]", "an event's own error [m/s2]"
+    header = ("stretch", "length [m]", "drop [m]", "events", spread, errors)
     return f"""## Retardation from the recorded speeds
 
     a_ret = (U_lower^2 - U_upper^2) / (2 length) - g drop / length
 
-from dU^2/(2 ds) = g sin(phi) + a_ret, with the track's drop; every event that has both speeds, U = 0
-included.
+from dU^2/(2 ds) = g sin(phi) + a_ret, with the track's drop; every event that has both
+speeds, U = 0 included. An event's own error is what the stated 10 % and 1 m/s of its speeds make of it.
 
-{table(("stretch", "length [m]", "drop [m]", "events", "mean ± sd over events [m/s2]", "10 % and 1 m/s errors"), rows)}
+{table(header, rows)}
 
 {_groups(recorded_retardation(problem, "LC", "CD"))}"""
 

@@ -31,6 +31,7 @@ PAPER = {"coulomb": (0.47,), "pcm": (0.2, 3e-3), "constant": (4.5,)}
 """The paper's figures for the laws' strengths."""
 LC, CD, B, RUNOUT = range(4)
 SPEEDS_FIT = "LC, CD, b"
+STOPS_FIT = "LC, CD, b, stops counted as latent speeds"
 Tell = Callable[[str], None]
 
 
@@ -113,9 +114,9 @@ class Study:
     fits: list[Fit]
     plain_mean: FloatArray
 
-    def speeds_fit(self, law_id: str) -> FloatArray:
-        """Strengths from least squares of the plain mean speeds."""
-        return next(f.strengths for f in self.fits if (f.law_id, f.what) == (law_id, SPEEDS_FIT))
+    def speeds_fit(self, law_id: str, what: str = SPEEDS_FIT) -> FloatArray:
+        """Strengths from least squares of the plain mean speeds, or of other means."""
+        return next(f.strengths for f in self.fits if (f.law_id, f.what) == (law_id, what))
 
     @property
     def base(self) -> Case:
@@ -216,5 +217,5 @@ def plain_fits(base: Case, plain_mean: FloatArray) -> list[Fit]:
             fits.append(Fit(law_id, what, strengths, readings))
         latent = base.problem.recorded_mean
         strengths, readings = fit_means(base.problem, base.mechanisms(law_id), latent, speeds)
-        fits.append(Fit(law_id, "LC, CD, b, stops counted as latent speeds", strengths, readings))
+        fits.append(Fit(law_id, STOPS_FIT, strengths, readings))
     return fits

@@ -8,8 +8,8 @@ import numpy as np
 
 from skred.work.reproduction_cases import LAWS, SHORT, Outcome
 from skred.work.reproduction_facts import bowl_limit, recorded_retardation, start_for_limit
-from skred.work.reproduction_statements import CLOSE, Statement
-from skred.work.reproduction_study import LC, PAPER, RUNOUT, Study
+from skred.work.reproduction_statements import CLOSE, Statement, height_at_limit
+from skred.work.reproduction_study import LC, PAPER, RUNOUT, STOPS_FIT, Study
 
 _NOT_THE_START = ("recordings", "sensor places", "terrain", "priors")
 _LATE = "release150"
@@ -65,8 +65,9 @@ def _coulomb(study: Study) -> str:
     text = [f"**M1.** Our a0 is {base:.3f}, the paper's {target}."]
     if height > 0.1:
         text.append(
-            f"Ours leans on the largest friction that still passes the bowl ({limit:.4f}): there its"
-            f" posterior has {100 * height:.0f} % of its largest height and is cut off, so its small width is no merit."
+            f"Ours leans on the largest friction that still passes the bowl ({limit:.4f}), where its"
+            f" posterior is cut off at {100 * height:.0f} % of its largest height: its small width is no"
+            " merit."
         )
     if abs(move) < 0.5 * abs(gap):
         text.append(
@@ -77,15 +78,6 @@ def _coulomb(study: Study) -> str:
     else:
         text.append(f"It moves by {move:+.3f} with: {which.case.title}.")
     return " ".join([*text, *_start(study, gap, base)])
-
-
-def height_at_limit(study: Study) -> float:
-    """Density of M1's posterior at the bowl's limit, relative to its largest."""
-    posterior = study.baseline("coulomb").posterior
-    limit, _ = bowl_limit(study.base.problem, study.base.mechanisms("coulomb"), 1.5, 0.0)
-    (axis,) = posterior.axes
-    last = max(int(np.searchsorted(axis, limit)) - 1, 0)
-    return float(posterior.weights[last] / posterior.weights.max())
 
 
 def _start(study: Study, gap: float, base: float) -> list[str]:
@@ -106,7 +98,7 @@ def _start(study: Study, gap: float, base: float) -> list[str]:
             f"But from there M3's limit at the bowl is {late_m3:.2f} m/s2, not the paper's 4.7; where that is"
             f" 4.70 (s = {start:.0f} m) M1's limit is {there:.3f}. On our track no single start gives both"
             " figures. We do not know what does: another track in or above the bowl, or starts that differ"
-            " between avalanches, are the candidates left."
+            " between avalanches, are candidates."
         )
     return text
 
@@ -150,11 +142,15 @@ def _pcm(study: Study) -> str:
                 )
                 else "It does not explain the other two laws."
             )
-    speeds = float(study.outcomes["speeds", "pcm"].posterior.mean[0])
-    if speeds > mean[0]:
+    stops = study.speeds_fit("pcm", STOPS_FIT)
+    if stops[0] > fit[0] + 0.5 * abs(float(mean[0]) - fit[0]):
         text.append(
-            f"Leaving the runouts out of our likelihood leads the other way ({speeds:.3f}): with Sigma's"
-            " correlation and the stops counted, the speeds alone ask for more friction, not less."
+            "The avalanches that did not arrive, which a plain mean leaves out, are enough to part our"
+            f" posterior from that fit: with the stops counted it gives {stops[0]:.3f} and"
+            f" {1e3 * stops[1]:.2f}e-3 1/m, on the other side of ours."
+            if stops[0] > mean[0]
+            else "Counting the avalanches that did not arrive moves that fit towards our posterior:"
+            f" {stops[0]:.3f} and {1e3 * stops[1]:.2f}e-3 1/m."
         )
     move, which = largest_move(study, "pcm", 0, _NOT_THE_START)
     start, _ = largest_move(study, "pcm", 0, ("release",))
