@@ -1,1 +1,1 @@
-
+"""Bayesian calibration and comparison of avalanche block models against recordings."""

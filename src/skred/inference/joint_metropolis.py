@@ -1,10 +1,12 @@
-"""PyMC's Metropolis with a joint, adapted proposal, several moves a draw inside numba.
+"""PyMC's Metropolis with joint, adapted proposals, several moves a draw inside numba.
 
-PyMC's own moves one scalar at a time and evaluates the density twice a move; on the strongly
-correlated parameters of a friction law its chains crawl. Here all parameters move together, with
-the covariance of the chain so far (Haario, Saksman and Tamminen, 2001, doi 10.2307/3318737) and a
-scale driven to the acceptance that is best in few dimensions (Roberts and Rosenthal, 2001, doi
-10.1214/ss/1015346320). Adaptation ends with tuning; the draws come from a fixed kernel.
+PyMC's own moves one scalar at a time and evaluates the density twice a move. Here all parameters
+move together, by turns in two ways: a random walk with the covariance of the chain so far (Haario,
+Saksman and Tamminen, 2001, doi 10.2307/3318737) and a scale driven to the acceptance that is best in
+few dimensions (Roberts and Rosenthal, 2001, doi 10.1214/ss/1015346320), which gets anywhere; and a
+jump to an independent draw from a Student t with the chain's mean and covariance (Tierney, 1994, doi
+10.1214/aos/1176325750), which forgets at once where the posterior is nearly normal. Adaptation
+ends with tuning; the draws come from a fixed kernel.
 """
 
 from __future__ import annotations
@@ -25,8 +27,12 @@ from pymc.step_methods.metropolis import MetropolisState
 from pymc.step_methods.state import dataclass_state
 
 FloatArray = NDArray[np.float64]
-MOVES_PER_DRAW = 10
-"""Moves between two draws that are kept; the others would be all but copies."""
+MOVES_PER_DRAW = 4
+"""Moves between two draws that are kept, half of them jumps; the others would be all but copies."""
+DEGREES_OF_FREEDOM = 6.0
+"""Of the jumps: tails heavier than the posterior's, so that no jump is too good to leave."""
+_BLOCK = 100
+"""Draws made at once when tuning is over and the proposals are fixed."""
 TARGET_ACCEPTANCE = {1: 0.44, 2: 0.35}
 _TARGET_ELSE = 0.25
 _FORGET_UNTIL = 10
@@ -43,28 +49,66 @@ def _weighted_sum(rest, pointwise, weights):  # type: ignore[no-untyped-def]
     return -np.inf if np.isnan(total) else total
 
 
-def _run_chain(density, data, weights, q, factor, normals, log_uniforms, draws, terms):  # type: ignore[no-untyped-def]
-    """Metropolis moves, (n_draws, n_moves) of them; returns the shares accepted and acceptable.
+@njit(error_model="numpy", cache=True)
+def _log_t(z):  # type: ignore[no-untyped-def]
+    """Log density of a multivariate Student t at standardised z, but for its constant."""
+    square = 0.0
+    for i in range(z.size):
+        square += z[i] * z[i]
+    return -0.5 * (DEGREES_OF_FREEDOM + z.size) * np.log1p(square / DEGREES_OF_FREEDOM)
+
+
+@njit(error_model="numpy", cache=True)
+def _standardise(x, mean, factor, z):  # type: ignore[no-untyped-def]
+    """Solve x = mean + factor z."""
+    for i in range(x.size):
+        z[i] = x[i] - mean[i]
+        for j in range(i):
+            z[i] -= factor[i, j] * z[j]
+        z[i] /= factor[i, i]
+
+
+@njit(error_model="numpy", cache=True)
+def _add_product(start, factor, z, result):  # type: ignore[no-untyped-def]
+    """Write start + factor z to `result`."""
+    for i in range(z.size):
+        result[i] = start[i]
+        for j in range(i + 1):
+            result[i] += factor[i, j] * z[j]
+
+
+def _run_chain(  # type: ignore[no-untyped-def]
+    density, data, weights, q, mean, factor, scale, noise, log_uniforms, draws, terms
+):
+    """Metropolis moves, (n_draws, n_moves) of them: walks and jumps by turns.
 
     `q` is left at the last state; the state after each n_moves is stored in `draws`, and the
-    pointwise terms there in `terms` unless that is empty.
+    pointwise terms there in `terms` unless that is empty. Returns the share of all moves that was
+    accepted and the mean probability of acceptance of the walks.
     """
-    n_draws, n_moves, n = normals.shape
-    accepted, acceptance = 0, 0.0
-    proposal = np.empty(n)
+    n_draws, n_moves, n = noise.shape
+    accepted, acceptance, n_walks = 0, 0.0, 0
+    proposal, z = np.empty(n), np.empty(n)
+    walk = scale * factor
     rest, pointwise = density((q, *data))
     current = _weighted_sum(rest, pointwise, weights)
     for draw in range(n_draws):
         for move in range(n_moves):
-            for i in range(n):
-                proposal[i] = q[i]
-                for j in range(i + 1):
-                    proposal[i] += factor[i, j] * normals[draw, move, j]
+            is_walk = move % 2 == 0
+            correction = 0.0
+            if is_walk:
+                _add_product(q, walk, noise[draw, move], proposal)
+            else:
+                _add_product(mean, factor, noise[draw, move], proposal)
+                _standardise(q, mean, factor, z)
+                correction = _log_t(z) - _log_t(noise[draw, move])
             rest, pointwise = density((proposal, *data))
             proposed = _weighted_sum(rest, pointwise, weights)
             # Both -inf: accept, so that a chain can leave a place of no density.
-            difference = proposed - current if proposed > -np.inf or current > -np.inf else 0.0
-            acceptance += np.exp(min(difference, 0.0))
+            difference = proposed - current + correction if proposed > -np.inf or current > -np.inf else 0.0
+            if is_walk:
+                n_walks += 1
+                acceptance += np.exp(min(difference, 0.0))
             if log_uniforms[draw, move] < difference:
                 q[:] = proposal
                 current = proposed
@@ -72,8 +116,7 @@ def _run_chain(density, data, weights, q, factor, normals, log_uniforms, draws, 
         draws[draw] = q
         if terms.size > 0:
             terms[draw] = density((q, *data))[1]
-    n_all = n_draws * n_moves
-    return accepted / n_all, acceptance / n_all
+    return accepted / (n_draws * n_moves), acceptance / n_walks
 
 
 @cache
@@ -84,7 +127,9 @@ def _chain_for(density: types.FunctionType, data: types.BaseTuple) -> Callable[.
     and no faster to run.
     """
     scalar, vector, matrix, cube = (types.Array(types.float64, n, "C") for n in range(4))
-    signature = (density, data, vector, vector, matrix, cube, matrix, matrix, matrix)
+    signature = (
+        density, data, vector, vector, vector, matrix, types.float64, cube, matrix, matrix, matrix
+    )  # fmt: skip
     chain: Callable[..., tuple[float, float]] = njit(signature, error_model="numpy", cache=True)(_run_chain)
     return chain
 
@@ -101,14 +146,14 @@ class JointMetropolisState(MetropolisState):
 
 
 class JointMetropolis(pm.Metropolis):
-    """Random-walk Metropolis on all variables at once.
+    """Metropolis on all variables at once, random walk and independent jumps by turns.
 
     Parameters
     ----------
     vars : list, optional
         Variables to sample; all continuous ones by default.
     moves_per_draw : int
-        Metropolis moves between two draws.
+        Metropolis moves between two draws; every second one is a jump.
     pointwise : str, optional
         Observed variable whose terms can be weighted one by one through `weights`, as exact
         leave-one-out needs; all weights are 1 to begin with.
@@ -183,15 +228,34 @@ class JointMetropolis(pm.Metropolis):
             self.mean, self.covariance = np.zeros(len(self._start)), self._start.copy()
             self.adaptations, self.log_scale = 0, 0.0
             self.factor = np.linalg.cholesky(self.covariance)
+            self._forget_block()
+
+    def _forget_block(self) -> None:
+        """Drop the draws made ahead."""
+        self._block, self._used = np.empty((0, len(self._start))), 0
+        self._stood, self._stats = np.empty(0), {"accept": 0.0, "accepted": 0.0}
 
     def astep(self, q0: RaveledVars) -> tuple[RaveledVars, list[dict[str, float]]]:
         """One draw: some moves and, while tuning, one step of adaptation."""
         q = np.array(q0.data, dtype=float)
-        _, _, accepted, acceptance = self._run(q, 1, self.rng, with_terms=False)
         if self.tune:
+            _, _, accepted, acceptance = self._run(q, 1, self.rng, with_terms=False)
             self._adapt(q, acceptance)
-        stats = {"scaling": float(np.exp(self.log_scale)), "accept": acceptance, "accepted": accepted}
+            self._stats = {"accept": acceptance, "accepted": accepted}
+        else:
+            q = self._next_of_block(q)
+        stats = {"scaling": float(np.exp(self.log_scale)), **self._stats}
         return RaveledVars(q, q0.point_map_info), [stats]
+
+    def _next_of_block(self, q: FloatArray) -> FloatArray:
+        """The draw after q from a block made at once, or from a new one if q is not where it stood."""
+        if self._used >= len(self._block) or not np.array_equal(q, self._stood):
+            self._block, _, accepted, acceptance = self._run(q, _BLOCK, self.rng, with_terms=False)
+            self._stats = {"accept": acceptance, "accepted": accepted}
+            self._used = 0
+        self._stood = self._block[self._used]
+        self._used += 1
+        return self._stood.copy()
 
     def adapt(self, q: FloatArray, n_draws: int, rng: np.random.Generator) -> None:
         """Forget, then adapt over `n_draws` draws from `q`, which is changed in place."""
@@ -222,17 +286,21 @@ class JointMetropolis(pm.Metropolis):
         self, q: FloatArray, n_draws: int, rng: np.random.Generator, *, with_terms: bool
     ) -> tuple[FloatArray, FloatArray, float, float]:
         shape = (n_draws, self.moves_per_draw)
-        normals, log_uniforms = rng.standard_normal((*shape, len(q))), np.log(rng.random(shape))
+        noise, log_uniforms = rng.standard_normal((*shape, len(q))), np.log(rng.random(shape))
+        jumps = noise[:, 1::2]
+        jumps /= np.sqrt(rng.chisquare(DEGREES_OF_FREEDOM, jumps.shape[:2]) / DEGREES_OF_FREEDOM)[..., None]
         draws = np.empty((n_draws, len(q)))
         terms = np.empty((n_draws if with_terms else 0, len(self.weights)))
-        factor = np.exp(self.log_scale) * self.factor
+        scale = 2.38 / np.sqrt(len(q)) * float(np.exp(self.log_scale))
         accepted, acceptance = self._chain(
             self._density,
             self._data_values(),
             self.weights,
             q,
-            factor,
-            normals,
+            self.mean,
+            self.factor,
+            scale,
+            noise,
             log_uniforms,
             draws,
             terms,
@@ -250,5 +318,5 @@ class JointMetropolis(pm.Metropolis):
         self.mean = self.mean + weight * deviation
         self.covariance = (1 - weight) * (self.covariance + weight * np.outer(deviation, deviation))
         self.log_scale += (acceptance - TARGET_ACCEPTANCE.get(size, _TARGET_ELSE)) / self.adaptations**0.6
-        proposal = 2.38**2 / size * self.covariance + 1e-10 * np.trace(self.covariance) * np.eye(size)
-        self.factor = np.linalg.cholesky(proposal)
+        floor = 1e-10 * np.trace(self.covariance) * np.eye(size)
+        self.factor = np.linalg.cholesky(self.covariance + floor)

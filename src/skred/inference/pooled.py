@@ -42,7 +42,6 @@ def observe(problem: PooledProblem, response: Any) -> Any:
     The readings enter as constants of the density, not as `observed`, where a missing one would
     become a free parameter; what is observed is the number of each event.
     """
-
     arrays = problem.arrays
     if len(problem.releases) > 1:
         # The distribution's batch is the event: give every event its own row.

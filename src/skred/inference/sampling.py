@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
@@ -104,13 +106,13 @@ def _starts(law: Law, problem: PooledProblem, prior: xr.Dataset, chains: int) ->
     return [{name: samples[name][i] for name in samples} for i in best]
 
 
-class quiet_pymc:
-    """PyMC logs every stage; the commands say in their own words what goes on."""
-
-    def __enter__(self) -> None:
-        self._logger = logging.getLogger("pymc")
-        self._level = self._logger.level
-        self._logger.setLevel(logging.ERROR)
-
-    def __exit__(self, *error: object) -> None:
-        self._logger.setLevel(self._level)
+@contextmanager
+def quiet_pymc() -> Iterator[None]:
+    """Silence PyMC's log of its stages; the commands say in their own words what goes on."""
+    logger = logging.getLogger("pymc")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)

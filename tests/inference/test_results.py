@@ -1,0 +1,183 @@
+"""The tree of a calibration: what is in it, in which units, and that plain tools read it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import arviz as az
+import numpy as np
+import pymc as pm
+import pytest
+import xarray as xr
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skred.inference.results import save
+from skred.inference.sampling import SamplerSettings
+from skred.laws import load_law
+from skred.work.calibrate import calibrate
+
+GROUPS = {
+    "posterior",
+    "sample_stats",
+    "log_likelihood",
+    "posterior_predictive",
+    "prior",
+    "prior_predictive",
+    "observed_data",
+    "constant_data",
+}
+ATTRIBUTES = {
+    "title",
+    "law",
+    "equation",
+    "campaign",
+    "campaign_fingerprint",
+    "likelihood",
+    "smoothing_m",
+    "n_cells",
+    "settings",
+    "seed",
+    "gate",
+    "versions",
+}
+
+
+@pytest.fixture(scope="module")
+def smc(problem: Any) -> Any:
+    return calibrate(problem, load_law("constant"), SamplerSettings("smc", draws=500, chains=2, seed=1))
+
+
+@pytest.fixture(scope="module")
+def stored(calibration: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("stored") / "posterior.nc"
+    save(calibration.tree, file)
+    return file
+
+
+def test_groups_and_attributes(calibration: Any, problem: Any) -> None:
+    tree = calibration.tree
+    assert set(tree.children) == GROUPS
+    assert ATTRIBUTES <= set(tree.attrs)
+    assert tree.attrs["campaign_fingerprint"] == problem.campaign.fingerprint()
+    assert json.loads(tree.attrs["settings"]) == calibration.settings.as_dict()
+    assert json.loads(tree.attrs["gate"])["passed"] is True
+    assert json.loads(tree.attrs["versions"])["pymc"] == pm.__version__
+
+
+def test_no_dim_has_a_variables_name(calibration: Any) -> None:
+    for group in calibration.tree.children.values():
+        dataset = group.to_dataset()
+        assert not set(map(str, dataset.dims)) & set(map(str, dataset.data_vars)), group.path
+        for name in dataset.data_vars:
+            unnamed = [
+                dim for dim in dataset[name].dims if str(dim).startswith("dim_") or "_dim_" in str(dim)
+            ]
+            assert not unnamed, (group.path, name, unnamed)
+
+
+@pytest.mark.parametrize("group", ["posterior", "prior"])
+def test_parameters_have_units(group: str, calibration: Any) -> None:
+    dataset = calibration.tree[group].to_dataset()
+    assert set(dataset.data_vars) == {"dry_friction", "turbulent_drag"}
+    assert dataset["dry_friction"].attrs["units"] == "1"
+    assert dataset["turbulent_drag"].attrs["units"] == "m-1"
+    assert dataset["turbulent_drag"].attrs["symbol"] == "D"
+
+
+def test_shapes(calibration: Any, problem: Any) -> None:
+    tree, n_draws = calibration.tree, {"chain": 4, "draw": 1000}
+    events = {"event": 22, "sensor": 4}
+    assert dict(tree["posterior_predictive"]["reading"].sizes) == {**n_draws, **events}
+    assert dict(tree["posterior_predictive"]["mean_response"].sizes) == {**n_draws, "release": 1, "sensor": 4}
+    assert dict(tree["log_likelihood"]["recordings"].sizes) == {**n_draws, "event": 22}
+    assert dict(tree["observed_data"]["reading"].sizes) == events
+    assert tree["log_likelihood"]["event"].values.tolist() == list(problem.campaign.event_ids)
+    assert_array_equal(tree["observed_data"]["reading"].values, problem.values)
+
+
+def test_log_likelihood_is_pymcs(calibration: Any) -> None:
+    few = xr.DataTree.from_dict(
+        {"posterior": calibration.tree["posterior"].to_dataset().isel(draw=slice(20))}
+    )
+    theirs = pm.compute_log_likelihood(
+        few, model=calibration.model, extend_inferencedata=False, progressbar=False
+    )
+    ours = calibration.tree["log_likelihood"]["recordings"].isel(draw=slice(20))
+    found = theirs["recordings"] if isinstance(theirs, xr.Dataset) else theirs["log_likelihood"]["recordings"]
+    assert_allclose(ours.values, found.transpose(*ours.dims).values, rtol=1e-9)
+
+
+def test_predictive_readings_scatter_about_the_response_by_sigma(calibration: Any, problem: Any) -> None:
+    predictive = calibration.tree["posterior_predictive"].to_dataset()
+    residual = (predictive["reading"] - predictive["mean_response"].isel(release=0)).values.reshape(-1, 4)
+    sd = np.sqrt(np.diag(problem.covariance))
+    assert np.abs(residual.mean(axis=0) / sd).max() < 0.02
+    assert np.abs((np.cov(residual.T) - problem.covariance) / np.outer(sd, sd)).max() < 0.02
+
+
+def test_response_of_several_releases(two_releases: Any, calibration: Any) -> None:
+    from skred.inference.results import assemble
+
+    law = calibration.law
+    posterior = xr.DataTree.from_dict(
+        {"posterior": calibration.tree["posterior"].to_dataset().isel(draw=slice(5))}
+    )
+    prior = calibration.tree["prior"].to_dataset().isel(draw=slice(5))
+    tree = assemble(two_releases, law, posterior, prior, calibration.gate, calibration.settings)
+    response = tree["posterior_predictive"]["mean_response"]
+    assert response["release"].values.tolist() == [0.0, 700.0]
+    rows = law.strength_rows({n: posterior["posterior"][n].values.ravel() for n in law.parameter_names})
+    expected = two_releases.simulate(law.mechanisms, rows)[:, [0, 1]]
+    assert_allclose(response.values.reshape(-1, 2, 4), expected, rtol=1e-12)
+    assert "sample_stats" not in tree.children
+
+
+def test_plain_xarray_and_arviz_read_it(stored: Path, calibration: Any) -> None:
+    with xr.open_datatree(stored, engine="h5netcdf") as tree:
+        assert set(tree.children) == GROUPS
+        xr.testing.assert_identical(tree.load(), xr.open_datatree(stored).load())
+        for path in ("posterior", "log_likelihood", "observed_data", "constant_data"):
+            xr.testing.assert_equal(tree[path].to_dataset(), calibration.tree[path].to_dataset())
+        assert tree["posterior"]["turbulent_drag"].attrs["units"] == "m-1"
+        assert tree.attrs["campaign_fingerprint"] == calibration.tree.attrs["campaign_fingerprint"]
+        summary = az.summary(tree)
+        assert set(summary.index) == {"dry_friction", "turbulent_drag"}
+        from_file = az.loo(tree, var_name="recordings")
+    assert from_file.elpd == pytest.approx(az.loo(calibration.tree, var_name="recordings").elpd)
+    assert np.isfinite(from_file.elpd)
+
+
+def test_saving_leaves_nothing_half_written(stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert [file.name for file in stored.parent.iterdir()] == ["posterior.nc"]
+    before = stored.read_bytes()
+
+    def break_off(tree: xr.DataTree, file: Path, **options: Any) -> None:
+        file.write_bytes(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(xr.DataTree, "to_netcdf", break_off)
+    with pytest.raises(KeyboardInterrupt):
+        save(xr.DataTree(), stored)
+    assert stored.read_bytes() == before
+
+
+def test_statistics_of_smc_can_be_stored(
+    smc: Any, tmp_path: Path, quadrature_of: Callable[[str], Any]
+) -> None:
+    stats = smc.tree["sample_stats"].to_dataset()
+    assert all(variable.dtype != object for variable in stats.data_vars.values())
+    save(smc.tree, tmp_path / "smc.nc")
+    with xr.open_datatree(tmp_path / "smc.nc", engine="h5netcdf") as tree:
+        evidence = tree["sample_stats"]["log_marginal_likelihood"].values
+    last = [chain[np.isfinite(chain)][-1] for chain in evidence.reshape(2, -1)]
+    assert_allclose(last, quadrature_of("constant").log_evidence, atol=0.4)
+
+
+def test_posterior_of_smc_is_that_of_the_grid(smc: Any, quadrature_of: Callable[[str], Any]) -> None:
+    grid = quadrature_of("constant")
+    draws = smc.tree["posterior"]["retardation"].values
+    assert abs(draws.mean() - grid.mean[0]) < 0.3 * grid.sd[0]
+    assert 0.8 < draws.std() / grid.sd[0] < 1.2
