@@ -22,6 +22,7 @@ import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -105,12 +106,14 @@ def uniformity(ranks: Sequence[int] | IntArray, n_ranked: int = N_RANKED, band: 
     counts = np.bincount(ranks * n_bins // n_values, minlength=n_bins)
     at = np.arange(1, n_values) / n_values
     below = _counts_below(ranks[None], n_values)[0]
-    level, p_value = _simultaneous(n, n_values, _least_likely(below, n, at), band)
+    # The pointwise level at which a band holds whole uniform ECDFs with the probability asked for.
+    of_uniform = _least_likely_of_uniform(n, n_values)
+    level = np.quantile(of_uniform, 1 - band)
     return Uniformity(
         n,
         n_bins,
         float(chisquare(counts).pvalue),
-        p_value,
+        float(np.mean(of_uniform <= _least_likely(below, n, at))),
         at,
         below / n - at,
         binom.ppf(level / 2, n, at) / n - at,
@@ -131,13 +134,13 @@ def _least_likely(below: IntArray, n: int, at: FloatArray) -> Any:
     return np.minimum(tails, 1.0).min(axis=-1)
 
 
-def _simultaneous(n: int, n_values: int, found: float, band: float) -> tuple[float, float]:
-    """Pointwise level at which the band holds whole uniform ECDFs, and the p-value of what was found."""
+@cache
+def _least_likely_of_uniform(n: int, n_values: int) -> FloatArray:
+    """`_least_likely` of many samples of uniform ranks."""
     rng = np.random.default_rng(1)
-    at = np.arange(1, n_values) / n_values
     below = _counts_below(rng.integers(n_values, size=(_UNIFORM_SAMPLES, n)), n_values)
-    smallest = _least_likely(below, n, at)
-    return float(np.quantile(smallest, 1 - band)), float(np.mean(smallest <= found))
+    least: FloatArray = _least_likely(below, n, np.arange(1, n_values) / n_values)
+    return least
 
 
 def rank(truth: float, draws: FloatArray, rng: np.random.Generator) -> int:

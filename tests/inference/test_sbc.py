@@ -76,13 +76,13 @@ def test_a_wrong_posterior_is_found(sbc: Any, wrong: str) -> None:
     results = toy_ranks(sbc, wrong).values()
     assert min(result.ecdf_p for result in results) < 0.001
     assert not all(result.inside_band for result in results)
-    assert min(result.chi_square_p for result in results) < 0.001
+    assert min(result.chi_square_p for result in results) < 0.01
 
 
 def test_a_dropped_event_shows_in_the_log_likelihood_alone(sbc: Any) -> None:
     """Which is why it is ranked: the posterior from fewer events is calibrated for the parameter."""
     results = toy_ranks(sbc, "an event dropped")
-    assert results["mu"].inside_band and not results["log_likelihood"].inside_band
+    assert results["mu"].ecdf_p > 0.01 and results["log_likelihood"].ecdf_p < 0.001
 
 
 @pytest.mark.parametrize("n", [15, 100])
