@@ -92,7 +92,7 @@ def test_equation_and_documentation(law: Any) -> None:
         ("coulomb", "dU^2/(2 ds) = g sin(phi) - mu max(0, g cos(phi) + kappa U^2)"),
         ("pcm", "dU^2/(2 ds) = g sin(phi) - mu max(0, g cos(phi) + kappa U^2) - D U^2"),
         ("constant", "dU^2/(2 ds) = g sin(phi) - b"),
-        ("voellmy", "dU^2/(2 ds) = g sin(phi) - mu g cos(phi) - D U^2"),
+        ("voellmy", "dU^2/(2 ds) = g sin(phi) - mu g cos(phi) - D U^2, D = g / (xi h)"),
     ],
 )
 def test_equations(law_id: str, equation: str) -> None:

@@ -52,7 +52,8 @@ def test_help_imports_nothing_heavy() -> None:
         "sys.argv = ['pcm', '--help']\n"
         "try: run_model('pcm')\n"
         "except SystemExit: pass\n"
-        "print([m for m in ('pymc', 'pytensor', 'arviz', 'xarray', 'pandas', 'matplotlib') if m in sys.modules])"
+        "heavy = 'pymc', 'pytensor', 'arviz', 'xarray', 'pandas', 'matplotlib', 'numba'\n"
+        "print([module for module in heavy if module in sys.modules])"
     )
     assert run("-c", code).stdout.strip().endswith("[]")
 

@@ -49,7 +49,7 @@ def test_a_clear_winner() -> None:
 
 def test_a_close_race_prefers_nobody() -> None:
     text = told(model("A"), behind("B", 1.5, 2.0, False), behind("C", 40.0, 5.0, True))
-    assert "recordings rank first law A" in text and "prefer law" not in text
+    assert "recordings put first law A" in text and "prefer law" not in text
     assert "law B is behind by 1.50 (standard error 2.00): no practical difference" in text
     assert "law C predicts worse by 40.00" in text
 

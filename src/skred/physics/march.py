@@ -197,19 +197,6 @@ def _recur(first, keep, gain, limits, v):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _stops_plainly(i, keep, gain, limits, v):  # type: ignore[no-untyped-def]
-    """Whether a moving front stops in cell i in contact, and no barrier has a part in it."""
-    return 0.0 < v[i] <= limits[i] and limits[i + 1] > 0.0 and keep[i] * v[i] + gain[i] <= 0.0
-
-
-@compiled()
-def _stopping_distance(v, i, edge, ground, table):  # type: ignore[no-untyped-def]
-    """How far into cell i a front stops that is in contact, in closed form."""
-    a, b = contact_law(i, ground, table)
-    return min(distance_to(v, 0.0, a, b), edge[i + 1] - edge[i])
-
-
-@compiled()
 def contact_law(i, ground, table):  # type: ignore[no-untyped-def]
     """Source and decay of cell i, the normal force on, no terms in U."""
     mu = table[FRICTION, i]
@@ -235,9 +222,14 @@ def march(  # type: ignore[no-untyped-def]
                 break
         if i > first:
             start = edge[i]
-        if at_edge and not speed_terms and _stops_plainly(i, keep, gain, limits, v):
-            # Apart from the general case, whose handling of arrays would cost as much as 50 cells.
-            s, stopped = start + _stopping_distance(v[i], i, edge, ground, table), True
+        ahead = keep[i] * v[i] + gain[i]
+        plain = at_edge and not speed_terms and 0.0 < v[i] <= limits[i] and limits[i + 1] > 0.0
+        if plain and ahead <= 0.0:
+            # A stop in contact, written out: handing arrays to a function costs as much as 50 cells.
+            mu = table[FRICTION, i]
+            a = 2.0 * (GRAVITY * (ground[0, i] - mu * ground[1, i]) - table[CONSTANT, i])
+            b = 2.0 * (table[QUADRATIC, i] + mu * ground[2, i])
+            s, stopped = start + min(distance_to(v[i], 0.0, a, b), edge[i + 1] - start), True
             v[i + 1] = 0.0
         else:
             cell, end = cell_at(i, ground, table, u_c, speed_terms), edge[i + 1]
@@ -251,7 +243,9 @@ def march(  # type: ignore[no-untyped-def]
 @compiled()
 def is_regular(i, first, limits, speed_terms, v):  # type: ignore[no-untyped-def]
     """Whether nothing happens in cell i: it is crossed whole, in contact, in closed form."""
-    return i > first and not speed_terms and _regular_until(i, i + 1, limits, v) > i
+    if i <= first or speed_terms:
+        return False
+    return v[i] <= limits[i] and 0.0 < v[i + 1] <= limits[i + 1]
 
 
 @compiled(fastmath=_FAST)

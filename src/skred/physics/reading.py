@@ -4,18 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from skred.physics.cell import CONSTANT, QUADRATIC, cell_at, phi1, psi
+from skred.physics.cell import CONSTANT, FRICTION, QUADRATIC, cell_at, phi1, psi
 from skred.physics.columns import GRAVITY
 from skred.physics.compiled import compiled
 from skred.physics.inputs import RUNOUT
 from skred.physics.march import contact_law, is_regular, start_tangents, travel, travel_tangents
-
-
-@compiled()
-def _regular_speed(length, i, ground, table, v):  # type: ignore[no-untyped-def]
-    """Front speed [m/s] `length` metres into a cell in which nothing happens."""
-    a, b = contact_law(i, ground, table)
-    return np.sqrt(max(v[i] + (a - b * v[i]) * length * phi1(b * length), 0.0))
 
 
 @compiled()
@@ -64,9 +57,19 @@ def read(  # type: ignore[no-untyped-def]
         s_from, s_to, i = sensors[j, 1], sensors[j, 2], cells[j]
         if sensors[j, 0] == RUNOUT:
             readings[run, j] = runout
-        elif s_from == s_to and s_from <= runout and is_regular(i, first, limits, speed_terms, v):
-            # Apart from the general case, whose handling of arrays would cost as much again.
-            readings[run, j] = _regular_speed(s_from - edge[i], i, ground, table, v)
+        elif (
+            s_from == s_to
+            and i > first
+            and not speed_terms
+            and v[i] <= limits[i]
+            and 0.0 < v[i + 1] <= limits[i + 1]
+        ):
+            # Written out: handing arrays to a function costs more than this, in counted references.
+            mu = table[FRICTION, i]
+            a = 2.0 * (GRAVITY * (ground[0, i] - mu * ground[1, i]) - table[CONSTANT, i])
+            b = 2.0 * (table[QUADRATIC, i] + mu * ground[2, i])
+            length = s_from - edge[i]
+            readings[run, j] = np.sqrt(max(v[i] + (a - b * v[i]) * length * phi1(b * length), 0.0))
         elif s_from == s_to:
             readings[run, j] = speed_at(
                 s_from, i, release, runout, first, edge, ground, barriers, u_c, speed_terms, table, v
