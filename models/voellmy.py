@@ -48,6 +48,7 @@ LAW = Law(
     build=build,
     reference="Voellmy (1955); Salm (1993), Annals of Glaciology 18, 221-226",
     strengths=strengths,
+    derived=(Parameter("xi", "xi", "m s-2"),),
     relation="D = g / (xi h)",
 )
 

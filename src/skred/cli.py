@@ -32,6 +32,7 @@ app = App(
 )
 
 Force = Annotated[bool, Parameter(name="--force", negative="")]
+Draws = Annotated[int, Parameter(validator=validators.Number(gte=4, lte=1_000_000))]
 Positive = Annotated[int, Parameter(validator=validators.Number(gte=1, lte=1_000_000))]
 Chains = Annotated[int, Parameter(validator=validators.Number(gte=2, lte=100))]
 Seed = Annotated[int, Parameter(validator=validators.Number(gte=0, lt=2**31))]
@@ -67,7 +68,7 @@ def run_model(law_id: str) -> None:
         *,
         campaign: str = "ryggfonn",
         sampler: Literal["metropolis", "nuts", "smc"] = "metropolis",
-        draws: Positive = 1000,
+        draws: Draws = 1000,
         tune: Positive = 500,
         chains: Chains = 4,
         seed: Seed = 0,
@@ -176,7 +177,7 @@ def compare(
     /,
     *,
     models: str = "coulomb,pcm,constant,voellmy",
-    draws: Positive = 1000,
+    draws: Draws = 1000,
     tune: Positive = 500,
     chains: Chains = 4,
     seed: Seed = 0,

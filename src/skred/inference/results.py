@@ -110,7 +110,9 @@ def _response(problem: PooledProblem, law: Law, parameters: xr.Dataset) -> xr.Da
 
 def _with_units(parameters: xr.Dataset, law: Law) -> xr.Dataset:
     labelled = parameters.copy()
-    for parameter in law.parameters:
+    for parameter in (*law.parameters, *law.derived):
+        if parameter.name not in labelled:
+            continue  # the prior holds the free variables only
         labelled[parameter.name].attrs.update(units=parameter.unit, symbol=parameter.symbol)
     return labelled
 

@@ -57,6 +57,8 @@ class Law:
         Where the law comes from.
     strengths : callable
         Parameters, in order, to the strengths of the mechanisms, in order.
+    derived : tuple of Parameter
+        Quantities that its model computes from the parameters, for display.
     relation : str
         The same in words of an equation, where they are not the parameters themselves.
     """
@@ -68,6 +70,7 @@ class Law:
     build: Callable[[Any], Any]
     reference: str
     strengths: Callable[..., tuple[Any, ...]] = _as_they_are
+    derived: tuple[Parameter, ...] = ()
     relation: str = ""
 
     @property
