@@ -13,9 +13,9 @@ ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results"
 HEAD = """# Benchmarks
 
-Written by `python scripts/benchmark_page.py` from `benchmarks/results/`; each section names the command that
-measured it. One machine, two cores (AMD EPYC, 2.6 GHz nominal), other work running on the second core; times are the
-best of several, and ratios are within one run.
+Written by `python scripts/benchmark_page.py` from `benchmarks/results/`; each section names the command
+that measured it. One machine, two cores (AMD EPYC, 2.6 GHz nominal), other work on the second core while
+sampling; times are the best of several, and ratios are within one run.
 """
 
 
@@ -36,16 +36,16 @@ def forward() -> str:
     return f"""
 ## The kernel
 
-`python benchmarks/forward.py --json benchmarks/results/forward.json`: 22 fronts with 22 parameter vectors on the
-394 cells of Ryggfonn, four sensors, microseconds per trajectory.
+`python benchmarks/forward.py --json benchmarks/results/forward.json`: 22 fronts with 22 parameter vectors
+on the 394 cells of Ryggfonn, four sensors, microseconds per trajectory.
 
 | what | us | numba loop / it | Python / it |
 | --- | --- | --- | --- |
 {rows}
-Asked: at most 1 us (measured {plain:.2f}), or 10 times faster than the numba loop and 200 times than Python
-(measured {peer / plain:.1f} and {python / plain:.0f}: the plain loop stops computing where the front stops, and is
-itself far faster than the 8 to 15 us it was expected to take). Largest relative difference from the reference
-over the prior's range {difference:.1e} (asked: below 1e-10).
+Asked: at most 1 us (measured {plain:.2f}), or 10 times faster than the numba loop and 200 times than
+Python (measured {peer / plain:.1f} and {python / plain:.0f}: the plain loop stops computing where the
+front stops, and is itself far faster than the 8 to 15 us it was expected to take). Largest relative
+difference from the reference over the prior's range {difference:.1e} (asked: below 1e-10).
 """
 
 
@@ -76,8 +76,8 @@ def sampling() -> str:
     rows.sort(key=lambda row: -row["rate"])
     base = next(row["rate"] for row in rows if row["name"] == "PyMC Metropolis")
     table = "".join(
-        f"| {row['name']} | {row['rate']:.0f} | {row['low']:.0f}-{row['high']:.0f} | {row['rate'] / base:.1f} |"
-        f" {row['compile']:.1f} | {row['r_hat']:.3f} | {row['mean']:.4f} |\n"
+        f"| {row['name']} | {row['rate']:.0f} | {row['low']:.0f}-{row['high']:.0f} |"
+        f" {row['rate'] / base:.1f} | {row['compile']:.1f} | {row['r_hat']:.3f} | {row['mean']:.4f} |\n"
         for row in rows
     )
     ours = next(row for row in rows if row["name"].startswith("skred"))
@@ -86,17 +86,18 @@ def sampling() -> str:
     return f"""
 ## Sampling
 
-`python benchmarks/sampling.py --seeds 5 --json benchmarks/results/sampling.json`: bulk effective draws per CPU
-second of the pooled PCM posterior on Ryggfonn, the smaller of both parameters, adaptation included,
-compilation apart; median and range over {ours["seeds"]} seeds. Settings of every sampler are in the result file.
+`python benchmarks/sampling.py --seeds 5 --json benchmarks/results/sampling.json`: bulk effective draws per
+CPU second of the pooled PCM posterior on Ryggfonn, the smaller of both parameters, adaptation included,
+compilation apart; median and range over {ours["seeds"]} seeds. The result file holds all settings.
 
 | sampler | ESS / CPU s | range | times PyMC's default Metropolis | compile [s] | largest r-hat | mean mu |
 | --- | --- | --- | --- | --- | --- | --- |
 {table}
-Asked: 20 times PyMC's default Metropolis (measured {ours["rate"] / base:.1f}) and ahead of every other sampler
-(measured {ours["rate"] / best["rate"]:.2f} times the best that converged, {best["name"]}). The two parameters are
-all but uncorrelated in this posterior, so one scalar at a time does far better than on a ridge: PyMC's default
-gives {base:.0f} here where 50 to 66 were expected. About half of our time is PyMC's own work per draw.
+Asked: 20 times PyMC's default Metropolis (measured {ours["rate"] / base:.1f}) and ahead of every other
+sampler (measured {ours["rate"] / best["rate"]:.2f} times the best that converged, {best["name"]}). The
+two parameters are all but uncorrelated in this posterior, so one scalar at a time does far better than on a
+ridge: PyMC's default gives {base:.0f} here where 50 to 66 were expected. About half of our time is PyMC's
+own work per draw.
 """
 
 
@@ -127,15 +128,15 @@ def calibration() -> str:
     return f"""
 ## Simulation-based calibration
 
-`python benchmarks/sbc.py --n 200 --seed 0`: {summary["n"]} data sets from the prior, the pooled PCM model refitted
-to each; are the ranks of the truth uniform?
+`python benchmarks/sbc.py --n 200 --seed 0`: {summary["n"]} data sets from the prior, the pooled PCM model
+refitted to each; are the ranks of the truth uniform?
 
 | quantity | chi-square p | ECDF p | ECDF p, gate passed | 95 % band |
 | --- | --- | --- | --- | --- |
 {rows}
-{summary["errors"]} refits ended in an error. {summary["gate_failed"]} still failed the gate of convergence after a second
-try with four times the draws; they are kept in the ranks. Of seven such that were looked at, five had true fronts
-that leave the track's end and two fronts that stop high up: corners of a vague prior.
+{summary["errors"]} refits ended in an error. {summary["gate_failed"]} still failed the gate of convergence
+after a second try with four times the draws; they are kept in the ranks. Of seven such that were looked at,
+five had true fronts that leave the track's end and two fronts that stop high up: corners of a vague prior.
 
 ![Rank ECDF less uniform, with 95 % band](results/sbc.png)
 """

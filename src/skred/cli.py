@@ -31,14 +31,33 @@ app = App(
     suppress_keyboard_interrupt=False,
 )
 
-Force = Annotated[bool, Parameter(name="--force", negative="")]
-Draws = Annotated[int, Parameter(validator=validators.Number(gte=4, lte=1_000_000))]
-Positive = Annotated[int, Parameter(validator=validators.Number(gte=1, lte=1_000_000))]
-Chains = Annotated[int, Parameter(validator=validators.Number(gte=2, lte=100))]
-Seed = Annotated[int, Parameter(validator=validators.Number(gte=0, lt=2**31))]
-NotNegative = Annotated[float, Parameter(validator=validators.Number(gte=0.0, lte=1000.0))]
-Quiet = Annotated[bool, Parameter(name="--quiet", negative="")]
-Json = Annotated[bool, Parameter(name="--json", negative="")]
+Campaigns = Annotated[str, Parameter(help="A folder, or the name of an embedded campaign.")]
+Models = Annotated[str, Parameter(help="Laws, separated by commas.")]
+Samplers = Annotated[
+    Literal["metropolis", "nuts", "smc"],
+    Parameter(help="PyMC's Metropolis with joint adapted proposals, NUTS, or sequential Monte Carlo."),
+]
+Draws = Annotated[
+    int, Parameter(validator=validators.Number(gte=4, lte=1_000_000), help="Draws kept per chain.")
+]
+Tune = Annotated[
+    int, Parameter(validator=validators.Number(gte=1, lte=1_000_000), help="Adaptation draws before them.")
+]
+Chains = Annotated[int, Parameter(validator=validators.Number(gte=2, lte=100), help="Number of chains.")]
+Seed = Annotated[int, Parameter(validator=validators.Number(gte=0, lt=2**31), help="Seed of all randomness.")]
+Smoothing = Annotated[
+    float,
+    Parameter(validator=validators.Number(gte=0.0, lte=1000.0), help="Smoothing length of the terrain, m."),
+]
+Out = Annotated[
+    Path | None,
+    Parameter(
+        help="Folder for the results: new, empty, or with --force; by default a fresh one in skred-out."
+    ),
+]
+Force = Annotated[bool, Parameter(name="--force", negative="", help="Use a folder that holds files.")]
+Quiet = Annotated[bool, Parameter(name="--quiet", negative="", help="Write nothing but errors.")]
+Json = Annotated[bool, Parameter(name="--json", negative="", help="Write the result as JSON to stdout.")]
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -66,45 +85,19 @@ def run_model(law_id: str) -> None:
 
     def calibrate_law(
         *,
-        campaign: str = "ryggfonn",
-        sampler: Literal["metropolis", "nuts", "smc"] = "metropolis",
+        campaign: Campaigns = "ryggfonn",
+        sampler: Samplers = "metropolis",
         draws: Draws = 1000,
-        tune: Positive = 500,
+        tune: Tune = 500,
         chains: Chains = 4,
         seed: Seed = 0,
-        smoothing: NotNegative = 10.0,
-        out: Path | None = None,
+        smoothing: Smoothing = 10.0,
+        out: Out = None,
         force: Force = False,
         as_json: Json = False,
         quiet: Quiet = False,
     ) -> int:
-        """Sample the posterior, check it, and write summary.json, posterior.nc and figures.
-
-        Parameters
-        ----------
-        campaign
-            A folder, or the name of an embedded campaign.
-        sampler
-            PyMC's Metropolis with a joint adapted proposal, NUTS, or sequential Monte Carlo.
-        draws
-            Draws kept per chain.
-        tune
-            Adaptation draws before them.
-        chains
-            Number of chains.
-        seed
-            Seed of all randomness.
-        smoothing
-            Smoothing length of the terrain, m.
-        out
-            Folder for the results: new, empty, or with --force; by default a fresh one under skred-out.
-        force
-            Use a folder that holds files.
-        as_json
-            Write the summary as JSON to stdout.
-        quiet
-            Write nothing but errors.
-        """
+        """Sample the posterior, check it, and write summary.json, posterior.nc and figures."""
         settings = {"sampler": sampler, "draws": draws, "tune": tune, "chains": chains, "seed": seed}
         return _calibrate(law_id, campaign, settings, smoothing, out, force, as_json, quiet)
 
@@ -143,18 +136,8 @@ def run(arguments: list[str], program: App = app) -> int:
 
 
 @app.command
-def validate(campaign: str, /, *, as_json: Json = False, quiet: Quiet = False) -> int:
-    """Check the files of a campaign and list every problem.
-
-    Parameters
-    ----------
-    campaign
-        A folder, or the name of an embedded campaign.
-    as_json
-        Write the result as JSON to stdout.
-    quiet
-        Write nothing if all is well.
-    """
+def validate(campaign: Campaigns, /, *, as_json: Json = False, quiet: Quiet = False) -> int:
+    """Check the files of a campaign and list every problem."""
     from skred.campaign import CampaignError, find_campaign, read_campaign
 
     try:
@@ -173,47 +156,21 @@ def validate(campaign: str, /, *, as_json: Json = False, quiet: Quiet = False) -
 
 @app.command
 def compare(
-    campaign: str = "ryggfonn",
+    campaign: Campaigns = "ryggfonn",
     /,
     *,
-    models: str = "coulomb,pcm,constant,voellmy",
+    models: Models = "coulomb,pcm,constant,voellmy",
     draws: Draws = 1000,
-    tune: Positive = 500,
+    tune: Tune = 500,
     chains: Chains = 4,
     seed: Seed = 0,
-    smoothing: NotNegative = 10.0,
-    out: Path | None = None,
+    smoothing: Smoothing = 10.0,
+    out: Out = None,
     force: Force = False,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
-    """Calibrate several laws and say which one the recordings prefer, and by how much.
-
-    Parameters
-    ----------
-    campaign
-        A folder, or the name of an embedded campaign.
-    models
-        Laws, separated by commas.
-    draws
-        Draws kept per chain.
-    tune
-        Adaptation draws before them.
-    chains
-        Number of chains.
-    seed
-        Seed of all randomness.
-    smoothing
-        Smoothing length of the terrain, m.
-    out
-        Folder for the results: new, empty, or with --force; by default a fresh one under skred-out.
-    force
-        Use a folder that holds files.
-    as_json
-        Write the comparison as JSON to stdout.
-    quiet
-        Write nothing but errors.
-    """
+    """Calibrate several laws and say which one the recordings prefer, and by how much."""
     from skred.work.output import output_folder, plain
 
     laws = _laws(models)

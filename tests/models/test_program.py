@@ -15,7 +15,7 @@ LAWS = ("coulomb", "pcm", "constant", "voellmy")
 COMMANDS = [["-m", f"models.{law}"] for law in LAWS]
 COMMANDS += [["-m", "skred.cli", *command] for command in ([], ["validate"], ["compare"])]
 HELP_SECONDS = 3.0
-"""The bar is 1 s on a quiet machine (measured on a busy one: 0.44 to 0.68 s); this leaves room for a busy one."""
+"""The bar is 1 s on a quiet machine (measured: 0.40 to 0.68 s); this leaves room for a busy one."""
 
 
 def run(*arguments: str, cwd: Path | None = None, timeout: float = 120) -> subprocess.CompletedProcess[str]:

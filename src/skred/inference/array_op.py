@@ -7,6 +7,7 @@ campaign.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
@@ -25,13 +26,13 @@ class ArrayOp(Op):
     array_inputs: ClassVar[tuple[ArrayInput, ...]]
     differentiable: ClassVar[frozenset[str]] = frozenset()
 
+    @abstractmethod
     def output_shape(self, shapes: Sequence[tuple[Any, ...]]) -> tuple[Any, ...]:
         """Shape of the one output from those of the inputs."""
-        raise NotImplementedError(type(self).__name__)
 
+    @abstractmethod
     def evaluate(self, inputs: Sequence[Any]) -> Any:
         """Value of the one output from numpy arrays."""
-        raise NotImplementedError(type(self).__name__)
 
     def make_node(self, *inputs: Any) -> Apply:
         """Node with its inputs checked."""

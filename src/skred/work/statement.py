@@ -67,12 +67,16 @@ def _agreement(valid: list[dict[str, Any]]) -> list[str]:
     for model in valid:
         if model["loo"]["n_bad"]:
             sentences.append(
-                f"Importance sampling is unreliable for {model['loo']['n_bad']} events of {model['title']}"
-                f" (Pareto k up to {model['loo']['pareto_k_max']:.2f}); the ranking rests on exact refits."
+                f"Importance sampling is unreliable for {_count(model['loo']['n_bad'], 'event')} of"
+                f" {model['title']} (Pareto k up to {model['loo']['pareto_k_max']:.2f}); the ranking rests on exact refits."
             )
         if model["exact"]["failed_refits"]:
             sentences.append(
-                f"{len(model['exact']['failed_refits'])} refits of {model['title']} did not converge:"
-                " do not build on its place in the ranking."
+                f"{_count(len(model['exact']['failed_refits']), 'refit')} of {model['title']} did not"
+                " converge: do not build on its place in the ranking."
             )
     return sentences
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
