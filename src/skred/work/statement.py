@@ -68,7 +68,8 @@ def _agreement(valid: list[dict[str, Any]]) -> list[str]:
         if model["loo"]["n_bad"]:
             sentences.append(
                 f"Importance sampling is unreliable for {_count(model['loo']['n_bad'], 'event')} of"
-                f" {model['title']} (Pareto k up to {model['loo']['pareto_k_max']:.2f}); the ranking rests on exact refits."
+                f" {model['title']} (Pareto k up to {model['loo']['pareto_k_max']:.2f}); the ranking rests on"
+                " exact refits."
             )
         if model["exact"]["failed_refits"]:
             sentences.append(
