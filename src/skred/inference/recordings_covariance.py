@@ -159,7 +159,7 @@ def _checked(values: ArrayLike, not_reached: ArrayLike) -> tuple[FloatArray, Boo
     if complete < n_sensors + 1:
         raise ValueError(
             f"{complete} events are recorded or not reached at all {n_sensors} sensors;"
-            f" their covariance needs at least {n_sensors + 1}: add events, or leave out a sensor that few reached"
+            f" their covariance needs at least {n_sensors + 1}: add events, or leave out a sensor"
         )
     # An event without any knowledge would only slow the iteration down.
     return values[known.any(axis=1)], not_reached[known.any(axis=1)]
