@@ -31,7 +31,7 @@ LAW = Law(
     mechanisms=(RETARDATION,),
     parameters=(parameter_of(RETARDATION.strength),),
     build=build,
-    reference="Gauer and others (2008), doi 10.1016/j.coldregions.2007.05.002",
+    reference="yield stress as in Bartelt, Salm and Gruber (1999), doi 10.3189/S002214300000174X",
 )
 
 if __name__ == "__main__":

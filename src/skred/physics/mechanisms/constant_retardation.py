@@ -16,8 +16,8 @@ MECHANISM = Mechanism(
     ),
     equation="-b",
     mark="the loss of U^2/2 between two places is the same for every event",
-    reference="Gauer and others (2008), Cold Regions Science and Technology 51, 193-203",
-    doi="10.1016/j.coldregions.2007.05.002",
+    reference="friction limited by a yield stress: Bartelt, Salm and Gruber (1999), Journal of Glaciology 45(150)",
+    doi="10.3189/S002214300000174X",
     column=Column.CONSTANT,
     profile=everywhere,
 )

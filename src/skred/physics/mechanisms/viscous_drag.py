@@ -16,8 +16,8 @@ MECHANISM = Mechanism(
     ),
     equation="-c U",
     mark="between constant and quadratic: hard to tell from turbulent drag",
-    reference="Salm (1966); Nishimura and Maeno (1989), Annals of Glaciology 13, 207-210",
-    doi="10.3189/S0260305500007916",
+    reference="among the flow laws compared by Bartelt, Salm and Gruber (1999), Journal of Glaciology 45(150)",
+    doi="10.3189/S002214300000174X",
     column=Column.LINEAR,
     profile=everywhere,
 )
