@@ -16,7 +16,7 @@ MECHANISM = Mechanism(
     ),
     equation="-b",
     mark="the loss of U^2/2 between two places is the same for every event",
-    reference="friction limited by a yield stress: Bartelt, Salm and Gruber (1999), Journal of Glaciology 45(150)",
+    reference="friction limited by a yield stress: Bartelt, Salm and Gruber (1999), J. Glaciology 45(150)",
     doi="10.3189/S002214300000174X",
     column=Column.CONSTANT,
     profile=everywhere,

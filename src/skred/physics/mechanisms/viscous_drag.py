@@ -16,7 +16,7 @@ MECHANISM = Mechanism(
     ),
     equation="-c U",
     mark="between constant and quadratic: hard to tell from turbulent drag",
-    reference="among the flow laws compared by Bartelt, Salm and Gruber (1999), Journal of Glaciology 45(150)",
+    reference="among the flow laws compared by Bartelt, Salm and Gruber (1999), J. Glaciology 45(150)",
     doi="10.3189/S002214300000174X",
     column=Column.LINEAR,
     profile=everywhere,
