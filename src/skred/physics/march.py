@@ -20,11 +20,11 @@ from skred.physics.cell import (
     SERIES_LIMIT,
     cell_at,
     cross,
-    cross_tangents,
     distance_to,
     phi1_series,
     psi_series,
 )
+from skred.physics.cell_tangents import cross_tangents
 from skred.physics.columns import GRAVITY
 from skred.physics.compiled import compiled
 from skred.physics.inputs import cell_of

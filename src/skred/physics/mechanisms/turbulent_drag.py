@@ -12,7 +12,7 @@ MECHANISM = Mechanism(
         paper_symbol="a2",
         unit="m-1",
         prior_scale=0.01,
-        prior_reason="1/D is the distance over which drag alone takes 63 % of v/2; 95 % of D below "
+        prior_reason="over 1/(2 D) drag alone takes 63 % of U^2; 95 % of D below "
         "0.02 1/m, which on 30 degrees without friction allows no more than 16 m/s",
     ),
     equation="-D U^2",
