@@ -75,7 +75,8 @@ class Case:
         spans = [
             ("span", s, t) for s, t in zip(places[:-2], places[2:], strict=True) if s != self.release_s_m
         ]
-        object.__setattr__(self, "sensors", (*points, *spans, ("runout", 0.0, 0.0)))
+        to_stop = [("span to stop", s, t) for _, s, t in spans if s < t]
+        object.__setattr__(self, "sensors", (*points, *spans, *to_stop, ("runout", 0.0, 0.0)))
 
     def kernel(self) -> tuple[np.ndarray, np.ndarray]:
         """Readings and jacobian."""
@@ -83,7 +84,12 @@ class Case:
         law = make_contributions(COLUMNS, np.ones((5, terrain.n_cells)), WEAKENING_SPEED)
         if self.strengths[Column.LINEAR] == self.strengths[Column.WEAKENING] == 0:
             law = law._replace(speed_terms=False)
-        table = sensor_table([None if kind == "runout" else (s, t) for kind, s, t in self.sensors])
+        table = np.vstack(
+            [
+                sensor_table([None if kind == "runout" else (s, t)], to_stop=kind == "span to stop")
+                for kind, s, t in self.sensors
+            ]
+        )
         arguments = (
             np.array([self.strengths]),
             np.array([self.release_s_m]),
@@ -120,7 +126,9 @@ class Case:
         ).runout_s_m
         at_barrier = [place for place, _, _ in self.barriers]
         ends = np.array([t for _, _, t in self.sensors])
-        return (abs(ends - runout) > 1e-3) | np.isin(ends, at_barrier) | (ends == runout)
+        starts = np.array([s if kind == "span to stop" else np.inf for kind, s, _ in self.sensors])
+        clear = (abs(ends - runout) > 1e-3) | np.isin(ends, at_barrier) | (ends == runout)
+        return clear & (abs(starts - runout) > 1e-3)
 
 
 @st.composite

@@ -51,5 +51,5 @@ CacheImpl._locator_classes[:0] = [_stamped(base) for base in CacheImpl._locator_
 
 
 def compiled(**options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """`numba.njit` as every function of the ring uses it: cached, IEEE division."""
-    return njit(cache=True, error_model="numpy", **options)
+    """`numba.njit` as every function of the ring uses it: cached, IEEE division, without the GIL."""
+    return njit(cache=True, error_model="numpy", nogil=True, **options)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from skred.physics.inputs import (
     FRONT_VELOCITY,
     RUNOUT,
+    VELOCITY_TO_STOP,
     Contributions,
     Path,
     make_contributions,
@@ -51,7 +52,16 @@ def contributions_of(
     return contributions
 
 
-def sensor_table(places: Sequence[tuple[float, float] | None]) -> FloatArray:
-    """Sensors as the kernel reads them: (s_from, s_to) in m for a front velocity, None for runout."""
-    rows = [(RUNOUT, 0.0, 0.0) if place is None else (FRONT_VELOCITY, place[0], place[1]) for place in places]
+def sensor_table(places: Sequence[tuple[float, float] | None], *, to_stop: bool = False) -> FloatArray:
+    """Sensors as the kernel reads them: (s_from, s_to) in m for a front velocity, None for runout.
+
+    With `to_stop` a span in which the front stops reads the mean speed up to there instead of 0.
+    """
+    rows = []
+    for place in places:
+        if place is None:
+            rows.append((RUNOUT, 0.0, 0.0))
+        else:
+            is_span = place[0] < place[1]
+            rows.append((VELOCITY_TO_STOP if to_stop and is_span else FRONT_VELOCITY, place[0], place[1]))
     return np.array(rows, dtype=float).reshape(-1, 3)

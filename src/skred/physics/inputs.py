@@ -10,8 +10,12 @@ from numpy.typing import NDArray
 from skred.physics.columns import GRAVITY, Column
 from skred.physics.compiled import compiled
 
-FRONT_VELOCITY, RUNOUT = 0.0, 1.0
-"""Codes of a sensor's quantity in the sensor table."""
+FRONT_VELOCITY, RUNOUT, VELOCITY_TO_STOP = 0.0, 1.0, 2.0
+"""Codes of a sensor's quantity in the sensor table.
+
+The last is a span's mean speed up to the stop of a front that stops inside, where FRONT_VELOCITY
+is 0: continuous in the strengths, for likelihoods that take the stop itself into account.
+"""
 
 _LINEAR, _WEAKENING = int(Column.LINEAR), int(Column.WEAKENING)
 

@@ -7,7 +7,7 @@ import numpy as np
 from skred.physics.cell import CONSTANT, FRICTION, QUADRATIC, cell_at, phi1, psi
 from skred.physics.columns import GRAVITY
 from skred.physics.compiled import compiled
-from skred.physics.inputs import RUNOUT
+from skred.physics.inputs import RUNOUT, VELOCITY_TO_STOP
 from skred.physics.march import contact_law, is_regular, start_tangents, travel, travel_tangents
 
 
@@ -24,27 +24,37 @@ def speed_at(  # type: ignore[no-untyped-def]
 
 
 @compiled()
+def span_end(quantity, s_from, s_to, release, runout):  # type: ignore[no-untyped-def]
+    """Where the part of a span ends over which the front is timed; `s_from` if it is not timed at all."""
+    if s_from < release or (s_to > runout and quantity != VELOCITY_TO_STOP):
+        return s_from
+    return max(min(s_to, runout), s_from)
+
+
+@compiled()
 def span_speed(  # type: ignore[no-untyped-def]
-    s_from, s_to, i, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms, table, v
-):
-    """Mean speed [m/s]: length over travel time; 0 where the front stops before the lower end.
+    s_from, s_to, end, i, release, first, edge, ground, barriers, limits, u_c, speed_terms, table, v
+):  # fmt: skip
+    """Mean speed [m/s] from `s_from`, in cell i, to `end`: length over travel time; 0 for no length.
+
+    `end` is `s_to` or a stop above it.
 
     The time over a cell, or the part of one in which nothing changes, is its length over the mean
     of the speeds at its ends: exact for a constant retardation, second order otherwise.
     """
-    if s_from < release or s_to > runout:
+    if end <= s_from:
         return 0.0
     time = 0.0
-    while i < edge.size - 1 and edge[i] < s_to:
-        if s_from <= edge[i] and edge[i + 1] <= s_to and is_regular(i, first, limits, speed_terms, v):
+    while i < edge.size - 1 and edge[i] < end:
+        if s_from <= edge[i] and edge[i + 1] <= end and is_regular(i, first, limits, speed_terms, v):
             time += 2.0 * (edge[i + 1] - edge[i]) / (np.sqrt(v[i]) + np.sqrt(v[i + 1]))
         else:
             cell = cell_at(i, ground, table, u_c, speed_terms)
             start = release if i == first else edge[i]
-            ahead = min(edge[i + 1], s_to)
+            ahead = min(edge[i + 1], s_to)  # not `end`: a stop is to be met, not to be rounded to
             time += travel(v[i], start, ahead, edge[i + 1], s_from, cell, barriers)[3]
         i += 1
-    return (s_to - s_from) / time
+    return (end - s_from) / time
 
 
 @compiled()
@@ -75,9 +85,9 @@ def read(  # type: ignore[no-untyped-def]
                 s_from, i, release, runout, first, edge, ground, barriers, u_c, speed_terms, table, v
             )
         else:
+            end = span_end(sensors[j, 0], s_from, s_to, release, runout)
             readings[run, j] = span_speed(
-                s_from, s_to, i, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms,
-                table, v,
+                s_from, s_to, end, i, release, first, edge, ground, barriers, limits, u_c, speed_terms, table, v
             )  # fmt: skip
 
 
@@ -106,12 +116,13 @@ def _regular_speed_tangents(  # type: ignore[no-untyped-def]
 
 @compiled()
 def _span_tangents(  # type: ignore[no-untyped-def]
-    s_from, s_to, i, speed, release, first, edge, ground, barriers, u_c, speed_terms, columns, profiles,
-    table, v, dv, step, shift, d_time, tangents,
+    s_from, s_to, i, speed, release, runout, first, edge, ground, barriers, u_c, speed_terms, columns,
+    profiles, table, v, dv, step, shift, d_time, d_runout, tangents,
 ):  # fmt: skip
     """Tangents of a span's mean speed, which is `speed`."""
+    end = min(s_to, runout)
     d_time[:] = 0.0
-    while i < edge.size - 1 and edge[i] < s_to:
+    while i < edge.size - 1 and edge[i] < end:
         start = start_tangents(i, first, release, edge, dv, step, shift)
         cell, ahead = cell_at(i, ground, table, u_c, speed_terms), min(edge[i + 1], s_to)
         travel_tangents(
@@ -120,7 +131,8 @@ def _span_tangents(  # type: ignore[no-untyped-def]
         )  # fmt: skip
         i += 1
     for k in range(tangents.size):
-        tangents[k] = -speed * speed / (s_to - s_from) * d_time[k]
+        d_end = d_runout[k] if runout < s_to else 0.0
+        tangents[k] = speed * (d_end - speed * d_time[k]) / (end - s_from)
 
 
 @compiled()
@@ -138,8 +150,8 @@ def read_tangents(  # type: ignore[no-untyped-def]
             tangents[:] = 0.0
         elif s_from < s_to:
             _span_tangents(
-                s_from, s_to, i, speed, release, first, edge, ground, barriers, u_c, speed_terms,
-                columns, profiles, table, v, dv, step, shift, d_time, tangents,
+                s_from, s_to, i, speed, release, runout, first, edge, ground, barriers, u_c, speed_terms,
+                columns, profiles, table, v, dv, step, shift, d_time, d_runout, tangents,
             )  # fmt: skip
         elif is_regular(i, first, limits, speed_terms, v):
             _regular_speed_tangents(

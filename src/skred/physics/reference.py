@@ -26,7 +26,7 @@ from skred.physics.terrain import Terrain
 Barrier = tuple[float, float, complex]
 """Place [m], height [m], loss of those that pass [J/kg]."""
 Sensor = tuple[str, float, float]
-"""``"point"``, ``"span"`` or ``"runout"``; from and to [m] (equal for a point, unused for runout)."""
+"""``"point"``, ``"span"``, ``"span to stop"`` or ``"runout"``; from and to [m] (equal for a point, unused for runout)."""
 
 
 class Cell(NamedTuple):
@@ -94,18 +94,28 @@ class FrontRun:
         piece = next((p for p in self.pieces if p.end_s.real >= s), self.pieces[-1])
         return _speed(piece.speed_squared(s))
 
-    def span_speed(self, s_from: float, s_to: float) -> complex:
-        """Return length over travel time [m/s]; 0 where the front did not cover the whole span."""
-        if not self.pieces or s_from < self.pieces[0].start_s.real or s_to > self.runout_s_m.real:
+    def span_speed(self, s_from: float, s_to: float, *, to_stop: bool = False) -> complex:
+        """Return length over travel time [m/s]; 0 where the front did not cover the whole span.
+
+        With `to_stop`, of the part that it covered.
+        """
+        if not self.pieces or s_from < self.pieces[0].start_s.real:
             return 0j
+        last: complex = s_to
+        if s_to > self.runout_s_m.real:
+            if not to_stop or s_from >= self.runout_s_m.real:
+                return 0j
+            last = self.runout_s_m
         time = 0j
         for piece in self.pieces:
             start = piece.start_s if piece.start_s.real > s_from else s_from
             end = piece.end_s if piece.end_s.real < s_to else s_to
             if end.real > start.real:
-                mean = (_speed(piece.speed_squared(start)) + _speed(piece.speed_squared(end))) / 2
-                time += (end - start) / mean
-        return (s_to - s_from) / time
+                at_end = piece.speed_squared(end)
+                if end == self.runout_s_m and abs(at_end) < 1e-9 * abs(piece.speed_squared(start)):
+                    at_end = 0j  # at rest, but for rounding
+                time += (end - start) / ((_speed(piece.speed_squared(start)) + _speed(at_end)) / 2)
+        return (last - s_from) / time
 
 
 def run_front(
@@ -191,10 +201,10 @@ def read_front(
             readings[index] = run.runout_s_m
         elif kind == "point":
             readings[index] = run.speed(s_from)
-        elif kind == "span":
-            readings[index] = run.span_speed(s_from, s_to)
+        elif kind in ("span", "span to stop"):
+            readings[index] = run.span_speed(s_from, s_to, to_stop=kind == "span to stop")
         else:
-            raise ValueError(f"sensor {index}: expected point, span or runout, found {kind!r}")
+            raise ValueError(f"sensor {index}: expected point, span, span to stop or runout, found {kind!r}")
     return readings if isinstance(run.runout_s_m, complex) else readings.real
 
 
