@@ -14,14 +14,12 @@ RETARDATION = constant_retardation.MECHANISM
 
 
 def build(problem: Any) -> Any:
-    """PyMC model of the pooled calibration, with a vague half-normal prior."""
+    """PyMC model of a campaign; with `--likelihood hierarchical` the prior is of the events' median."""
     import pymc as pm
-
-    from skred.inference.pooled import mean_response, observe
 
     with pm.Model(coords=problem.coords) as model:
         b = pm.HalfNormal("retardation", sigma=RETARDATION.strength.prior_scale)
-        observe(problem, mean_response(problem, LAW.mechanisms, [b]))
+        problem.observe(LAW.mechanisms, [b])
     return model
 
 

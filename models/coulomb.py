@@ -14,14 +14,12 @@ DRY = coulomb_friction.MECHANISM
 
 
 def build(problem: Any) -> Any:
-    """PyMC model of the pooled calibration, with a vague half-normal prior."""
+    """PyMC model of a campaign; with `--likelihood hierarchical` the prior is of the events' median."""
     import pymc as pm
-
-    from skred.inference.pooled import mean_response, observe
 
     with pm.Model(coords=problem.coords) as model:
         mu = pm.HalfNormal("dry_friction", sigma=DRY.strength.prior_scale)
-        observe(problem, mean_response(problem, LAW.mechanisms, [mu]))
+        problem.observe(LAW.mechanisms, [mu])
     return model
 
 

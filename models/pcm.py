@@ -15,19 +15,17 @@ DRAG = turbulent_drag.MECHANISM
 
 
 def build(problem: Any) -> Any:
-    """PyMC model of the pooled calibration.
+    """PyMC model of a campaign; with `--likelihood hierarchical` priors are of the events' medians.
 
     The priors are half-normal, vague and physical (their reasons stand with the mechanisms); the
     paper's came from an optimisation on the same recordings.
     """
     import pymc as pm
 
-    from skred.inference.pooled import mean_response, observe
-
     with pm.Model(coords=problem.coords) as model:
         mu = pm.HalfNormal("dry_friction", sigma=DRY.strength.prior_scale)
         drag = pm.HalfNormal("turbulent_drag", sigma=DRAG.strength.prior_scale)
-        observe(problem, mean_response(problem, LAW.mechanisms, [mu, drag]))
+        problem.observe(LAW.mechanisms, [mu, drag])
     return model
 
 

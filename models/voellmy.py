@@ -26,17 +26,15 @@ def strengths(mu: Any, xi_h: Any) -> tuple[Any, Any]:
 
 
 def build(problem: Any) -> Any:
-    """PyMC model of the pooled calibration, with vague physical priors."""
+    """PyMC model of a campaign; with `--likelihood hierarchical` priors are of the events' medians."""
     import numpy as np
     import pymc as pm
-
-    from skred.inference.pooled import mean_response, observe
 
     with pm.Model(coords=problem.coords) as model:
         mu = pm.HalfNormal("dry_friction", sigma=DRY.strength.prior_scale)
         xi_h = pm.LogNormal("xi_h", mu=np.log(XI_H_MEDIAN), sigma=XI_H_LOG_SD)
         pm.Deterministic("xi", xi_h / FLOW_DEPTH_M)
-        observe(problem, mean_response(problem, LAW.mechanisms, strengths(mu, xi_h)))
+        problem.observe(LAW.mechanisms, strengths(mu, xi_h))
     return model
 
 

@@ -1,11 +1,12 @@
-"""What a pooled calibration starts from: recordings, their covariance, and the path."""
+"""What a calibration starts from: a campaign on its terrain, and how its recordings are compared."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from skred.inference.recordings_covariance import recordings_covariance
 from skred.physics.geometry import contributions_of, path_of, sensor_table
 from skred.physics.inputs import Contributions, Path
 from skred.physics.kernel import front_speeds, simulate
+from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
 from skred.physics.terrain import CELL_M, SMOOTHING_M, Terrain, build_terrain
 
@@ -23,24 +25,39 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class PooledProblem:
-    """One parameter vector for the path: y_e ~ N(m(theta), Sigma) for each event's readings.
+class Problem(ABC):
+    """A campaign on its terrain, and a likelihood of its recordings.
 
     Attributes
     ----------
     campaign : Campaign
     terrain : Terrain
-    covariance : (n_sensors, n_sensors) array
-        Sigma, the covariance of the recordings across events; fixed, the same for all laws. It
-        contains the event-to-event spread, so the posterior is that of the mean response.
-    recorded_mean : (n_sensors,) array
-        The recordings' mean, from the same estimate.
     """
 
     campaign: Campaign
     terrain: Terrain
-    covariance: FloatArray
-    recorded_mean: FloatArray
+
+    likelihood: ClassVar[str]
+
+    @abstractmethod
+    def parameters(self, law: Law) -> tuple[Parameter, ...]:
+        """Free random variables of a law's model: the law's own and what the likelihood adds."""
+
+    @abstractmethod
+    def observe(self, mechanisms: Sequence[Mechanism], strengths: Sequence[Any]) -> Any:
+        """Add the observed variable ``recordings`` to the current PyMC model; returns it.
+
+        Parameters
+        ----------
+        mechanisms : sequence of Mechanism
+            The law.
+        strengths : sequence of scalar tensors
+            One for each mechanism, in its unit.
+        """
+
+    @abstractmethod
+    def log_likelihood(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
+        """Log density of each event for many parameter vectors: arrays by name to (n, n_events)."""
 
     @cached_property
     def values(self) -> FloatArray:
@@ -56,6 +73,55 @@ class PooledProblem:
     def not_reached(self) -> NDArray[np.bool_]:
         """Where the front stopped above the sensor, (n_events, n_sensors)."""
         return np.asarray(self.campaign.status == Status.NOT_REACHED)
+
+    @cached_property
+    def path(self) -> Path:
+        """The track as the kernel reads it."""
+        return path_of(self.terrain)
+
+    @cached_property
+    def sensor_places(self) -> list[tuple[float, float] | None]:
+        """From and to [m] of each sensor, None for a runout."""
+        return [
+            None if sensor.is_runout else (sensor.s_from_m, sensor.s_to_m) for sensor in self.campaign.sensors
+        ]
+
+    @property
+    def coords(self) -> dict[str, Any]:
+        """Coordinates of the models' named dims."""
+        return {"event": list(self.campaign.event_ids), "sensor": list(self.campaign.sensor_ids)}
+
+    def contributions(self, mechanisms: Sequence[Mechanism]) -> Contributions:
+        """How the strengths of a law's mechanisms enter the equation of motion on this terrain."""
+        return contributions_of(mechanisms, self.terrain)
+
+    def speeds(
+        self, mechanisms: Sequence[Mechanism], strengths: FloatArray, release_s_m: float | FloatArray
+    ) -> FloatArray:
+        """Front speed [m/s] at the cell edges: (n, n_strengths) to (n, n_cells + 1)."""
+        releases = np.full(len(strengths), release_s_m, dtype=float)
+        law = self.contributions(mechanisms)
+        speeds: FloatArray = front_speeds(np.asarray(strengths, float), releases, self.path, law)
+        return speeds
+
+
+@dataclass(frozen=True, eq=False)
+class PooledProblem(Problem):
+    """One parameter vector for the path: y_e ~ N(m(theta), Sigma) for each event's readings.
+
+    Attributes
+    ----------
+    covariance : (n_sensors, n_sensors) array
+        Sigma, the covariance of the recordings across events; fixed, the same for all laws. It
+        contains the event-to-event spread, so the posterior is that of the mean response.
+    recorded_mean : (n_sensors,) array
+        The recordings' mean, from the same estimate.
+    """
+
+    covariance: FloatArray
+    recorded_mean: FloatArray
+
+    likelihood = "pooled"
 
     @cached_property
     def _unique_releases(self) -> tuple[FloatArray, NDArray[np.int64]]:
@@ -74,19 +140,9 @@ class PooledProblem:
         return self._unique_releases[1]
 
     @cached_property
-    def path(self) -> Path:
-        """The track as the kernel reads it."""
-        return path_of(self.terrain)
-
-    @cached_property
     def sensors(self) -> FloatArray:
         """The sensors as the kernel reads them."""
-        return sensor_table(
-            [
-                None if sensor.is_runout else (sensor.s_from_m, sensor.s_to_m)
-                for sensor in self.campaign.sensors
-            ]
-        )
+        return sensor_table(self.sensor_places)
 
     @cached_property
     def arrays(self) -> PooledArrays:
@@ -95,40 +151,36 @@ class PooledProblem:
             self.values, self.observed, self.not_reached, self.release_of_event, self.covariance
         )
 
-    @property
-    def coords(self) -> dict[str, Any]:
-        """Coordinates of the models' named dims."""
-        return {"event": list(self.campaign.event_ids), "sensor": list(self.campaign.sensor_ids)}
+    def parameters(self, law: Law) -> tuple[Parameter, ...]:
+        """The law's own parameters."""
+        return law.parameters
 
-    def contributions(self, mechanisms: Sequence[Mechanism]) -> Contributions:
-        """How the strengths of a law's mechanisms enter the equation of motion on this terrain."""
-        return contributions_of(mechanisms, self.terrain)
+    def observe(self, mechanisms: Sequence[Mechanism], strengths: Sequence[Any]) -> Any:
+        """Observed variable ``recordings``: y_e ~ N(mean response, Sigma)."""
+        from skred.inference.pooled import mean_response, observe
+
+        return observe(self, mean_response(self, mechanisms, strengths))
+
+    def log_likelihood(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
+        """Log density of each event for many parameter vectors: arrays by name to (n, n_events)."""
+        return self.log_density(law.mechanisms, law.strength_rows(samples))
 
     def simulate(self, mechanisms: Sequence[Mechanism], strengths: FloatArray) -> FloatArray:
         """Mean response for many strengths: (n, n_strengths) to (n, n_events, n_sensors)."""
-        n, n_releases = len(strengths), len(self.releases)
-        runs = np.repeat(np.asarray(strengths, float), n_releases, axis=0)
-        law = self.contributions(mechanisms)
-        readings = simulate(runs, np.tile(self.releases, n), self.path, law, self.sensors)
-        return readings.reshape(n, n_releases, -1)[:, self.release_of_event]
+        return self._responses(mechanisms, strengths)[:, self.release_of_event]
 
     def log_density(self, mechanisms: Sequence[Mechanism], strengths: FloatArray) -> FloatArray:
         """Log density of each event for many strengths: (n, n_strengths) to (n, n_events)."""
+        rows = self._responses(mechanisms, strengths)
+        return np.array([pooled_log_density(row, self.arrays) for row in rows])
+
+    def _responses(self, mechanisms: Sequence[Mechanism], strengths: FloatArray) -> FloatArray:
+        """Mean response from each release place, (n, n_releases, n_sensors)."""
         n, n_releases = len(strengths), len(self.releases)
         runs = np.repeat(np.asarray(strengths, float), n_releases, axis=0)
         law = self.contributions(mechanisms)
-        readings = simulate(runs, np.tile(self.releases, n), self.path, law, self.sensors)
-        rows = readings.reshape(n, n_releases, -1)
-        return np.array([pooled_log_density(row, self.arrays) for row in rows])
-
-    def speeds(
-        self, mechanisms: Sequence[Mechanism], strengths: FloatArray, release_s_m: float
-    ) -> FloatArray:
-        """Front speed [m/s] at the cell edges: (n, n_strengths) to (n, n_cells + 1)."""
-        releases = np.full(len(strengths), float(release_s_m))
-        law = self.contributions(mechanisms)
-        speeds: FloatArray = front_speeds(np.asarray(strengths, float), releases, self.path, law)
-        return speeds
+        readings: FloatArray = simulate(runs, np.tile(self.releases, n), self.path, law, self.sensors)
+        return readings.reshape(n, n_releases, -1)
 
 
 def pooled_problem(

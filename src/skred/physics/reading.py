@@ -87,7 +87,8 @@ def read(  # type: ignore[no-untyped-def]
         else:
             end = span_end(sensors[j, 0], s_from, s_to, release, runout)
             readings[run, j] = span_speed(
-                s_from, s_to, end, i, release, first, edge, ground, barriers, limits, u_c, speed_terms, table, v
+                s_from, s_to, end, i, release, first, edge, ground, barriers, limits, u_c, speed_terms,
+                table, v,
             )  # fmt: skip
 
 

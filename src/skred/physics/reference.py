@@ -26,7 +26,8 @@ from skred.physics.terrain import Terrain
 Barrier = tuple[float, float, complex]
 """Place [m], height [m], loss of those that pass [J/kg]."""
 Sensor = tuple[str, float, float]
-"""``"point"``, ``"span"``, ``"span to stop"`` or ``"runout"``; from and to [m] (equal for a point, unused for runout)."""
+"""``"point"``, ``"span"``, ``"span to stop"`` or ``"runout"``; from and to [m]
+(equal for a point, unused for runout)."""
 
 
 class Cell(NamedTuple):

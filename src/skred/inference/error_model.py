@@ -1,0 +1,142 @@
+"""How readings scatter about what one front does: the error models, and recordings as they read them.
+
+The relative part of an error is taken of the prediction, not of the noisy reading. Where a front
+stopped enters once, as an interval between the lowest sensor that it reached and the highest that
+it did not, softened by how well the places are known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial.hermite_e import hermegauss
+from numpy.typing import NDArray
+
+from skred.campaign import Campaign, Status
+
+FloatArray = NDArray[np.float64]
+PLACE_SD_M = 8.0
+"""How well it is known where a front stopped relative to a sensor."""
+
+
+class Errors(NamedTuple):
+    """An error model as numba reads it: a mixture over what an event's errors are like.
+
+    Attributes
+    ----------
+    weights, scales, shares : (n,) arrays
+        Probability of each case, the factor on all stated errors in it, and its share of outliers.
+    degrees : float
+        Degrees of freedom of Student's t; 0 for the normal distribution.
+    common : float
+        Share of a velocity's error variance that all velocities of an event have in common.
+    """
+
+    weights: FloatArray
+    scales: FloatArray
+    shares: FloatArray
+    degrees: float
+    common: float
+
+
+@dataclass(frozen=True)
+class ErrorModel:
+    """An error model with its name.
+
+    Attributes
+    ----------
+    id, title : str
+    errors : Errors
+    """
+
+    id: str
+    title: str
+    errors: Errors
+
+
+def _errors(
+    weights: Any = 1.0, scales: Any = 1.0, shares: Any = 0.0, degrees: float = 0.0, common: float = 0.0
+) -> Errors:
+    weights, scales, shares = np.broadcast_arrays(*(np.atleast_1d(x) for x in (weights, scales, shares)))
+    w, s, o = (np.array(values, dtype=float) for values in (weights, scales, shares))
+    return Errors(w, s, o, degrees, common)
+
+
+_NODES, _WEIGHTS = hermegauss(7)
+ERROR_MODELS: dict[str, ErrorModel] = {
+    model.id: model
+    for model in (
+        ErrorModel(
+            "robust",
+            "normal, with a few outliers (0.2 or 2 % of the readings, six times as wide)",
+            _errors(weights=(0.5, 0.5), shares=(0.002, 0.02)),
+        ),
+        ErrorModel("normal", "normal, as stated", _errors()),
+        ErrorModel("student", "Student t with 4 degrees of freedom", _errors(degrees=4.0)),
+        ErrorModel(
+            "correlated",
+            "normal; half of the error variance of an event's velocities is common",
+            _errors(common=0.5),
+        ),
+        ErrorModel(
+            "scaled",
+            "normal, all errors of an event times a log-normal factor (log standard deviation 0.5)",
+            _errors(weights=_WEIGHTS / _WEIGHTS.sum(), scales=np.exp(0.5 * _NODES)),
+        ),
+    )
+}
+"""Error models by name; compared, not assumed."""
+
+
+class EventReadings(NamedTuple):
+    """The recordings as the error models read them, made by `event_readings`.
+
+    Attributes
+    ----------
+    values : (n_events, n_sensors) array, m/s or m
+        0 where there is no reading.
+    observed : (n_events, n_sensors) boolean array
+    stated_sd : (n_events, n_sensors) array
+        Of readings that state their own, 0 elsewhere.
+    relative_sd, absolute_sd : (n_sensors,) arrays
+        Of the other readings.
+    is_velocity : (n_sensors,) boolean array
+    reached, not_reached : (n_events,) arrays, m
+        Lowest place that the front is known to have reached, -inf if none; highest that it is known not to
+        have reached, inf if none.
+    place_sd : float, m
+    """
+
+    values: FloatArray
+    observed: NDArray[np.bool_]
+    stated_sd: FloatArray
+    relative_sd: FloatArray
+    absolute_sd: FloatArray
+    is_velocity: NDArray[np.bool_]
+    reached: FloatArray
+    not_reached: FloatArray
+    place_sd: float
+
+
+def event_readings(campaign: Campaign, place_sd_m: float = PLACE_SD_M) -> EventReadings:
+    """Readings of a campaign."""
+    observed = np.asarray(campaign.status == Status.OBSERVED)
+    values = np.where(observed, campaign.values, 0.0)
+    sensors = campaign.sensors
+    is_velocity = np.array([not sensor.is_runout for sensor in sensors])
+    ends = np.array([np.nan if sensor.is_runout else sensor.s_to_m for sensor in sensors], dtype=float)
+    moved = observed & is_velocity & (values > 0.0)
+    stopped = np.asarray(campaign.status == Status.NOT_REACHED) & is_velocity
+    return EventReadings(
+        values,
+        observed,
+        np.nan_to_num(np.where(observed, campaign.stated_sd, 0.0), nan=0.0),
+        np.array([sensor.relative_sd for sensor in sensors], dtype=float),
+        np.array([sensor.absolute_sd for sensor in sensors], dtype=float),
+        is_velocity,
+        np.where(moved, ends, -np.inf).max(axis=1, initial=-np.inf),
+        np.where(stopped, ends, np.inf).min(axis=1, initial=np.inf),
+        float(place_sd_m),
+    )

@@ -1,0 +1,371 @@
+"""Densities of one event in numba: its readings given a front, bounds, and the sum over a population.
+
+All compiled functions that call each other stand in this one file, because numba's cache notices a
+change only in a function's own file.
+"""
+
+from __future__ import annotations
+
+import math
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+
+OUTLIER_FACTOR = 6.0
+"""How much wider than its stated error an outlying reading scatters."""
+EVENT_DENSITY_CACHE_KEY = int(sha256(Path(__file__).read_bytes()).hexdigest()[:12], 16)
+"""From this file's content: PyTensor caches compiled callers of its functions under it."""
+_LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
+_SQRT_HALF = math.sqrt(0.5)
+_LEAST = 1e-300
+_COMMON_STEPS, _COMMON_STEP = 8, 0.5
+_NEGLIGIBLE = 36.0
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def reading_sd(event, sensor, prediction, readings):  # type: ignore[no-untyped-def]
+    """Standard deviation of a reading [m/s or m]: its own, else from the prediction."""
+    if readings.stated_sd[event, sensor] > 0.0:
+        return readings.stated_sd[event, sensor]
+    return math.hypot(readings.relative_sd[sensor] * prediction, readings.absolute_sd[sensor])
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _log_stop(stop, reached, not_reached, place_sd):  # type: ignore[no-untyped-def]
+    """Log probability that a front that stops at `stop` is seen to stop between two places."""
+    upper = 0.5 * math.erfc(-(not_reached - stop) / place_sd * _SQRT_HALF) if not_reached < np.inf else 1.0
+    lower = 0.5 * math.erfc(-(reached - stop) / place_sd * _SQRT_HALF) if reached > -np.inf else 0.0
+    if reached > -np.inf and not_reached == np.inf:  # no cancellation far below
+        return math.log(max(0.5 * math.erfc((reached - stop) / place_sd * _SQRT_HALF), _LEAST))
+    return math.log(max(upper - lower, _LEAST))
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _log_reading(residual, sd, scale, share, degrees):  # type: ignore[no-untyped-def]
+    """Log density of one reading's residual."""
+    wide = sd * scale
+    square = (residual / wide) ** 2
+    if degrees > 0.0:
+        constant = math.lgamma(0.5 * (degrees + 1.0)) - math.lgamma(0.5 * degrees)
+        constant -= 0.5 * math.log(degrees * math.pi) + math.log(wide)
+        return constant - 0.5 * (degrees + 1.0) * math.log1p(square / degrees)
+    if share == 0.0:
+        return -0.5 * square - math.log(wide) - _LOG_SQRT_2PI
+    usual, outlying = -0.5 * square, -0.5 * square / (OUTLIER_FACTOR * OUTLIER_FACTOR)
+    ratio = share / (OUTLIER_FACTOR * (1.0 - share)) * math.exp(min(outlying - usual, 700.0))
+    return usual + math.log((1.0 - share) * (1.0 + ratio)) - math.log(wide) - _LOG_SQRT_2PI
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _nearest(event, sensor, low, high, shift, readings):  # type: ignore[no-untyped-def]
+    """The residual of smallest size, and its standard deviation, for predictions between two values.
+
+    `shift` is an error common to the velocities, in standard deviations of theirs.
+    """
+    value = readings.values[event, sensor]
+    prediction = min(max(value, low), high)
+    sd = reading_sd(event, sensor, prediction, readings)
+    if shift != 0.0 and readings.is_velocity[sensor]:
+        prediction = min(max(value - shift * sd, low), high)
+        sd = reading_sd(event, sensor, prediction, readings)
+        return value - prediction - shift * sd, sd
+    return value - prediction, sd
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _log_independent(event, low, high, readings, errors):  # type: ignore[no-untyped-def]
+    """Log likelihood of the observed readings, independent within each case of the mixture."""
+    n_sensors = readings.values.shape[1]
+    most, total = -np.inf, 0.0
+    for case in range(errors.weights.size):
+        term = math.log(errors.weights[case])
+        for j in range(n_sensors):
+            if readings.observed[event, j]:
+                residual, sd = _nearest(event, j, low[j], high[j], 0.0, readings)
+                term += _log_reading(residual, sd, errors.scales[case], errors.shares[case], errors.degrees)
+        if term > most:
+            total = total * math.exp(most - term) + 1.0
+            most = term
+        else:
+            total += math.exp(term - most)
+    return most + math.log(total)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _log_correlated(event, prediction, readings, common):  # type: ignore[no-untyped-def]
+    """Log likelihood of the observed readings with an error common to the velocities."""
+    n_velocities, n, log_sd, squares, total = 0, 0, 0.0, 0.0, 0.0
+    for j in range(readings.values.shape[1]):
+        if not readings.observed[event, j]:
+            continue
+        sd = reading_sd(event, j, prediction[j], readings)
+        z = (readings.values[event, j] - prediction[j]) / sd
+        own = 1.0 - common if readings.is_velocity[j] else 1.0
+        log_sd += math.log(sd) + 0.5 * math.log(own)
+        squares += z * z / own
+        n += 1
+        if readings.is_velocity[j]:
+            n_velocities += 1
+            total += z / own
+    inflation = 1.0 + common * n_velocities / (1.0 - common)
+    squares -= common * total * total / inflation
+    return -0.5 * squares - log_sd - 0.5 * math.log(inflation) - n * _LOG_SQRT_2PI
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _bound_correlated(event, low, high, readings, common):  # type: ignore[no-untyped-def]
+    """Largest log likelihood for predictions between two values, over a grid of the common error."""
+    most = -np.inf
+    for step in range(-_COMMON_STEPS, _COMMON_STEPS + 1):
+        c = step * _COMMON_STEP
+        term = -0.5 * c * c
+        for j in range(readings.values.shape[1]):
+            if readings.observed[event, j]:
+                own = 1.0 - common if readings.is_velocity[j] else 1.0
+                residual, sd = _nearest(event, j, low[j], high[j], math.sqrt(common) * c, readings)
+                term += _log_reading(residual, sd, math.sqrt(own), 0.0, 0.0)
+        most = max(most, term)
+    return most
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def log_likelihood(event, prediction, readings, errors):  # type: ignore[no-untyped-def]
+    """Log likelihood of an event's readings given what its front does.
+
+    Parameters
+    ----------
+    event : int
+    prediction : (n_sensors + 1,) array
+        Readings of the front [m/s or m], spans up to the stop, and last its runout [m].
+    readings : EventReadings
+    errors : Errors
+    """
+    stop = prediction[prediction.size - 1]
+    at_stop = _log_stop(stop, readings.reached[event], readings.not_reached[event], readings.place_sd)
+    if errors.common > 0.0:
+        return at_stop + _log_correlated(event, prediction, readings, errors.common)
+    return at_stop + _log_independent(event, prediction, prediction, readings, errors)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def log_likelihood_bound(event, low, high, readings, errors):  # type: ignore[no-untyped-def]
+    """Upper bound of `log_likelihood` over all predictions between two, each by itself."""
+    last = low.size - 1
+    reached, not_reached = readings.reached[event], readings.not_reached[event]
+    best = 0.5 * (reached + not_reached)
+    if reached == -np.inf and not_reached == np.inf:
+        best = low[last]
+    stop = min(max(best, low[last]), high[last])
+    at_stop = _log_stop(stop, reached, not_reached, readings.place_sd)
+    if errors.common > 0.0:
+        return at_stop + _bound_correlated(event, low, high, readings, errors.common)
+    return at_stop + _log_independent(event, low, high, readings, errors)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def log_likelihoods(events, predictions, readings, errors):  # type: ignore[no-untyped-def]
+    """Log likelihood of each event for each of its runs, (n,) and (n, n_sensors + 1) to (n,)."""
+    result = np.empty(events.size)
+    for i in range(events.size):
+        result[i] = log_likelihood(events[i], predictions[i], readings, errors)
+    return result
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def assess(events, predictions, readings, errors, envelope, change, bound, top, mean):  # type: ignore[no-untyped-def]
+    """Fill, for each box, the change of its readings along each axis, and what its likelihood may be.
+
+    That is its bound, its best corner and the corners' mean, all as logarithms and times the envelope.
+    `envelope` is (n_boxes, 1 + n_corners): its logarithm, at most within the box and at the corners.
+
+    `predictions` is (n_boxes, n_corners, n_sensors + 1); bit j of a corner's number is its side on axis j.
+    """
+    n_boxes, n_corners, n_columns = predictions.shape
+    low, high, sd = np.empty(n_columns), np.empty(n_columns), np.empty(n_columns)
+    corners = np.empty(n_corners)
+    for box in range(n_boxes):
+        event = events[box]
+        uses_stop = readings.reached[event] > -np.inf or readings.not_reached[event] < np.inf
+        for j in range(n_columns):
+            least, most = predictions[box, 0, j], predictions[box, 0, j]
+            for corner in range(1, n_corners):
+                least = min(least, predictions[box, corner, j])
+                most = max(most, predictions[box, corner, j])
+            low[j], high[j], sd[j] = least, most, np.inf
+            if j == n_columns - 1:
+                if uses_stop:
+                    sd[j] = readings.place_sd
+            elif readings.observed[event, j]:
+                sd[j] = reading_sd(event, j, min(max(readings.values[event, j], least), most), readings)
+        bound[box] = envelope[box, 0] + log_likelihood_bound(event, low, high, readings, errors)
+        for corner in range(n_corners):
+            corners[corner] = log_likelihood(event, predictions[box, corner], readings, errors)
+            corners[corner] += envelope[box, 1 + corner]
+        top[box] = corners.max()
+        mean[box] = top[box] + math.log(np.exp(corners - top[box]).mean())
+        for axis in range(change.shape[1]):
+            largest = 0.0
+            for corner in range(n_corners):
+                other = corner | (1 << axis)
+                if other != corner:
+                    square = 0.0
+                    for j in range(n_columns):
+                        square += ((predictions[box, other, j] - predictions[box, corner, j]) / sd[j]) ** 2
+                    largest = max(largest, square)
+            change[box, axis] = math.sqrt(largest)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _whiten(factor):  # type: ignore[no-untyped-def]
+    """Inverse of a lower triangular matrix, and the log of its determinant."""
+    n = factor.shape[0]
+    inverse, log_determinant = np.zeros((n, n)), 0.0
+    for i in range(n):
+        inverse[i, i] = 1.0 / factor[i, i]
+        log_determinant += math.log(inverse[i, i])
+        for j in range(i):
+            for k in range(j, i):
+                inverse[i, j] -= factor[i, k] * inverse[k, j]
+            inverse[i, j] *= inverse[i, i]
+    return inverse, log_determinant
+
+
+@njit(cache=True, error_model="numpy", nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+def _exponents(first, last, mean, whiten, points, log_weights, result):  # type: ignore[no-untyped-def]
+    """Log weight times normal density, but for its constant, at nodes first to last; returns the largest."""
+    n_strengths = mean.size
+    for k in range(last - first):
+        result[k] = log_weights[first + k]
+    for i in range(n_strengths):
+        if n_strengths == 1:
+            shift, scale = mean[0], whiten[0, 0]
+            for k in range(last - first):
+                z = scale * (points[0, first + k] - shift)
+                result[k] -= 0.5 * z * z
+        elif n_strengths == 2:
+            a, b, at_0, at_1 = whiten[i, 0], whiten[i, 1], mean[0], mean[1]
+            for k in range(last - first):
+                z = a * (points[0, first + k] - at_0) + b * (points[1, first + k] - at_1)
+                result[k] -= 0.5 * z * z
+        else:
+            for k in range(last - first):
+                z = 0.0
+                for j in range(i + 1):
+                    z += whiten[i, j] * (points[j, first + k] - mean[j])
+                result[k] -= 0.5 * z * z
+    largest = -np.inf
+    for k in range(last - first):
+        largest = max(largest, result[k])
+    return largest
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def integrated_log_density(means, factor, first, points, log_weights):  # type: ignore[no-untyped-def]
+    """Log likelihood of each event, its own strengths integrated over the population.
+
+    Parameters
+    ----------
+    means : (n_events, n_strengths) array
+        Population mean of the logarithms of the strengths, for each event.
+    factor : (n_strengths, n_strengths) array
+        Lower Cholesky factor of their covariance.
+    first : (n_events + 1,) integer array
+        Where each event's nodes begin.
+    points : (n_strengths, n_nodes) array
+    log_weights : (n_nodes,) array
+
+    Returns
+    -------
+    (n_events,) array
+    """
+    n_events, n_strengths = means.shape
+    whiten, log_determinant = _whiten(factor)
+    constant = log_determinant - n_strengths * _LOG_SQRT_2PI
+    exponents = np.empty(np.max(first[1:] - first[:-1]))
+    density = np.empty(n_events)
+    for event in range(n_events):
+        start, end = first[event], first[event + 1]
+        largest = _exponents(start, end, means[event], whiten, points, log_weights, exponents)
+        total = 0.0
+        for k in range(end - start):
+            if exponents[k] > largest - _NEGLIGIBLE:
+                total += math.exp(exponents[k] - largest)
+        density[event] = constant + largest + math.log(total)
+    return density
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def integrated_log_density_pullback(  # type: ignore[no-untyped-def]
+    cotangent, means, factor, first, points, log_weights
+):
+    """Cotangents of means and factor, one below the other, from those of the densities.
+
+    Returns
+    -------
+    (n_events + n_strengths, n_strengths) array
+    """
+    n_events, n = means.shape
+    whiten, _ = _whiten(factor)
+    exponents = np.empty(np.max(first[1:] - first[:-1]))
+    pulled, z, back = np.zeros((n_events + n, n)), np.empty(n), np.empty(n)
+    for event in range(n_events):
+        start, end = first[event], first[event + 1]
+        largest = _exponents(start, end, means[event], whiten, points, log_weights, exponents)
+        total = 0.0
+        for k in range(end - start):
+            exponents[k] = math.exp(exponents[k] - largest)
+            total += exponents[k]
+        for k in range(end - start):
+            weight = cotangent[event] * exponents[k] / total
+            if weight == 0.0:
+                continue
+            for i in range(n):
+                z[i] = 0.0
+                for j in range(i + 1):
+                    z[i] += whiten[i, j] * (points[j, start + k] - means[event, j])
+            for j in range(n):
+                back[j] = 0.0
+                for i in range(j, n):
+                    back[j] += whiten[i, j] * z[i]
+            for j in range(n):
+                pulled[event, j] += weight * back[j]
+                for i in range(j, n):
+                    pulled[n_events + i, j] += weight * back[i] * z[j]
+        for j in range(n):
+            pulled[n_events + j, j] -= cotangent[event] * whiten[j, j]
+    return pulled
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def draw_nodes(means, factors, uniforms, first, points, log_weights):  # type: ignore[no-untyped-def]
+    """A node of each event for each population, drawn by its share of the integral.
+
+    Parameters
+    ----------
+    means : (n, n_strengths) array
+    factors : (n, n_strengths, n_strengths) array
+    uniforms : (n, n_events) array
+    first, points, log_weights :
+        As for `integrated_log_density`.
+
+    Returns
+    -------
+    (n, n_events) integer array
+    """
+    n, n_events = uniforms.shape
+    drawn = np.empty((n, n_events), dtype=np.int64)
+    exponents = np.empty(np.max(first[1:] - first[:-1]))
+    for draw in range(n):
+        whiten, _ = _whiten(factors[draw])
+        for event in range(n_events):
+            start, size = first[event], first[event + 1] - first[event]
+            largest = _exponents(start, start + size, means[draw], whiten, points, log_weights, exponents)
+            total = 0.0
+            for k in range(size):
+                total += math.exp(exponents[k] - largest)
+                exponents[k] = total
+            node = np.searchsorted(exponents[:size], uniforms[draw, event] * total, side="right")
+            drawn[draw, event] = start + min(node, size - 1)
+    return drawn

@@ -1,0 +1,200 @@
+"""Every avalanche its own friction: the population of events, their own strengths integrated out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.campaign import Campaign
+from skred.inference.bisection import COARSE, Fronts, Releases, Resolution
+from skred.inference.error_model import ERROR_MODELS, PLACE_SD_M, ErrorModel, EventReadings, event_readings
+from skred.inference.event_density import integrated_log_density
+from skred.inference.population import (
+    correlation_parameters,
+    population_of,
+    population_variables,
+    spread_parameters,
+)
+from skred.inference.problem import Problem
+from skred.inference.rough_population import envelope_around, rough_population
+from skred.inference.surface import Surfaces, build_surfaces
+from skred.physics.geometry import sensor_table
+from skred.physics.kernel import simulate
+from skred.physics.law import Law, Parameter
+from skred.physics.mechanisms.spec import Mechanism
+from skred.physics.terrain import CELL_M, SMOOTHING_M, build_terrain
+
+FloatArray = NDArray[np.float64]
+_BELOW_SCALE, _ABOVE_SCALE = 6.0, 1.7
+"""How far from the log of its prior's scale a strength is looked for."""
+_MEDIAN_LOG_MEAN, _MEDIAN_LOG_SD = -0.64, 1.1
+"""Mean and standard deviation of the log of a half-normal variable of scale 1."""
+_COARSE_CELL, _CELL_IN_SPREADS, _CELL_RANGE = 0.25, 0.4, (0.02, 0.2)
+_CHECKED_EVENTS = 24
+
+
+@dataclass(frozen=True, eq=False)
+class HierarchicalProblem(Problem):
+    """Each event has its own strengths and release; its readings scatter as an error model says.
+
+    Attributes
+    ----------
+    error_model : ErrorModel
+    place_sd_m : float
+        How well it is known where a front stopped relative to a sensor.
+    """
+
+    error_model: ErrorModel = ERROR_MODELS["robust"]
+    place_sd_m: float = PLACE_SD_M
+    _surfaces: dict[tuple[str, ...], Surfaces] = field(default_factory=dict, repr=False)
+
+    likelihood = "hierarchical"
+
+    def parameters(self, law: Law) -> tuple[Parameter, ...]:
+        """The law's own parameters, here medians over events, then spreads and correlations."""
+        extra = (*spread_parameters(law.mechanisms), *correlation_parameters(law.mechanisms))
+        return (*law.parameters, *extra)
+
+    def observe(self, mechanisms: Sequence[Mechanism], strengths: Sequence[Any]) -> Any:
+        """Observed variable ``recordings``: one log density per event, its strengths integrated out."""
+        import pymc as pm
+        import pytensor.tensor as pt
+
+        from skred.inference.integrated_op import IntegratedLogDensity
+
+        # As data, so that one compiled model serves many campaigns of as many events.
+        nodes = [
+            pm.Data(f"surface_{name}", value)
+            for name, value in self.surfaces(mechanisms).nodes._asdict().items()
+        ]
+        n_events = self.campaign.n_events
+        factor = population_variables(mechanisms)
+        means = pt.alloc(pt.log(pt.stack(list(strengths))), n_events, len(mechanisms))
+
+        def logp(event_number: Any, event_means: Any, event_factors: Any) -> Any:
+            # The distribution's batch is the event; the factor is the same for all.
+            return IntegratedLogDensity()(event_means, event_factors[0], *nodes)
+
+        return pm.CustomDist(
+            "recordings",
+            means,
+            factor,
+            logp=logp,
+            signature="(n),(n,m)->()",
+            observed=np.arange(n_events, dtype=float),
+            dims="event",
+        )
+
+    def log_likelihood(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
+        """Log density of each event for many parameter vectors: arrays by name to (n, n_events)."""
+        return self._log_likelihood(self.surfaces(law.mechanisms), law, samples)
+
+    def _log_likelihood(self, surfaces: Surfaces, law: Law, samples: Mapping[str, Any]) -> FloatArray:
+        means, factors = population_of(law, samples)
+        n_events = len(surfaces.first) - 1
+        result = np.empty((len(means), n_events))
+        for k, (mean, factor) in enumerate(zip(means, factors, strict=True)):
+            result[k] = integrated_log_density(np.tile(mean, (n_events, 1)), factor, *surfaces.nodes)
+        return result
+
+    @cached_property
+    def readings(self) -> EventReadings:
+        """The recordings as the error model reads them."""
+        return event_readings(self.campaign, self.place_sd_m)
+
+    @cached_property
+    def sensors(self) -> FloatArray:
+        """The sensors as the kernel reads them, spans up to the stop, and the runout last."""
+        return np.vstack([sensor_table(self.sensor_places, to_stop=True), sensor_table([None])])
+
+    @cached_property
+    def releases(self) -> Releases:
+        """Where the events start, and how well that is known."""
+        events = self.campaign.events
+        sd = [0.0 if event.release_sd_m is None else event.release_sd_m for event in events]
+        mean = np.array([event.release_s_m for event in events], dtype=float)
+        return Releases(mean, np.array(sd, dtype=float), self.terrain.length_m)
+
+    def fronts(self, mechanisms: Sequence[Mechanism]) -> Fronts:
+        """All that decides how likely an event's readings are under a law."""
+        law, errors = self.contributions(mechanisms), self.error_model.errors
+        return Fronts(self.path, law, self.sensors, self.readings, errors, self.releases)
+
+    def predict(
+        self, mechanisms: Sequence[Mechanism], strengths: FloatArray, releases: FloatArray
+    ) -> FloatArray:
+        """Readings of fronts: (n, n_strengths) and (n,) to (n, n_sensors), 0 where a front does not come."""
+        table, law = sensor_table(self.sensor_places), self.contributions(mechanisms)
+        strengths, releases = np.asarray(strengths, dtype=float), np.asarray(releases, dtype=float)
+        readings: FloatArray = simulate(strengths, releases, self.path, law, table)
+        return readings
+
+    def surfaces(self, mechanisms: Sequence[Mechanism]) -> Surfaces:
+        """Surfaces of all events under a law, made once: coarsely, then finely where it matters."""
+        key = tuple(mechanism.id for mechanism in mechanisms)
+        if key not in self._surfaces:
+            self._surfaces[key] = self._resolve(mechanisms, self.fronts(mechanisms), Resolution(), 1.0)
+        return self._surfaces[key]
+
+    def _resolve(
+        self, mechanisms: Sequence[Mechanism], fronts: Fronts, resolution: Resolution, fineness: float
+    ) -> Surfaces:
+        """Surfaces with patches `fineness` times smaller and an envelope that much wider than usual."""
+        scale = np.log([mechanism.strength.prior_scale for mechanism in mechanisms])
+        box = np.column_stack([scale - _BELOW_SCALE, scale + _ABOVE_SCALE])
+        n = len(mechanisms)
+        coarse = build_surfaces(self.fronts(mechanisms), box, COARSE, np.full(n, _COARSE_CELL))
+        mean, covariance = rough_population(coarse, scale + _MEDIAN_LOG_MEAN, np.full(n, _MEDIAN_LOG_SD))
+        envelope = envelope_around(mean, fineness * covariance, self.campaign.n_events)
+        cell = np.clip(_CELL_IN_SPREADS * np.sqrt(np.diag(covariance)), *_CELL_RANGE) / fineness
+        return build_surfaces(fronts, box, resolution, cell, envelope)
+
+    def integration_errors(self, law: Law, samples: Mapping[str, Any], seed: int = 0) -> FloatArray:
+        """Differences of event log densities to a much finer integration, (n, n_checked_events).
+
+        Of at most 24 events, drawn at random from larger campaigns; positive where the usual is larger.
+        """
+        n_events = self.campaign.n_events
+        rng = np.random.default_rng([seed, 5])
+        chosen = np.sort(rng.permutation(n_events)[:_CHECKED_EVENTS])
+        fronts = self.fronts(law.mechanisms)
+        readings, releases = fronts.readings, fronts.releases
+        fronts = fronts._replace(
+            readings=readings._replace(
+                **{
+                    name: getattr(readings, name)[chosen]
+                    for name in ("values", "observed", "stated_sd", "reached", "not_reached")
+                }
+            ),
+            releases=releases._replace(mean=releases.mean[chosen], sd=releases.sd[chosen]),
+        )
+        finer = self._resolve(law.mechanisms, fronts, Resolution().finer(), 2.0)
+        exact = self._log_likelihood(finer, law, samples)
+        difference: FloatArray = self.log_likelihood(law, samples)[:, chosen] - exact
+        return difference
+
+
+def hierarchical_problem(
+    campaign: Campaign,
+    *,
+    error_model: str = "robust",
+    smoothing_m: float = SMOOTHING_M,
+    cell_m: float = CELL_M,
+) -> HierarchicalProblem:
+    """Problem of a campaign.
+
+    Raises
+    ------
+    ValueError
+        If no event has a reading.
+    """
+    terrain = build_terrain(campaign.track.x_m, campaign.track.z_m, smoothing_m=smoothing_m, cell_m=cell_m)
+    problem = HierarchicalProblem(campaign, terrain, ERROR_MODELS[error_model])
+    if not problem.observed.any():
+        raise ValueError("no reading is observed: there is nothing to calibrate against")
+    return problem
