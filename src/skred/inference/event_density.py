@@ -21,7 +21,7 @@ _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 _SQRT_HALF = math.sqrt(0.5)
 _LEAST = 1e-300
 _COMMON_STEPS, _COMMON_STEP = 8, 0.5
-_NEGLIGIBLE = 36.0
+_NEGLIGIBLE = -60.0
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -261,6 +261,32 @@ def _exponents(first, last, mean, whiten, points, log_weights, result):  # type:
     return largest
 
 
+@njit(cache=True, error_model="numpy", nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+def _sum_of_exponentials(exponents, size, largest):  # type: ignore[no-untyped-def]
+    """Sum of exp(exponent - largest): exp(x / 1024) by its series, squared ten times, which vectorises.
+
+    Its relative error is about 1e-13; what is negligible counts as e^-60.
+    """
+    total = 0.0
+    for k in range(size):
+        x = max(exponents[k] - largest, _NEGLIGIBLE) * (1.0 / 1024.0)
+        power = 1.0 + x * (
+            1.0 + x * (1.0 / 2.0 + x * (1.0 / 6.0 + x * (1.0 / 24.0 + x * (1.0 / 120.0 + x / 720.0))))
+        )
+        power *= power
+        power *= power
+        power *= power
+        power *= power
+        power *= power
+        power *= power
+        power *= power
+        power *= power
+        power *= power
+        power *= power
+        total += power
+    return total
+
+
 @njit(cache=True, error_model="numpy", nogil=True)
 def integrated_log_density(means, factor, first, points, log_weights):  # type: ignore[no-untyped-def]
     """Log likelihood of each event, its own strengths integrated over the population.
@@ -288,10 +314,7 @@ def integrated_log_density(means, factor, first, points, log_weights):  # type: 
     for event in range(n_events):
         start, end = first[event], first[event + 1]
         largest = _exponents(start, end, means[event], whiten, points, log_weights, exponents)
-        total = 0.0
-        for k in range(end - start):
-            if exponents[k] > largest - _NEGLIGIBLE:
-                total += math.exp(exponents[k] - largest)
+        total = _sum_of_exponentials(exponents, end - start, largest)
         density[event] = constant + largest + math.log(total)
     return density
 

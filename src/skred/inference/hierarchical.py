@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign
@@ -101,6 +102,18 @@ class HierarchicalProblem(Problem):
             result[k] = integrated_log_density(np.tile(mean, (n_events, 1)), factor, *surfaces.nodes)
         return result
 
+    def predictive(
+        self, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
+    ) -> dict[str, xr.Dataset]:
+        """Each recorded avalanche's own strengths, and new avalanches from the population."""
+        from skred.inference.hierarchical_results import predictive_groups
+
+        return predictive_groups(self, law, posterior, prior, seed)
+
+    def constants(self) -> dict[str, Any]:
+        """How well the releases are known."""
+        return {"release_sd": ("event", self.releases.sd, {"units": "m"})}
+
     @cached_property
     def readings(self) -> EventReadings:
         """The recordings as the error model reads them."""
@@ -127,8 +140,12 @@ class HierarchicalProblem(Problem):
     def predict(
         self, mechanisms: Sequence[Mechanism], strengths: FloatArray, releases: FloatArray
     ) -> FloatArray:
-        """Readings of fronts: (n, n_strengths) and (n,) to (n, n_sensors), 0 where a front does not come."""
-        table, law = sensor_table(self.sensor_places), self.contributions(mechanisms)
+        """Readings of fronts: (n, n_strengths) and (n,) to (n, n_sensors + 1), the runout last.
+
+        0 where a front does not come; a span's mean speed where it covered the whole of it.
+        """
+        table = sensor_table([*self.sensor_places, None])
+        law = self.contributions(mechanisms)
         strengths, releases = np.asarray(strengths, dtype=float), np.asarray(releases, dtype=float)
         readings: FloatArray = simulate(strengths, releases, self.path, law, table)
         return readings

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign, Status
@@ -58,6 +59,16 @@ class Problem(ABC):
     @abstractmethod
     def log_likelihood(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
         """Log density of each event for many parameter vectors: arrays by name to (n, n_events)."""
+
+    @abstractmethod
+    def predictive(
+        self, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
+    ) -> dict[str, xr.Dataset]:
+        """Groups of a result that are this likelihood's own, from draws of the parameters."""
+
+    @abstractmethod
+    def constants(self) -> dict[str, Any]:
+        """Variables of the group constant_data that are this likelihood's own, and attributes."""
 
     @cached_property
     def values(self) -> FloatArray:
@@ -164,6 +175,21 @@ class PooledProblem(Problem):
     def log_likelihood(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
         """Log density of each event for many parameter vectors: arrays by name to (n, n_events)."""
         return self.log_density(law.mechanisms, law.strength_rows(samples))
+
+    def predictive(
+        self, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
+    ) -> dict[str, xr.Dataset]:
+        """Mean response, and a latent reading of a new avalanche from each event's release."""
+        from skred.inference.pooled_results import predictive_groups
+
+        return predictive_groups(self, law, posterior, prior, seed)
+
+    def constants(self) -> dict[str, Any]:
+        """Sigma and the recordings' mean."""
+        return {
+            "covariance": (("sensor", "sensor_bis"), self.covariance),
+            "recorded_mean": ("sensor", self.recorded_mean, {"units": "m s-1; m for the runout"}),
+        }
 
     def simulate(self, mechanisms: Sequence[Mechanism], strengths: FloatArray) -> FloatArray:
         """Mean response for many strengths: (n, n_strengths) to (n, n_events, n_sensors)."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -13,15 +14,15 @@ import numpy as np
 import xarray as xr
 
 from skred.inference.gate import Gate
-from skred.inference.problem import PooledProblem
+from skred.inference.problem import Problem
 from skred.inference.sampling import SamplerSettings
-from skred.physics.law import Law
+from skred.physics.law import Law, Parameter
 
 _PACKAGES = ("skred", "pymc", "pytensor", "arviz", "numba", "numpy", "scipy", "xarray")
 
 
 def assemble(
-    problem: PooledProblem,
+    problem: Problem,
     law: Law,
     posterior: xr.DataTree,
     prior: xr.Dataset,
@@ -32,40 +33,25 @@ def assemble(
 
     Groups
     ------
-    posterior, prior : parameters of the law
-    posterior_predictive : ``mean_response`` (chain, draw, release, sensor), the response of the path,
-        and ``reading`` (chain, draw, event, sensor), a latent reading of a new avalanche from each
-        event's release, y ~ N(mean_response, Sigma): at most 0 where it would not have been reached
-    prior_predictive : ``mean_response``
+    posterior, prior : parameters of the law, and of the population in a hierarchical calibration
+    posterior_predictive, prior_predictive, event_posterior : see `pooled_results`, `hierarchical_results`
     log_likelihood : ``recordings`` (chain, draw, event)
     observed_data : ``reading`` (event, sensor), NaN where there is none
     constant_data : status, covariance of the recordings, sensors, track, terrain
     """
     parameters = posterior["posterior"].to_dataset()
-    rng = np.random.default_rng([settings.seed, 1])
-    response = _response(problem, law, parameters)
-    draws = response.values[:, :, problem.release_of_event]
-    factor = np.linalg.cholesky(problem.covariance)
-    reading = draws + rng.standard_normal(draws.shape) @ factor.T
-    log_density = problem.log_density(law.mechanisms, law.strength_rows(_flat(parameters, law)))
+    own = problem.parameters(law)
+    samples = {parameter.name: parameters[parameter.name].values.ravel() for parameter in own}
+    log_density = problem.log_likelihood(law, samples)
     sizes = (parameters.sizes["chain"], parameters.sizes["draw"])
-    event, sensor = problem.coords["event"], problem.coords["sensor"]
-    chain_draw = {"chain": parameters["chain"].values, "draw": parameters["draw"].values}
     groups = {
-        "posterior": _with_units(parameters, law),
+        "posterior": _with_units(parameters, own, law),
         "log_likelihood": xr.Dataset(
             {"recordings": (("chain", "draw", "event"), log_density.reshape(*sizes, -1))},
-            coords={**chain_draw, "event": event},
+            coords={**chain_and_draw(parameters), "event": problem.coords["event"]},
         ),
-        "posterior_predictive": xr.Dataset(
-            {
-                "mean_response": response,
-                "reading": (("chain", "draw", "event", "sensor"), reading),
-            },
-            coords={**chain_draw, "event": event, "sensor": sensor},
-        ),
-        "prior": _with_units(prior, law),
-        "prior_predictive": xr.Dataset({"mean_response": _response(problem, law, prior)}),
+        "prior": _with_units(prior, own, law),
+        **problem.predictive(law, parameters, prior, settings.seed),
         "observed_data": _observed(problem),
         "constant_data": _constant(problem),
     }
@@ -76,6 +62,11 @@ def assemble(
     return tree
 
 
+def chain_and_draw(dataset: xr.Dataset) -> dict[str, Any]:
+    """Coordinates of the draws."""
+    return {"chain": dataset["chain"].values, "draw": dataset["draw"].values}
+
+
 def save(tree: xr.DataTree, file: Path) -> None:
     """Write a tree as netCDF, whole or not at all."""
     partial = file.with_name(f".{file.name}.partial")
@@ -83,48 +74,23 @@ def save(tree: xr.DataTree, file: Path) -> None:
     os.replace(partial, file)
 
 
-def _flat(parameters: xr.Dataset, law: Law) -> dict[str, Any]:
-    return {name: parameters[name].values.ravel() for name in law.parameter_names}
-
-
-def _response(problem: PooledProblem, law: Law, parameters: xr.Dataset) -> xr.DataArray:
-    """Mean response, (chain, draw, release, sensor)."""
-    rows = law.strength_rows(_flat(parameters, law))
-    of_event = problem.simulate(law.mechanisms, rows)
-    first_event = [
-        int(np.flatnonzero(problem.release_of_event == k)[0]) for k in range(len(problem.releases))
-    ]
-    sizes = (parameters.sizes["chain"], parameters.sizes["draw"])
-    return xr.DataArray(
-        of_event[:, first_event].reshape(*sizes, len(first_event), -1),
-        dims=("chain", "draw", "release", "sensor"),
-        coords={
-            "chain": parameters["chain"].values,
-            "draw": parameters["draw"].values,
-            "release": problem.releases,
-            "sensor": problem.coords["sensor"],
-        },
-        attrs={"units": "m s-1; m for the runout"},
-    )
-
-
-def _with_units(parameters: xr.Dataset, law: Law) -> xr.Dataset:
+def _with_units(parameters: xr.Dataset, own: Sequence[Parameter], law: Law) -> xr.Dataset:
     labelled = parameters.copy()
-    for parameter in (*law.parameters, *law.derived):
+    for parameter in (*own, *law.derived):
         if parameter.name not in labelled:
             continue  # the prior holds the free variables only
         labelled[parameter.name].attrs.update(units=parameter.unit, symbol=parameter.symbol)
     return labelled
 
 
-def _observed(problem: PooledProblem) -> xr.Dataset:
+def _observed(problem: Problem) -> xr.Dataset:
     return xr.Dataset(
         {"reading": (("event", "sensor"), problem.values, {"units": "m s-1; m for the runout"})},
         coords=problem.coords,
     )
 
 
-def _constant(problem: PooledProblem) -> xr.Dataset:
+def _constant(problem: Problem) -> xr.Dataset:
     campaign, terrain = problem.campaign, problem.terrain
     sensor = problem.coords["sensor"]
     return xr.Dataset(
@@ -134,8 +100,6 @@ def _constant(problem: PooledProblem) -> xr.Dataset:
                 campaign.status,
                 {"flag_values": [0, 1, 2], "flag_meanings": "observed not_reached missing"},
             ),
-            "covariance": (("sensor", "sensor_bis"), problem.covariance),
-            "recorded_mean": ("sensor", problem.recorded_mean, {"units": "m s-1; m for the runout"}),
             "s_from": ("sensor", [s.s_from_m for s in campaign.sensors], {"units": "m"}),
             "s_to": ("sensor", [s.s_to_m for s in campaign.sensors], {"units": "m"}),
             "release_s": ("event", [e.release_s_m for e in campaign.events], {"units": "m"}),
@@ -144,6 +108,7 @@ def _constant(problem: PooledProblem) -> xr.Dataset:
             "cell_edge": ("edge", terrain.edge_s_m, {"units": "m"}),
             "slope": ("cell", terrain.slope_rad, {"units": "rad"}),
             "curvature": ("cell", terrain.curvature, {"units": "m-1"}),
+            **problem.constants(),
         },
         coords={"event": problem.coords["event"], "sensor": sensor, "sensor_bis": sensor},
     )
@@ -165,15 +130,15 @@ def _last_finite(value: Any) -> float:
     return float(finite[-1]) if len(finite) else float("nan")
 
 
-def _attributes(problem: PooledProblem, law: Law, gate: Gate, settings: SamplerSettings) -> dict[str, Any]:
+def _attributes(problem: Problem, law: Law, gate: Gate, settings: SamplerSettings) -> dict[str, Any]:
     campaign = problem.campaign
     return {
-        "title": f"{law.title}, pooled calibration on {campaign.name}",
+        "title": f"{law.title}, {problem.likelihood} calibration on {campaign.name}",
         "law": law.id,
         "equation": law.equation,
         "campaign": campaign.name,
         "campaign_fingerprint": campaign.fingerprint(),
-        "likelihood": "pooled",
+        "likelihood": problem.likelihood,
         "smoothing_m": problem.terrain.smoothing_m,
         "n_cells": problem.terrain.n_cells,
         "settings": json.dumps(settings.as_dict()),

@@ -13,7 +13,7 @@ import pymc as pm
 import xarray as xr
 
 from skred.inference.joint_metropolis import JointMetropolis
-from skred.inference.problem import PooledProblem
+from skred.inference.problem import Problem
 from skred.physics.law import Law
 
 Sampler = Literal["metropolis", "nuts", "smc"]
@@ -46,15 +46,16 @@ class SamplerSettings:
 
 def sample_prior(model: pm.Model, law: Law, seed: int, draws: int = PRIOR_DRAWS) -> xr.Dataset:
     """Prior draws of the free random variables, (chain, draw)."""
+    names = [variable.name for variable in model.free_RVs]
     with quiet_pymc():
-        tree = pm.sample_prior_predictive(draws, model, var_names=law.parameter_names, random_seed=seed)
+        tree = pm.sample_prior_predictive(draws, model, var_names=names, random_seed=seed)
     return tree["prior"].to_dataset()
 
 
 def sample_posterior(
     model: pm.Model,
     law: Law,
-    problem: PooledProblem,
+    problem: Problem,
     prior: xr.Dataset,
     settings: SamplerSettings,
     *,
@@ -96,12 +97,12 @@ def sample_posterior(
     return tree
 
 
-def _starts(law: Law, problem: PooledProblem, prior: xr.Dataset, chains: int) -> list[dict[str, Any]]:
+def _starts(law: Law, problem: Problem, prior: xr.Dataset, chains: int) -> list[dict[str, Any]]:
     """One starting point for each chain."""
-    samples = {name: prior[name].values.ravel() for name in law.parameter_names}
-    n = min(_STARTS_PER_CHAIN, len(samples[law.parameter_names[0]]) // chains)
-    rows = law.strength_rows({name: values[: n * chains] for name, values in samples.items()})
-    log_density = problem.log_density(law.mechanisms, rows).sum(axis=1).reshape(chains, n)
+    samples = {str(name): variable.values.ravel() for name, variable in prior.data_vars.items()}
+    n = min(_STARTS_PER_CHAIN, prior.sizes["chain"] * prior.sizes["draw"] // chains)
+    first = {name: values[: n * chains] for name, values in samples.items()}
+    log_density = problem.log_likelihood(law, first).sum(axis=1).reshape(chains, n)
     best = np.nan_to_num(log_density, nan=-np.inf).argmax(axis=1) + n * np.arange(chains)
     return [{name: samples[name][i] for name in samples} for i in best]
 

@@ -1,0 +1,56 @@
+"""What a pooled posterior says of readings: the response of the path, and a new avalanche's readings."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from skred.inference.problem import PooledProblem
+from skred.inference.results import chain_and_draw
+from skred.physics.law import Law
+
+
+def predictive_groups(
+    problem: PooledProblem, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
+) -> dict[str, xr.Dataset]:
+    """Predictive groups of a result.
+
+    Groups
+    ------
+    posterior_predictive : ``mean_response`` (chain, draw, release, sensor), the response of the path,
+        and ``reading`` (chain, draw, event, sensor), a latent reading of a new avalanche from each
+        event's release, y ~ N(mean_response, Sigma): at most 0 where it would not have been reached
+    prior_predictive : ``mean_response``
+    """
+    rng = np.random.default_rng([seed, 1])
+    response = _response(problem, law, posterior)
+    draws = response.values[:, :, problem.release_of_event]
+    factor = np.linalg.cholesky(problem.covariance)
+    reading = draws + rng.standard_normal(draws.shape) @ factor.T
+    return {
+        "posterior_predictive": xr.Dataset(
+            {"mean_response": response, "reading": (("chain", "draw", "event", "sensor"), reading)},
+            coords={**chain_and_draw(posterior), **problem.coords},
+        ),
+        "prior_predictive": xr.Dataset({"mean_response": _response(problem, law, prior)}),
+    }
+
+
+def _response(problem: PooledProblem, law: Law, parameters: xr.Dataset) -> xr.DataArray:
+    """Mean response, (chain, draw, release, sensor)."""
+    rows = law.strength_rows({name: parameters[name].values.ravel() for name in law.parameter_names})
+    of_event = problem.simulate(law.mechanisms, rows)
+    first_event = [
+        int(np.flatnonzero(problem.release_of_event == k)[0]) for k in range(len(problem.releases))
+    ]
+    sizes = (parameters.sizes["chain"], parameters.sizes["draw"])
+    return xr.DataArray(
+        of_event[:, first_event].reshape(*sizes, len(first_event), -1),
+        dims=("chain", "draw", "release", "sensor"),
+        coords={
+            **chain_and_draw(parameters),
+            "release": problem.releases,
+            "sensor": problem.coords["sensor"],
+        },
+        attrs={"units": "m s-1; m for the runout"},
+    )
