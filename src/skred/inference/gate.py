@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import arviz as az
@@ -40,6 +40,10 @@ class Gate:
     def passed(self) -> bool:
         """Whether the result may be used."""
         return not self.problems
+
+    def with_problems(self, more: Sequence[str]) -> Gate:
+        """The same gate with further reasons to fail."""
+        return replace(self, problems=(*self.problems, *more))
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for files."""

@@ -36,7 +36,9 @@ _BELOW_SCALE, _ABOVE_SCALE = 6.0, 1.7
 _MEDIAN_LOG_MEAN, _MEDIAN_LOG_SD = -0.64, 1.1
 """Mean and standard deviation of the log of a half-normal variable of scale 1."""
 _COARSE_CELL, _CELL_IN_SPREADS, _CELL_RANGE = 0.25, 0.4, (0.02, 0.2)
-_CHECKED_EVENTS = 24
+_CHECKED_EVENTS, _CHECKED_DRAWS = 24, 40
+INTEGRATION_LIMIT = 0.2
+"""Largest error of the log likelihood over 22 events, in nats."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +55,7 @@ class HierarchicalProblem(Problem):
     error_model: ErrorModel = ERROR_MODELS["robust"]
     place_sd_m: float = PLACE_SD_M
     _surfaces: dict[tuple[str, ...], Surfaces] = field(default_factory=dict, repr=False)
+    _errors: dict[tuple[str, ...], FloatArray] = field(default_factory=dict, repr=False)
 
     likelihood = "hierarchical"
 
@@ -110,6 +113,36 @@ class HierarchicalProblem(Problem):
 
         return predictive_groups(self, law, posterior, prior, seed)
 
+    def summary(self, law: Law, tree: xr.DataTree) -> dict[str, Any]:
+        """The error model, a new avalanche at each sensor, and each event's own strengths."""
+        from skred.inference.hierarchical_results import event_rows, new_avalanche_rows
+
+        return {
+            "error_model": {"id": self.error_model.id, "title": self.error_model.title},
+            "place_sd_m": self.place_sd_m,
+            "integration": {
+                "largest_error_of_an_event": float(np.abs(self._errors[_key(law.mechanisms)]).max()),
+                "largest_error_of_22_events": float(_of_22_events(self._errors[_key(law.mechanisms)])),
+                "checked_events": int(self._errors[_key(law.mechanisms)].shape[1]),
+            },
+            "new_avalanche": new_avalanche_rows(self, tree),
+            "events": event_rows(self, law, tree),
+        }
+
+    def numerical_problems(self, law: Law, posterior: xr.Dataset) -> tuple[str, ...]:
+        """Whether the integration over events is good enough, at draws of the posterior."""
+        draws = {p.name: posterior[p.name].values.ravel() for p in self.parameters(law)}
+        n = len(next(iter(draws.values())))
+        chosen = np.linspace(0, n - 1, min(n, _CHECKED_DRAWS)).astype(int)
+        errors = self.integration_errors(law, {name: values[chosen] for name, values in draws.items()})
+        self._errors[_key(law.mechanisms)] = errors
+        if _of_22_events(errors) <= INTEGRATION_LIMIT:
+            return ()
+        return (
+            f"the integration over events is wrong by {_of_22_events(errors):.2f} nats in 22 events (limit"
+            f" {INTEGRATION_LIMIT}): are recordings stated with errors far below what is possible?",
+        )
+
     def constants(self) -> dict[str, Any]:
         """How well the releases are known."""
         return {"release_sd": ("event", self.releases.sd, {"units": "m"})}
@@ -152,7 +185,7 @@ class HierarchicalProblem(Problem):
 
     def surfaces(self, mechanisms: Sequence[Mechanism]) -> Surfaces:
         """Surfaces of all events under a law, made once: coarsely, then finely where it matters."""
-        key = tuple(mechanism.id for mechanism in mechanisms)
+        key = _key(mechanisms)
         if key not in self._surfaces:
             self._surfaces[key] = self._resolve(mechanisms, self.fronts(mechanisms), Resolution(), 1.0)
         return self._surfaces[key]
@@ -193,6 +226,16 @@ class HierarchicalProblem(Problem):
         exact = self._log_likelihood(finer, law, samples)
         difference: FloatArray = self.log_likelihood(law, samples)[:, chosen] - exact
         return difference
+
+
+def _key(mechanisms: Sequence[Mechanism]) -> tuple[str, ...]:
+    """What a law's surfaces depend on: the same id with and without curvature is not the same term."""
+    return tuple(f"{mechanism.id}: {mechanism.equation}" for mechanism in mechanisms)
+
+
+def _of_22_events(errors: FloatArray) -> float:
+    """Largest error over draws, for 22 events like those checked."""
+    return float(22.0 * np.abs(errors.mean(axis=1)).max())
 
 
 def hierarchical_problem(

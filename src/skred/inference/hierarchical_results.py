@@ -14,6 +14,7 @@ from skred.inference.event_draws import (
     recorded_avalanches,
 )
 from skred.inference.hierarchical import HierarchicalProblem
+from skred.inference.intervals import interval
 from skred.physics.law import Law
 
 MOST_AVALANCHES = 200_000
@@ -87,3 +88,43 @@ def _avalanches(
     variables["front"] = ((*dims, "sensor"), fronts[..., :-1].reshape(*sizes, -1), _READING)
     coords = {"chain": draws["chain"].values, "draw": draws["draw"].values, **problem.coords}
     return xr.Dataset(variables, coords=coords)
+
+
+def new_avalanche_rows(problem: HierarchicalProblem, tree: xr.DataTree) -> list[dict[str, Any]]:
+    """A new avalanche's reading at each sensor, where it comes there, beside the recorded ones."""
+    predicted = tree["posterior_predictive"].to_dataset()
+    rows = []
+    for number, sensor in enumerate(problem.campaign.sensors):
+        reached = predicted["reached"].values[..., number]
+        values = predicted["reading"].values[..., number][reached]
+        recorded = problem.values[problem.observed[:, number], number]
+        known = problem.observed[:, number] | problem.not_reached[:, number]
+        row = {
+            "sensor": sensor.id,
+            "unit": "m" if sensor.is_runout else "m/s",
+            "reached": float(reached.mean()),
+            "recorded_reached": float(problem.observed[known, number].mean()) if known.any() else None,
+            "n_recorded": len(recorded),
+        }
+        for name, sample in (("", values), ("recorded_", recorded)):
+            low, high = interval(sample) if len(sample) else (float("nan"), float("nan"))
+            row[f"{name}mean"] = float(sample.mean()) if len(sample) else None
+            row[f"{name}sd"] = float(sample.std(ddof=1)) if len(sample) > 1 else None
+            row[f"{name}low"], row[f"{name}high"] = low, high
+        rows.append(row)
+    return rows
+
+
+def event_rows(problem: HierarchicalProblem, law: Law, tree: xr.DataTree) -> list[dict[str, Any]]:
+    """Each recorded avalanche's own strengths and release."""
+    events = tree["event_posterior"].to_dataset()
+    units = {m.strength.name: m.strength.unit for m in law.mechanisms} | {"release": "m"}
+    rows = []
+    for number, event in enumerate(problem.campaign.event_ids):
+        row: dict[str, Any] = {"event": event}
+        for name, unit in units.items():
+            values = events[name].values[..., number]
+            low, high = interval(values)
+            row[name] = {"median": float(np.median(values)), "low": low, "high": high, "unit": unit}
+        rows.append(row)
+    return rows

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
+from skred.inference.intervals import interval
 from skred.inference.problem import PooledProblem
 from skred.inference.results import chain_and_draw
 from skred.physics.law import Law
@@ -54,3 +57,28 @@ def _response(problem: PooledProblem, law: Law, parameters: xr.Dataset) -> xr.Da
         },
         attrs={"units": "m s-1; m for the runout"},
     )
+
+
+def response_rows(problem: PooledProblem, tree: xr.DataTree) -> list[dict[str, Any]]:
+    """Mean response at each sensor, averaged over the events, beside the recordings' mean."""
+    response = tree["posterior_predictive"].to_dataset()["mean_response"]
+    mean_over_events = response.isel(release=problem.release_of_event).mean("release")
+    rows = []
+    for number, sensor in enumerate(problem.campaign.sensors):
+        values = np.asarray(mean_over_events.isel(sensor=number).to_numpy(), dtype=float)
+        low, high = interval(values)
+        recorded = int(problem.observed[:, number].sum())
+        rows.append(
+            {
+                "sensor": sensor.id,
+                "unit": "m" if sensor.is_runout else "m/s",
+                "mean": float(values.mean()),
+                "sd": float(values.std(ddof=1)),
+                "low": low,
+                "high": high,
+                "recorded_mean": float(problem.recorded_mean[number]),
+                "recorded_se": float(np.sqrt(problem.covariance[number, number] / problem.campaign.n_events)),
+                "n_recorded": recorded,
+            }
+        )
+    return rows

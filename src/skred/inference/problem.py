@@ -67,6 +67,14 @@ class Problem(ABC):
         """Groups of a result that are this likelihood's own, from draws of the parameters."""
 
     @abstractmethod
+    def summary(self, law: Law, tree: xr.DataTree) -> dict[str, Any]:
+        """What a summary says beside the parameters: plain data, from the whole result."""
+
+    def numerical_problems(self, law: Law, posterior: xr.Dataset) -> tuple[str, ...]:
+        """What is wrong with the numerics of the likelihood, and what to do."""
+        return ()
+
+    @abstractmethod
     def constants(self) -> dict[str, Any]:
         """Variables of the group constant_data that are this likelihood's own, and attributes."""
 
@@ -183,6 +191,12 @@ class PooledProblem(Problem):
         from skred.inference.pooled_results import predictive_groups
 
         return predictive_groups(self, law, posterior, prior, seed)
+
+    def summary(self, law: Law, tree: xr.DataTree) -> dict[str, Any]:
+        """Mean response at each sensor."""
+        from skred.inference.pooled_results import response_rows
+
+        return {"response": response_rows(self, tree)}
 
     def constants(self) -> dict[str, Any]:
         """Sigma and the recordings' mean."""

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import arviz as az
-import numpy as np
 import pymc as pm
 import xarray as xr
 
 from skred.inference.gate import Gate, check_gate
+from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY, interval
 from skred.inference.joint_metropolis import JointMetropolis
-from skred.inference.problem import PooledProblem
+from skred.inference.problem import Problem
 from skred.inference.results import assemble, save
 from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior
-from skred.physics.law import Law
+from skred.physics.law import Law, Parameter
 from skred.work.output import write_json
-
-INTERVAL_KIND, INTERVAL_PROBABILITY = "equal-tailed", 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +39,7 @@ class Calibration:
     """
 
     law: Law
-    problem: PooledProblem
+    problem: Problem
     settings: SamplerSettings
     model: pm.Model
     step: JointMetropolis
@@ -54,20 +53,21 @@ class Calibration:
             "title": self.law.title,
             "equation": self.law.equation,
             "gate": self.gate.as_dict(),
-            "parameters": _parameter_rows(self.tree, self.law),
-            "response": _response_rows(self.tree, self.problem),
+            "parameters": _parameter_rows(self.tree, self.problem.parameters(self.law)),
+            **self.problem.summary(self.law, self.tree),
         }
 
 
 def calibrate(
-    problem: PooledProblem, law: Law, settings: SamplerSettings, *, progress: bool = False
+    problem: Problem, law: Law, settings: SamplerSettings, *, progress: bool = False
 ) -> Calibration:
-    """Sample the pooled posterior of a law and diagnose it."""
+    """Sample the posterior of a law and diagnose it."""
     model = law.build(problem)
     prior = sample_prior(model, law, settings.seed)
     step = JointMetropolis(model=model, pointwise="recordings")
     posterior = sample_posterior(model, law, problem, prior, settings, step=step, progress=progress)
-    gate = check_gate(posterior, law.parameter_names)
+    gate = check_gate(posterior, [parameter.name for parameter in problem.parameters(law)])
+    gate = gate.with_problems(problem.numerical_problems(law, posterior["posterior"].to_dataset()))
     tree = assemble(problem, law, posterior, prior, gate, settings)
     return Calibration(law, problem, settings, model, step, tree, gate)
 
@@ -93,21 +93,14 @@ def write_calibration(calibration: Calibration, folder: Path) -> None:
     write_json(folder / "summary.json", summary)
 
 
-def _interval(values: Any) -> tuple[float, float]:
-    """Equal-tailed interval."""
-    tail = 0.5 * (1.0 - INTERVAL_PROBABILITY)
-    low, high = np.quantile(np.ravel(values), [tail, 1.0 - tail])
-    return float(low), float(high)
-
-
-def _parameter_rows(tree: xr.DataTree, law: Law) -> list[dict[str, Any]]:
-    posterior = tree["posterior"].to_dataset()[law.parameter_names]
+def _parameter_rows(tree: xr.DataTree, parameters: Sequence[Parameter]) -> list[dict[str, Any]]:
+    posterior = tree["posterior"].to_dataset()[[parameter.name for parameter in parameters]]
     bulk, tail = az.ess(posterior, method="bulk"), az.ess(posterior, method="tail")
     r_hat, mcse = az.rhat(posterior), az.mcse(posterior, method="mean")
     rows = []
-    for parameter in law.parameters:
+    for parameter in parameters:
         name = parameter.name
-        low, high = _interval(posterior[name].values)
+        low, high = interval(posterior[name].values)
         rows.append(
             {
                 "name": name,
@@ -122,31 +115,6 @@ def _parameter_rows(tree: xr.DataTree, law: Law) -> list[dict[str, Any]]:
                 "ess_tail": float(tail[name]),
                 "r_hat": float(r_hat[name]),
                 "mcse_mean": float(mcse[name]),
-            }
-        )
-    return rows
-
-
-def _response_rows(tree: xr.DataTree, problem: PooledProblem) -> list[dict[str, Any]]:
-    """Mean response at each sensor, averaged over the events, beside the recordings' mean."""
-    response = tree["posterior_predictive"].to_dataset()["mean_response"]
-    mean_over_events = response.isel(release=problem.release_of_event).mean("release")
-    rows = []
-    for number, sensor in enumerate(problem.campaign.sensors):
-        values = np.asarray(mean_over_events.isel(sensor=number).to_numpy(), dtype=float)
-        low, high = _interval(values)
-        recorded = int(problem.observed[:, number].sum())
-        rows.append(
-            {
-                "sensor": sensor.id,
-                "unit": "m" if sensor.is_runout else "m/s",
-                "mean": float(values.mean()),
-                "sd": float(values.std(ddof=1)),
-                "low": low,
-                "high": high,
-                "recorded_mean": float(problem.recorded_mean[number]),
-                "recorded_se": float(np.sqrt(problem.covariance[number, number] / problem.campaign.n_events)),
-                "n_recorded": recorded,
             }
         )
     return rows

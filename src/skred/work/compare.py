@@ -14,13 +14,14 @@ import numpy as np
 from skred.campaign import Status
 from skred.inference.alpha_beta import ALPHA_SD_DEG, alpha_beta
 from skred.inference.evidence import evidence
+from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY
 from skred.inference.leave_one_out import ExactLoo, exact_leave_one_out
 from skred.inference.problem import PooledProblem
 from skred.inference.results import save
 from skred.inference.sampling import SamplerSettings
 from skred.inference.waic import waic
 from skred.physics.law import Law
-from skred.work.calibrate import INTERVAL_KIND, INTERVAL_PROBABILITY, Calibration, calibrate
+from skred.work.calibrate import Calibration, calibrate
 from skred.work.output import write_json, write_text
 from skred.work.statement import statement
 
