@@ -18,6 +18,7 @@ from skred.inference.joint_metropolis import JointMetropolis
 
 FloatArray = NDArray[np.float64]
 REFIT_CHAINS, REFIT_DRAWS, REFIT_BURN = 4, 500, 100
+"""Draws of models of one or two parameters; chains of more are longer."""
 _ADAPTATION = 500
 _BATCHES = 5
 
@@ -28,7 +29,8 @@ class ExactLoo:
 
     Attributes
     ----------
-    pointwise : (n_events,) array
+    pointwise : (n,) array
+        Of the events that were left out, in their order.
     mcse : float
         Monte Carlo standard error of the sum.
     failed : tuple of str
@@ -55,6 +57,7 @@ def exact_leave_one_out(
     step: JointMetropolis,
     events: Sequence[str],
     seed: int,
+    which: Sequence[int] | None = None,
     tell: Callable[[int, int], None] = lambda done, of: None,
 ) -> ExactLoo:
     """Refit without each event and predict it.
@@ -67,26 +70,29 @@ def exact_leave_one_out(
     events : sequence of str
         Ids, in the order of the pointwise terms.
     seed : int
+    which : sequence of int, optional
+        Numbers of the events to leave out; by default all.
     tell : callable, optional
         Told the number of refits done and of all.
     """
+    left_out = range(len(events)) if which is None else which
     rng = np.random.default_rng([seed, 2])
     start = DictToArrayBijection.map(model.initial_point()).data.astype(float)
     step.weights[:] = 1.0
     step.adapt(start, _ADAPTATION, rng)
     draws, terms = [], []
     try:
-        for number in range(len(events)):
+        for done, number in enumerate(left_out):
             step.weights[:] = 1.0
             step.weights[number] = 0.0
             chains = [_refit(step, start.copy(), rng) for _ in range(REFIT_CHAINS)]
             draws.append([chain[0] for chain in chains])
             terms.append([chain[1][:, number] for chain in chains])
-            tell(number + 1, len(events))
+            tell(done + 1, len(left_out))
     finally:
         step.weights[:] = 1.0
     r_hat = _r_hat(np.array(draws))
-    failed = tuple(event for event, value in zip(events, r_hat, strict=True) if not value <= R_HAT_LIMIT)
+    failed = tuple(events[k] for k, value in zip(left_out, r_hat, strict=True) if not value <= R_HAT_LIMIT)
     densities = np.array(terms)
     pointwise = logsumexp(densities, axis=(1, 2)) - np.log(densities[0].size)
     return ExactLoo(pointwise, float(np.sqrt(np.sum(_mcse(densities) ** 2))), failed)
@@ -94,7 +100,7 @@ def exact_leave_one_out(
 
 def _refit(step: JointMetropolis, q: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     step.run(q, REFIT_BURN, rng)
-    return step.run(q, REFIT_DRAWS, rng)
+    return step.run(q, REFIT_DRAWS * max(1, (len(q) + 1) // 2), rng)
 
 
 def _r_hat(draws: FloatArray) -> FloatArray:

@@ -20,8 +20,8 @@ from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
 
 FloatArray = NDArray[np.float64]
-CORRELATION_SCALE = 0.5
-"""Of the normal prior, cut off at -1 and 1, of each (partial) correlation."""
+LKJ_SHAPE = 2.0
+"""Of the prior of the correlations (Lewandowski, Kurowicka and Joe): mildly against strong ones."""
 _LEAST = 1e-6
 
 
@@ -100,9 +100,21 @@ def population_variables(mechanisms: Sequence[Mechanism]) -> Any:
         pm.LogNormal(p.name, mu=math.log(SPREAD_MEDIAN), sigma=SPREAD_LOG_SD)
         for p in spread_parameters(mechanisms)
     ]
+    n = len(mechanisms)
     correlations = [
-        pm.TruncatedNormal(p.name, mu=0.0, sigma=CORRELATION_SCALE, lower=-1.0, upper=1.0)
-        for p in correlation_parameters(mechanisms)
+        _lkj_partial(p.name, LKJ_SHAPE + 0.5 * (n - 2 - given))
+        for p, (given, _) in zip(correlation_parameters(mechanisms), combinations(range(n), 2), strict=True)
     ]
     rows = population_factor(spreads, correlations, pt.sqrt)
     return pt.stack([pt.stack([pt.as_tensor_variable(value) for value in row]) for row in rows])
+
+
+def _lkj_partial(name: str, shape: float) -> Any:
+    """Partial correlation whose (1 + r) / 2 is Beta(shape, shape)."""
+    import pymc as pm
+    from pymc.distributions.transforms import Interval
+
+    def scaled_beta(size: Any) -> Any:
+        return 2.0 * pm.Beta.dist(shape, shape, size=size) - 1.0
+
+    return pm.CustomDist(name, dist=scaled_beta, default_transform=Interval(-1.0, 1.0))

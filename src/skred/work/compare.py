@@ -5,22 +5,24 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import arviz as az
 import numpy as np
+from numpy.typing import NDArray
 
 from skred.campaign import Status
-from skred.inference.alpha_beta import ALPHA_SD_DEG, alpha_beta
-from skred.inference.evidence import evidence
+from skred.inference.evidence import SMC_DRAWS, evidence
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY
 from skred.inference.leave_one_out import ExactLoo, exact_leave_one_out
-from skred.inference.problem import PooledProblem
+from skred.inference.problem import PooledProblem, Problem
 from skred.inference.results import save
 from skred.inference.sampling import SamplerSettings
 from skred.inference.waic import waic
 from skred.physics.law import Law
+from skred.work.alpha_beta_entry import alpha_beta_entry
 from skred.work.calibrate import Calibration, calibrate
 from skred.work.output import write_json, write_text
 from skred.work.statement import statement
@@ -31,6 +33,22 @@ PRACTICAL = 4.0
 Tell = Callable[[str], None]
 
 
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """Laws calibrated on one problem, with their scores.
+
+    Attributes
+    ----------
+    document : dict
+        As in ``compare.json``.
+    figures : dict of str to Path
+        Of each law, by ``<law id>/<figure>``.
+    """
+
+    document: dict[str, Any]
+    figures: dict[str, Path]
+
+
 def compare(
     problem: PooledProblem,
     laws: Sequence[Law],
@@ -38,7 +56,7 @@ def compare(
     folder: Path,
     tell: Tell = lambda line: None,
 ) -> dict[str, Any]:
-    """Calibrate and compare, writing each law's results as soon as they are there.
+    """Calibrate and compare by the pooled likelihood, writing each law's results as soon as they are there.
 
     Parameters
     ----------
@@ -55,57 +73,89 @@ def compare(
     dict
         The content of ``compare.json``.
     """
-    from skred.report.figures import save_comparison_figures, save_model_figures
-    from skred.report.html import render_comparison
-
     started = time.monotonic()
+    scored = score(problem, laws, settings, folder, tell, exact=True)
+    return write_comparison(scored, folder, started, tell)
+
+
+def score(
+    problem: Problem,
+    laws: Sequence[Law],
+    settings: SamplerSettings,
+    folder: Path,
+    tell: Tell,
+    *,
+    exact: bool,
+) -> Scored:
+    """Calibrate laws and score their predictions; `exact` refits without every event in turn."""
+    from skred.report.figures import save_model_figures
+
     entries: list[dict[str, Any]] = []
     figures: dict[str, Path] = {}
     trees: dict[str, Any] = {}
     for law in laws:
-        tell(f"{law.id}: sampling")
+        tell(f"{law.id}: sampling ({problem.likelihood})")
         calibration = calibrate(problem, law, settings)
         entry = calibration.entry()
         if calibration.gate.passed:
             tell(f"{law.id}: leave-one-event-out and evidence")
-            entry |= _scores(calibration)
+            entry |= scores(calibration, exact=exact)
             trees[law.id] = calibration.tree
         else:
             tell(f"{law.id}: the gate failed: {'; '.join(calibration.gate.problems)}")
             entry |= dict.fromkeys(("loo", "waic", "exact", "difference", "evidence", "weight"))
         entries.append(entry)
         law_folder = folder / law.id
-        law_folder.mkdir(exist_ok=True)
+        law_folder.mkdir(exist_ok=True, parents=True)
         save(calibration.tree, law_folder / "posterior.nc")
         drawn = save_model_figures(calibration.tree, law, problem, law_folder)
         figures |= {f"{law.id}/{figure.stem}": figure for figure in drawn}
-    comparison = _document(problem, settings, calibration, rank(entries, trees))
+    return Scored(_document(problem, settings, calibration, rank(entries, trees)), figures)
+
+
+def write_comparison(scored: Scored, folder: Path, started: float, tell: Tell) -> dict[str, Any]:
+    """Say what came out, and write ``compare.json``, figures and ``report.html``; returns the document."""
+    from skred.report.figures import save_comparison_figures
+    from skred.report.html import render_comparison
+
+    comparison = scored.document
     comparison["statement"] = statement(comparison)
     comparison["seconds"] = time.monotonic() - started
     tell("writing the report")
-    figures |= save_comparison_figures(comparison, folder)
+    figures = scored.figures | save_comparison_figures(comparison, folder)
     write_json(folder / "compare.json", comparison)
     write_text(folder / "report.html", render_comparison(comparison, figures))
     return comparison
 
 
-def _scores(calibration: Calibration) -> dict[str, Any]:
-    """Everything a law's entry says of its predictions."""
+def scores(
+    calibration: Calibration,
+    *,
+    exact: bool,
+    evidence_seeds: int = EVIDENCE_SEEDS,
+    evidence_draws: int = SMC_DRAWS,
+) -> dict[str, Any]:
+    """Everything a law's entry says of its predictions.
+
+    Events whose importance sampling is unreliable are refitted exactly, with `exact` all.
+    """
     events = calibration.problem.campaign.event_ids
     seed = calibration.settings.seed
     loo = az.loo(calibration.tree, var_name="recordings", pointwise=True)
     information = waic(calibration.tree, variable="recordings")
-    exact = exact_leave_one_out(calibration.model, calibration.step, events, seed)
-    seeds = [10 * seed + k + 1 for k in range(EVIDENCE_SEEDS)]
-    marginal = evidence(calibration.model, seeds)
+    seeds = [10 * seed + k + 1 for k in range(evidence_seeds)]
+    marginal = evidence(calibration.model, seeds, evidence_draws)
     pareto_k = np.asarray(loo.pareto_k, dtype=float)
+    unreliable = np.flatnonzero(~(pareto_k <= float(loo.good_k)))
+    which = list(range(len(events))) if exact else unreliable.tolist()
+    refits = exact_leave_one_out(calibration.model, calibration.step, events, seed, which) if which else None
     return {
         "loo": {
             "elpd": float(loo.elpd),
             "se": float(loo.se),
             "p": float(loo.p),
             "pareto_k_max": float(pareto_k.max()),
-            "n_bad": int((pareto_k > float(loo.good_k)).sum()),
+            "n_bad": len(unreliable),
             "pareto_k": pareto_k.tolist(),
         },
         "waic": {
@@ -114,7 +164,7 @@ def _scores(calibration: Calibration) -> dict[str, Any]:
             "p": float(information.p_waic),
             "n_unreliable": int(information.n_unreliable),
         },
-        "exact": _exact_entry(exact),
+        "exact": _exact_entry(np.asarray(loo.elpd_i, dtype=float), refits, which, events),
         "evidence": {
             "log_evidence": list(marginal.log_evidence),
             "mean": marginal.mean,
@@ -124,13 +174,20 @@ def _scores(calibration: Calibration) -> dict[str, Any]:
     }
 
 
-def _exact_entry(exact: ExactLoo) -> dict[str, Any]:
+def _exact_entry(
+    pointwise: NDArray[np.float64], refits: ExactLoo | None, which: Sequence[int], events: Sequence[str]
+) -> dict[str, Any]:
+    """Leave-one-event-out: exact where an event was refitted, by importance sampling elsewhere."""
+    pointwise = pointwise.copy()
+    if refits is not None:
+        pointwise[list(which)] = refits.pointwise
     return {
-        "elpd": exact.elpd,
-        "se": exact.se,
-        "mcse": exact.mcse,
-        "pointwise": exact.pointwise.tolist(),
-        "failed_refits": list(exact.failed),
+        "elpd": float(pointwise.sum()),
+        "se": float(np.sqrt(len(pointwise) * np.var(pointwise, ddof=1))),
+        "mcse": refits.mcse if refits is not None else 0.0,
+        "pointwise": pointwise.tolist(),
+        "refitted": [events[k] for k in which],
+        "failed_refits": list(refits.failed) if refits is not None else [],
     }
 
 
@@ -164,11 +221,12 @@ def _stacking(ids: Sequence[str], trees: dict[str, Any]) -> dict[str, float]:
 
 
 def _document(
-    problem: PooledProblem, settings: SamplerSettings, any_of_them: Calibration, models: list[dict[str, Any]]
+    problem: Problem, settings: SamplerSettings, any_of_them: Calibration, models: list[dict[str, Any]]
 ) -> dict[str, Any]:
     campaign = problem.campaign
     return {
         "format": 1,
+        "likelihood": problem.likelihood,
         "campaign": {
             "name": campaign.name,
             "description": campaign.description,
@@ -190,36 +248,3 @@ def _document(
         "models": models,
         "alpha_beta": alpha_beta_entry(problem),
     }
-
-
-def alpha_beta_entry(problem: PooledProblem) -> dict[str, Any]:
-    """The alpha-beta model's extreme runout beside the largest recorded one.
-
-    It predicts where the extreme avalanche of a path stops, not the distribution of its runouts,
-    so it has no place in a comparison by leave-one-event-out.
-    """
-    campaign, terrain = problem.campaign, problem.terrain
-    runouts = [j for j, sensor in enumerate(campaign.sensors) if sensor.is_runout]
-    middle = 0.5 * (terrain.edge_s_m[1:] + terrain.edge_s_m[:-1])
-    slope = np.interp(campaign.track.s_m, middle, terrain.slope_rad)
-    try:
-        model = alpha_beta(campaign.track.x_m, campaign.track.z_m, slope)
-    except ValueError as error:
-        return {"reason": str(error)}
-    zero = campaign.reference_s_m or 0.0
-    entry = {
-        "beta_deg": model.beta_deg,
-        "alpha_deg": model.alpha_deg,
-        "runout_m": model.runout_s_m(reference_s_m=zero),
-        "runout_minus_1sd_m": model.runout_s_m(model.alpha_deg - ALPHA_SD_DEG, reference_s_m=zero),
-        "note": "runouts relative to the campaign's reference" if zero else "runouts as arc length",
-    }
-    if runouts and np.isfinite(problem.values[:, runouts]).any():
-        values = problem.values[:, runouts].max(axis=1, initial=-np.inf, where=problem.observed[:, runouts])
-        largest = int(values.argmax())
-        entry |= {
-            "recorded_max_m": float(values[largest]) - zero,
-            "recorded_max_event": campaign.event_ids[largest],
-            "exceedance_of_recorded_max": model.exceedance_probability(float(values[largest])),
-        }
-    return entry
