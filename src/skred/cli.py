@@ -9,15 +9,33 @@ import os
 import sys
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from cyclopts import App, CycloptsError, Parameter, validators
+from cyclopts import App, CycloptsError
 
+from skred.cli_options import (
+    Campaigns,
+    Chains,
+    Draws,
+    Errors,
+    ExactLoo,
+    Force,
+    Json,
+    Likelihoods,
+    Models,
+    Out,
+    Quiet,
+    Samplers,
+    Seed,
+    Smoothing,
+    Tune,
+)
 from skred.errors import InputError
 
 if TYPE_CHECKING:
     from skred.campaign import Campaign, CampaignError
-    from skred.inference.problem import PooledProblem
+    from skred.inference.hierarchical import HierarchicalProblem
+    from skred.inference.problem import PooledProblem, Problem
     from skred.physics.law import Law
 
 DONE, GATE_FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -30,34 +48,6 @@ app = App(
     # main() decides what an interruption means, the same for every command.
     suppress_keyboard_interrupt=False,
 )
-
-Campaigns = Annotated[str, Parameter(help="A folder, or the name of an embedded campaign.")]
-Models = Annotated[str, Parameter(help="Laws, separated by commas.")]
-Samplers = Annotated[
-    Literal["metropolis", "nuts", "smc"],
-    Parameter(help="PyMC's Metropolis with joint adapted proposals, NUTS, or sequential Monte Carlo."),
-]
-Draws = Annotated[
-    int, Parameter(validator=validators.Number(gte=4, lte=1_000_000), help="Draws kept per chain.")
-]
-Tune = Annotated[
-    int, Parameter(validator=validators.Number(gte=1, lte=1_000_000), help="Adaptation draws before them.")
-]
-Chains = Annotated[int, Parameter(validator=validators.Number(gte=2, lte=100), help="Number of chains.")]
-Seed = Annotated[int, Parameter(validator=validators.Number(gte=0, lt=2**31), help="Seed of all randomness.")]
-Smoothing = Annotated[
-    float,
-    Parameter(validator=validators.Number(gte=0.0, lte=1000.0), help="Smoothing length of the terrain, m."),
-]
-Out = Annotated[
-    Path | None,
-    Parameter(
-        help="Folder for the results: new, empty, or with --force; by default a fresh one in skred-out."
-    ),
-]
-Force = Annotated[bool, Parameter(name="--force", negative="", help="Use a folder that holds files.")]
-Quiet = Annotated[bool, Parameter(name="--quiet", negative="", help="Write nothing but errors.")]
-Json = Annotated[bool, Parameter(name="--json", negative="", help="Write the result as JSON to stdout.")]
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -86,6 +76,8 @@ def run_model(law_id: str) -> None:
     def calibrate_law(
         *,
         campaign: Campaigns = "ryggfonn",
+        likelihood: Likelihoods = "pooled",
+        errors: Errors = None,
         sampler: Samplers = "metropolis",
         draws: Draws = 1000,
         tune: Tune = 500,
@@ -99,7 +91,8 @@ def run_model(law_id: str) -> None:
     ) -> int:
         """Sample the posterior, check it, and write summary.json, posterior.nc and figures."""
         settings = {"sampler": sampler, "draws": draws, "tune": tune, "chains": chains, "seed": seed}
-        return _calibrate(law_id, campaign, settings, smoothing, out, force, as_json, quiet)
+        problem = _problem(campaign, likelihood, errors, smoothing)
+        return _calibrate(law_id, problem, settings, out, force, as_json, quiet)
 
     program.default(calibrate_law)
     sys.exit(run(sys.argv[1:], program))
@@ -160,6 +153,9 @@ def compare(
     /,
     *,
     models: Models = "coulomb,pcm,constant,voellmy",
+    likelihood: Likelihoods = "pooled",
+    errors: Errors = None,
+    exact_loo: ExactLoo = False,
     draws: Draws = 1000,
     tune: Tune = 500,
     chains: Chains = 4,
@@ -174,15 +170,22 @@ def compare(
     from skred.work.output import output_folder, plain
 
     laws = _laws(models)
-    problem = _problem(campaign, smoothing)
+    problem = _problem(campaign, likelihood, errors, smoothing)
     folder = output_folder(out, "compare", force=force)
 
+    from skred.inference.hierarchical import HierarchicalProblem
     from skred.inference.sampling import SamplerSettings
     from skred.report.tables import comparison_table
-    from skred.work.compare import compare as compare_laws
+    from skred.work.compare import compare as compare_pooled
+    from skred.work.compare_hierarchical import compare_hierarchical
 
     settings = SamplerSettings("metropolis", draws, tune, chains, seed)
-    comparison = compare_laws(problem, laws, settings, folder, _teller(quiet or as_json))
+    tell = _teller(quiet or as_json)
+    if isinstance(problem, HierarchicalProblem):
+        pooled = _pooled_or_reason(problem.campaign, smoothing)
+        comparison = compare_hierarchical(problem, pooled, laws, settings, folder, tell, exact=exact_loo)
+    else:
+        comparison = compare_pooled(problem, laws, settings, folder, tell)
     if as_json:
         _write_json(plain(comparison))
     elif not quiet:
@@ -192,9 +195,8 @@ def compare(
 
 def _calibrate(
     law_id: str,
-    campaign: str,
+    problem: "Problem",
     settings: dict[str, Any],
-    smoothing: float,
     out: Path | None,
     force: bool,
     as_json: bool,
@@ -205,7 +207,6 @@ def _calibrate(
     from skred.work.output import output_folder, plain
 
     law = load_law(law_id)
-    problem = _problem(campaign, smoothing)
     folder = output_folder(out, law_id, force=force)
     tell = _teller(quiet or as_json)
     tell(f"{law_id}: sampling")
@@ -238,18 +239,40 @@ def _laws(names: str) -> "list[Law]":
     return [load_law(name) for name in wanted]
 
 
-def _problem(campaign: str, smoothing: float) -> "PooledProblem":
-    """The pooled problem of a campaign, or what is wrong with it."""
+def _problem(
+    campaign: str, likelihood: str, errors: str | None, smoothing: float
+) -> "PooledProblem | HierarchicalProblem":
+    """The problem of a campaign, or what is wrong with it."""
     from skred.campaign import find_campaign, read_campaign
 
     checked = read_campaign(find_campaign(campaign))
+    if likelihood == "pooled":
+        if errors is not None:
+            raise InputError(
+                "--errors: the pooled likelihood has no errors of its own; add --likelihood hierarchical"
+            )
+        problem = _pooled_or_reason(checked, smoothing)
+        if isinstance(problem, str):
+            raise InputError(f"campaign {checked.name}: {problem}")
+        return problem
+    from skred.inference.error_model import DEFAULT_ERRORS
+    from skred.inference.hierarchical import hierarchical_problem
+
+    try:
+        return hierarchical_problem(checked, error_model=errors or DEFAULT_ERRORS, smoothing_m=smoothing)
+    except ValueError as error:
+        raise InputError(f"campaign {checked.name}: {error}") from error
+
+
+def _pooled_or_reason(campaign: "Campaign", smoothing: float) -> "PooledProblem | str":
+    """The pooled problem of a campaign, or why there is none."""
     from skred.inference.problem import pooled_problem
 
     try:
-        problem = pooled_problem(checked, smoothing_m=smoothing)
+        problem = pooled_problem(campaign, smoothing_m=smoothing)
         _ = problem.arrays
     except ValueError as error:
-        raise InputError(f"campaign {checked.name}: {error}") from error
+        return str(error)
     return problem
 
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from skred.campaign import Campaign, Status
 
 FloatArray = NDArray[np.float64]
+DEFAULT_ERRORS = "robust"
 PLACE_SD_M = 8.0
 """How well it is known where a front stopped relative to a sensor."""
 

@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 
 from skred.campaign import Campaign
 from skred.inference.bisection import COARSE, Fronts, Releases, Resolution
-from skred.inference.error_model import ERROR_MODELS, PLACE_SD_M, ErrorModel, EventReadings, event_readings
+from skred.inference.error_model import (
+    DEFAULT_ERRORS,
+    ERROR_MODELS,
+    PLACE_SD_M,
+    ErrorModel,
+    EventReadings,
+    event_readings,
+)
 from skred.inference.event_density import integrated_log_density
 from skred.inference.population import (
     correlation_parameters,
@@ -52,7 +59,7 @@ class HierarchicalProblem(Problem):
         How well it is known where a front stopped relative to a sensor.
     """
 
-    error_model: ErrorModel = ERROR_MODELS["robust"]
+    error_model: ErrorModel = ERROR_MODELS[DEFAULT_ERRORS]
     place_sd_m: float = PLACE_SD_M
     _surfaces: dict[tuple[str, ...], Surfaces] = field(default_factory=dict, repr=False)
     _errors: dict[tuple[str, ...], FloatArray] = field(default_factory=dict, repr=False)
@@ -241,7 +248,7 @@ def _of_22_events(errors: FloatArray) -> float:
 def hierarchical_problem(
     campaign: Campaign,
     *,
-    error_model: str = "robust",
+    error_model: str = DEFAULT_ERRORS,
     smoothing_m: float = SMOOTHING_M,
     cell_m: float = CELL_M,
 ) -> HierarchicalProblem:

@@ -130,12 +130,12 @@ def _level_change(best: dict[str, Any], gain: float) -> str:
     if gain < 0:
         return (
             f"Under {best['title']} the hierarchical likelihood predicts an unseen event worse, by"
-            f" {-gain:.1f} in elpd: friction that varies between events, with errors as stated, does not account"
-            " for how the readings of one avalanche differ from its front, and the pooled covariance, taken from"
-            " the recordings, absorbs that. It is a reason to look for what the law misses, not for the"
-            " pooled model."
+            f" {-gain:.1f} in elpd: parameters that vary between events, and errors and places of sensors as"
+            " stated, do not account for how the readings of one avalanche differ from its front, while the"
+            " pooled covariance, taken from these same recordings, absorbs that. It is a reason to ask what"
+            " the law or the stated errors miss, not one for the pooled model."
         )
     return (
         f"Under {best['title']} the hierarchical likelihood predicts an unseen event better, by {gain:.1f} in"
-        " elpd: what differs between events is largely their friction."
+        " elpd: what differs between events is largely their own parameters."
     )

@@ -1,0 +1,50 @@
+"""Options that commands share, each with its check and its help."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import Parameter, validators
+
+Campaigns = Annotated[str, Parameter(help="A folder, or the name of an embedded campaign.")]
+Models = Annotated[str, Parameter(help="Laws, separated by commas.")]
+Samplers = Annotated[
+    Literal["metropolis", "nuts", "smc"],
+    Parameter(help="PyMC's Metropolis with joint adapted proposals, NUTS, or sequential Monte Carlo."),
+]
+Draws = Annotated[
+    int, Parameter(validator=validators.Number(gte=4, lte=1_000_000), help="Draws kept per chain.")
+]
+Tune = Annotated[
+    int, Parameter(validator=validators.Number(gte=1, lte=1_000_000), help="Adaptation draws before them.")
+]
+Chains = Annotated[int, Parameter(validator=validators.Number(gte=2, lte=100), help="Number of chains.")]
+Likelihoods = Annotated[
+    Literal["pooled", "hierarchical"],
+    Parameter(help="Pooled: one parameter vector for the path. Hierarchical: every avalanche has its own."),
+]
+Errors = Annotated[
+    Literal["robust", "normal", "student", "correlated", "scaled"] | None,
+    Parameter(help="Hierarchical: errors of readings around what each front does; robust by default."),
+]
+ExactLoo = Annotated[
+    bool,
+    Parameter(
+        name="--exact-loo",
+        negative="",
+        help="Hierarchical: refit without every event, not only where importance sampling is unreliable.",
+    ),
+]
+Seed = Annotated[int, Parameter(validator=validators.Number(gte=0, lt=2**31), help="Seed of all randomness.")]
+Smoothing = Annotated[
+    float,
+    Parameter(validator=validators.Number(gte=0.0, lte=1000.0), help="Smoothing length of the terrain, m."),
+]
+Out = Annotated[
+    Path | None,
+    Parameter(
+        help="Folder for the results: new, empty, or with --force; by default a fresh one in skred-out."
+    ),
+]
+Force = Annotated[bool, Parameter(name="--force", negative="", help="Use a folder that holds files.")]
+Quiet = Annotated[bool, Parameter(name="--quiet", negative="", help="Write nothing but errors.")]
+Json = Annotated[bool, Parameter(name="--json", negative="", help="Write the result as JSON to stdout.")]
