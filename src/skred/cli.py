@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from cyclopts import App, CycloptsError
 
 from skred.cli_options import (
+    TUNE,
     Campaigns,
     Chains,
     Draws,
@@ -80,7 +81,7 @@ def run_model(law_id: str) -> None:
         errors: Errors = None,
         sampler: Samplers = "metropolis",
         draws: Draws = 1000,
-        tune: Tune = 500,
+        tune: Tune = None,
         chains: Chains = 4,
         seed: Seed = 0,
         smoothing: Smoothing = 10.0,
@@ -90,7 +91,13 @@ def run_model(law_id: str) -> None:
         quiet: Quiet = False,
     ) -> int:
         """Sample the posterior, check it, and write summary.json, posterior.nc and figures."""
-        settings = {"sampler": sampler, "draws": draws, "tune": tune, "chains": chains, "seed": seed}
+        settings = {
+            "sampler": sampler,
+            "draws": draws,
+            "tune": tune or TUNE[likelihood],
+            "chains": chains,
+            "seed": seed,
+        }
         problem = _problem(campaign, likelihood, errors, smoothing)
         return _calibrate(law_id, problem, settings, out, force, as_json, quiet)
 
@@ -157,7 +164,7 @@ def compare(
     errors: Errors = None,
     exact_loo: ExactLoo = False,
     draws: Draws = 1000,
-    tune: Tune = 500,
+    tune: Tune = None,
     chains: Chains = 4,
     seed: Seed = 0,
     smoothing: Smoothing = 10.0,
@@ -179,7 +186,7 @@ def compare(
     from skred.work.compare import compare as compare_pooled
     from skred.work.compare_hierarchical import compare_hierarchical
 
-    settings = SamplerSettings("metropolis", draws, tune, chains, seed)
+    settings = SamplerSettings("metropolis", draws, tune or TUNE[likelihood], chains, seed)
     tell = _teller(quiet or as_json)
     if isinstance(problem, HierarchicalProblem):
         pooled = _pooled_or_reason(problem.campaign, smoothing)

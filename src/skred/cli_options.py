@@ -15,8 +15,14 @@ Draws = Annotated[
     int, Parameter(validator=validators.Number(gte=4, lte=1_000_000), help="Draws kept per chain.")
 ]
 Tune = Annotated[
-    int, Parameter(validator=validators.Number(gte=1, lte=1_000_000), help="Adaptation draws before them.")
+    int | None,
+    Parameter(
+        validator=validators.Number(gte=1, lte=1_000_000),
+        help="Adaptation draws before them; by default 500, hierarchical 1000.",
+    ),
 ]
+TUNE = {"pooled": 500, "hierarchical": 1000}
+"""Adaptation draws where none are asked for: more parameters take longer to adapt to."""
 Chains = Annotated[int, Parameter(validator=validators.Number(gte=2, lte=100), help="Number of chains.")]
 Likelihoods = Annotated[
     Literal["pooled", "hierarchical"],

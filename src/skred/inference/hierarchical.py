@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -44,6 +44,7 @@ _MEDIAN_LOG_MEAN, _MEDIAN_LOG_SD = -0.64, 1.1
 """Mean and standard deviation of the log of a half-normal variable of scale 1."""
 _COARSE_CELL, _CELL_IN_SPREADS, _CELL_RANGE = 0.25, 0.4, (0.02, 0.2)
 _CHECKED_EVENTS, _CHECKED_DRAWS = 24, 40
+_SHARP_RUNOUT_M = 4.0
 INTEGRATION_LIMIT = 0.2
 """Largest error of the log likelihood over 22 events, in nats."""
 
@@ -204,11 +205,20 @@ class HierarchicalProblem(Problem):
         scale = np.log([mechanism.strength.prior_scale for mechanism in mechanisms])
         box = np.column_stack([scale - _BELOW_SCALE, scale + _ABOVE_SCALE])
         n = len(mechanisms)
+        resolution = replace(resolution, narrow=resolution.narrow * self._sharpness)
         coarse = build_surfaces(self.fronts(mechanisms), box, COARSE, np.full(n, _COARSE_CELL))
         mean, covariance = rough_population(coarse, scale + _MEDIAN_LOG_MEAN, np.full(n, _MEDIAN_LOG_SD))
         envelope = envelope_around(mean, fineness * covariance, self.campaign.n_events)
         cell = np.clip(_CELL_IN_SPREADS * np.sqrt(np.diag(covariance)), *_CELL_RANGE) / fineness
         return build_surfaces(fronts, box, resolution, cell, envelope)
+
+    @cached_property
+    def _sharpness(self) -> float:
+        """Below 1 where runouts are known so well that boxes must be narrower before they count as such."""
+        readings = self.readings
+        sd = np.where(readings.stated_sd > 0.0, readings.stated_sd, readings.absolute_sd)
+        runouts = sd[readings.observed & ~readings.is_velocity]
+        return min(1.0, float(runouts.min(initial=np.inf)) / _SHARP_RUNOUT_M)
 
     def integration_errors(self, law: Law, samples: Mapping[str, Any], seed: int = 0) -> FloatArray:
         """Differences of event log densities to a much finer integration, (n, n_checked_events).
