@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -141,7 +143,8 @@ def scores(
     """
     events = calibration.problem.campaign.event_ids
     seed = calibration.settings.seed
-    loo = az.loo(calibration.tree, var_name="recordings", pointwise=True)
+    with _told_elsewhere():
+        loo = az.loo(calibration.tree, var_name="recordings", pointwise=True)
     information = waic(calibration.tree, variable="recordings")
     seeds = [10 * seed + k + 1 for k in range(evidence_seeds)]
     marginal = evidence(calibration.model, seeds, evidence_draws)
@@ -216,7 +219,8 @@ def _stacking(ids: Sequence[str], trees: dict[str, Any]) -> dict[str, float]:
     """Weights that predict best together (Yao and others, 2018, doi 10.1214/17-BA1091)."""
     if len(ids) < 2:
         return dict.fromkeys(ids, 1.0)
-    table = az.compare({law: trees[law] for law in ids}, method="stacking", var_name="recordings")
+    with _told_elsewhere():
+        table = az.compare({law: trees[law] for law in ids}, method="stacking", var_name="recordings")
     return {law: float(table.loc[law, "weight"]) for law in ids}
 
 
@@ -248,3 +252,11 @@ def _document(
         "models": models,
         "alpha_beta": alpha_beta_entry(problem),
     }
+
+
+@contextmanager
+def _told_elsewhere() -> Iterator[None]:
+    """Silence ArviZ's warnings of large Pareto k: these are in the tables, and such events are refitted."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Estimated shape parameter", category=UserWarning)
+        yield

@@ -1,0 +1,54 @@
+"""The error of a reading at any place, from those that a campaign states."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.campaign import Campaign, Status
+
+FloatArray = NDArray[np.float64]
+
+
+class ReadingError(NamedTuple):
+    """Standard deviation of a reading of x: sqrt((relative x)^2 + absolute^2).
+
+    Attributes
+    ----------
+    relative, absolute : float
+        NaN where the campaign has no such sensor.
+    rule : str
+        Where it comes from.
+    """
+
+    relative: float
+    absolute: float
+    rule: str
+
+    def variance(self, mean_square: FloatArray | float) -> FloatArray:
+        """Mean variance over readings whose mean square is given."""
+        return np.asarray(self.relative**2 * np.asarray(mean_square) + self.absolute**2)
+
+
+def reading_error(campaign: Campaign, *, runout: bool) -> ReadingError:
+    """The campaign's usual error of a front velocity or of a runout.
+
+    Where most readings state their own, the median of those; else the medians over the sensors.
+    """
+    what = "runouts" if runout else "front velocities"
+    columns = [k for k, sensor in enumerate(campaign.sensors) if sensor.is_runout == runout]
+    if not columns:
+        return ReadingError(np.nan, np.nan, f"the campaign has no sensor of {what}")
+    observed = campaign.status[:, columns] == Status.OBSERVED
+    stated = campaign.stated_sd[:, columns][observed]
+    own = stated[np.isfinite(stated)]
+    if 2 * len(own) > len(stated):
+        return ReadingError(0.0, float(np.median(own)), f"median of what the recorded {what} state")
+    sensors = [campaign.sensors[k] for k in columns]
+    return ReadingError(
+        float(np.median([sensor.relative_sd for sensor in sensors])),
+        float(np.median([sensor.absolute_sd for sensor in sensors])),
+        f"medians over the campaign's sensors of {what}",
+    )
