@@ -81,3 +81,15 @@ def test_a_failed_gate_comes_last_without_difference() -> None:
 @pytest.mark.parametrize("entries", [[], [entry("bad", passed=False)], [entry("only")]])
 def test_fewer_than_two(entries: list[dict[str, Any]]) -> None:
     assert [e["id"] for e in rank(entries, {})] == [e["id"] for e in entries]
+
+
+def test_events_that_were_refitted_are_exact_and_the_others_are_not() -> None:
+    by_importance = np.array([-1.0, -2.0, -3.0, -4.0])
+    refits = module.ExactLoo(np.array([-2.5, -4.5]), 0.03, ("d",))
+    made = module._exact_entry(by_importance, refits, [1, 3], ["a", "b", "c", "d"])
+    assert made["pointwise"] == [-1.0, -2.5, -3.0, -4.5] and made["elpd"] == pytest.approx(-11.0)
+    assert made["refitted"] == ["b", "d"] and made["failed_refits"] == ["d"] and made["mcse"] == 0.03
+    assert made["se"] == pytest.approx(np.sqrt(4 * np.var([-1.0, -2.5, -3.0, -4.5], ddof=1)))
+    assert by_importance[1] == -2.0
+    none = module._exact_entry(by_importance, None, [], ["a", "b", "c", "d"])
+    assert none["elpd"] == pytest.approx(-10.0) and none["refitted"] == [] and none["mcse"] == 0.0

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from skred.work.statement import statement
+from skred.work.statement import changes, statement
 
 
 def model(name: str, elpd: float = -320.0, **changes: Any) -> dict[str, Any]:
@@ -14,7 +14,7 @@ def model(name: str, elpd: float = -320.0, **changes: Any) -> dict[str, Any]:
         "id": name,
         "title": f"law {name}",
         "gate": {"passed": True, "problems": []},
-        "exact": {"elpd": elpd, "failed_refits": []},
+        "exact": {"elpd": elpd, "pointwise": [elpd], "refitted": ["e"], "failed_refits": []},
         "difference": {"elpd": 0.0, "se": 0.0, "practical": False},
         "evidence": {"mean": elpd - 3.0, "spread": 0.1},
         "loo": {"n_bad": 0, "pareto_k_max": 0.3},
@@ -80,9 +80,39 @@ def test_optimism_of_few_events_is_said(n_events: int) -> None:
 
 def test_unreliable_scores_are_said() -> None:
     bad = model("A", loo={"n_bad": 2, "pareto_k_max": 0.93})
-    unconverged = behind(
-        "B", 6.0, 1.0, True, exact={"elpd": -326.0, "failed_refits": ["19880315", "20050416"]}
-    )
+    unconverged = behind("B", 6.0, 1.0, True)
+    unconverged["exact"]["failed_refits"] = ["19880315", "20050416"]
     text = told(bad, unconverged)
     assert "unreliable for 2 events of law A (Pareto k up to 0.93)" in text
     assert "2 refits of law B did not converge" in text
+
+
+def test_scores_by_importance_sampling_are_not_called_exact() -> None:
+    quick = {"elpd": -320.0, "pointwise": [-320.0], "refitted": [], "failed_refits": []}
+    text = told(model("A", exact=quick), behind("B", 12.0, 3.0, True))
+    assert "By leave-one-event-out (exact where importance sampling is unreliable)" in text
+
+
+def both(ours: list[dict[str, Any]], theirs: list[dict[str, Any]], reason: str | None = None) -> str:
+    return " ".join(changes({"models": ours, "pooled": {"reason": reason, "models": theirs}}))
+
+
+def test_what_changes_when_the_order_stays() -> None:
+    ours = [model("A"), behind("B", 70.0, 20.0, True)]
+    theirs = [model("A", -300.0), behind("B", 14.7, 4.0, True)]
+    text = both(ours, theirs)
+    assert "same order; behind the best: B -70.0 (pooled -14.7)" in text
+    assert "worse, by 20.0 in elpd" in text and "what the law or the stated errors miss" in text
+
+
+def test_what_changes_when_the_order_does() -> None:
+    text = both([model("B"), behind("A", 3.0, 1.0, False)], [model("A", -350.0), model("B", -340.0)])
+    assert "The order of the laws changes: A, B pooled, B, A hierarchically" in text
+    assert "better, by 20.0 in elpd" in text
+
+
+def test_what_changes_without_a_pooled_calibration() -> None:
+    text = both([model("A")], [], reason="an event did not reach 9 sensors")
+    assert "There is no pooled calibration here: an event did not reach 9 sensors." in text
+    assert "elpd" not in text
+    assert len(changes({"models": [failed("A")], "pooled": {"reason": None, "models": [model("A")]}})) == 1

@@ -20,6 +20,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 _GAUSS = 0.5 / math.sqrt(3.0)
 """Distance of the two Gauss-Legendre nodes from the middle of a box, in its widths."""
+RELEASE_REACH = 4.0
+"""How many standard deviations from its mean a release is looked for."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +168,10 @@ class Bisection:
         return result
 
     def boxes(self, events: IntArray, edges: Sequence[FloatArray]) -> _Boxes:
-        """All boxes of a grid for each event."""
+        """All boxes of a grid for each event.
+
+        Edges on the axis of the release, if there is one, are shares of the range it is looked for in.
+        """
         corners = np.stack(np.meshgrid(*(e[:-1] for e in edges), indexing="ij"), axis=-1).reshape(
             -1, len(edges)
         )
@@ -174,6 +179,10 @@ class Bisection:
         event = np.repeat(events, len(corners))
         low = np.tile(corners, (len(events), 1))
         width = np.tile(widths.reshape(-1, len(edges)), (len(events), 1))
+        if len(edges) > self.n_strengths:
+            first, last = (ends[event] for ends in self.release_range())
+            low[:, -1] = first + (last - first) * low[:, -1]
+            width[:, -1] *= last - first
         return _Boxes(event, low, width, self.predict_corners(event, low, width))
 
     def split(self, boxes: _Boxes, axis: IntArray) -> _Boxes:
@@ -275,12 +284,17 @@ class Bisection:
             points = np.column_stack([points, np.zeros(len(points))])
         return event[kept], points[kept], log_weights[kept]
 
+    def release_range(self) -> tuple[FloatArray, FloatArray]:
+        """Between which deviations each event's release is looked for: on the track."""
+        mean, sd, length = self.fronts.releases
+        wide = np.maximum(sd, 1e-12)
+        return np.maximum(-RELEASE_REACH, -mean / wide), np.minimum(RELEASE_REACH, (length - mean) / wide)
+
     def log_release(self, events: IntArray, deviation: FloatArray) -> FloatArray:
         """Log density of a release's deviation, cut off where the track ends."""
         mean, sd = self.fronts.releases.mean[events], np.maximum(self.fronts.releases.sd[events], 1e-12)
         low, high = -mean / sd, (self.fronts.releases.length - mean) / sd
-        density = -0.5 * deviation**2 - 0.5 * math.log(2 * math.pi) - np.log(ndtr(high) - ndtr(low))
-        return np.where((deviation > low) & (deviation < high), density, -np.inf)
+        return -0.5 * deviation**2 - 0.5 * math.log(2 * math.pi) - np.log(ndtr(high) - ndtr(low))
 
 
 def _sides(n_axes: int) -> IntArray:

@@ -25,12 +25,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.inference.bisection import Bisection, Envelope, Fronts, Resolution
+from skred.inference.bisection import RELEASE_REACH, Bisection, Envelope, Fronts, Resolution
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-_RELEASE_REACH = 4.0
-"""How many standard deviations from its mean a release is looked for."""
 _EVENTS_AT_ONCE = 16
 
 
@@ -127,7 +125,7 @@ def build_surfaces(
         bisection = Bisection(fronts, resolution, cell, envelope)
         edges = [_edges(low, high, 0.5) for low, high in box]
         if uncertain[events[0]]:
-            edges.append(_edges(-_RELEASE_REACH, _RELEASE_REACH, 1.0))
+            edges.append(_edges(0.0, 1.0, 1.0 / (2.0 * RELEASE_REACH)))
         nodes = bisection.nodes(events, edges)
         return _patches(events, *nodes, cell, bisection.n_runs)
 
