@@ -15,6 +15,7 @@ from cyclopts import App, CycloptsError
 
 from skred.cli_options import (
     TUNE,
+    BaseModel,
     Campaigns,
     Chains,
     Draws,
@@ -26,9 +27,11 @@ from skred.cli_options import (
     Models,
     Out,
     Quiet,
+    Release,
     Samplers,
     Seed,
     Smoothing,
+    TrackFile,
     Tune,
 )
 from skred.errors import InputError
@@ -147,10 +150,14 @@ def validate(campaign: Campaigns, /, *, as_json: Json = False, quiet: Quiet = Fa
             raise
         _write_json({"valid": False, "problems": [problem.as_dict() for problem in error.problems]})
         return BAD_INPUT
+    from skred.work.campaign_summary import campaign_summary, summary_table
+
     if as_json:
-        _write_json({"valid": True, "problems": [], **_summary(checked)})
+        _write_json({"valid": True, "problems": [], **campaign_summary(checked)})
     elif not quiet:
-        _show_summary(_summary(checked))
+        from rich.console import Console
+
+        Console().print(summary_table(campaign_summary(checked)))
     return DONE
 
 
@@ -200,6 +207,50 @@ def compare(
     return DONE if all(model["gate"]["passed"] for model in comparison["models"]) else GATE_FAILED
 
 
+@app.command
+def predict(
+    campaign: Campaigns = "ryggfonn",
+    /,
+    *,
+    base_model: BaseModel = "pcm",
+    track: TrackFile = None,
+    release: Release = None,
+    errors: Errors = None,
+    draws: Draws = 1000,
+    tune: Tune = None,
+    chains: Chains = 4,
+    seed: Seed = 0,
+    smoothing: Smoothing = 10.0,
+    out: Out = None,
+    force: Force = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> int:
+    """Say how fast and how far the next avalanche goes, and how sure that is, along a track."""
+    from skred.laws import load_law
+    from skred.work.output import output_folder, plain
+
+    law = load_law(base_model)
+    problem = _hierarchical(_campaign(campaign), errors, smoothing)
+
+    from skred.inference.sampling import SamplerSettings
+    from skred.report.predicting import prediction_table
+    from skred.work.predict import predict as predict_avalanches
+    from skred.work.predict_track import prediction_track
+
+    where = prediction_track(problem, track, release)
+    folder = output_folder(out, "predict", force=force)
+    settings = SamplerSettings("metropolis", draws, tune or TUNE["hierarchical"], chains, seed)
+    silent = quiet or as_json
+    progress = sys.stderr.isatty() and not silent
+    prediction = predict_avalanches(problem, law, settings, folder, where, _teller(silent), progress=progress)
+    if as_json:
+        _write_json(plain(prediction))
+    elif not quiet:
+        _show(prediction_table(prediction), prediction["statement"], folder)
+    return DONE if prediction["gate"]["passed"] else GATE_FAILED
+
+
 def _calibrate(
     law_id: str,
     problem: "Problem",
@@ -246,29 +297,39 @@ def _laws(names: str) -> "list[Law]":
     return [load_law(name) for name in wanted]
 
 
+def _campaign(name: str) -> "Campaign":
+    """A campaign that passed every check."""
+    from skred.campaign import find_campaign, read_campaign
+
+    return read_campaign(find_campaign(name))
+
+
 def _problem(
     campaign: str, likelihood: str, errors: str | None, smoothing: float
 ) -> "PooledProblem | HierarchicalProblem":
     """The problem of a campaign, or what is wrong with it."""
-    from skred.campaign import find_campaign, read_campaign
+    checked = _campaign(campaign)
+    if likelihood == "hierarchical":
+        return _hierarchical(checked, errors, smoothing)
+    if errors is not None:
+        raise InputError(
+            "--errors: only with --likelihood hierarchical; pooled errors come from the recordings"
+        )
+    problem = _pooled_or_reason(checked, smoothing)
+    if isinstance(problem, str):
+        raise InputError(f"campaign {checked.name}: {problem}")
+    return problem
 
-    checked = read_campaign(find_campaign(campaign))
-    if likelihood == "pooled":
-        if errors is not None:
-            raise InputError(
-                "--errors: the pooled likelihood has no errors of its own; add --likelihood hierarchical"
-            )
-        problem = _pooled_or_reason(checked, smoothing)
-        if isinstance(problem, str):
-            raise InputError(f"campaign {checked.name}: {problem}")
-        return problem
+
+def _hierarchical(campaign: "Campaign", errors: str | None, smoothing: float) -> "HierarchicalProblem":
+    """The hierarchical problem of a campaign, or what is wrong with it."""
     from skred.inference.error_model import DEFAULT_ERRORS
     from skred.inference.hierarchical import hierarchical_problem
 
     try:
-        return hierarchical_problem(checked, error_model=errors or DEFAULT_ERRORS, smoothing_m=smoothing)
+        return hierarchical_problem(campaign, error_model=errors or DEFAULT_ERRORS, smoothing_m=smoothing)
     except ValueError as error:
-        raise InputError(f"campaign {checked.name}: {error}") from error
+        raise InputError(f"campaign {campaign.name}: {error}") from error
 
 
 def _pooled_or_reason(campaign: "Campaign", smoothing: float) -> "PooledProblem | str":
@@ -303,50 +364,6 @@ def _show(table: Any, sentences: list[str], where: Path) -> None:
 def _discard_output() -> None:
     """Send what is still in stdout's buffer nowhere; Python would fail again to write it at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _summary(campaign: "Campaign") -> dict[str, Any]:
-    """Count what a campaign holds."""
-    from skred.campaign import Status
-
-    return {
-        "name": campaign.name,
-        "origin": campaign.origin,
-        "events": campaign.n_events,
-        "sensors": campaign.n_sensors,
-        "readings": {status.name.lower(): int((campaign.status == status).sum()) for status in Status},
-        "covariates": sorted({name for event in campaign.events for name in event.covariates}),
-        "track_points": len(campaign.track.x_m),
-        "track_length_m": campaign.track.length_m,
-        "reference_s_m": campaign.reference_s_m,
-        "fingerprint": campaign.fingerprint(),
-    }
-
-
-def _show_summary(summary: dict[str, Any]) -> None:
-    """Show the summary as a table."""
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    readings = ", ".join(
-        f"{count} {status.replace('_', ' ')}" for status, count in summary["readings"].items()
-    )
-    reference = summary["reference_s_m"]
-    rows = {
-        "campaign": f"{summary['name']} ({summary['origin']}): no problems",
-        "events": str(summary["events"]),
-        "sensors": str(summary["sensors"]),
-        "readings": readings,
-        "covariates": ", ".join(summary["covariates"]) or "none",
-        "track": f"{summary['track_length_m']:.1f} m, {summary['track_points']} points",
-        "reference": "none" if reference is None else f"s = {reference:.1f} m",
-    }
-    table = Table(box=None, show_header=False)
-    for name, text in rows.items():
-        # Text, because names come from a file and may look like rich's markup.
-        table.add_row(Text(name, style="bold"), Text(text))
-    Console().print(table)
 
 
 def _tell_problems(error: "CampaignError") -> None:

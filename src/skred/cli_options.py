@@ -7,6 +7,15 @@ from cyclopts import Parameter, validators
 
 Campaigns = Annotated[str, Parameter(help="A folder, or the name of an embedded campaign.")]
 Models = Annotated[str, Parameter(help="Laws, separated by commas.")]
+BaseModel = Annotated[str, Parameter(help="The law to predict with.")]
+TrackFile = Annotated[
+    Path | None,
+    Parameter(help="Track to predict on: a table like a campaign's track.csv; by default the campaign's."),
+]
+Release = Annotated[
+    float | None,
+    Parameter(help="Where fronts start, m; by default as recorded, on another track its first point."),
+]
 Samplers = Annotated[
     Literal["metropolis", "nuts", "smc"],
     Parameter(help="PyMC's Metropolis with joint adapted proposals, NUTS, or sequential Monte Carlo."),

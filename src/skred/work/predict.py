@@ -24,7 +24,7 @@ from skred.inference.results import save
 from skred.inference.sampling import SamplerSettings
 from skred.physics.law import Law
 from skred.work.calibrate import calibrate
-from skred.work.predict_document import named_places, prediction_document
+from skred.work.predict_document import named_places, prediction_document, recorded_runouts
 from skred.work.predict_errors import reading_error
 from skred.work.predict_files import write_prediction
 from skred.work.predict_fronts import new_fronts
@@ -134,7 +134,9 @@ def prediction_of(
     seed = int(tree.attrs["seed"])
     fronts = new_fronts(law, populations, track.terrain, track.releases, places, simulation.avalanches, seed)
     velocity, runout = (reading_error(problem.campaign, runout=which) for which in (False, True))
-    data = prediction_dataset(fronts, velocity, runout)
+    recorded = recorded_runouts(problem, track)
+    shortest = recorded[0] if recorded else None
+    data = prediction_dataset(fronts, velocity, runout, shortest)
     points = track.track
     for name, values, what in (("x", points.x_m, "horizontal distance"), ("z", points.z_m, "elevation")):
         at_places = np.interp(places, points.s_m, values)
@@ -149,6 +151,7 @@ def prediction_of(
             }
         ),
         "share_that_does_not_start": stays,
+        **({} if shortest is None else {"shortest_recorded_runout_m": shortest}),
         "reading_error_velocity": json.dumps(_plain_error(velocity._asdict())),
         "reading_error_runout": json.dumps(_plain_error(runout._asdict())),
     }
@@ -175,7 +178,7 @@ def _places(problem: HierarchicalProblem, track: PredictionTrack) -> FloatArray:
     step = next(fitting, length / _MOST_STEPS)
     regular = np.arange(0.0, length, step)
     own = [place for _, place in named_places(problem, track)]
-    within = [s for s in (*regular, *own) if 0.0 <= s < length]
+    within = [s for s in (*regular, *own, *recorded_runouts(problem, track)) if 0.0 <= s < length]
     return np.array([*sorted(set(within)), length])
 
 
@@ -193,6 +196,7 @@ def _attributes(
         "track_fingerprint": track.fingerprint(),
         "track_is_own": int(track.is_own),
         "release": track.release_text,
+        "release_short": track.release_text.split(", the first")[0],
         "interval": f"{INTERVAL_KIND}, {INTERVAL_PROBABILITY:g}, over populations",
         **{name: tree.attrs[name] for name in copied if name in tree.attrs},
     }

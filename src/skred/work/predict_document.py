@@ -45,7 +45,6 @@ def prediction_document(
             "name": campaign.name,
             "fingerprint": campaign.fingerprint(),
             "n_events": campaign.n_events,
-            "recorded_runout_max_m": _longest_recorded(problem),
         },
         "law": {"id": law.id, "title": law.title, "equation": law.equation},
         "track": {
@@ -70,10 +69,13 @@ def prediction_document(
     return document
 
 
-def _longest_recorded(problem: HierarchicalProblem) -> float | None:
+def recorded_runouts(problem: HierarchicalProblem, track: PredictionTrack) -> tuple[float, float] | tuple[()]:
+    """Shortest and longest recorded runout [m], on the campaign's own track only."""
     of_runout = [sensor.is_runout for sensor in problem.campaign.sensors]
     values = problem.values[:, of_runout]
-    return float(np.nanmax(values)) if np.isfinite(values).any() else None
+    if not track.is_own or not np.isfinite(values).any():
+        return ()
+    return float(np.nanmin(values)), float(np.nanmax(values))
 
 
 def _numbers(problem: HierarchicalProblem, track: PredictionTrack, data: xr.Dataset) -> dict[str, Any]:
@@ -93,8 +95,12 @@ def _numbers(problem: HierarchicalProblem, track: PredictionTrack, data: xr.Data
             "exceeded_by": quantiles,
             "end_of_track": {"s_m": track.length_m, **_banded(data, "runout_probability", s=last)},
             "does_not_start": float(data.attrs["share_that_does_not_start"]),
-            "mean_m": float(data["runout_mean"]),
-            **{f"sd_{part}_m": float(data[f"runout_sd_{part}"]) for part in (*PARTS, "total")},
+            "beyond_recorded": [
+                {"s_m": s, **_banded(data, "runout_probability", s=_nearest(data, s))}
+                for s in recorded_runouts(problem, track)
+            ],
+            "all": _runout_parts(data, "runout"),
+            "beyond_shortest_recorded": _runout_parts(data, "long_runout"),
         },
         "places": [_place(data, name, s) for name, s in named_places(problem, track)],
     }
@@ -102,7 +108,7 @@ def _numbers(problem: HierarchicalProblem, track: PredictionTrack, data: xr.Data
 
 def _place(data: xr.Dataset, name: str, s_m: float) -> dict[str, Any]:
     """What is predicted at one place."""
-    k = int(np.abs(data["s"].values - s_m).argmin())
+    k = _nearest(data, s_m)
     return {
         "name": name,
         "s_m": s_m,
@@ -118,6 +124,18 @@ def _place(data: xr.Dataset, name: str, s_m: float) -> dict[str, Any]:
         "mean_speed_m_s": float(data["mean_speed"][k]),
         **{f"speed_sd_{part}_m_s": float(data[f"speed_sd_{part}"][k]) for part in (*PARTS, "total")},
     }
+
+
+def _nearest(data: xr.Dataset, s_m: float) -> int:
+    return int(np.abs(data["s"].values - s_m).argmin())
+
+
+def _runout_parts(data: xr.Dataset, name: str) -> dict[str, float] | None:
+    """Mean and standard deviations [m] of runouts."""
+    if f"{name}_mean" not in data:
+        return None
+    parts = {f"sd_{part}_m": float(data[f"{name}_sd_{part}"]) for part in (*PARTS, "total")}
+    return {"mean_m": float(data[f"{name}_mean"]), **parts}
 
 
 def _banded(data: xr.Dataset, name: str, **place: int) -> dict[str, float]:

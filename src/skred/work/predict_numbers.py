@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -25,7 +25,10 @@ PARTS = ("parameter", "event", "residual")
 
 
 def prediction_dataset(
-    fronts: NewFronts, speed_error: ReadingError, runout_error: ReadingError
+    fronts: NewFronts,
+    speed_error: ReadingError,
+    runout_error: ReadingError,
+    shortest_recorded_m: float | None = None,
 ) -> xr.Dataset:
     """Everything predicted, by place.
 
@@ -38,7 +41,8 @@ def prediction_dataset(
         together, with ``_low`` and ``_high``, the equal-tailed interval over populations.
         ``mean_speed``, ``speed_sd_parameter``, ``speed_sd_event``, ``speed_sd_residual``,
         ``speed_sd_total`` (s) of the avalanches that come there, and ``runout_mean``,
-        ``runout_sd_...`` of all.
+        ``runout_sd_...`` of all; ``long_runout_...`` of those that run beyond the shortest recorded
+        runout, if there is one on this track.
     """
     speeds = _occurring(fronts)
     columns = np.rint(speeds / SPEED_STEP_M_S).astype(int)
@@ -70,7 +74,9 @@ def prediction_dataset(
         "m",
     )
     _add_speed_parts(data, fronts, speed_error)
-    _add_runout_parts(data, fronts, runout_error)
+    _add_runout_parts(data, "runout", fronts, runout_error)
+    if shortest_recorded_m is not None and (fronts.runout > shortest_recorded_m).mean() >= LEAST_ARRIVAL:
+        _add_runout_parts(data, "long_runout", fronts, runout_error, shortest_recorded_m)
     return data
 
 
@@ -147,36 +153,52 @@ def _covariance(first: FloatArray, second: FloatArray, weights: FloatArray) -> F
     return np.asarray((weights * a * b).sum(axis=0) / total)
 
 
-def _add_speed_parts(data: xr.Dataset, fronts: NewFronts, error: ReadingError) -> None:
-    """Variance of the speed of the avalanches that come to a place, by where it comes from.
+class _Sums(NamedTuple):
+    """Number, sum and sum of squares of a quantity, (2, n_populations, ...), by half of the avalanches."""
 
-    A population counts by how many of its avalanches come. The covariance over populations of the means
-    of two independent halves is the variance of the mean itself: the halves' own errors cancel.
-    """
-    count = fronts.passing.sum(axis=0)
-    everything = np.maximum(count.sum(axis=0), 1.0)
-    mean = fronts.total.sum(axis=(0, 1)) / everything
-    square = fronts.square.sum(axis=(0, 1)) / everything
-    variance = np.maximum(square - mean**2, 0.0)
-    halves = fronts.total / np.maximum(fronts.passing, 1.0)
-    weights = np.where((fronts.passing > 0).all(axis=0), count, 0.0)
-    parameter = np.clip(_covariance(halves[0], halves[1], weights), 0.0, variance)
-    parts = (parameter, variance - parameter, error.variance(square))
+    number: FloatArray
+    total: FloatArray
+    square: FloatArray
+
+    def parts(self, error: ReadingError) -> tuple[FloatArray, list[FloatArray]]:
+        """Mean, and variance by where it comes from.
+
+        A population counts by how many avalanches it has here. The covariance over populations of the
+        means of two independent halves is the variance of the mean itself: the halves' own errors cancel.
+        """
+        everything = np.maximum(self.number.sum(axis=(0, 1)), 1.0)
+        mean = self.total.sum(axis=(0, 1)) / everything
+        square = self.square.sum(axis=(0, 1)) / everything
+        variance = np.maximum(square - mean**2, 0.0)
+        halves = self.total / np.maximum(self.number, 1.0)
+        weights = np.where((self.number > 0).all(axis=0), self.number.sum(axis=0), 0.0)
+        parameter = np.clip(_covariance(halves[0], halves[1], weights), 0.0, variance)
+        return mean, [parameter, variance - parameter, error.variance(square)]
+
+
+def _add_speed_parts(data: xr.Dataset, fronts: NewFronts, error: ReadingError) -> None:
+    """Speed of the avalanches that come to a place; none where too few come."""
+    mean, parts = _Sums(fronts.passing, fronts.total, fronts.square).parts(error)
     few = data["arrival_probability"].values < LEAST_ARRIVAL
     _add_parts(data, "speed", ("s",), [np.where(few, np.nan, part) for part in parts], "m s-1")
     data["mean_speed"] = (("s",), np.where(few, np.nan, mean), {"units": "m s-1"})
 
 
-def _add_runout_parts(data: xr.Dataset, fronts: NewFronts, error: ReadingError) -> None:
-    """Variance of the runout by where it comes from; the track's end stands for what goes beyond."""
-    runout = fronts.runout
-    half = runout.shape[1] // 2
-    first, second = runout[:, :half].mean(axis=1), runout[:, half:].mean(axis=1)
-    variance = runout.var()
-    parameter = np.clip(_covariance(first, second, np.ones(len(first))), 0.0, variance)
-    parts = (parameter, variance - parameter, error.variance(float((runout**2).mean())))
-    _add_parts(data, "runout", (), [np.asarray(part) for part in parts], "m")
-    data["runout_mean"] = ((), runout.mean(), {"units": "m"})
+def _add_runout_parts(
+    data: xr.Dataset, name: str, fronts: NewFronts, error: ReadingError, beyond_m: float = -np.inf
+) -> None:
+    """Runout of the avalanches that run beyond a place; the track's end stands for what goes further."""
+    n = fronts.n_avalanches // 2
+    runout = np.stack([fronts.runout[:, :n], fronts.runout[:, n:]])
+    chosen = np.asarray(runout > beyond_m, dtype=float)
+    # About the middle, so that squares of distances of kilometres do not round the variance away.
+    middle = float(np.median(runout))
+    sums = [(chosen * (runout - middle) ** power).sum(axis=2) for power in (1, 2)]
+    mean, parts = _Sums(chosen.sum(axis=2), *sums).parts(ReadingError(0.0, 0.0, ""))
+    mean = mean + middle
+    residual = error.variance(mean**2 + parts[0] + parts[1])
+    _add_parts(data, name, (), [parts[0], parts[1], residual], "m")
+    data[f"{name}_mean"] = ((), float(mean), {"units": "m"})
 
 
 def _add_parts(

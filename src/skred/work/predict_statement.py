@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 
@@ -18,10 +19,13 @@ def _distances(document: dict[str, Any]) -> list[str]:
     zero, length = track["reference_s_m"], track["length_m"]
     told = []
     for row in runout["exceeded_by"]:
+        which = f"{100 * row['share']:g} %"
         low, high = (_end_or(row[key], length) for key in ("low", "high"))
-        place = _end_or(row["value"], length)
-        offset = "" if zero is None or row["at_least"] else f", {_from_reference(row['value'] - zero)}"
-        told.append(f"{100 * row['share']:g} % beyond s = {place} m{offset} ({low} to {high} m)")
+        if row["at_least"]:
+            told.append(f"{which} to the end of the track, s = {length:.0f} m, or beyond ({low} to {high} m)")
+            continue
+        offset = "" if zero is None else f", {_from_reference(row['value'] - zero)}"
+        told.append(f"{which} beyond s = {row['value']:.0f} m{offset} ({low} to {high} m)")
     sentences = [
         "Of avalanches like those recorded, from " + track["release"] + ", run: " + "; ".join(told) + "."
     ]
@@ -50,32 +54,28 @@ def _at_places(document: dict[str, Any]) -> list[str]:
 
 def _parts(document: dict[str, Any]) -> str:
     runout, n_events = document["runout"], document["campaign"]["n_events"]
-    residual = runout["sd_residual_m"]
-    reading = "" if residual != residual else f", {residual:.0f} m error of a reading"
+    parts, whose = runout["beyond_shortest_recorded"], " that goes as far as recorded ones"
+    if parts is None:
+        parts, whose = runout["all"], ""
+    residual = parts["sd_residual_m"]
+    reading = "" if math.isnan(residual) else f", {residual:.0f} m error of a reading"
     return (
-        f"Standard deviation of the next runout: {runout['sd_event_m']:.0f} m from one avalanche to another,"
-        f" {runout['sd_parameter_m']:.0f} m because {n_events} avalanches do not tell the population better"
-        f"{reading}."
+        f"Standard deviation of the runout of the next avalanche{whose}: {parts['sd_event_m']:.0f} m from one"
+        f" avalanche to another, {parts['sd_parameter_m']:.0f} m because {n_events} avalanches do not tell"
+        f" the population better{reading}."
     )
 
 
 def _conditions(document: dict[str, Any]) -> list[str]:
     campaign, track = document["campaign"], document["track"]
-    longest = campaign["recorded_runout_max_m"]
-    beyond = (
-        ""
-        if longest is None or not track["is_own"]
-        else f" (the longest recorded runout is s = {longest:.0f} m)"
-    )
-    rare = 1.0 / campaign["n_events"]
     sentences = [
         "Probabilities are per avalanche like those recorded, not per year: how often avalanches come is not"
         " in the recordings.",
         "Recorded avalanches are a selection, those that went far enough for the instruments; nothing here"
-        " corrects for that.",
-        f"What lies beyond the recorded range{beyond}, and every share below about {_percent(rare)} (1 in"
-        f" {campaign['n_events']}), is an extrapolation: by the law, and by strengths that are log-normal"
-        " across avalanches.",
+        f" corrects for that.{_outside(document)}",
+        f"Every share below about {_percent(1.0 / campaign['n_events'])} (1 in {campaign['n_events']}), and"
+        " what lies outside the recorded range, is an extrapolation: by the law, and by strengths that are"
+        " log-normal across avalanches.",
         f"Bands hold {100 * document['interval']['probability']:.0f} % of the posterior probability"
         f" ({document['interval']['kind']}) if the law is right; that it may be wrong is not in them.",
     ]
@@ -85,6 +85,19 @@ def _conditions(document: dict[str, Any]) -> list[str]:
             " the same one (snow, size, release) is assumed, and no recording here tests it."
         )
     return sentences
+
+
+def _outside(document: dict[str, Any]) -> str:
+    """How much of what is predicted lies outside of what was recorded."""
+    if not document["runout"]["beyond_recorded"]:
+        return ""
+    shortest, longest = document["runout"]["beyond_recorded"]
+    above = {"value": 1 - shortest["value"], "low": 1 - shortest["high"], "high": 1 - shortest["low"]}
+    low, high = shortest["s_m"], longest["s_m"]
+    return (
+        f" Of those predicted, {_chance(above)} stop above the shortest recorded runout (s = {low:.0f} m),"
+        f" {_chance(longest)} run beyond the longest (s = {high:.0f} m)."
+    )
 
 
 def _chance(band: dict[str, float]) -> str:

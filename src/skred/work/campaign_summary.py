@@ -1,0 +1,48 @@
+"""What `skred validate` says of a campaign without problems."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.table import Table
+from rich.text import Text
+
+from skred.campaign import Campaign, Status
+
+
+def campaign_summary(campaign: Campaign) -> dict[str, Any]:
+    """Count what a campaign holds."""
+    return {
+        "name": campaign.name,
+        "origin": campaign.origin,
+        "events": campaign.n_events,
+        "sensors": campaign.n_sensors,
+        "readings": {status.name.lower(): int((campaign.status == status).sum()) for status in Status},
+        "covariates": sorted({name for event in campaign.events for name in event.covariates}),
+        "track_points": len(campaign.track.x_m),
+        "track_length_m": campaign.track.length_m,
+        "reference_s_m": campaign.reference_s_m,
+        "fingerprint": campaign.fingerprint(),
+    }
+
+
+def summary_table(summary: dict[str, Any]) -> Table:
+    """Show a summary as a table."""
+    readings = ", ".join(
+        f"{count} {status.replace('_', ' ')}" for status, count in summary["readings"].items()
+    )
+    reference = summary["reference_s_m"]
+    rows = {
+        "campaign": f"{summary['name']} ({summary['origin']}): no problems",
+        "events": str(summary["events"]),
+        "sensors": str(summary["sensors"]),
+        "readings": readings,
+        "covariates": ", ".join(summary["covariates"]) or "none",
+        "track": f"{summary['track_length_m']:.1f} m, {summary['track_points']} points",
+        "reference": "none" if reference is None else f"s = {reference:.1f} m",
+    }
+    table = Table(box=None, show_header=False)
+    for name, text in rows.items():
+        # Text, because names come from a file and may look like rich's markup.
+        table.add_row(Text(name, style="bold"), Text(text))
+    return table
