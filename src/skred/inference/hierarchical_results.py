@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from skred.inference.event_draws import (
     fronts_of,
@@ -103,7 +104,8 @@ def new_avalanche_rows(problem: HierarchicalProblem, tree: xr.DataTree) -> list[
             "sensor": sensor.id,
             "unit": "m" if sensor.is_runout else "m/s",
             "reached": float(reached.mean()),
-            "recorded_reached": float(problem.observed[known, number].mean()) if known.any() else None,
+            # A velocity of 0 is no sign that the front came, here as in the likelihood.
+            "recorded_reached": _share(recorded > 0.0, known) if not sensor.is_runout else 1.0,
             "n_recorded": len(recorded),
         }
         for name, sample in (("", values), ("recorded_", recorded)):
@@ -113,6 +115,11 @@ def new_avalanche_rows(problem: HierarchicalProblem, tree: xr.DataTree) -> list[
             row[f"{name}low"], row[f"{name}high"] = low, high
         rows.append(row)
     return rows
+
+
+def _share(came: NDArray[np.bool_], known: NDArray[np.bool_]) -> float | None:
+    """How many of the events of which it is known came."""
+    return float(came.sum() / known.sum()) if known.any() else None
 
 
 def event_rows(problem: HierarchicalProblem, law: Law, tree: xr.DataTree) -> list[dict[str, Any]]:

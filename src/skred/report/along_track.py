@@ -1,84 +1,43 @@
-"""Figure of the front speed along the track, with recordings and terrain."""
+"""Figure of the mean response's front speed along the track, with recordings and terrain."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.report.draws import chains_of, spread
-from skred.report.labels import figure_text, unit_text
-from skred.report.style import GREY, INK, RECORDED, law_colours, legend_below, new_figure, styled
+from skred.report.draws import chains_of
+from skred.report.labels import figure_text
+from skred.report.style import RECORDED, law_colours, styled
+from skred.report.track_panels import highest_recorded, placed_sensors, track_figure
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from skred.campaign import Sensor
     from skred.inference.problem import PooledProblem
     from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
 MAX_DRAWS = 400
-_MAX_NAMED = 30
-_ZOOM_BELOW = 0.6
-"""Where all recordings lie in less than this share of the track, that part is shown enlarged."""
 
 
 @styled
 def along_track_figure(tree: xr.DataTree, law: Law, problem: PooledProblem) -> Figure:
-    """Median and 50 and 90 % bands of the mean response's speed, and the terrain below.
-
-    The whole track at the left, and the part with recordings enlarged at the right where it is short.
-    """
+    """Median and 50 and 90 % bands of the mean response's speed, and the terrain below."""
     release = float(np.median([event.release_s_m for event in problem.campaign.events]))
-    figure = new_figure(
-        5.7, f"Front speed along the track, and what was recorded\n{figure_text(law.title, 80)}"
-    )
-    windows = _windows(problem, release)
-    layout: dict[str, Any] = {"height_ratios": [2.1, 1]}
-    panels = figure.subplots(2, len(windows), sharex="col", sharey="row", squeeze=False, gridspec_kw=layout)
     speeds = _speeds(tree, law, problem, release)
-    for column, (low, high) in enumerate(windows):
-        in_detail = column == len(windows) - 1
-        speed, profile = panels[:, column]
-        _bands(speed, problem.terrain.edge_s_m, speeds, law_colours([law.id])[law.id])
-        if in_detail:
-            _readings(speed, problem)
-        _means(speed, problem)
-        _runouts(speed, problem)
-        _profile(profile, problem, (low, high), named=in_detail)
-        _reference(speed, profile, problem)
-        speed.set_xlim(low, high)
-    panels[0, 0].set_ylabel(f"front speed [{unit_text('m s-1')}]")
-    panels[0, 0].set_ylim(0, _top(speeds, problem))
-    panels[1, 0].set_ylabel("elevation [m]")
-    panels[1, -1].set_xlabel("s, the part with recordings [m]")
-    panels[1, 0].set_xlabel(f"s [m], {_release_text(problem, release)}")
-    legend_below(figure, panels[0], columns=2)
-    return figure
+    colour = law_colours([law.id])[law.id]
 
+    def draw(axes: Axes) -> None:
+        _bands(axes, problem.terrain.edge_s_m, speeds, colour)
+        _means(axes, problem)
 
-def _placed(problem: PooledProblem) -> list[tuple[int, Sensor, float]]:
-    """Column, sensor and middle [m] of every sensor of speed."""
-    sensors = enumerate(problem.campaign.sensors)
-    return [(k, s, (s.s_from_m + s.s_to_m) / 2) for k, s in sensors if not s.is_runout]
-
-
-def _windows(problem: PooledProblem, release: float) -> list[tuple[float, float]]:
-    """Stretches of the track to show: all of it, and the one with recordings if that is short."""
-    length = problem.terrain.length_m
-    whole = (min(release, length), length)
-    places = [s for _, sensor, _ in _placed(problem) for s in (sensor.s_from_m, sensor.s_to_m)]
-    for column, sensor in enumerate(problem.campaign.sensors):
-        if sensor.is_runout:
-            places += problem.values[problem.observed[:, column], column].tolist()
-    if not places:
-        return [whole]
-    low, high = max(whole[0], min(places) - 0.03 * length), min(length, max(places) + 0.03 * length)
-    return [whole, (low, high)] if high - low < _ZOOM_BELOW * (length - whole[0]) else [whole]
+    title = f"Front speed along the track, and what was recorded\n{figure_text(law.title, 80)}"
+    start = (release, _release_text(problem, release))
+    return track_figure(problem, title, draw, top=_top(speeds, problem), start=start)
 
 
 def _release_text(problem: PooledProblem, release: float) -> str:
@@ -98,14 +57,12 @@ def _speeds(tree: xr.DataTree, law: Law, problem: PooledProblem, release: float)
 
 def _top(speeds: FloatArray, problem: PooledProblem) -> float:
     """Upper end of the speed axis: everything is inside."""
-    of_speed = [column for column, _, _ in _placed(problem)]
-    recorded = (problem.values + problem.campaign.reading_sd())[:, of_speed]
-    spread_of_mean = problem.recorded_mean + np.sqrt(np.diagonal(problem.covariance))
-    highest = [float(np.quantile(speeds, 0.95, axis=0).max()), 1.0]
-    for values in (recorded, spread_of_mean[of_speed]):
-        finite = values[np.isfinite(values)]
-        highest += [float(finite.max())] if len(finite) else []
-    return 1.05 * max(highest)
+    of_speed = [column for column, _, _ in placed_sensors(problem)]
+    spread_of_mean = (problem.recorded_mean + np.sqrt(np.diagonal(problem.covariance)))[of_speed]
+    finite = spread_of_mean[np.isfinite(spread_of_mean)].tolist()
+    return 1.05 * max(
+        float(np.quantile(speeds, 0.95, axis=0).max()), 1.0, *highest_recorded(problem), *finite
+    )
 
 
 def _bands(axes: Axes, s_m: FloatArray, speeds: FloatArray, colour: str) -> None:
@@ -115,37 +72,10 @@ def _bands(axes: Axes, s_m: FloatArray, speeds: FloatArray, colour: str) -> None
     axes.plot(s_m, median, color=colour, linewidth=1.4, label="mean response, median")
 
 
-def _readings(axes: Axes, problem: PooledProblem) -> None:
-    """Each reading with its error; spread sideways in order, or else they hide each other."""
-    sd = problem.campaign.reading_sd()
-    placed = _placed(problem)
-    half = _half_width([middle for _, _, middle in placed], problem.terrain.length_m)
-    label: str | None = "recorded, with its error (spread sideways)"
-    for column, sensor, middle in placed:
-        rows = problem.observed[:, column]
-        values, errors = problem.values[rows, column], sd[rows, column]
-        if len(values) == 0:
-            continue
-        rank = np.argsort(np.argsort(values, kind="stable"), kind="stable")
-        x = middle + half * (2 * (rank + 0.5) / len(values) - 1)
-        if sensor.is_span:
-            axes.hlines(values, sensor.s_from_m, sensor.s_to_m, color=GREY, linewidth=0.4, alpha=0.6)
-        axes.errorbar(
-            x, values, errors, label=label, fmt="o", color=GREY, markersize=2.4, elinewidth=0.6, clip_on=False
-        )
-        label = None
-
-
-def _half_width(places: list[float], length: float) -> float:
-    """Half of the width that the points of one sensor are spread over [m]."""
-    gaps = np.diff(np.unique(places))
-    return float(min([0.016 * length, *(0.4 * gaps)]))
-
-
 def _means(axes: Axes, problem: PooledProblem) -> None:
     """Mean and sd as the calibration uses them: events without a reading count for what they say."""
     label: str | None = "recorded mean and sd across events (not reached counted in)"
-    for column, sensor, middle in _placed(problem):
+    for column, sensor, middle in placed_sensors(problem):
         mean, sd = float(problem.recorded_mean[column]), float(np.sqrt(problem.covariance[column, column]))
         if sensor.is_span:
             axes.hlines(mean, sensor.s_from_m, sensor.s_to_m, color=RECORDED, linewidth=1.4)
@@ -162,62 +92,3 @@ def _means(axes: Axes, problem: PooledProblem) -> None:
             zorder=5,
         )
         label = None
-
-
-def _runouts(axes: Axes, problem: PooledProblem) -> None:
-    """Rug of the recorded runouts at the foot of the panel."""
-    label = "recorded runouts"
-    for column, sensor in enumerate(problem.campaign.sensors):
-        values = problem.values[problem.observed[:, column], column]
-        if sensor.is_runout and len(values):
-            foot = axes.get_xaxis_transform()
-            axes.vlines(values, 0, 0.045, transform=foot, color=RECORDED, linewidth=1.2, label=label)
-            label = "_not in the legend"
-
-
-def _profile(axes: Axes, problem: PooledProblem, window: tuple[float, float], *, named: bool) -> None:
-    """Terrain with the sensors on it; spans as thick lines."""
-    track = problem.campaign.track
-    s_m, z_m = np.asarray(track.s_m), np.asarray(track.z_m)
-    height = float(np.ptp(z_m)) or 1.0
-    axes.fill_between(s_m, z_m, z_m.min() - 0.08 * height, color="#ececec", linewidth=0)
-    axes.plot(s_m, z_m, color=INK, linewidth=1.0)
-    for _, sensor, middle in _placed(problem):
-        if sensor.is_span:
-            span = np.linspace(sensor.s_from_m, sensor.s_to_m, 20)
-            axes.plot(span, np.interp(span, s_m, z_m), color=INK, linewidth=3.5, solid_capstyle="butt")
-        axes.plot(middle, float(np.interp(middle, s_m, z_m)), marker="o", markersize=3.5, color=INK)
-    if named:
-        _names(axes, problem, window)
-    axes.set_ylim(z_m.min() - 0.08 * height, z_m.max() + 0.05 * height)
-
-
-def _names(axes: Axes, problem: PooledProblem, window: tuple[float, float]) -> None:
-    """Names of the sensors above the panel, moved apart where they would overlap."""
-    placed = _placed(problem)[:_MAX_NAMED]
-    track = problem.campaign.track
-    gap = 0.045 * (window[1] - window[0])
-    middles = np.array([middle for _, _, middle in placed])
-    for (_, sensor, middle), x in zip(placed, spread(middles, gap), strict=True):
-        z = float(np.interp(middle, track.s_m, track.z_m))
-        axes.annotate(
-            figure_text(sensor.id, 14),
-            (middle, z),
-            (float(x), 1.02),
-            textcoords=axes.get_xaxis_transform(),
-            rotation=90,
-            ha="center",
-            va="bottom",
-            fontsize=7.5,
-            arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkB": 3},
-        )
-
-
-def _reference(speed: Axes, profile: Axes, problem: PooledProblem) -> None:
-    """Mark the zero that runouts are reported from, such as the crown of a dam."""
-    reference = problem.campaign.reference_s_m
-    if reference is None:
-        return
-    label = f"reference (zero of reported runouts), s = {reference:.0f} m"
-    speed.axvline(reference, color=GREY, linewidth=0.9, linestyle="--", label=label)
-    profile.axvline(reference, color=GREY, linewidth=0.9, linestyle="--")

@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.report.draws import INTERVAL, chains_of, density, gate_text, interval
-from skred.report.labels import figure_text, parameter_label, symbol_text
+from skred.report.labels import figure_text, parameter_label, population_label, symbol_label, symbol_text
 from skred.report.numbers import decimals_for, rounded
 from skred.report.style import GREY, INK, WIDTH, bare, law_colours, new_figure, shade_map, shades, styled
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -27,34 +29,46 @@ _LINES = 0.64
 """Share of a panel's height that is drawn in; the legend has the rest."""
 
 
+def _shown(law: Law, parameters: Sequence[Parameter] | None) -> tuple[Parameter, ...]:
+    """The parameters to show: the law's own if no others are given."""
+    return law.parameters if parameters is None else tuple(parameters)
+
+
+def _label(parameter: Parameter, law: Law, n_shown: int) -> str:
+    """Label of an axis; where there are more than the law's own, they are those of a population."""
+    of_population = n_shown > len(law.parameters)
+    return population_label(parameter) if of_population else parameter_label(parameter)
+
+
 @styled
-def trace_figure(tree: xr.DataTree, law: Law) -> Figure:
-    """Trace and rank histogram of every chain, one row per parameter.
+def trace_figure(tree: xr.DataTree, law: Law, parameters: Sequence[Parameter] | None = None) -> Figure:
+    """Trace and rank histogram of every chain, one row per parameter (the law's own if none are given).
 
     Ranks are over all chains together: in chains that sample the same distribution they are spread
     evenly (Vehtari and others, 2021, doi 10.1214/20-BA1221).
     """
-    n = len(law.parameters)
+    shown = _shown(law, parameters)
+    n = len(shown)
     title = "Chains: traces that overlap and ranks that are level have mixed"
     figure = new_figure(0.9 + 1.75 * n, f"{title}\n{figure_text(law.title, 80)}\n{gate_text(tree)}")
     panels = figure.subplots(n, 2, squeeze=False, gridspec_kw={"width_ratios": [1.7, 1]})
-    for row, parameter in zip(panels, law.parameters, strict=True):
+    for row, parameter in zip(panels, shown, strict=True):
         chains = chains_of(tree, parameter.name)
         colours = shades(law_colours([law.id])[law.id], len(chains))
-        _trace(row[0], chains, colours, parameter)
+        _trace(row[0], chains, colours, _label(parameter, law, n))
         _ranks(row[1], chains, colours)
     panels[-1, 0].set_xlabel("draw")
     panels[-1, 1].set_xlabel("rank among the draws of all chains")
     return figure
 
 
-def _trace(axes: Axes, chains: FloatArray, colours: list[str], parameter: Parameter) -> None:
+def _trace(axes: Axes, chains: FloatArray, colours: list[str], label: str) -> None:
     step = max(1, chains.shape[1] // _MAX_TRACE_POINTS)
     draw = np.arange(0, chains.shape[1], step)
     for chain, colour in zip(chains, colours, strict=True):
         axes.plot(draw, chain[::step], color=colour, linewidth=0.4)
     axes.set_xlim(0, chains.shape[1])
-    axes.set_ylabel(parameter_label(parameter).replace(" (", "\n(").replace(" [", "\n[", 1))
+    axes.set_ylabel(label if "\n" in label else label.replace(" (", "\n(").replace(" [", "\n[", 1))
 
 
 def _ranks(axes: Axes, chains: FloatArray, colours: list[str]) -> None:
@@ -73,12 +87,15 @@ def _ranks(axes: Axes, chains: FloatArray, colours: list[str]) -> None:
 
 
 @styled
-def joint_figure(tree: xr.DataTree, law: Law) -> Figure:
+def joint_figure(tree: xr.DataTree, law: Law, parameters: Sequence[Parameter] | None = None) -> Figure:
     """Two-dimensional histogram of each pair of parameters, with their marginal histograms."""
-    parameters = law.parameters[:_MAX_JOINT]
-    draws = [chains_of(tree, parameter.name).ravel() for parameter in parameters]
-    n = len(parameters)
-    figure = new_figure(min(WIDTH, 1.2 + 2.2 * n), _joint_title(law, draws))
+    every = _shown(law, parameters)
+    shown = every[:_MAX_JOINT]
+    draws = [chains_of(tree, parameter.name).ravel() for parameter in shown]
+    n = len(shown)
+    bins = 3 if n > 3 else 5
+    labels = [symbol_label(p) if n > 3 else _label(p, law, len(every)) for p in shown]
+    figure = new_figure(min(WIDTH, 1.2 + 2.2 * n), _joint_title(law, every, draws))
     panels = figure.subplots(n, n, sharex="col", squeeze=False)
     colour = law_colours([law.id])[law.id]
     for i in range(n):
@@ -88,47 +105,53 @@ def joint_figure(tree: xr.DataTree, law: Law) -> Figure:
                 axes.remove()
             elif i == j:
                 axes.hist(draws[i], bins=50, color=colour, alpha=0.8)
-                axes.locator_params(axis="x", nbins=5)
+                axes.locator_params(axis="x", nbins=bins)
                 bare(axes)
             else:
                 _pair(axes, draws[j], draws[i], colour)
+                axes.locator_params(nbins=bins)
                 if j == 0:
-                    axes.set_ylabel(parameter_label(parameters[i]))
+                    axes.set_ylabel(labels[i])
             if j <= i == n - 1:
-                axes.set_xlabel(parameter_label(parameters[j]))
+                axes.set_xlabel(labels[j])
+                if n > 3:  # narrow panels
+                    axes.tick_params(axis="x", labelrotation=40, labelsize=7)
+                    axes.xaxis.label.set_fontsize(7.5)
     return figure
 
 
-def _joint_title(law: Law, draws: list[FloatArray]) -> str:
-    title = f"Joint posterior\n{figure_text(law.title, 80)}"
+def _joint_title(law: Law, parameters: tuple[Parameter, ...], draws: list[FloatArray]) -> str:
+    of_population = len(parameters) > len(law.parameters)
+    what = " of the medians, spreads and correlations across avalanches" if of_population else ""
+    title = f"Joint posterior{what}\n{figure_text(law.title, 80)}"
     if len(draws) == 2 and all(np.ptp(values) > 0 for values in draws):
-        first, second = (figure_text(symbol_text(p.symbol)) for p in law.parameters)
+        first, second = (figure_text(symbol_text(p.symbol)) for p in parameters)
         correlation = float(np.corrcoef(draws[0], draws[1])[0, 1])
         title += f"\ncorrelation of {first} and {second}: {correlation:+.2f}; + is the mean"
-    elif len(law.parameters) > len(draws):
-        title += f"\nthe first {len(draws)} of {len(law.parameters)} parameters"
+    elif len(parameters) > len(draws):
+        title += f"\nthe first {len(draws)} of {len(parameters)} parameters"
     return title
 
 
 def _pair(axes: Axes, x: FloatArray, y: FloatArray, colour: str) -> None:
     axes.hist2d(x, y, bins=50, cmap=shade_map(colour))
-    axes.locator_params(nbins=5)
     axes.plot(x.mean(), y.mean(), marker="+", color=INK, markersize=11)
 
 
 @styled
-def marginals_figure(tree: xr.DataTree, law: Law) -> Figure:
+def marginals_figure(tree: xr.DataTree, law: Law, parameters: Sequence[Parameter] | None = None) -> Figure:
     """Posterior of each parameter against its prior density, with mean and 90 % interval."""
-    n = len(law.parameters)
+    shown = _shown(law, parameters)
+    n = len(shown)
     columns = min(n, 2)
     rows = -(-n // columns)
     title = f"What the recordings say of each parameter, against the prior\n{figure_text(law.title, 80)}"
     figure = new_figure(0.9 + 2.4 * rows, title)
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes, parameter in zip(panels, law.parameters, strict=False):
+    for axes, parameter in zip(panels, shown, strict=False):
         prior = chains_of(tree, parameter.name, "prior").ravel()
         _marginal(axes, chains_of(tree, parameter.name).ravel(), prior, law_colours([law.id])[law.id])
-        axes.set_xlabel(parameter_label(parameter))
+        axes.set_xlabel(_label(parameter, law, n).replace("\n", " "))
     for axes in panels[n:]:
         axes.remove()
     return figure
@@ -147,6 +170,8 @@ def _marginal(axes: Axes, draws: FloatArray, prior: FloatArray, colour: str) -> 
     # Strengths are not negative: their priors end at 0, where they may be largest.
     lower = 0.0 if prior.min() >= 0 else None
     inside = grid if lower is None else grid[grid >= lower]
+    if lower is None and np.abs(prior).max() <= 1:  # a correlation
+        inside = grid[np.abs(grid) <= 1]
     axes.plot(inside, density(prior, inside, lower=lower), color=GREY, linewidth=1.2, label=prior_label)
     interval_label = (
         f"{percent} interval (equal-tailed) {rounded(low, decimals)} to {rounded(high, decimals)}"

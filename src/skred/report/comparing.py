@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skred.report.document import PRACTICAL_DIFFERENCE, Document, get, listed, pareto_k_limit, ranked
+from skred.report.document import (
+    PRACTICAL_DIFFERENCE,
+    Document,
+    get,
+    is_hierarchical,
+    listed,
+    pareto_k_limit,
+    ranked,
+)
 from skred.report.draws import MAX_SENSORS
 from skred.report.labels import figure_text, unit_text
 from skred.report.numbers import fixed, floats, is_number
@@ -39,14 +47,18 @@ def save_comparison_figures(comparison: Document, folder: Path) -> dict[str, Pat
     Returns
     -------
     dict of Path
-        By name: comparison_elpd, pointwise, pareto_k, predictions, evidence.
+        By name: comparison_elpd, pointwise, pareto_k, predictions, evidence; of a hierarchical comparison
+        that has a pooled one beside it also likelihoods.
     """
+    from skred.report.comparing_likelihoods import likelihoods_figure, new_avalanches_figure
+
     makers = {
         "comparison_elpd": elpd_figure,
         "pointwise": pointwise_figure,
         "pareto_k": pareto_k_figure,
-        "predictions": predictions_figure,
+        "predictions": new_avalanches_figure if is_hierarchical(comparison) else predictions_figure,
         "evidence": evidence_figure,
+        "likelihoods": likelihoods_figure,
     }
     files = {}
     for name, make in makers.items():
@@ -56,7 +68,7 @@ def save_comparison_figures(comparison: Document, folder: Path) -> dict[str, Pat
     return files
 
 
-def _law_axis(axes: Axes, laws: list[Document]) -> None:
+def law_axis(axes: Axes, laws: list[Document]) -> None:
     """One row per law, best at the top."""
     axes.set_yticks(range(len(laws)), [figure_text(law["id"], 24) for law in laws])
     axes.set_ylim(len(laws) - 0.5, -0.5)
@@ -64,12 +76,13 @@ def _law_axis(axes: Axes, laws: list[Document]) -> None:
     axes.tick_params(axis="y", length=0)
 
 
-def _styles(comparison: Document) -> tuple[dict[str, str], dict[str, str]]:
+def styles(comparison: Document) -> tuple[dict[str, str], dict[str, str]]:
+    """Colour and marker of each law."""
     ids = [str(law["id"]) for law in listed(comparison, "models")]
     return law_colours(ids), law_markers(ids)
 
 
-def _typeset(number: float) -> str:
+def typeset(number: float) -> str:
     """Two decimals, with the minus sign of the axes."""
     return fixed(number).replace("-", "\N{MINUS SIGN}")
 
@@ -80,7 +93,7 @@ def elpd_figure(comparison: Document) -> Figure | None:
     laws = [law for law in ranked(comparison) if is_number(get(law, "difference", "elpd"))]
     if not laws:
         return None
-    colours, markers = _styles(comparison)
+    colours, markers = styles(comparison)
     best = figure_text(laws[0]["id"])
     title = f"How much worse each law predicts an avalanche left out, against {best}"
     figure = new_figure(1.65 + 0.36 * len(laws), title)
@@ -96,13 +109,14 @@ def elpd_figure(comparison: Document) -> Figure | None:
         axes.plot(difference, row, marker=markers[law["id"]], color=colour, markersize=6)
         place = (difference, row)
         axes.annotate(
-            _typeset(difference), place, (0, 7), textcoords="offset points", ha="center", fontsize=7.5
+            typeset(difference), place, (0, 7), textcoords="offset points", ha="center", fontsize=7.5
         )
     axes.plot([], [], color=GREY, linewidth=4, alpha=0.55, label="standard error")
     axes.plot([], [], color=GREY, linewidth=1.2, label="doubled standard error")
-    _law_axis(axes, laws)
+    law_axis(axes, laws)
     axes.set_ylim(len(laws) - 0.5, -0.75)
-    axes.set_xlabel("difference of elpd (exact leave-one-event-out) to the best law [nats]")
+    exact = "" if is_hierarchical(comparison) else "exact "
+    axes.set_xlabel(f"difference of elpd ({exact}leave-one-event-out) to the best law [nats]")
     legend_below(figure, [axes], columns=3)
     return figure
 
@@ -114,7 +128,7 @@ def pointwise_figure(comparison: Document) -> Figure | None:
     laws = [law for law in ranked(comparison) if len(listed(law, "exact", "pointwise")) == len(events)]
     if len(laws) < 2 or not events:
         return None
-    colours, markers = _styles(comparison)
+    colours, markers = styles(comparison)
     best = floats(listed(laws[0], "exact", "pointwise"))
     title = "Which avalanches decide: below 0 the best law predicted the avalanche better"
     figure = new_figure(4.0, title)
@@ -130,7 +144,7 @@ def pointwise_figure(comparison: Document) -> Figure | None:
         axes.vlines(x, 0, difference, color=colour, linewidth=1.0, alpha=0.7)
         filled = [colour if str(event) not in failed else "#ffffff" for event in events]
         axes.scatter(x, difference, s=20, c=filled, marker=markers[law["id"]], edgecolors=colour, zorder=3)
-        total = _typeset(float(np.nansum(difference)))
+        total = typeset(float(np.nansum(difference)))
         axes.scatter(
             [],
             [],
@@ -164,10 +178,11 @@ def pareto_k_figure(comparison: Document) -> Figure | None:
     laws = [law for law in ranked(comparison) if len(listed(law, "loo", "pareto_k")) == len(events)]
     if not laws or not events:
         return None
-    colours, markers = _styles(comparison)
+    colours, markers = styles(comparison)
     limit = pareto_k_limit(comparison)
-    title = "Pareto k: avalanches above the line need an exact refit"
-    figure = new_figure(3.6, f"{title}\n(values below {_typeset(_LOWEST_K)} are drawn there)")
+    need = "were refitted exactly" if is_hierarchical(comparison) else "need an exact refit"
+    title = f"Pareto k: avalanches above the line {need}"
+    figure = new_figure(3.6, f"{title}\n(values below {typeset(_LOWEST_K)} are drawn there)")
     axes = figure.subplots()
     axes.axhline(limit, color=INK, linewidth=1.0, linestyle="--", label=f"limit {limit:.2f}")
     for law in laws:
@@ -212,7 +227,7 @@ def predictions_figure(comparison: Document) -> Figure | None:
 
 
 def _responses(axes: Axes, comparison: Document, laws: list[Document], sensor: str, unit: str) -> None:
-    colours, markers = _styles(comparison)
+    colours, markers = styles(comparison)
     reference = get(comparison, "campaign", "reference_s_m")
     from_reference = unit == "m" and is_number(reference)
     offset = float(reference) if from_reference else 0.0
@@ -230,7 +245,7 @@ def _responses(axes: Axes, comparison: Document, laws: list[Document], sensor: s
         axes.hlines(row, low - offset, high - offset, color=colour, linewidth=2.2)
         axes.plot(mean - offset, row, marker=markers[law["id"]], color=colour, markersize=5)
     axes.plot([], [], color=GREY, linewidth=2.2, label=f"mean response, {percent:.0f} % interval")
-    _law_axis(axes, laws)
+    law_axis(axes, laws)
     axes.locator_params(axis="x", nbins=6)
     axes.set_title(figure_text(sensor, 30))
     quantity = "relative to the reference " if from_reference else ""
@@ -243,7 +258,7 @@ def evidence_figure(comparison: Document) -> Figure | None:
     laws = [law for law in ranked(comparison) if is_number(get(law, "evidence", "mean"))]
     if not laws:
         return None
-    colours, markers = _styles(comparison)
+    colours, markers = styles(comparison)
     title = "Evidence: how well each law with its prior foretold the recordings (right is better)"
     figure = new_figure(1.3 + 0.34 * len(laws), title)
     axes = figure.subplots()
@@ -260,10 +275,10 @@ def evidence_figure(comparison: Document) -> Figure | None:
             marker=markers[law["id"]],
         )
         axes.plot([mean, mean], [row - 0.28, row + 0.28], color=colour, linewidth=1.6)
-        axes.annotate(_typeset(mean), (mean, row - 0.3), ha="center", va="bottom", fontsize=7.5)
+        axes.annotate(typeset(mean), (mean, row - 0.3), ha="center", va="bottom", fontsize=7.5)
     axes.scatter([], [], s=26, facecolors="none", edgecolors=GREY, label="one seed of SMC")
     axes.plot([], [], color=GREY, linewidth=1.6, label="mean over the seeds")
-    _law_axis(axes, laws)
+    law_axis(axes, laws)
     axes.set_ylim(len(laws) - 0.5, -0.85)
     axes.margins(x=0.08)
     axes.set_xlabel("log evidence [nats]")

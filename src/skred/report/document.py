@@ -47,6 +47,20 @@ def failed(comparison: Document) -> list[Document]:
     return [model for model in models(comparison) if not passed(model)]
 
 
+def is_hierarchical(comparison: Document) -> bool:
+    """Whether every avalanche has its own strengths; older documents do not say, and are pooled."""
+    return get(comparison, "likelihood") == "hierarchical"
+
+
+def side_by_side(comparison: Document) -> list[Document]:
+    """For each law its entry here and in the pooled calibration: ``id``, ``hierarchical``, ``pooled``."""
+    here = {str(get(model, "id")): model for model in models(comparison)}
+    pooled = {str(get(model, "id")): model for model in listed(comparison, "pooled", "models")}
+    return [
+        {"id": law, "hierarchical": here.get(law), "pooled": pooled.get(law)} for law in {**here, **pooled}
+    ]
+
+
 def pareto_k_limit(comparison: Document) -> float:
     """Largest Pareto k at which importance sampling can be trusted.
 

@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from skred.report.labels import figure_text, unit_text
+from skred.report.style import tint
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
 
     from skred.campaign import Campaign, Sensor
-    from skred.inference.problem import PooledProblem
+    from skred.inference.problem import PooledProblem, Problem
 
 FloatArray = NDArray[np.float64]
 
@@ -57,13 +59,14 @@ def density(values: ArrayLike, grid: FloatArray, *, lower: float | None = None) 
     width = max(width, 1e-3 * float(np.ptp(grid)), 1e-12)
     counts, edges = np.histogram(draws, bins=min(2000, max(10, len(draws))))
     centres, weights = (edges[1:] + edges[:-1]) / 2, counts / counts.sum()
-    smooth = _kernels(grid, centres, width) @ weights
+    smooth = kernels(grid, centres, width) @ weights
     if lower is not None:
-        smooth = smooth + _kernels(grid, 2 * lower - centres, width) @ weights
+        smooth = smooth + kernels(grid, 2 * lower - centres, width) @ weights
     return np.asarray(smooth)
 
 
-def _kernels(grid: FloatArray, centres: FloatArray, width: float) -> FloatArray:
+def kernels(grid: FloatArray, centres: FloatArray, width: float) -> FloatArray:
+    """Gaussian kernels, (n_grid, n_centres)."""
     z = (grid[:, None] - centres[None, :]) / width
     return np.asarray(np.exp(-0.5 * z**2) / (width * np.sqrt(2 * np.pi)))
 
@@ -80,8 +83,8 @@ def gate_text(tree: xr.DataTree) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class SensorDraws:
-    """What one sensor recorded, and what a law says of it.
+class Recorded:
+    """What one sensor recorded.
 
     Attributes
     ----------
@@ -90,10 +93,6 @@ class SensorDraws:
         Subtracted from the values [m]: the campaign's reference, for a runout.
     recorded : (n_recorded,) array
     n_not_reached, n_missing : int
-    response : (n_draws,) array
-        Mean response; where events differ in their release points, averaged over the events.
-    reading : (n_draws * n_events,) array
-        Predictive distribution of a reading.
     """
 
     sensor: Sensor
@@ -101,8 +100,6 @@ class SensorDraws:
     recorded: FloatArray
     n_not_reached: int
     n_missing: int
-    response: FloatArray
-    reading: FloatArray
 
     @property
     def axis_label(self) -> str:
@@ -110,6 +107,39 @@ class SensorDraws:
         if not self.sensor.is_runout:
             return f"front speed [{unit_text('m s-1')}]"
         return "runout relative to the reference [m]" if self.offset else "runout s [m]"
+
+
+@dataclass(frozen=True, eq=False)
+class SensorDraws(Recorded):
+    """What one sensor recorded, and what a law says of it.
+
+    Attributes
+    ----------
+    response : (n_draws,) array
+        Mean response; where events differ in their release points, averaged over the events.
+    reading : (n_draws * n_events,) array
+        Predictive distribution of a reading.
+    """
+
+    response: FloatArray
+    reading: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class NewAvalanche(Recorded):
+    """What one sensor recorded, and what a new avalanche of the population would do there.
+
+    Attributes
+    ----------
+    reached : float
+        Share of new avalanches that get there.
+    front, reading : (n,) arrays
+        Of those: what the front does, and what is read of it.
+    """
+
+    reached: float
+    front: FloatArray
+    reading: FloatArray
 
 
 def shown_sensors(campaign: Campaign) -> tuple[Sensor, ...]:
@@ -123,27 +153,50 @@ def left_out(campaign: Campaign) -> str:
     return f" (the first {MAX_SENSORS} of {n} sensors)" if n > MAX_SENSORS else ""
 
 
-def sensor_draws(tree: xr.DataTree, problem: PooledProblem, sensor: Sensor) -> SensorDraws:
-    """Gather what belongs to one sensor."""
+def recorded_at(problem: Problem, sensor: Sensor) -> dict[str, Any]:
+    """The fields of `Recorded` of one sensor."""
     campaign = problem.campaign
     column = campaign.sensors.index(sensor)
     offset = campaign.reference_s_m or 0.0 if sensor.is_runout else 0.0
+    observed, not_reached = problem.observed[:, column], problem.not_reached[:, column]
+    return {
+        "sensor": sensor,
+        "offset": offset,
+        "recorded": problem.values[observed, column] - offset,
+        "n_not_reached": int(not_reached.sum()),
+        "n_missing": int((~observed & ~not_reached).sum()),
+    }
+
+
+def sensor_draws(tree: xr.DataTree, problem: PooledProblem, sensor: Sensor) -> SensorDraws:
+    """Gather what belongs to one sensor of a pooled calibration."""
+    recorded = recorded_at(problem, sensor)
+    column = problem.campaign.sensors.index(sensor)
     predictive = tree["posterior_predictive"].to_dataset()
     response = predictive["mean_response"].transpose("chain", "draw", "release", "sensor").values[..., column]
     events_per_release = np.bincount(problem.release_of_event, minlength=len(problem.releases))
-    observed, not_reached = problem.observed[:, column], problem.not_reached[:, column]
+    reading = predictive["reading"].transpose("chain", "draw", "event", "sensor").values[..., column]
     return SensorDraws(
-        sensor=sensor,
-        offset=offset,
-        recorded=problem.values[observed, column] - offset,
-        n_not_reached=int(not_reached.sum()),
-        n_missing=int((~observed & ~not_reached).sum()),
-        response=np.average(response, axis=-1, weights=events_per_release).ravel() - offset,
-        reading=predictive["reading"]
-        .transpose("chain", "draw", "event", "sensor")
-        .values[..., column]
-        .ravel()
-        - offset,
+        **recorded,
+        response=np.average(response, axis=-1, weights=events_per_release).ravel() - recorded["offset"],
+        reading=reading.ravel() - recorded["offset"],
+    )
+
+
+def new_avalanche(tree: xr.DataTree, problem: Problem, sensor: Sensor) -> NewAvalanche:
+    """Gather what belongs to one sensor of a hierarchical calibration."""
+    recorded = recorded_at(problem, sensor)
+    column = problem.campaign.sensors.index(sensor)
+    predictive = tree["posterior_predictive"].to_dataset()
+    front, reading, reached = (
+        predictive[name].transpose("chain", "draw", "event", "sensor").values[..., column]
+        for name in ("front", "reading", "reached")
+    )
+    return NewAvalanche(
+        **recorded,
+        reached=float(reached.mean()),
+        front=front[reached] - recorded["offset"],
+        reading=reading[reached] - recorded["offset"],
     )
 
 
@@ -170,6 +223,22 @@ def spread(positions: ArrayLike, gap: float) -> FloatArray:
     moved = np.empty_like(wanted)
     moved[order] = _isotonic(target) + gap * np.arange(len(wanted))
     return moved
+
+
+def shaded_density(
+    axes: Axes, grid: FloatArray, heights: FloatArray, draws: FloatArray, colour: str, name: str
+) -> None:
+    """Area under a density, in steps for all of it, and for its 90 and 50 % intervals."""
+    for tail, amount, label in (
+        (0.0, 0.15, name),
+        (0.05, 0.38, f"{name}, 90 %"),
+        (0.25, 0.68, f"{name}, 50 %"),
+    ):
+        start, end = np.quantile(draws, [tail, 1.0 - tail]) if tail else (grid[0], grid[-1])
+        ends = np.clip([start, end], grid[0], grid[-1])
+        inside = np.concatenate([ends[:1], grid[(grid > start) & (grid < end)], ends[1:]])
+        area = np.interp(inside, grid, heights)
+        axes.fill_between(inside, area, color=tint(colour, amount), linewidth=0, label=label)
 
 
 def _isotonic(values: FloatArray) -> FloatArray:

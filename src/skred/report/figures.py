@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from skred.report.along_track import along_track_figure
 from skred.report.chains import joint_figure, marginals_figure, trace_figure
@@ -15,23 +16,32 @@ from skred.report.comparing import (
     predictions_figure,
     save_comparison_figures,
 )
+from skred.report.new_avalanches import new_avalanche_figure, new_avalanche_track_figure
+from skred.report.population import events_figure, population_figure
 from skred.report.predictive import predictive_figure
 from skred.report.style import write_png
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from collections.abc import Callable
 
-    from skred.inference.problem import PooledProblem
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from skred.inference.problem import PooledProblem, Problem
     from skred.physics.law import Law
 
 __all__ = [
     "along_track_figure",
     "elpd_figure",
+    "events_figure",
     "evidence_figure",
     "joint_figure",
     "marginals_figure",
+    "new_avalanche_figure",
+    "new_avalanche_track_figure",
     "pareto_k_figure",
     "pointwise_figure",
+    "population_figure",
     "predictions_figure",
     "predictive_figure",
     "save_comparison_figures",
@@ -40,7 +50,7 @@ __all__ = [
 ]
 
 
-def save_model_figures(tree: xr.DataTree, law: Law, problem: PooledProblem, folder: Path) -> list[Path]:
+def save_model_figures(tree: xr.DataTree, law: Law, problem: Problem, folder: Path) -> list[Path]:
     """Write the figures of one calibration as PNG.
 
     Parameters
@@ -48,7 +58,7 @@ def save_model_figures(tree: xr.DataTree, law: Law, problem: PooledProblem, fold
     tree : DataTree
         As made by `skred.inference.results.assemble`.
     law : Law
-    problem : PooledProblem
+    problem : Problem
         What it was calibrated on.
     folder : Path
         An existing folder.
@@ -56,12 +66,21 @@ def save_model_figures(tree: xr.DataTree, law: Law, problem: PooledProblem, fold
     Returns
     -------
     list of Path
-        trace, joint (laws of two or more parameters), marginals, predictive, along_track.
+        trace, joint (where there are two or more parameters), marginals; of a pooled calibration then
+        predictive and along_track, of a hierarchical one new_avalanche, population, events and along_track.
     """
-    files = [write_png(trace_figure(tree, law), folder / "trace.png")]
-    if len(law.parameters) > 1:
-        files.append(write_png(joint_figure(tree, law), folder / "joint.png"))
-    files.append(write_png(marginals_figure(tree, law), folder / "marginals.png"))
-    files.append(write_png(predictive_figure(tree, law, problem), folder / "predictive.png"))
-    files.append(write_png(along_track_figure(tree, law, problem), folder / "along_track.png"))
-    return files
+    parameters = problem.parameters(law)
+    makers: dict[str, Callable[[], Figure]] = {"trace": partial(trace_figure, tree, law, parameters)}
+    if len(parameters) > 1:
+        makers["joint"] = partial(joint_figure, tree, law, parameters)
+    makers["marginals"] = partial(marginals_figure, tree, law, parameters)
+    if problem.likelihood == "hierarchical":
+        makers["new_avalanche"] = partial(new_avalanche_figure, tree, law, problem)
+        makers["population"] = partial(population_figure, tree, law, problem)
+        makers["events"] = partial(events_figure, tree, law, problem)
+        makers["along_track"] = partial(new_avalanche_track_figure, tree, law, problem)
+    else:
+        pooled = cast("PooledProblem", problem)
+        makers["predictive"] = partial(predictive_figure, tree, law, pooled)
+        makers["along_track"] = partial(along_track_figure, tree, law, pooled)
+    return [write_png(make(), folder / f"{name}.png") for name, make in makers.items()]

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skred.report import document as doc
-from skred.report.labels import name_text, printable, symbol_text, unit_text
+from skred.report.labels import name_text, population_role, printable, symbol_text, unit_text
 from skred.report.numbers import decimals_for, fixed, is_number, rounded, share, whole
+from skred.report.relative import relative_new_avalanche, relative_response
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -27,7 +29,30 @@ _TITLES = {
     "predictive": "Recorded readings, mean response and predictive distribution at each sensor.",
     "along_track": "Front speed along the track with recordings, and the terrain.",
 }
+_HIERARCHICAL_TITLES = {
+    "predictions": "A new avalanche under each law at each sensor against the recorded ones.",
+    "likelihoods": "Differences of elpd to the best law: every avalanche its own friction, and pooled.",
+    "joint": "Joint posterior of the medians, spreads and correlations across avalanches.",
+    "new_avalanche": "A new avalanche at each sensor, with its 50 and 90 % intervals, and what was recorded.",
+    "population": "Friction across avalanches: where 50 and 90 % of new ones lie, and each recorded one.",
+    "events": "Each recorded avalanche's own friction: median, 50 and 90 %; new avalanches behind.",
+    "along_track": "Front speed of new avalanches; apart from it, how well their median is known.",
+}
 _OF_A_LAW = ("marginals", "joint", "predictive", "along_track", "trace")
+_NORMAL_90, _MOST_SPREAD = 1.645, 20.0
+_OF_A_POPULATION = ("new_avalanche", "population", "events")
+_SECTIONS = {
+    "recorded": "What was recorded",
+    "preferred": "Which law the recordings prefer, and by how much",
+    "trust": "Can the chains be trusted?",
+    "population": "Every avalanche its own friction",
+    "likelihoods": "Pooled and hierarchical side by side",
+    "errors": "Error models, compared",
+    "laws": "Each law",
+    "predicted": "Predicted against recorded",
+    "alpha-beta": "The alpha-beta baseline",
+    "made": "How the numbers were made",
+}
 
 
 def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> str:
@@ -37,12 +62,12 @@ def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> 
     ----------
     comparison : mapping
         The document that is also written as ``compare.json``; null where there is no number. Runouts in
-        ``response`` are arc lengths, shown relative to the campaign's reference where it has one. Where
-        ``alpha_beta`` is null, ``alpha_beta_reason`` says why.
+        ``response`` and ``new_avalanche`` are arc lengths, shown relative to the campaign's reference where
+        it has one. Where ``alpha_beta`` is null, ``alpha_beta_reason`` says why.
     figures : mapping of str to Path
-        PNG files: ``comparison_elpd``, ``pointwise``, ``pareto_k``, ``predictions``, ``evidence``, and those
-        of one law as ``<law id>/trace``, ``/joint``, ``/marginals``, ``/predictive``, ``/along_track``.
-        What is missing is left out.
+        PNG files: ``comparison_elpd``, ``pointwise``, ``pareto_k``, ``predictions``, ``evidence``,
+        ``likelihoods``, and those of one law as ``<law id>/trace`` and so on, see
+        `skred.report.figures.save_model_figures`. What is missing is left out.
 
     Returns
     -------
@@ -51,6 +76,8 @@ def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> 
     """
     from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
 
+    hierarchical = doc.is_hierarchical(comparison)
+    sections = _sections(comparison)
     return (
         _environment()
         .get_template("compare.html.jinja")
@@ -61,8 +88,14 @@ def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> 
             failed=doc.failed(comparison),
             figures={name: _data_uri(file) for name, file in figures.items()},
             sensors=_sensors(comparison),
-            titles=_TITLES,
+            hierarchical=hierarchical,
+            sections=sections,
+            number={name: place for place, name in enumerate(sections, start=1)},
+            side_by_side=doc.side_by_side(comparison),
+            titles={**_TITLES, **_HIERARCHICAL_TITLES} if hierarchical else _TITLES,
             of_a_law=_OF_A_LAW,
+            of_a_population=_OF_A_POPULATION,
+            integration_limit=_integration_limit() if hierarchical else None,
             k_limit=doc.pareto_k_limit(comparison),
             practical=doc.PRACTICAL_DIFFERENCE,
             r_hat_limit=R_HAT_LIMIT,
@@ -71,10 +104,37 @@ def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> 
     )
 
 
+def _sections(comparison: doc.Document) -> dict[str, str]:
+    """Titles of the report's sections by their anchors, in their order."""
+    hierarchical = doc.is_hierarchical(comparison)
+    has = {
+        "population": hierarchical,
+        "likelihoods": hierarchical and doc.get(comparison, "pooled") is not None,
+        "errors": hierarchical and bool(doc.listed(comparison, "error_models")),
+    }
+    return {name: title for name, title in _SECTIONS.items() if has.get(name, True)}
+
+
+def _integration_limit() -> float:
+    from skred.inference.hierarchical import INTEGRATION_LIMIT
+
+    return INTEGRATION_LIMIT
+
+
 def _sensors(comparison: doc.Document) -> list[Any]:
-    """Sensors of all laws' responses, in their order."""
-    names = (doc.get(entry, "sensor") for m in doc.models(comparison) for entry in doc.listed(m, "response"))
+    """Sensors of all laws' responses or new avalanches, in their order."""
+    key = "new_avalanche" if doc.is_hierarchical(comparison) else "response"
+    names = (doc.get(entry, "sensor") for m in doc.models(comparison) for entry in doc.listed(m, key))
     return list(dict.fromkeys(names))
+
+
+def _within_factor(parameter: doc.Document) -> str:
+    """Factor of the median that 90 % of avalanches lie within, from a spread of logarithms."""
+    mean, sd = doc.get(parameter, "mean"), doc.get(parameter, "sd")
+    if not (is_number(mean) and is_number(sd)) or mean > _MOST_SPREAD:
+        return fixed(None)
+    factor = math.exp(_NORMAL_90 * mean)
+    return rounded(factor, decimals_for(_NORMAL_90 * sd * factor))
 
 
 def _data_uri(file: Path) -> str:
@@ -99,13 +159,15 @@ def _environment() -> Environment:
         share=share,
         rounded=rounded,
         shown=_shown,
-        unit=unit_text,
-        symbol=symbol_text,
+        unit=lambda unit: _kept_together(unit_text(unit)),
+        symbol=lambda symbol: _kept_together(symbol_text(symbol)),
         name=name_text,
         difference=_difference,
+        role=population_role,
+        within_factor=_within_factor,
     )
     environment.globals.update(get=doc.get, listed=doc.listed, decimals_for=decimals_for, is_number=is_number)
-    environment.globals.update(relative=relative_response)
+    environment.globals.update(relative=relative_response, relative_new=relative_new_avalanche)
     return environment
 
 
@@ -118,32 +180,11 @@ def _shown(value: Any) -> str:
     return printable(value)
 
 
+def _kept_together(text: str) -> str:
+    """A unit or symbol without line breaks, but after a comma."""
+    return text.replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")
+
+
 def _difference(value: Any) -> str:
     """Whether a difference matters in practice, in words."""
     return {True: "yes", False: "no"}.get(value, "n/a")
-
-
-def relative_response(comparison: doc.Document, entry: doc.Document) -> dict[str, Any]:
-    """Entry of a law's response, as text; a runout relative to the campaign's reference."""
-    reference = doc.get(comparison, "campaign", "reference_s_m")
-    from_reference = doc.get(entry, "unit") == "m" and is_number(reference)
-    offset = float(reference) if from_reference else 0.0
-    decimals = decimals_for(doc.get(entry, "sd"))
-    recorded_decimals = decimals_for(doc.get(entry, "recorded_se"))
-
-    def moved(key: str, places: int | None) -> str:
-        value = doc.get(entry, key)
-        return rounded(value - offset, places) if is_number(value) else rounded(None, places)
-
-    quantity = " from the reference" if from_reference else ""
-    return {
-        "sensor": printable(doc.get(entry, "sensor")),
-        "unit": unit_text(doc.get(entry, "unit")) + quantity,
-        "mean": moved("mean", decimals),
-        "low": moved("low", decimals),
-        "high": moved("high", decimals),
-        "sd": rounded(doc.get(entry, "sd"), decimals),
-        "recorded_mean": moved("recorded_mean", recorded_decimals),
-        "recorded_se": rounded(doc.get(entry, "recorded_se"), recorded_decimals),
-        "n_recorded": whole(doc.get(entry, "n_recorded")),
-    }

@@ -37,8 +37,9 @@ def unit_text(unit: Any) -> str:
 
 
 def symbol_text(symbol: Any) -> str:
-    """A symbol with its Greek letters: ``xi h`` as ξ h."""
-    return " ".join(_GREEK.get(word, word) for word in printable(symbol).split())
+    """A symbol with its Greek letters: ``xi h`` as ξ h, ``sd(log mu)`` as sd(log μ)."""
+    shown = " ".join(printable(symbol).split())
+    return re.sub(r"\b[a-z]+\b", lambda match: _GREEK.get(match[0], match[0]), shown)
 
 
 def name_text(name: Any) -> str:
@@ -52,4 +53,27 @@ def parameter_label(parameter: Any) -> str:
     name = name_text(parameter.name)
     shown = symbol if name == printable(parameter.symbol) else f"{name} {symbol}"
     paper = f" (paper: {printable(parameter.paper_symbol)})" if parameter.paper_symbol else ""
-    return f"{figure_text(shown + paper, 60)} [{figure_text(unit_text(parameter.unit), 20)}]"
+    return _with_unit(shown + paper, parameter)
+
+
+def symbol_label(parameter: Any) -> str:
+    """Symbol and unit, where there is no room for the name."""
+    return _with_unit(symbol_text(parameter.symbol), parameter)
+
+
+def population_label(parameter: Any) -> str:
+    """What a parameter of a population is; below it its symbol and unit."""
+    role, name = population_role(parameter.name), name_text(parameter.name)
+    if role == "median" and name != printable(parameter.symbol):
+        role = f"median {figure_text(name, 30)}"
+    return f"{role}\n{symbol_label(parameter)}"
+
+
+def population_role(name: Any) -> str:
+    """Whether a hierarchical calibration's parameter is a median, a spread or a correlation."""
+    ending = str(name).rpartition("_")[2]
+    return ending if ending in ("spread", "correlation") else "median"
+
+
+def _with_unit(text: str, parameter: Any) -> str:
+    return f"{figure_text(text, 60)} [{figure_text(unit_text(parameter.unit), 20)}]"

@@ -58,7 +58,7 @@ def _panel(axes: Axes, draws: SensorDraws, colour: str, *, small: bool) -> None:
     grid = np.linspace(low - margin, high + margin, 300)
     predictive = density(reading, grid)
     axes.fill_between(grid, predictive, color=colour, alpha=0.25, linewidth=0, label=_PREDICTIVE)
-    _recorded(axes, recorded)
+    recorded_marks(axes, recorded)
     top = max(predictive.max(), axes.get_ylim()[1] / 1.05)
     peak = density(response, grid)
     peak *= _RESPONSE_HEIGHT * top / peak.max()
@@ -77,7 +77,7 @@ def _panel(axes: Axes, draws: SensorDraws, colour: str, *, small: bool) -> None:
     bare(axes)
 
 
-def _recorded(axes: Axes, recorded: FloatArray) -> None:
+def recorded_marks(axes: Axes, recorded: FloatArray) -> None:
     """Histogram and rug of the recordings, on the scale of the predictive density."""
     if len(recorded) == 0:
         return

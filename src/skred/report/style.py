@@ -107,6 +107,14 @@ def shades(colour: str, n: int) -> list[Any]:
     return mixed
 
 
+def tint(colour: str, amount: float) -> tuple[float, float, float]:
+    """A colour mixed with white: opaque, so that it looks the same in a legend and over another."""
+    from matplotlib.colors import to_rgb
+
+    red, green, blue = (1.0 + (part - 1.0) * amount for part in to_rgb(colour))
+    return red, green, blue
+
+
 def shade_map(colour: str) -> Colormap:
     """Colour map from white to a dark shade of one colour."""
     from matplotlib.colors import LinearSegmentedColormap

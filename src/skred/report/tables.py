@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from skred.report import document as doc
-from skred.report.labels import printable, shortened
+from skred.report.labels import population_role, printable, shortened
 from skred.report.numbers import decimals_for, fixed, is_number, rounded, share, whole
+from skred.report.relative import relative_new_avalanche
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
     from rich.table import Table
     from rich.text import Text
 
@@ -21,13 +23,13 @@ def comparison_table(comparison: doc.Document) -> Table:
     comparison : mapping
         As `skred.report.html.render_comparison` takes it.
     """
+    own = "with every avalanche its own friction" if doc.is_hierarchical(comparison) else ""
+    name = shortened(doc.get(comparison, "campaign", "name"), 36 if own else 60)
     table = _table(
-        _text(
-            f"{shortened(doc.get(comparison, 'campaign', 'name'), 60)}: laws compared by leave-one-event-out"
-        ),
+        _text(f"{name}: laws compared {own or 'by leave-one-event-out'}"),
         left=("law",),
         right=(
-            "exact\nelpd",
+            "\nelpd" if own else "exact\nelpd",
             "differ-\nence",
             "2 se",
             "counts",
@@ -44,30 +46,64 @@ def comparison_table(comparison: doc.Document) -> Table:
     failed = doc.failed(comparison)
     for model in failed:
         table.add_row(_text(shortened(doc.get(model, "id"))), _text("gate failed", "red"), *["-"] * 8)
-    table.caption = _text("\n".join([_explanation(comparison), *map(_failure, failed)]))
+    lines = [_explanation(comparison), *_pooled_line(comparison), *map(_failure, failed)]
+    table.caption = _text("\n".join(lines))
     table.caption_justify = "left"
     return table
 
 
-def summary_table(model: doc.Document, *, probability: float = 0.9) -> Table:
-    """Parameters of one law.
+def summary_table(model: doc.Document, *, probability: float = 0.9) -> RenderableType:
+    """Parameters of one law; of a hierarchical calibration also a new avalanche at each sensor.
 
     Parameters
     ----------
     model : mapping
-        Entry of ``models`` in the comparison document; ``title``, ``parameters`` and ``gate`` are read.
+        Entry of ``models`` in the comparison document; ``title``, ``parameters``, ``gate`` and, where it
+        has them, ``new_avalanche`` and ``error_model`` are read.
     probability : float
         Of the equal-tailed interval from ``low`` to ``high``.
     """
+    from rich.console import Group
+
+    of_population = bool(doc.listed(model, "new_avalanche"))
     table = _table(
         _text(shortened(doc.get(model, "title") or doc.get(model, "id") or "", 76)),
         left=("parameter", "symbol\n(paper)", "unit"),
         right=("mean", "sd", f"{100 * probability:.0f} % interval", "ESS\nbulk", "ESS\ntail", "r-hat"),
     )
     for parameter in doc.listed(model, "parameters"):
-        table.add_row(*_parameter_row(parameter))
-    note = f"Interval equal-tailed, of the mean response. {_gate(model)}"
-    table.caption = _text(note)
+        table.add_row(*_parameter_row(parameter, of_population=of_population))
+    of_what = "across avalanches: see below" if of_population else "of the mean response"
+    table.caption = _text(f"Interval equal-tailed, {of_what}. {_gate(model)}")
+    table.caption_justify = "left"
+    if not of_population:
+        return table
+    kind = f"{100 * probability:.0f} % interval"
+    table.caption = _text(
+        "Every avalanche has its own friction: spread is the standard deviation of its logarithm across"
+        f" avalanches. Intervals equal-tailed. {_gate(model)}"
+    )
+    return Group(table, _text(""), _new_avalanche_table(model, kind))
+
+
+def _new_avalanche_table(model: doc.Document, kind: str) -> Table:
+    table = _table(
+        _text("A new avalanche, beside the recorded ones"),
+        left=("sensor", "unit"),
+        right=("gets\nthere", f"reading,\n{kind}", "mean", "recorded:\nthere", f"\n{kind}", "mean", "n"),
+    )
+    for entry in doc.listed(model, "new_avalanche"):
+        row = relative_new_avalanche({}, entry)
+        table.add_row(
+            _text(shortened(row["sensor"], 24)),
+            _text(shortened(row["unit"], 12)),
+            *(row[k] for k in ("reached", "interval", "mean", "recorded_reached", "recorded_interval")),
+            *(row[k] for k in ("recorded_mean", "n_recorded")),
+        )
+    errors = shortened(doc.get(model, "error_model", "title") or "n/a", 100)
+    table.caption = _text(
+        f"Readings of avalanches that get there; the runout is the length along the track. Errors: {errors}."
+    )
     table.caption_justify = "left"
     return table
 
@@ -113,11 +149,23 @@ def _explanation(comparison: doc.Document) -> str:
     n_events = doc.get(comparison, "campaign", "n_events")
     few = f" with {whole(n_events)} events" if is_number(n_events) and n_events < 100 else ""
     limit = f"{doc.PRACTICAL_DIFFERENCE:.0f}"
+    how = (
+        "by importance sampling, refitted where that cannot be trusted"
+        if doc.is_hierarchical(comparison)
+        else "exact: refitted without each event"
+    )
     return (
-        "elpd in nats, larger is better; exact: refitted without each event. 2 se: doubled standard "
+        f"elpd in nats, larger is better; {how}. 2 se: doubled standard "
         f"error of the difference (the plain one is optimistic{few}). A difference counts if it is at least "
         f"{limit} and exceeds 2 se. Weight: stacking, a share."
     )
+
+
+def _pooled_line(comparison: doc.Document) -> list[str]:
+    """The differences of the pooled calibration beside it, in one line."""
+    models = [m for m in doc.listed(comparison, "pooled", "models") if doc.passed(m)]
+    values = [f"{shortened(doc.get(m, 'id'))} {fixed(doc.get(m, 'difference', 'elpd'))}" for m in models]
+    return [f"Differences of the pooled calibration: {', '.join(values)}."] if values else []
 
 
 def _failure(model: doc.Document) -> str:
@@ -125,14 +173,18 @@ def _failure(model: doc.Document) -> str:
     return f"{shortened(doc.get(model, 'id'))} failed the gate: {'; '.join(problems) or 'sample again'}"
 
 
-def _parameter_row(parameter: doc.Document) -> list[Any]:
+def _parameter_row(parameter: doc.Document, *, of_population: bool) -> list[Any]:
     sd = doc.get(parameter, "sd")
     by_sd, by_both = decimals_for(sd), decimals_for(sd, doc.get(parameter, "mcse_mean"))
     paper = doc.get(parameter, "paper_symbol")
     symbol = f"{doc.get(parameter, 'symbol')}" + (f" ({paper})" if paper else "")
     low, high = (rounded(doc.get(parameter, key), by_sd) for key in ("low", "high"))
+    name = shortened(doc.get(parameter, "name"))
+    if of_population:  # the symbol says of what
+        role = population_role(doc.get(parameter, "name"))
+        name = f"median {name}" if role == "median" else role
     return [
-        _text(shortened(doc.get(parameter, "name"))),
+        _text(name),
         _text(shortened(symbol)),
         _text(shortened(doc.get(parameter, "unit"), 20)),
         rounded(doc.get(parameter, "mean"), by_both),

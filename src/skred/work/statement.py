@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+_NOTABLE_SHARE = 0.05
+
 
 def statement(comparison: dict[str, Any]) -> list[str]:
     """Sentences on which law the recordings prefer, by how much, and how far to trust it."""
@@ -100,6 +102,8 @@ def changes(comparison: dict[str, Any]) -> list[str]:
         " law misses. The hierarchical one gives every avalanche its own parameters and lets its"
         " readings differ from its own front only by what instruments are stated to err."
     ]
+    if ours:
+        sentences += _selection(ours[0])
     if comparison["pooled"]["reason"]:
         return [*sentences, f"There is no pooled calibration here: {comparison['pooled']['reason']}."]
     if not ours or not theirs:
@@ -110,6 +114,19 @@ def changes(comparison: dict[str, Any]) -> list[str]:
     if best["id"] in elpd:
         sentences.append(_level_change(best, best["exact"]["elpd"] - elpd[best["id"]]))
     return sentences
+
+
+def _selection(best: dict[str, Any]) -> list[str]:
+    """Whether the law stops more avalanches above a sensor than were recorded to stop."""
+    rows = [row for row in best.get("new_avalanche", []) if row["recorded_reached"] is not None]
+    row = max(rows, key=lambda row: row["recorded_reached"] - row["reached"], default=None)
+    if row is None or row["recorded_reached"] - row["reached"] < _NOTABLE_SHARE:
+        return []
+    return [
+        f"Under {best['title']} {100 * row['reached']:.0f} % of new avalanches come to {row['sensor']}, of those"
+        f" recorded {100 * row['recorded_reached']:.0f} %: an avalanche that stops above the instruments is not"
+        " recorded, which the likelihood does not know, or its parameters vary in another way than assumed."
+    ]
 
 
 def _order_change(ours: list[dict[str, Any]], theirs: list[dict[str, Any]]) -> str:
