@@ -121,6 +121,6 @@ def test_what_changes_without_a_pooled_calibration() -> None:
 def test_avalanches_that_stop_unseen() -> None:
     row = {"sensor": "LC", "reached": 0.86, "recorded_reached": 0.95}
     text = both([model("A", new_avalanche=[row])], [model("A")])
-    assert "86 % of new avalanches come to LC, of those recorded 95 %" in text
+    assert "86 % of new avalanches come to LC, of recorded ones 95 %" in text
     text = both([model("A", new_avalanche=[row | {"recorded_reached": 0.88}])], [model("A")])
-    assert "of those recorded" not in text
+    assert "of recorded ones" not in text

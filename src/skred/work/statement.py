@@ -122,10 +122,11 @@ def _selection(best: dict[str, Any]) -> list[str]:
     row = max(rows, key=lambda row: row["recorded_reached"] - row["reached"], default=None)
     if row is None or row["recorded_reached"] - row["reached"] < _NOTABLE_SHARE:
         return []
+    predicted, recorded = 100 * row["reached"], 100 * row["recorded_reached"]
     return [
-        f"Under {best['title']} {100 * row['reached']:.0f} % of new avalanches come to {row['sensor']}, of those"
-        f" recorded {100 * row['recorded_reached']:.0f} %: an avalanche that stops above the instruments is not"
-        " recorded, which the likelihood does not know, or its parameters vary in another way than assumed."
+        f"Under {best['title']} {predicted:.0f} % of new avalanches come to {row['sensor']}, of recorded"
+        f" ones {recorded:.0f} %: an avalanche that stops above the instruments is not recorded, which the"
+        " likelihood does not know, or its parameters vary in another way than assumed."
     ]
 
 
