@@ -29,7 +29,7 @@ from skred.inference.population import (
     spread_parameters,
 )
 from skred.inference.problem import Problem
-from skred.inference.rough_population import envelope_around, rough_population
+from skred.inference.rough_population import rough_population
 from skred.inference.surface import Surfaces, build_surfaces
 from skred.physics.geometry import sensor_table
 from skred.physics.kernel import simulate
@@ -42,7 +42,7 @@ _BELOW_SCALE, _ABOVE_SCALE = 6.0, 1.7
 """How far from the log of its prior's scale a strength is looked for."""
 _MEDIAN_LOG_MEAN, _MEDIAN_LOG_SD = -0.64, 1.1
 """Mean and standard deviation of the log of a half-normal variable of scale 1."""
-_COARSE_CELL, _CELL_IN_SPREADS, _CELL_RANGE = 0.25, 0.4, (0.02, 0.2)
+_COARSE_CELL = 0.25
 _CHECKED_EVENTS, _CHECKED_DRAWS = 24, 40
 _SHARP_RUNOUT_M = 4.0
 INTEGRATION_LIMIT = 0.2
@@ -207,10 +207,8 @@ class HierarchicalProblem(Problem):
         n = len(mechanisms)
         resolution = replace(resolution, narrow=resolution.narrow * self._sharpness)
         coarse = build_surfaces(self.fronts(mechanisms), box, COARSE, np.full(n, _COARSE_CELL))
-        mean, covariance = rough_population(coarse, scale + _MEDIAN_LOG_MEAN, np.full(n, _MEDIAN_LOG_SD))
-        envelope = envelope_around(mean, fineness * covariance, self.campaign.n_events)
-        cell = np.clip(_CELL_IN_SPREADS * np.sqrt(np.diag(covariance)), *_CELL_RANGE) / fineness
-        return build_surfaces(fronts, box, resolution, cell, envelope)
+        rough = rough_population(coarse, scale + _MEDIAN_LOG_MEAN, np.full(n, _MEDIAN_LOG_SD))
+        return build_surfaces(fronts, box, resolution, rough.cell / fineness, rough.envelope(fineness))
 
     @cached_property
     def _sharpness(self) -> float:

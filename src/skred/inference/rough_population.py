@@ -1,11 +1,12 @@
 """Where the population is, roughly: expectation-maximisation on coarse surfaces.
 
-It only decides where surfaces are resolved finely; nothing is inferred from it.
+It only decides where and how finely surfaces are resolved; nothing is inferred from it.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,16 +17,52 @@ from skred.inference.surface import Surfaces
 FloatArray = NDArray[np.float64]
 SPREAD_MEDIAN, SPREAD_LOG_SD = 0.13, 0.6
 """Prior of a population's standard deviation of a strength's logarithm: log-normal."""
-_ITERATIONS = 200
+_SEARCH, _ITERATIONS, _ENOUGH = 30, 300, 1e-4
+_STARTING_SPREAD = 0.3
 _PRIOR_EVENTS = 2.0
-_ENOUGH = 1e-4
-_LEAST_SPREAD = 0.03
+_REACH = 2.5
+"""How many posterior standard deviations away a population may be."""
+_CELL_IN_SPREADS, _LEAST_CELL, _LARGEST_CELL = 1.5, 0.02, 0.25
 
 
-def rough_population(
-    surfaces: Surfaces, prior_mean: FloatArray, prior_sd: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Mean and covariance of the logarithms of the strengths, (n,) and (n, n).
+@dataclass(frozen=True, eq=False)
+class RoughPopulation:
+    """A population and how uncertain it is, by strength.
+
+    Attributes
+    ----------
+    mean : (n_strengths,) array
+        Of the logarithms of the strengths.
+    mean_sd : (n_strengths,) array
+        Posterior standard deviation of that.
+    spread : (n_strengths,) array
+        Standard deviation across events.
+    log_spread_sd : (n_strengths,) array
+        Posterior standard deviation of its logarithm.
+    correlation : (n_strengths, n_strengths) array
+    """
+
+    mean: FloatArray
+    mean_sd: FloatArray
+    spread: FloatArray
+    log_spread_sd: FloatArray
+    correlation: FloatArray
+
+    @property
+    def cell(self) -> FloatArray:
+        """Size of a patch over which even the narrowest population to be expected varies little."""
+        narrowest = self.spread * np.exp(-_REACH * self.log_spread_sd)
+        return np.clip(_CELL_IN_SPREADS * narrowest, _LEAST_CELL, _LARGEST_CELL)
+
+    def envelope(self, inflation: float = 1.0) -> Envelope:
+        """Envelope of all populations to be expected, its variances times `inflation`."""
+        widest = self.spread * np.exp(_REACH * self.log_spread_sd)
+        covariance = np.outer(widest, widest) * self.correlation + np.diag((2.0 * self.mean_sd) ** 2)
+        return Envelope(self.mean, np.linalg.inv(np.linalg.cholesky(inflation * covariance)))
+
+
+def rough_population(surfaces: Surfaces, prior_mean: FloatArray, prior_sd: FloatArray) -> RoughPopulation:
+    """Find the population.
 
     Parameters
     ----------
@@ -37,28 +74,66 @@ def rough_population(
     points, within = surfaces.mean[:, :n], surfaces.covariance[:, :n, :n]
     event = np.repeat(np.arange(n_events), np.diff(surfaces.first))
     mean, covariance = prior_mean.copy(), np.eye(n)
-    for _ in range(_ITERATIONS):
-        z = np.linalg.solve(np.linalg.cholesky(covariance), (points - mean).T)
-        exponent = surfaces.log_weights - 0.5 * np.sum(z * z, axis=0)
-        weight = np.exp(exponent - np.maximum.reduceat(exponent, surfaces.first[:-1])[event])
-        weight /= np.bincount(event, weight)[event]
+    for iteration in range(_ITERATIONS):
+        weight = _weights(surfaces, event, points, mean, covariance)
         precision = np.linalg.inv(covariance)
         centre = np.linalg.solve(
             n_events * precision + np.diag(prior_sd**-2.0),
             precision @ (weight @ points) + prior_mean / prior_sd**2,
         )
-        deviation = points - centre
-        moment = np.einsum("k,ki,kj->ij", weight, deviation, deviation)
-        moment += np.einsum("k,kij->ij", weight, within) + _PRIOR_EVENTS * SPREAD_MEDIAN**2 * np.eye(n)
-        change = np.abs(centre - mean).max()
-        mean, covariance = centre, moment / (n_events + _PRIOR_EVENTS)
-        if change < _ENOUGH:
+        moment = _moment(points - centre, weight, within)
+        spread, correlation = _spreads(moment, n_events)
+        change = np.abs(centre - mean).max() + np.abs(spread**2 - np.diag(covariance)).max()
+        mean, covariance = centre, np.outer(spread, spread) * correlation
+        if iteration == _SEARCH:  # found; from here on what the data leave open is the prior's
+            covariance = np.minimum(spread, _STARTING_SPREAD) ** 2 * np.eye(n)
+        elif iteration > _SEARCH and change < _ENOUGH:
             break
-    return mean, covariance
+    own = _own_variance(points, weight, within, event, n_events)
+    informed = np.clip(1.0 - own / spread**2, 0.0, 1.0)
+    mean_sd = 1.0 / np.sqrt(prior_sd**-2.0 + informed.sum(axis=0) / spread**2)
+    log_spread_sd = 1.0 / np.sqrt(SPREAD_LOG_SD**-2.0 + 2.0 * np.sum(informed**2, axis=0))
+    return RoughPopulation(mean, mean_sd, spread, log_spread_sd, correlation)
 
 
-def envelope_around(mean: FloatArray, covariance: FloatArray, n_events: int) -> Envelope:
-    """Envelope of all populations that a campaign of so many events may have."""
-    inflation = (1.5 + 4.0 / math.sqrt(2.0 * n_events)) ** 2 + 4.0 / n_events
-    wide = inflation * covariance + _LEAST_SPREAD**2 * np.eye(len(mean))
-    return Envelope(mean, np.linalg.inv(np.linalg.cholesky(wide)))
+def _weights(
+    surfaces: Surfaces, event: NDArray[np.int64], points: FloatArray, mean: FloatArray, covariance: FloatArray
+) -> FloatArray:
+    """Posterior weight of each patch within its event."""
+    z = np.linalg.solve(np.linalg.cholesky(covariance), (points - mean).T)
+    exponent = surfaces.log_weights - 0.5 * np.sum(z * z, axis=0)
+    weight = np.exp(exponent - np.maximum.reduceat(exponent, surfaces.first[:-1])[event])
+    normalised: FloatArray = weight / np.bincount(event, weight)[event]
+    return normalised
+
+
+def _moment(deviation: FloatArray, weight: FloatArray, within: FloatArray) -> FloatArray:
+    """Sum over events of the expected square of the deviation from the mean."""
+    between = np.einsum("k,ki,kj->ij", weight, deviation, deviation)
+    total: FloatArray = between + np.einsum("k,kij->ij", weight, within)
+    return total
+
+
+def _spreads(moment: FloatArray, n_events: int) -> tuple[FloatArray, FloatArray]:
+    """Most probable spreads under their log-normal prior, by Newton's method, and correlation."""
+    squares = np.diag(moment)
+    log_spread = 0.5 * np.log(squares / n_events + 1e-12)
+    for _ in range(20):
+        ratio = squares * np.exp(-2.0 * log_spread)
+        slope = n_events - ratio + (log_spread - math.log(SPREAD_MEDIAN)) / SPREAD_LOG_SD**2
+        log_spread = log_spread - np.clip(slope / (2.0 * ratio + SPREAD_LOG_SD**-2.0), -1.0, 1.0)
+    regular = moment + _PRIOR_EVENTS * SPREAD_MEDIAN**2 * np.eye(len(moment))
+    scale = np.sqrt(np.diag(regular))
+    return np.exp(log_spread), regular / np.outer(scale, scale)
+
+
+def _own_variance(
+    points: FloatArray, weight: FloatArray, within: FloatArray, event: NDArray[np.int64], n_events: int
+) -> FloatArray:
+    """Posterior variance of each event's own logarithms, (n_events, n_strengths)."""
+    own = np.empty((n_events, points.shape[1]))
+    for k in range(points.shape[1]):
+        mean = np.bincount(event, weight * points[:, k], n_events)
+        square = np.bincount(event, weight * (points[:, k] ** 2 + within[:, k, k]), n_events)
+        own[:, k] = square - mean**2
+    return own

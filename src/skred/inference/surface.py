@@ -25,11 +25,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.inference.bisection import RELEASE_REACH, Bisection, Envelope, Fronts, Resolution
+from skred.inference.bisection import RELEASE_REACH, Bisection, Envelope, Fronts, Resolution, stagger
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 _EVENTS_AT_ONCE = 16
+_FIRST_WIDTH = 0.5
 
 
 class Nodes(NamedTuple):
@@ -109,7 +110,7 @@ def build_surfaces(
         Range of the logarithm of each strength that is searched.
     resolution : Resolution
     cell : (n_strengths,) array
-        Size of a patch: a population should vary little over it.
+        Size of a patch at most: a population should vary little over it.
     envelope : Envelope, optional
         What a population could be at most; without it all of the box counts.
     tell : callable, optional
@@ -117,17 +118,20 @@ def build_surfaces(
     """
     uncertain = fronts.releases.sd > 0.0
     n_events = len(uncertain)
+    steps = (box[:, 1] - box[:, 0]) / np.ceil((box[:, 1] - box[:, 0]) / _FIRST_WIDTH)
+    cell = steps * 0.5 ** np.ceil(np.log2(steps / cell))  # halvings of a first box
     chunks: list[IntArray] = []
     for group in (np.flatnonzero(~uncertain), np.flatnonzero(uncertain)):
         chunks += [group[k : k + _EVENTS_AT_ONCE] for k in range(0, len(group), _EVENTS_AT_ONCE)]
 
     def build(events: IntArray) -> Surfaces:
         bisection = Bisection(fronts, resolution, cell, envelope)
-        edges = [_edges(low, high, 0.5) for low, high in box]
+        edges = [_edges(low - step, high, step) for (low, high), step in zip(box, steps, strict=True)]
         if uncertain[events[0]]:
             edges.append(_edges(0.0, 1.0, 1.0 / (2.0 * RELEASE_REACH)))
         nodes = bisection.nodes(events, edges)
-        return _patches(events, *nodes, cell, bisection.n_runs)
+        origin = box[:, 0] - steps + stagger(np.arange(n_events), steps)
+        return _patches(events, *nodes, origin, cell, bisection.n_runs)
 
     parts: list[Surfaces] = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -146,11 +150,12 @@ def _patches(
     event: IntArray,
     points: FloatArray,
     log_weights: FloatArray,
+    origin: FloatArray,
     cell: FloatArray,
     n_runs: int,
 ) -> Surfaces:
     """Gather nodes by event and cell, into weights and moments."""
-    keys = np.column_stack([event, np.floor(points[:, :-1] / cell).astype(np.int64)])
+    keys = np.column_stack([event, np.floor((points[:, :-1] - origin[event]) / cell).astype(np.int64)])
     found, group = np.unique(keys, axis=0, return_inverse=True)
     most = np.full(len(found), -np.inf)
     np.maximum.at(most, group, log_weights)
