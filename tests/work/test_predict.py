@@ -272,7 +272,7 @@ def test_several_uncertain_releases(problem: HierarchicalProblem) -> None:
         replace(event, release_s_m=700.0 * (k % 2), release_sd_m=5.0)
         for k, event in enumerate(problem.campaign.events)
     )
-    changed = replace(problem, campaign=replace(problem.campaign, events=events), _surfaces={}, _errors={})
+    changed = replace(problem, campaign=replace(problem.campaign, events=events))
     track = prediction_track(changed)
     assert "0 to 700 m, known to 5 m" in track.release_text
     data = predicted(changed, "constant", track)

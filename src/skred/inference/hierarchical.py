@@ -38,8 +38,12 @@ from skred.physics.mechanisms.spec import Mechanism
 from skred.physics.terrain import CELL_M, SMOOTHING_M, build_terrain
 
 FloatArray = NDArray[np.float64]
-_BELOW_SCALE, _ABOVE_SCALE = 6.0, 1.7
-"""How far from the log of its prior's scale a strength is looked for."""
+_BELOW_SCALE, _ABOVE_SCALE = 6.0, 4.5
+"""How far from the log of its prior's scale a strength is looked for.
+
+Far above it: a single slow avalanche may need many times what a median would be.
+"""
+_WIDER_CHECK = 1.0
 _MEDIAN_LOG_MEAN, _MEDIAN_LOG_SD = -0.64, 1.1
 """Mean and standard deviation of the log of a half-normal variable of scale 1."""
 _COARSE_CELL = 0.25
@@ -62,8 +66,9 @@ class HierarchicalProblem(Problem):
 
     error_model: ErrorModel = ERROR_MODELS[DEFAULT_ERRORS]
     place_sd_m: float = PLACE_SD_M
-    _surfaces: dict[tuple[str, ...], Surfaces] = field(default_factory=dict, repr=False)
-    _errors: dict[tuple[str, ...], FloatArray] = field(default_factory=dict, repr=False)
+    # Not init: a problem made from this one by `replace` must not keep what belongs to other recordings.
+    _surfaces: dict[tuple[str, ...], Surfaces] = field(init=False, default_factory=dict, repr=False)
+    _errors: dict[tuple[str, ...], FloatArray] = field(init=False, default_factory=dict, repr=False)
 
     likelihood = "hierarchical"
 
@@ -201,9 +206,10 @@ class HierarchicalProblem(Problem):
     def _resolve(
         self, mechanisms: Sequence[Mechanism], fronts: Fronts, resolution: Resolution, fineness: float
     ) -> Surfaces:
-        """Surfaces with patches `fineness` times smaller and an envelope that much wider than usual."""
+        """Surfaces with patches `fineness` times smaller, and box and envelope wider, than usual (1)."""
         scale = np.log([mechanism.strength.prior_scale for mechanism in mechanisms])
-        box = np.column_stack([scale - _BELOW_SCALE, scale + _ABOVE_SCALE])
+        wider = _WIDER_CHECK * (fineness - 1.0)
+        box = np.column_stack([scale - _BELOW_SCALE - wider, scale + _ABOVE_SCALE + wider])
         n = len(mechanisms)
         resolution = replace(resolution, narrow=resolution.narrow * self._sharpness)
         coarse = build_surfaces(self.fronts(mechanisms), box, COARSE, np.full(n, _COARSE_CELL))
