@@ -38,10 +38,10 @@ from skred.physics.mechanisms.spec import Mechanism
 from skred.physics.terrain import CELL_M, SMOOTHING_M, build_terrain
 
 FloatArray = NDArray[np.float64]
-_BELOW_SCALE, _ABOVE_SCALE = 6.0, 4.5
+_BELOW_SCALE, _ABOVE_SCALE = 6.0, 7.0
 """How far from the log of its prior's scale a strength is looked for.
 
-Far above it: a single slow avalanche may need many times what a median would be.
+Far above it: for a slow avalanche any drag beyond some size may do, and spreads can be above 1.
 """
 _WIDER_CHECK = 1.0
 _MEDIAN_LOG_MEAN, _MEDIAN_LOG_SD = -0.64, 1.1
