@@ -20,7 +20,7 @@ EVENT_DENSITY_CACHE_KEY = int(sha256(Path(__file__).read_bytes()).hexdigest()[:1
 _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 _SQRT_HALF = math.sqrt(0.5)
 _LEAST = 1e-300
-_COMMON_STEPS, _COMMON_STEP = 8, 0.5
+_COMMON_STEPS, _COMMON_STEP = 28, 0.5
 _NEGLIGIBLE = -60.0
 
 
@@ -35,11 +35,13 @@ def reading_sd(event, sensor, prediction, readings):  # type: ignore[no-untyped-
 @njit(cache=True, error_model="numpy", nogil=True)
 def _log_stop(stop, reached, not_reached, place_sd):  # type: ignore[no-untyped-def]
     """Log probability that a front that stops at `stop` is seen to stop between two places."""
-    upper = 0.5 * math.erfc(-(not_reached - stop) / place_sd * _SQRT_HALF) if not_reached < np.inf else 1.0
-    lower = 0.5 * math.erfc(-(reached - stop) / place_sd * _SQRT_HALF) if reached > -np.inf else 0.0
-    if reached > -np.inf and not_reached == np.inf:  # no cancellation far below
-        return math.log(max(0.5 * math.erfc((reached - stop) / place_sd * _SQRT_HALF), _LEAST))
-    return math.log(max(upper - lower, _LEAST))
+    above = (reached - stop) / place_sd * _SQRT_HALF
+    below = (not_reached - stop) / place_sd * _SQRT_HALF
+    if above > 0.0:  # from the upper tail, where the difference does not cancel
+        probability = 0.5 * (math.erfc(above) - math.erfc(below))
+    else:
+        probability = 0.5 * (math.erfc(-below) - math.erfc(-above))
+    return math.log(max(probability, _LEAST))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -53,9 +55,10 @@ def _log_reading(residual, sd, scale, share, degrees):  # type: ignore[no-untype
         return constant - 0.5 * (degrees + 1.0) * math.log1p(square / degrees)
     if share == 0.0:
         return -0.5 * square - math.log(wide) - _LOG_SQRT_2PI
-    usual, outlying = -0.5 * square, -0.5 * square / (OUTLIER_FACTOR * OUTLIER_FACTOR)
-    ratio = share / (OUTLIER_FACTOR * (1.0 - share)) * math.exp(min(outlying - usual, 700.0))
-    return usual + math.log((1.0 - share) * (1.0 + ratio)) - math.log(wide) - _LOG_SQRT_2PI
+    usual = math.log(1.0 - share) - 0.5 * square
+    outlying = math.log(share / OUTLIER_FACTOR) - 0.5 * square / (OUTLIER_FACTOR * OUTLIER_FACTOR)
+    either = max(usual, outlying) + math.log1p(math.exp(-abs(usual - outlying)))
+    return either - math.log(wide) - _LOG_SQRT_2PI
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

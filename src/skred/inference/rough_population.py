@@ -22,7 +22,7 @@ _STARTING_SPREAD = 0.3
 _PRIOR_EVENTS = 2.0
 _REACH = 2.5
 """How many posterior standard deviations away a population may be."""
-_CELL_IN_SPREADS, _LEAST_CELL, _LARGEST_CELL = 1.5, 0.02, 0.25
+_CELL_IN_SPREADS, _LEAST_CELL, _LARGEST_CELL = 1.0, 0.02, 0.25
 
 
 @dataclass(frozen=True, eq=False)
