@@ -1,0 +1,93 @@
+"""The error models' numbers, and recordings as they read them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skred.campaign import Campaign, Sensor, Status, find_campaign, read_campaign
+from skred.inference.error_model import ERROR_MODELS, event_readings
+
+CAMPAIGN = read_campaign(find_campaign("ryggfonn"))
+
+
+@pytest.mark.parametrize("name", ERROR_MODELS)
+def test_every_mixture_is_one(name: str) -> None:
+    model = ERROR_MODELS[name]
+    weights, scales, shares, degrees, common = model.errors
+    assert model.id == name and len(weights) == len(scales) == len(shares)
+    assert_allclose(weights.sum(), 1.0, rtol=1e-12)
+    assert np.all(weights > 0) and np.all(scales > 0) and np.all((shares >= 0) & (shares < 0.1))
+    assert degrees >= 0 and 0 <= common < 1
+
+
+def test_factor_of_the_scaled_errors_is_log_normal() -> None:
+    """Moments E[factor^k] = exp(k^2 / 8) of a log standard deviation of 0.5."""
+    weights, scales, *_ = ERROR_MODELS["scaled"].errors
+    for k in (-2, -1, 1, 2, 3):
+        assert_allclose(weights @ scales**k, np.exp(0.125 * k**2), rtol=1e-3)
+    assert_allclose(weights @ np.log(scales) ** 2, 0.25, rtol=1e-12)
+
+
+def with_a_span() -> Campaign:
+    """Four events, three gates of which the second is a span, and the runout."""
+    rows = [CAMPAIGN.event_ids.index(name) for name in ("19970208", "19920311", "19831031", "19970417")]
+    sensors = list(CAMPAIGN.sensors)
+    sensors[1] = Sensor("gate", "front_velocity", 1750.0, 1850.0, 0.2, 0.5)
+    stated = np.array(CAMPAIGN.stated_sd[rows])
+    stated[0, 0] = 3.5
+    return replace(
+        CAMPAIGN,
+        sensors=tuple(sensors),
+        events=tuple(CAMPAIGN.events[row] for row in rows),
+        values=CAMPAIGN.values[rows],
+        status=CAMPAIGN.status[rows],
+        stated_sd=stated,
+    )
+
+
+def test_readings_are_what_the_campaign_says() -> None:
+    campaign = with_a_span()
+    readings = event_readings(campaign, place_sd_m=5.0)
+    assert_array_equal(readings.observed, campaign.status == Status.OBSERVED)
+    assert_array_equal(readings.values[0], [45.0, 43.0, 40.0, 2135.0])
+    assert np.all(readings.values[~readings.observed] == 0.0)
+    assert_allclose(readings.stated_sd[0], [3.5, 0.0, 0.0, 22.9])
+    assert_allclose(readings.stated_sd[2], [0.0, 0.0, 0.0, 12.0])
+    assert_allclose(readings.relative_sd, [0.1, 0.2, 0.1, 0.0])
+    assert_allclose(readings.absolute_sd, [1.0, 0.5, 1.0, 12.0])
+    assert_array_equal(readings.is_velocity, [True, True, True, False])
+    assert readings.place_sd == 5.0
+    assert all(np.all(np.isfinite(getattr(readings, name))) for name in ("values", "stated_sd"))
+
+
+def test_where_a_front_stopped() -> None:
+    """A speed above 0 was reached, to the end of its span; a speed of 0 tells nothing; nor does a runout."""
+    campaign = with_a_span()
+    readings = event_readings(campaign)
+    # 19970208: past the last gate. 19920311: 0 at the first, not at the span. 19970417: 0 at the last.
+    assert_array_equal(readings.reached, [1910.0, -np.inf, -np.inf, 1850.0])
+    assert_array_equal(readings.not_reached, [np.inf, 1850.0, np.inf, np.inf])
+    passed = campaign.sensors[0]
+    last = replace(campaign, sensors=(replace(passed, s_from_m=500.0, s_to_m=600.0), *campaign.sensors[1:]))
+    assert event_readings(last).reached[3] == 1850.0
+
+
+def test_readings_in_any_order_of_sensors() -> None:
+    campaign = with_a_span()
+    order = [3, 2, 0, 1]
+    other = replace(
+        campaign,
+        sensors=tuple(campaign.sensors[j] for j in order),
+        values=campaign.values[:, order],
+        status=campaign.status[:, order],
+        stated_sd=campaign.stated_sd[:, order],
+    )
+    one, two = event_readings(campaign), event_readings(other)
+    assert_array_equal(one.reached, two.reached)
+    assert_array_equal(one.not_reached, two.not_reached)
+    assert_array_equal(one.values[:, order], two.values)
+    assert_array_equal(one.is_velocity[order], two.is_velocity)
