@@ -234,6 +234,8 @@ Asked: the central 90 % intervals cover the truth in 85 to 95 %.
 
 
 def _calibrated(kind: str) -> str:
+    if not (RESULTS / f"hierarchical_sbc_{kind}.json").exists():
+        return f"\n{kind.capitalize()}: not run yet on the present source.\n"
     result = read(f"hierarchical_sbc_{kind}")
     settings, summary = result["settings"], result["summary"]
     if summary is None:

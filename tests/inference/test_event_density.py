@@ -198,8 +198,6 @@ def test_log_likelihood_of_any_front(
     prediction = np.array([*speeds, stop, stop])
     sd = np.hypot(RELATIVE * prediction[:5], ABSOLUTE)
     readings = readings_of(prediction[:5] + sd * np.array(z), np.array(observed), None, reached, not_reached)
-    if reached > -np.inf and not_reached < np.inf and stop < reached - 5 * PLACE_SD:
-        return  # a difference of two numbers near 1: see the test of an interval far ahead
     found = log_likelihood(1, prediction, readings, ERROR_MODELS[name].errors)
     expected = by_hand(name, prediction, readings)
     if stop_term(stop, readings) < -600:
@@ -276,7 +274,7 @@ def test_log_likelihoods_is_each_of_them() -> None:
 
 # Bounds
 
-UNTIGHT = {"robust": 0.1, "normal": 0.05, "student": 0.1, "scaled": 1.0, "correlated": 0.5}
+UNTIGHT = {"robust": 0.1, "normal": 0.05, "student": 0.1, "scaled": 1.0, "correlated": 1.5}
 """How far, in nats, the bound may fall below: it takes the prediction nearest to each reading, although one
 a little further off can be likelier because its error is smaller; and, for "correlated", a grid."""
 
@@ -324,7 +322,7 @@ def test_bound_holds_within_the_box(
     rows = np.concatenate([inside, [low, high, nearest]])
     inside_too = np.clip(nearest * rng.normal(1.0, 0.05, (60, 6)), low, high)
     rows = np.concatenate([rows, inside_too])
-    if name == "correlated":  # its grid ends there: see the test of a common error further off
+    if name == "correlated":  # beyond, the nearest prediction is less and less the likeliest
         rows = np.array([row for row in rows if abs(common_error(row, readings)) < 4.0])
         if len(rows) == 0:
             return
