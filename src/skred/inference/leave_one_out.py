@@ -57,8 +57,8 @@ def exact_leave_one_out(
     step: JointMetropolis,
     events: Sequence[str],
     seed: int,
-    which: Sequence[int] | None = None,
     tell: Callable[[int, int], None] = lambda done, of: None,
+    which: Sequence[int] | None = None,
 ) -> ExactLoo:
     """Refit without each event and predict it.
 
@@ -70,10 +70,10 @@ def exact_leave_one_out(
     events : sequence of str
         Ids, in the order of the pointwise terms.
     seed : int
-    which : sequence of int, optional
-        Numbers of the events to leave out; by default all.
     tell : callable, optional
         Told the number of refits done and of all.
+    which : sequence of int, optional
+        Numbers of the events to leave out; by default all.
     """
     left_out = range(len(events)) if which is None else which
     rng = np.random.default_rng([seed, 2])

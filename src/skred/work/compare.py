@@ -151,7 +151,9 @@ def scores(
     pareto_k = np.asarray(loo.pareto_k, dtype=float)
     unreliable = np.flatnonzero(~(pareto_k <= float(loo.good_k)))
     which = list(range(len(events))) if exact else unreliable.tolist()
-    refits = exact_leave_one_out(calibration.model, calibration.step, events, seed, which) if which else None
+    refits = (
+        exact_leave_one_out(calibration.model, calibration.step, events, seed, which=which) if which else None
+    )
     return {
         "loo": {
             "elpd": float(loo.elpd),
