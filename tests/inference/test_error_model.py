@@ -28,8 +28,8 @@ def test_factor_of_the_scaled_errors_is_log_normal() -> None:
     """Moments E[factor^k] = exp(k^2 / 8) of a log standard deviation of 0.5."""
     weights, scales, *_ = ERROR_MODELS["scaled"].errors
     for k in (-2, -1, 1, 2, 3):
-        assert_allclose(weights @ scales**k, np.exp(0.125 * k**2), rtol=1e-3)
-    assert_allclose(weights @ np.log(scales) ** 2, 0.25, rtol=1e-12)
+        assert_allclose(weights @ scales**k, np.exp(0.125 * k**2), rtol=5e-3)
+    assert_allclose(weights @ np.log(scales) ** 2, 0.25, rtol=1e-3)
 
 
 def with_a_span() -> Campaign:

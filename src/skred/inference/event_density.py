@@ -62,19 +62,38 @@ def _log_reading(residual, sd, scale, share, degrees):  # type: ignore[no-untype
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
+def _unshifted(value, shift, event, sensor, readings):  # type: ignore[no-untyped-def]
+    """The prediction whose reading, `shift` standard deviations higher, is the value.
+
+    The standard deviation is the prediction's own, which makes it the root of a quadratic equation.
+    """
+    stated = readings.stated_sd[event, sensor]
+    if stated > 0.0:
+        return value - shift * stated
+    absolute, relative = shift * readings.absolute_sd[sensor], shift * readings.relative_sd[sensor]
+    inside = absolute * absolute * (1.0 - relative * relative) + relative * relative * value * value
+    root = math.copysign(math.sqrt(max(inside, 0.0)), shift)
+    below = value + root
+    if abs(below) > 1e-9 * abs(value) + 1e-12:
+        return (value * value - absolute * absolute) / below
+    return value - shift * reading_sd(event, sensor, value, readings)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
 def _nearest(event, sensor, low, high, shift, readings):  # type: ignore[no-untyped-def]
     """The residual of smallest size, and its standard deviation, for predictions between two values.
 
     `shift` is an error common to the velocities, in standard deviations of theirs.
     """
     value = readings.values[event, sensor]
-    prediction = min(max(value, low), high)
+    if shift == 0.0 or not readings.is_velocity[sensor]:
+        shift = 0.0
+        nearest = value
+    else:
+        nearest = _unshifted(value, shift, event, sensor, readings)
+    prediction = min(max(nearest, low), high)
     sd = reading_sd(event, sensor, prediction, readings)
-    if shift != 0.0 and readings.is_velocity[sensor]:
-        prediction = min(max(value - shift * sd, low), high)
-        sd = reading_sd(event, sensor, prediction, readings)
-        return value - prediction - shift * sd, sd
-    return value - prediction, sd
+    return value - prediction - shift * sd, sd
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
