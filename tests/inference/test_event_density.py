@@ -126,7 +126,7 @@ BY_HAND: dict[str, Callable[..., float]] = {
     "scaled": scaled,
 }
 TOLERANCE = dict.fromkeys(BY_HAND, 1e-9) | {"scaled": 0.01}
-"""In nats. The scaled errors are a sum over nodes; a test below says that they are enough for many readings."""
+"""In nats. The scaled errors are a sum over nodes; a test below says that they are enough."""
 
 
 def by_hand(name: str, prediction: np.ndarray, readings: EventReadings) -> float:
