@@ -45,9 +45,16 @@ def contributions_of(
     terrain: Terrain,
     weakening_speed: float = WEAKENING_SPEED_M_S,
 ) -> Contributions:
-    """How the strengths of some mechanisms, in their order, enter the coefficient table."""
-    columns = np.array([int(mechanism.column) for mechanism in mechanisms], dtype=np.int64)
-    profiles = np.array([mechanism.profile(terrain) for mechanism in mechanisms], dtype=float)
+    """How the strengths of some mechanisms, in their order, enter the coefficient table.
+
+    Raises
+    ------
+    ValueError
+        If one of them cannot be a part of a base law.
+    """
+    terms = [mechanism.term(terrain) for mechanism in mechanisms]
+    columns = np.array([int(column) for column, _ in terms], dtype=np.int64)
+    profiles = np.array([profile for _, profile in terms], dtype=float)
     contributions: Contributions = make_contributions(columns, profiles, float(weakening_speed))
     return contributions
 

@@ -1,7 +1,15 @@
 """Speed-independent shear strength: the same retardation everywhere."""
 
 from skred.physics.columns import Column
-from skred.physics.mechanisms.spec import Mechanism, Strength, everywhere
+from skred.physics.mechanisms.spec import (
+    Added,
+    Mechanism,
+    Strength,
+    along_the_track,
+    everywhere,
+    lacking,
+    one_shape,
+)
 
 MECHANISM = Mechanism(
     id="constant_retardation",
@@ -20,4 +28,11 @@ MECHANISM = Mechanism(
     doi="10.3189/S002214300000174X",
     column=Column.CONSTANT,
     profile=everywhere,
+    added=Added(
+        scale=0.8,
+        reason="a shear strength of 200-300 Pa on a metre of snow of 300 kg/m3",
+        direction=along_the_track(Column.CONSTANT, everywhere),
+        shapes=one_shape,
+        joins=lacking("constant_retardation"),
+    ),
 )

@@ -8,7 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.physics.columns import GRAVITY, Column
-from skred.physics.mechanisms.spec import Mechanism, Strength, everywhere
+from skred.physics.mechanisms.spec import (
+    Added,
+    Mechanism,
+    Strength,
+    along_the_track,
+    everywhere,
+    lacking,
+    one_shape,
+)
 from skred.physics.terrain import Terrain
 
 DRY_FRICTION = Strength(
@@ -30,6 +38,13 @@ MECHANISM = Mechanism(
     doi="10.3189/S002214300000174X",
     column=Column.FRICTION,
     profile=everywhere,
+    added=Added(
+        scale=0.2,
+        reason="an ordinary friction coefficient of snow is 0.15-0.4; part of it a base law may hold already",
+        direction=along_the_track(Column.FRICTION, everywhere),
+        shapes=one_shape,
+        joins=lacking("coulomb_friction", "coulomb_friction_without_curvature"),
+    ),
 )
 
 
@@ -44,5 +59,6 @@ WITHOUT_CURVATURE = replace(
     equation="-mu g cos(phi)",
     column=Column.CONSTANT,
     profile=_on_a_straight_slope,
+    added=None,
 )
 """As in the Voellmy-Salm law; its missing part is the mechanism `centrifugal`."""

@@ -1,9 +1,10 @@
-"""What a mechanism says of itself: one spec that drives models, command line, reports, docs."""
+"""What a mechanism says of itself: one spec that drives models, diagnosis, command line, reports, docs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +12,23 @@ from numpy.typing import NDArray
 from skred.physics.columns import Column
 from skred.physics.terrain import Terrain
 
-Profile = Callable[[Terrain], NDArray[np.float64]]
+FloatArray = NDArray[np.float64]
+Profile = Callable[[Terrain], FloatArray]
 """Contribution per unit of strength to a column of the coefficient table, (n_cells,)."""
+
+
+class Group(StrEnum):
+    """What a mechanism blames."""
+
+    PHYSICS = "physics"
+    """A term of the equation of motion."""
+    INSTRUMENT = "instrument"
+    """The recordings."""
 
 
 @dataclass(frozen=True)
 class Strength:
-    """How strong a mechanism is: one non-negative number.
+    """How strong a mechanism is: one number.
 
     Attributes
     ----------
@@ -41,9 +52,127 @@ class Strength:
     prior_reason: str
 
 
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What an added mechanism can refer to: a base law on a terrain, and what was recorded there.
+
+    Attributes
+    ----------
+    terrain : Terrain
+    base : tuple of str
+        Ids of the base law's mechanisms, in order.
+    recorded_m : (float, float)
+        Between which places something was recorded [m].
+    sensors : tuple of str
+        Ids of the sensors, in order.
+    velocities : tuple of bool
+        Which of them read a front velocity.
+    covariates : mapping
+        Numeric covariates of the events by name, standardised, (n_events,) each; constant ones left out.
+    n_events : int
+    """
+
+    terrain: Terrain
+    base: tuple[str, ...]
+    recorded_m: tuple[float, float]
+    sensors: tuple[str, ...]
+    velocities: tuple[bool, ...]
+    covariates: Mapping[str, FloatArray]
+    n_events: int
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Where and how an added mechanism acts; integrated over, with equal weights.
+
+    Attributes
+    ----------
+    s_from_m, s_to_m : float, optional
+        The stretch, where it is local.
+    covariate, sensor : str, optional
+        What it depends on, which instrument it blames.
+    constants : mapping
+        Other constants by symbol with unit, as ``U_c [m s-1]``.
+    """
+
+    s_from_m: float | None = None
+    s_to_m: float | None = None
+    covariate: str | None = None
+    sensor: str | None = None
+    constants: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def place_m(self) -> float | None:
+        """Middle of the stretch."""
+        if self.s_from_m is None or self.s_to_m is None:
+            return None
+        return 0.5 * (self.s_from_m + self.s_to_m)
+
+
+@dataclass(frozen=True, eq=False)
+class Direction:
+    """What one unit of an added mechanism's strength changes: every part is linear in the strength.
+
+    Attributes
+    ----------
+    columns : tuple of Column
+        Columns of the coefficient table that it enters.
+    profiles : (n_columns, n_cells) array
+        With which profile.
+    log_strengths : (n_events,) array or None
+        Change of the logarithm of the base law's first strength, event by event.
+    release : float
+        Shift of all release places [m], downhill positive.
+    log_readings : (n_sensors,) array or None
+        Change of the logarithm of each sensor's readings.
+    weakening_speed : float or None
+        Its speed scale U_c [m/s] where it enters the column of weakening friction.
+    """
+
+    columns: tuple[Column, ...] = ()
+    profiles: FloatArray = field(default_factory=lambda: np.empty((0, 0)))
+    log_strengths: FloatArray | None = None
+    release: float = 0.0
+    log_readings: FloatArray | None = None
+    weakening_speed: float | None = None
+
+
+@dataclass(frozen=True)
+class Added:
+    """How a mechanism joins a law that leaves it out.
+
+    Attributes
+    ----------
+    scale : float
+        Scale of the normal prior of its strength, in the strength's unit: half-normal unless `either_sign`.
+    reason : str
+        Why that scale.
+    direction : callable
+        Setting and shape to Direction.
+    shapes : callable
+        Setting to the shapes to integrate over; none where it cannot be told from these recordings' columns.
+    either_sign : bool
+        Whether the strength may be negative.
+    joins : callable
+        Ids of the base law's mechanisms to whether it can be missing there.
+    """
+
+    scale: float
+    reason: str
+    direction: Callable[[Setting, Shape], Direction]
+    shapes: Callable[[Setting], tuple[Shape, ...]]
+    either_sign: bool = False
+    joins: Callable[[tuple[str, ...]], bool] = lambda base: True
+
+    @property
+    def relevant(self) -> float:
+        """Median of the prior of its size: a strength that matters."""
+        return 0.6745 * self.scale
+
+
 @dataclass(frozen=True)
 class Mechanism:
-    """One summand of the retardation.
+    """One summand of the retardation, or a fault of the instruments that looks like one.
 
     Attributes
     ----------
@@ -53,15 +182,21 @@ class Mechanism:
         In plain words.
     strength : Strength
     equation : str
-        The term as it enters dU^2/(2 ds) = g sin(phi) + a_ret.
+        The term as it enters dU^2/(2 ds) = g sin(phi) + a_ret; what is read instead, for a fault.
     mark : str
         What its presence looks like in recordings.
     reference, doi : str
         Where it comes from.
-    column : Column
-        The column of the coefficient table that its strength enters.
-    profile : callable
+    column : Column, optional
+        The column of the coefficient table that its strength enters as a part of a base law; None where it
+        can only be added to one.
+    profile : callable, optional
         Terrain to (n_cells,) contribution per unit of strength.
+    added : Added, optional
+        How it joins a law that leaves it out.
+    group : Group
+    same_term_as : str
+        Id of a mechanism that is the same term on a stretch: never to be told from it.
     """
 
     id: str
@@ -71,10 +206,80 @@ class Mechanism:
     mark: str
     reference: str
     doi: str
-    column: Column
-    profile: Profile
+    column: Column | None = None
+    profile: Profile | None = None
+    added: Added | None = None
+    group: Group = Group.PHYSICS
+    same_term_as: str = ""
+
+    def term(self, terrain: Terrain) -> tuple[Column, FloatArray]:
+        """Its column and its profile there, as a part of a base law.
+
+        Raises
+        ------
+        ValueError
+            If it can only be added to one.
+        """
+        if self.column is None or self.profile is None:
+            raise ValueError(f"{self.id} can be added to a law, not be a part of a base law")
+        return self.column, self.profile(terrain)
 
 
-def everywhere(terrain: Terrain) -> NDArray[np.float64]:
+def everywhere(terrain: Terrain) -> FloatArray:
     """Profile of a strength that acts alike along the whole track."""
     return np.ones(terrain.n_cells)
+
+
+def on_a_stretch(terrain: Terrain, s_from_m: float, s_to_m: float) -> FloatArray:
+    """Share of each cell that lies on a stretch, (n_cells,)."""
+    edge = terrain.edge_s_m
+    overlap = np.minimum(edge[1:], s_to_m) - np.maximum(edge[:-1], s_from_m)
+    share: FloatArray = np.clip(overlap / np.diff(edge), 0.0, 1.0)
+    return share
+
+
+def one_shape(setting: Setting) -> tuple[Shape, ...]:
+    """Shapes of a mechanism that acts alike along the whole track."""
+    return (Shape(),)
+
+
+def along_the_track(column: Column, profile: Profile) -> Callable[[Setting, Shape], Direction]:
+    """Direction of a mechanism that enters one column with one profile."""
+
+    def direction(setting: Setting, shape: Shape) -> Direction:
+        return Direction((column,), profile(setting.terrain)[None, :])
+
+    return direction
+
+
+def along_a_stretch(column: Column) -> Callable[[Setting, Shape], Direction]:
+    """Direction of a mechanism that enters one column on the shape's stretch."""
+
+    def direction(setting: Setting, shape: Shape) -> Direction:
+        assert shape.s_from_m is not None and shape.s_to_m is not None
+        return Direction((column,), on_a_stretch(setting.terrain, shape.s_from_m, shape.s_to_m)[None, :])
+
+    return direction
+
+
+STRETCHES_M = (75.0, 200.0, 500.0)
+"""Lengths of the stretches that are looked at [m]."""
+_STEP_IN_LENGTHS = 0.4
+
+
+def stretches(setting: Setting) -> tuple[Shape, ...]:
+    """Stretches of several lengths, overlapping, over the recorded part of the track."""
+    first, last = setting.recorded_m
+    shapes = []
+    for length in STRETCHES_M:
+        if length > 1.2 * (last - first):
+            continue
+        n = max(int(np.ceil(max(last - first - length, 0.0) / (_STEP_IN_LENGTHS * length))), 1)
+        for start in np.linspace(first, max(last - length, first), n + 1):
+            shapes.append(Shape(float(start), float(min(start + length, setting.terrain.length_m))))
+    return tuple(shapes)
+
+
+def lacking(*ids: str) -> Callable[[tuple[str, ...]], bool]:
+    """Whether a base law has none of some mechanisms."""
+    return lambda base: not set(ids) & set(base)

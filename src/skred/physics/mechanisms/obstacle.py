@@ -1,0 +1,67 @@
+"""A dam, a wall, a step at one place: what climbing it takes, what its lee side gives back, what is lost."""
+
+import numpy as np
+
+from skred.physics.columns import GRAVITY, Column
+from skred.physics.mechanisms.spec import (
+    Added,
+    Direction,
+    Mechanism,
+    Setting,
+    Shape,
+    Strength,
+    on_a_stretch,
+)
+
+HALF_WIDTH_M = 25.0
+"""Length of the climb and of the descent [m]."""
+LOSS = "loss [m-1]"
+LOSSES_PER_M = (0.006, 0.025)
+"""Energy lost for good in passing, as the exponent of v per metre of height."""
+_STEP_M = 40.0
+
+
+def _shapes(setting: Setting) -> tuple[Shape, ...]:
+    first, last = setting.recorded_m
+    n = max(int(np.ceil((last - first) / _STEP_M)), 1)
+    return tuple(
+        Shape(float(place - HALF_WIDTH_M), float(place + HALF_WIDTH_M), constants=((LOSS, loss),))
+        for place in np.linspace(first, last, n + 1)
+        for loss in LOSSES_PER_M
+        if HALF_WIDTH_M < place < setting.terrain.length_m - HALF_WIDTH_M
+    )
+
+
+def _direction(setting: Setting, shape: Shape) -> Direction:
+    crown = shape.place_m
+    assert crown is not None
+    climb = on_a_stretch(setting.terrain, crown - HALF_WIDTH_M, crown)
+    descent = on_a_stretch(setting.terrain, crown, crown + HALF_WIDTH_M)
+    slope = GRAVITY / HALF_WIDTH_M
+    loss = dict(shape.constants)[LOSS] / (4.0 * HALF_WIDTH_M)
+    profiles = np.array([slope * (climb - descent), loss * (climb + descent)])
+    return Direction((Column.CONSTANT, Column.QUADRATIC), profiles)
+
+
+MECHANISM = Mechanism(
+    id="obstacle",
+    title="an obstacle: a dam, a wall, a step",
+    strength=Strength(
+        name="obstacle_height",
+        symbol="h",
+        paper_symbol="",
+        unit="m",
+        prior_scale=8.0,
+        prior_reason="dams and steps that matter to a front of 20-40 m/s are metres to tens of metres high",
+    ),
+    equation="-(g h / w) [climb - descent] - (l h / 4 w) U^2 around s_o: v < 2 g h stops",
+    mark="stops pile up in front of it; above a threshold of speed fronts pass and lose a share of v",
+    reference="Faug, Gauer, Lied and Naaim (2008), Journal of Geophysical Research 113, F03009",
+    doi="10.1029/2007JF000854",
+    added=Added(
+        scale=8.0,
+        reason="dams and steps that matter to a front of 20-40 m/s are metres to tens of metres high",
+        direction=_direction,
+        shapes=_shapes,
+    ),
+)

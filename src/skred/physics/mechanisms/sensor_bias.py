@@ -1,0 +1,41 @@
+"""One sensor that reads too high or too low by a factor."""
+
+import numpy as np
+
+from skred.physics.mechanisms.spec import Added, Direction, Group, Mechanism, Setting, Shape, Strength
+
+
+def _shapes(setting: Setting) -> tuple[Shape, ...]:
+    """One velocity sensor each; with a single one its factor is no fault but a change of all speeds."""
+    velocities = [name for name, is_one in zip(setting.sensors, setting.velocities, strict=True) if is_one]
+    return tuple(Shape(sensor=name) for name in velocities) if len(velocities) > 1 else ()
+
+
+def _direction(setting: Setting, shape: Shape) -> Direction:
+    return Direction(log_readings=np.array([float(name == shape.sensor) for name in setting.sensors]))
+
+
+MECHANISM = Mechanism(
+    id="sensor_bias",
+    title="one sensor reads too high or too low",
+    strength=Strength(
+        name="log_sensor_factor",
+        symbol="a",
+        paper_symbol="",
+        unit="1",
+        prior_scale=0.15,
+        prior_reason="a calibration or a place that is off by 15 % of the reading",
+    ),
+    equation="-0 m s-2: reading = exp(a) times the front's speed, at one sensor",
+    mark="equal and opposite work in the two stretches beside the sensor",
+    reference="Sargsyan, Najm and Ghanem (2015), International Journal of Chemical Kinetics 47, 246-276",
+    doi="10.1002/kin.20906",
+    added=Added(
+        scale=0.15,
+        reason="a calibration or a place that is off by 15 % of the reading",
+        direction=_direction,
+        shapes=_shapes,
+        either_sign=True,
+    ),
+    group=Group.INSTRUMENT,
+)
