@@ -1,0 +1,226 @@
+"""Evidence over the population, its events' strengths integrated already: Laplace, and importance sampling.
+
+Coordinates of the population: means of the log strengths, logarithms of the spreads, inverse hyperbolic
+tangents of the partial correlations. Compiled, because a diagnosis asks for it a thousand times.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+from skred.diagnosis.mixed import MeanPrior
+from skred.diagnosis.modes import Population
+from skred.inference.event_density import integrated_log_density
+from skred.inference.population import LKJ_SHAPE
+from skred.inference.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
+from skred.inference.surface import Nodes
+
+FloatArray = NDArray[np.float64]
+_LOG_MEDIAN, _LOG_SD, _SHAPE = math.log(SPREAD_MEDIAN), SPREAD_LOG_SD, LKJ_SHAPE
+_LOG_2PI = math.log(2.0 * math.pi)
+_STEP = 2e-3
+_DEGREES = 5.0
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _factor(psi, n):  # type: ignore[no-untyped-def]
+    """Lower Cholesky factor of the covariance; partial correlations as in `population.population_factor`."""
+    factor = np.zeros((n, n))
+    for i in range(n):
+        left = math.exp(psi[n + i])
+        for j in range(i):
+            # Pairs in the order (0, 1), (0, 2), ..., (1, 2), ...
+            r = math.tanh(psi[2 * n + j * n - j * (j + 1) // 2 + i - j - 1])
+            factor[i, j] = left * r
+            left *= math.sqrt(1.0 - r * r + 1e-12)
+        factor[i, i] = left
+    return factor
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _log_prior(psi, n, log_scale):  # type: ignore[no-untyped-def]
+    """Log prior density in these coordinates, but for the constants of the correlations."""
+    total = 0.0
+    for i in range(n):
+        # Half-normal median, in the logarithm.
+        z = psi[i] - log_scale[i]
+        total += 0.5 * math.log(2.0 / math.pi) - 0.5 * math.exp(2.0 * z) + z
+        z = (psi[n + i] - _LOG_MEDIAN) / _LOG_SD
+        total += -0.5 * z * z - math.log(_LOG_SD) - 0.5 * _LOG_2PI
+    position = 2 * n
+    for j in range(n):
+        for _ in range(j + 1, n):
+            shape = _SHAPE + 0.5 * (n - 2 - j)
+            r = math.tanh(psi[position])
+            total += shape * math.log(max(1.0 - r * r, 1e-300))
+            position += 1
+    return total
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _log_target(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-untyped-def]
+    n_events = first.size - 1
+    means = np.empty((n_events, n))
+    for i in range(n):
+        means[:, i] = psi[i]
+    density = integrated_log_density(means, _factor(psi, n), first, points, log_weights)
+    total = _log_prior(psi, n, log_scale)
+    for event in range(n_events):
+        total += density[event]
+    return total if total == total else -np.inf
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _climb(psi, n, log_scale, first, points, log_weights, n_steps):  # type: ignore[no-untyped-def]
+    """Newton's method with halved steps: the top, its height, and minus the Hessian there."""
+    size = psi.size
+    best = _log_target(psi, n, log_scale, first, points, log_weights)
+    gradient, hessian = np.empty(size), np.empty((size, size))
+    for _ in range(n_steps):
+        for i in range(size):
+            up, down = psi.copy(), psi.copy()
+            up[i] += _STEP
+            down[i] -= _STEP
+            high = _log_target(up, n, log_scale, first, points, log_weights)
+            low = _log_target(down, n, log_scale, first, points, log_weights)
+            gradient[i] = (high - low) / (2.0 * _STEP)
+            hessian[i, i] = -(high - 2.0 * best + low) / _STEP**2
+            for j in range(i):
+                total = 0.0
+                for side_i in (-1.0, 1.0):
+                    for side_j in (-1.0, 1.0):
+                        there = psi.copy()
+                        there[i] += side_i * _STEP
+                        there[j] += side_j * _STEP
+                        value = _log_target(there, n, log_scale, first, points, log_weights)
+                        total += side_i * side_j * value
+                hessian[i, j] = hessian[j, i] = -total / (4.0 * _STEP**2)
+        values, axes = np.linalg.eigh(hessian)
+        along = axes.T @ gradient
+        step = axes @ (along / np.maximum(np.abs(values), 0.5))
+        largest = np.abs(step).max()
+        if largest > 1.0:
+            step /= largest
+        gained = -1.0
+        for _ in range(8):
+            new = _log_target(psi + step, n, log_scale, first, points, log_weights)
+            gained = new - best
+            if gained >= -1e-9:
+                break
+            step *= 0.4
+        if gained < -1e-9:
+            break
+        psi = psi + step
+        best += gained
+        if gained < 1e-3:
+            break
+    return psi, best, hessian
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _log_targets(psis, n, log_scale, first, points, log_weights):  # type: ignore[no-untyped-def]
+    result = np.empty(len(psis))
+    for k in range(len(psis)):
+        result[k] = _log_target(psis[k], n, log_scale, first, points, log_weights)
+    return result
+
+
+class Evidence(NamedTuple):
+    """What the population makes of nodes.
+
+    Attributes
+    ----------
+    log_evidence : float
+        By Laplace's formula.
+    psi : (n_psi,) array
+        Most probable population, in the coordinates of this module.
+    covariance : (n_psi, n_psi) array
+    """
+
+    log_evidence: float
+    psi: FloatArray
+    covariance: FloatArray
+
+    def population(self, n: int) -> Population:
+        """The most probable population."""
+        factor = _factor(self.psi, n)
+        return Population(self.psi[None, :n].copy(), (factor @ factor.T)[None])
+
+
+def coordinates(population: Population, group: int = 0) -> FloatArray:
+    """A group's population in the coordinates of this module."""
+    covariance = population.covariance[group]
+    n = len(covariance)
+    spread = np.sqrt(np.diag(covariance))
+    factor = np.linalg.cholesky(covariance)
+    partial = []
+    for j in range(n):
+        for i in range(j + 1, n):
+            left = math.sqrt(max(covariance[i, i] - float(np.sum(factor[i, :j] ** 2)), 1e-12))
+            partial.append(math.atanh(float(np.clip(factor[i, j] / left, -0.95, 0.95))))
+    return np.concatenate([population.mean[group], np.log(spread), partial])
+
+
+def _log_correlation_constant(n: int) -> float:
+    """Of the prior of the partial correlations: (1 + r) / 2 is Beta(shape, shape)."""
+    total = 0.0
+    for j in range(n):
+        shape = LKJ_SHAPE + 0.5 * (n - 2 - j)
+        each = float(gammaln(2.0 * shape) - 2.0 * gammaln(shape)) - (2.0 * shape - 1.0) * math.log(2.0)
+        total += (n - 1 - j) * each
+    return total
+
+
+def evidence(nodes: Nodes, log_scale: FloatArray, start: FloatArray, n_steps: int = 12) -> Evidence:
+    """Evidence of nodes over the population, by Laplace's formula.
+
+    Parameters
+    ----------
+    log_scale : (n_base,) array
+        Logarithm of the scales of the medians' half-normal priors.
+    start : (n_psi,) array
+    """
+    n = len(log_scale)
+    psi, best, hessian = _climb(start, n, log_scale, *nodes, n_steps)
+    values, axes = np.linalg.eigh(hessian)
+    values = np.maximum(values, 0.05)
+    covariance = (axes / values) @ axes.T
+    laplace = best + 0.5 * (len(psi) * _LOG_2PI - float(np.log(values).sum()))
+    return Evidence(laplace + _log_correlation_constant(n), psi, covariance)
+
+
+def importance_evidence(
+    nodes: Nodes, log_scale: FloatArray, found: Evidence, n_draws: int, seed: int
+) -> tuple[float, float]:
+    """Evidence by importance sampling around the Laplace approximation, and its standard error in nats."""
+    rng = np.random.default_rng([seed, 11])
+    n = len(found.psi)
+    factor = 1.15 * np.linalg.cholesky(found.covariance)
+    normal = rng.standard_normal((n_draws, n))
+    stretch = np.sqrt(_DEGREES / rng.chisquare(_DEGREES, n_draws))
+    white = normal * stretch[:, None]
+    draws = found.psi + white @ factor.T
+    targets = _log_targets(draws, len(log_scale), log_scale, *nodes)
+    log_t = float(gammaln(0.5 * (_DEGREES + n)) - gammaln(0.5 * _DEGREES))
+    log_t -= 0.5 * n * math.log(_DEGREES * math.pi) + float(np.log(np.diag(factor)).sum())
+    log_q = log_t - 0.5 * (_DEGREES + n) * np.log1p(np.sum(white**2, axis=1) / _DEGREES)
+    log_w = targets - log_q
+    most = float(log_w.max())
+    weights = np.exp(log_w - most)
+    mean = float(weights.mean())
+    error = float(weights.std() / math.sqrt(n_draws) / mean)
+    return most + math.log(mean) + _log_correlation_constant(len(log_scale)), error
+
+
+def prior_log_scale(prior: MeanPrior) -> FloatArray:
+    """Logarithm of the half-normal scales that a prior of the mean stands for."""
+    from skred.diagnosis.mixed import MEDIAN_LOG_MEAN
+
+    result: FloatArray = prior.mean - MEDIAN_LOG_MEAN
+    return result

@@ -1,0 +1,172 @@
+"""The most probable strengths and release of each event, given its population: Gauss-Newton, row by row."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.extension import Extension
+from skred.diagnosis.slopes import reading_slopes
+from skred.inference.error_model import Errors, EventReadings
+from skred.inference.event_density import log_likelihoods
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+_LARGEST_STEP = 1.0
+_STARTING_DAMPING = 1e-3
+_SETTLED = 1e-3
+
+
+class Rows(NamedTuple):
+    """Recordings to be explained: those of a campaign, or of many replicates of it one after the other.
+
+    Attributes
+    ----------
+    event : (n_rows,) integer array
+        Whose release and covariates each row has.
+    group : (n_rows,) integer array
+        Which replicate it belongs to.
+    readings : EventReadings
+        With one row each.
+    errors : Errors
+    """
+
+    event: IntArray
+    group: IntArray
+    readings: EventReadings
+    errors: Errors
+
+    @property
+    def n_groups(self) -> int:
+        """Number of replicates."""
+        return int(self.group[-1]) + 1
+
+
+class Population(NamedTuple):
+    """Normal population of the logarithms of the strengths, one for each group.
+
+    Attributes
+    ----------
+    mean : (n_groups, n_base) array
+    covariance : (n_groups, n_base, n_base) array
+    """
+
+    mean: FloatArray
+    covariance: FloatArray
+
+    @property
+    def precision(self) -> FloatArray:
+        """Inverse covariances, the release's unit precision last, (n_groups, n_base + 1, n_base + 1)."""
+        n = self.mean.shape[1]
+        result = np.zeros((len(self.mean), n + 1, n + 1))
+        result[:, :n, :n] = np.linalg.inv(self.covariance)
+        result[:, n, n] = 1.0
+        return result
+
+
+class Modes(NamedTuple):
+    """Most probable points and what the readings say around them.
+
+    Attributes
+    ----------
+    points : (n_rows, n_base + 1) array
+    predictions : (n_rows, n_columns) array
+    by_points : (n_rows, n_columns, n_base + 1) array
+    by_strengths : (n_rows, n_columns, n_directions) array
+    slope, curvature : (n_rows, n_columns) arrays
+        Of the log likelihood by the predictions.
+    """
+
+    points: FloatArray
+    predictions: FloatArray
+    by_points: FloatArray
+    by_strengths: FloatArray
+    slope: FloatArray
+    curvature: FloatArray
+
+    @property
+    def information(self) -> FloatArray:
+        """Of the readings about the points, (n_rows, n_base + 1, n_base + 1)."""
+        result: FloatArray = np.einsum(
+            "rij,ri,rik->rjk", self.by_points, self.curvature, self.by_points, optimize=True
+        )
+        return result
+
+
+def look_around(extension: Extension, rows: Rows, points: FloatArray, strengths: FloatArray) -> Modes:
+    """Tangents and slopes at some points; strengths are (n_directions,) or (n_rows, n_directions)."""
+    predictions, by_points, by_strengths = extension.tangents(rows.event, points, strengths)
+    at = np.arange(len(points))
+    slope, curvature = reading_slopes(at, predictions, rows.readings, rows.errors)
+    return Modes(points, predictions, by_points, by_strengths, slope, curvature)
+
+
+def log_joint(
+    extension: Extension, rows: Rows, points: FloatArray, strengths: FloatArray, population: Population
+) -> FloatArray:
+    """Log likelihood of each row plus the exponent of its population's density, (n_rows,)."""
+    predictions = extension.predict(rows.event, points, strengths)
+    likelihood: FloatArray = log_likelihoods(np.arange(len(points)), predictions, rows.readings, rows.errors)
+    deviation = points.copy()
+    deviation[:, :-1] -= population.mean[rows.group]
+    return likelihood - 0.5 * np.einsum(
+        "ri,rij,rj->r", deviation, population.precision[rows.group], deviation
+    )
+
+
+def event_modes(
+    extension: Extension,
+    rows: Rows,
+    start: FloatArray,
+    strengths: FloatArray,
+    population: Population,
+    n_steps: int = 12,
+) -> Modes:
+    """Most probable points by damped Gauss-Newton steps; a step that makes a row worse is not taken."""
+    points = start.copy()
+    precision = population.precision[rows.group]
+    best = log_joint(extension, rows, points, strengths, population)
+    damping = np.full(len(points), _STARTING_DAMPING)
+    around = look_around(extension, rows, points, strengths)
+    for _ in range(n_steps):
+        deviation = points.copy()
+        deviation[:, :-1] -= population.mean[rows.group]
+        gradient = np.einsum("ri,rij->rj", around.slope, around.by_points)
+        gradient -= np.einsum("rij,rj->ri", precision, deviation)
+        hessian = around.information + precision
+        diagonal = np.einsum("rii->ri", hessian)
+        damped = hessian.copy()
+        np.einsum("rii->ri", damped)[:] = diagonal * (1.0 + damping[:, None])
+        step = np.linalg.solve(damped, gradient[:, :, None])[:, :, 0]
+        size = np.abs(step).max(axis=1)
+        step *= np.minimum(1.0, _LARGEST_STEP / np.maximum(size, 1e-12))[:, None]
+        new = log_joint(extension, rows, points + step, strengths, population)
+        better = new >= best - 1e-9
+        points = np.where(better[:, None], points + step, points)
+        gained = np.where(better, new - best, 0.0)
+        best = np.where(better, new, best)
+        damping = np.where(better, 0.2 * damping, np.maximum(20.0 * damping, 0.1))
+        around = look_around(extension, rows, points, strengths)
+        if np.all(better & (gained < _SETTLED)):
+            break
+    return around
+
+
+def take_rows(readings: EventReadings, rows: IntArray) -> EventReadings:
+    """Recordings of some events, in this order, perhaps repeated."""
+    return readings._replace(
+        values=readings.values[rows],
+        observed=readings.observed[rows],
+        stated_sd=readings.stated_sd[rows],
+        reached=readings.reached[rows],
+        not_reached=readings.not_reached[rows],
+    )
+
+
+def campaign_rows(extension: Extension) -> Rows:
+    """The recordings of the campaign itself."""
+    problem = extension.problem
+    n = problem.campaign.n_events
+    return Rows(np.arange(n), np.zeros(n, dtype=np.int64), problem.readings, problem.error_model.errors)

@@ -1,0 +1,37 @@
+"""Prior odds and what becomes of them: the rule of the campaign format, in one place."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from skred.physics.mechanisms.spec import Group, Mechanism
+
+NOTHING, UNLISTED = "nothing", "unlisted"
+SHARES = {NOTHING: 0.5, Group.PHYSICS: 0.35, Group.INSTRUMENT: 0.1, UNLISTED: 0.05}
+"""Prior probability of each group, shared equally by its members."""
+
+
+def prior_odds(raced: Iterable[Mechanism]) -> dict[str, float]:
+    """Prior probability of each id, `nothing` and `unlisted` included.
+
+    A group without members gives its share to none: the rest is what it is relative to each other.
+    """
+    raced = list(raced)
+    odds = {NOTHING: SHARES[NOTHING], UNLISTED: SHARES[UNLISTED]}
+    for group in Group:
+        members = [mechanism.id for mechanism in raced if mechanism.group is group]
+        odds |= {name: SHARES[group] / len(members) for name in members}
+    total = sum(odds.values())
+    return {name: share / total for name, share in odds.items()}
+
+
+def probabilities(log_factors: Mapping[str, float], odds: Mapping[str, float]) -> dict[str, float]:
+    """Posterior probabilities from log Bayes factors against nothing; `nothing` itself is 0."""
+    logs = {name: math.log(odds[name]) + log_factors.get(name, 0.0) for name in odds}
+    most = max(logs.values())
+    weights = {name: math.exp(max(value - most, -700.0)) for name, value in logs.items()}
+    total = float(np.sum(list(weights.values())))
+    return {name: weight / total for name, weight in weights.items()}

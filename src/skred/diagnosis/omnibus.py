@@ -1,0 +1,93 @@
+"""Is anything wrong? The evidence for anything at all, against what clean campaigns show.
+
+Whole campaigns are simulated from the base law's posterior and everything is refitted to each, so that the
+price of looking at many mechanisms and places is paid; sampling stops as soon as the answer is clear
+(Besag and Clifford, 1991, doi 10.1093/biomet/78.2.301).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.extension import extended
+from skred.diagnosis.mixed import fit_population
+from skred.diagnosis.modes import Population, Rows
+from skred.diagnosis.replicas import replicas
+from skred.diagnosis.screen import Screen
+
+FloatArray = NDArray[np.float64]
+LIMIT = 0.01
+"""Share of clean campaigns that may be called wrong."""
+_ENOUGH_ABOVE = 8
+_BATCH = 25
+
+
+@dataclass(frozen=True, eq=False)
+class Omnibus:
+    """The check's outcome.
+
+    Attributes
+    ----------
+    statistic : float
+        Log odds of anything against nothing, in the linear model.
+    simulated : (n,) array
+        The same of clean campaigns.
+    """
+
+    statistic: float
+    simulated: FloatArray
+
+    @property
+    def p_value(self) -> float:
+        """Share of clean campaigns at least as odd; where sampling stopped early by Besag and Clifford's rule."""
+        above = int(np.sum(self.simulated >= self.statistic))
+        if above >= _ENOUGH_ABOVE:
+            return above / len(self.simulated)
+        return (above + 1) / (len(self.simulated) + 1)
+
+    @property
+    def fired(self) -> bool:
+        """Whether the calibrated limit is passed."""
+        return self.p_value <= LIMIT
+
+
+def omnibus(
+    screen: Screen,
+    rows: Rows,
+    start: tuple[Population, FloatArray],
+    draws: tuple[FloatArray, FloatArray],
+    seed: int,
+    most: int = 300,
+) -> Omnibus:
+    """Check the base law.
+
+    Parameters
+    ----------
+    start : (Population, points)
+        Of the real recordings.
+    draws : (n, n_base) and (n, n_base, n_base) arrays
+        Means and factors of populations from the base law's posterior, at least `most` of them.
+    """
+    statistic = float(_refitted(screen, rows, start)[0])
+    rng = np.random.default_rng([seed, 21])
+    extension = extended(screen.problem, screen.law)
+    simulated: list[FloatArray] = []
+    for first in range(0, most, _BATCH):
+        batch = slice(first, min(first + _BATCH, most))
+        means, factors = draws[0][batch], draws[1][batch]
+        made, points = replicas(extension, np.empty(0), means, factors, rng)
+        population = Population(means.copy(), np.einsum("gij,gkj->gik", factors, factors))
+        simulated.append(_refitted(screen, made, (population, points)))
+        if np.sum(np.concatenate(simulated) >= statistic) >= _ENOUGH_ABOVE:
+            break
+    return Omnibus(statistic, np.concatenate(simulated))
+
+
+def _refitted(screen: Screen, rows: Rows, start: tuple[Population, FloatArray]) -> FloatArray:
+    """The statistic after refitting populations and events, (n_groups,)."""
+    extension = extended(screen.problem, screen.law)
+    population, points = fit_population(extension, rows, np.empty(0), screen.prior, start)
+    return screen.statistic(screen.scores(rows, points, population))

@@ -1,0 +1,181 @@
+"""The cheap look at everything that could be missing: efficient scores at the events' modes.
+
+It is what detection limits come from, and the omnibus check's statistic: the evidence for anything at all
+over every mechanism, place, instrument and the unlisted force, with their prior odds, in the linear
+model. Being cheap, it is computed for the recordings and for simulated ones alike.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import log_ndtr, logsumexp
+
+from skred.diagnosis.extension import Extension
+from skred.diagnosis.mixed import MeanPrior, Scores, efficient_scores, mean_prior
+from skred.diagnosis.modes import Modes, Population, Rows, look_around
+from skred.diagnosis.odds import prior_odds
+from skred.diagnosis.unlisted import KINDS, Kind, hats, knots
+from skred.inference.hierarchical import HierarchicalProblem
+from skred.physics.columns import Column
+from skred.physics.law import Law
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A mechanism of one shape that could be missing."""
+
+    mechanism: Mechanism
+    shape: Shape
+    direction: Direction
+
+    @property
+    def with_speed(self) -> bool:
+        """Whether it enters with U itself, which the kernel is slow at."""
+        return bool({Column.LINEAR, Column.WEAKENING} & set(self.direction.columns))
+
+
+def candidates(setting: Setting, *, ties: bool = True) -> list[Candidate]:
+    """All that could be missing from a base law; without `ties`, one of each two that are the same term."""
+    found = []
+    for mechanism in mechanisms().values():
+        added = mechanism.added
+        if added is None or not added.joins(setting.base) or (mechanism.same_term_as and not ties):
+            continue
+        for shape in added.shapes(setting):
+            found.append(Candidate(mechanism, shape, added.direction(setting, shape)))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """Everything that could be missing from a law on a campaign.
+
+    Attributes
+    ----------
+    problem : HierarchicalProblem
+    law : Law
+    setting : Setting
+    """
+
+    problem: HierarchicalProblem
+    law: Law
+    setting: Setting
+
+    @cached_property
+    def candidates(self) -> list[Candidate]:
+        """The candidates, those that enter with U last."""
+        return sorted(candidates(self.setting), key=lambda candidate: candidate.with_speed)
+
+    @cached_property
+    def knots_m(self) -> FloatArray:
+        """Places of the knots of the unlisted force [m]."""
+        return knots(self.setting)
+
+    @cached_property
+    def columns(self) -> tuple[Column, ...]:
+        """How the unlisted force goes with speed."""
+        return tuple(dict.fromkeys(kind.column for kind in KINDS))
+
+    @cached_property
+    def _parts(self) -> list[Extension]:
+        """Extensions whose directions follow each other: candidates, profiles; then candidates with U."""
+        basis = hats(self.setting.terrain, self.knots_m)
+        profiles = [Direction((column,), row[None, :]) for column in self.columns for row in basis]
+        plain = [c.direction for c in self.candidates if not c.with_speed]
+        parts = [[*plain, *profiles]]
+        by_scale: dict[float | None, list[Direction]] = {}
+        for candidate in self.candidates:
+            if candidate.with_speed:
+                by_scale.setdefault(candidate.direction.weakening_speed, []).append(candidate.direction)
+        parts += list(by_scale.values())
+        return [Extension(self.problem, self.law, tuple(part)) for part in parts]
+
+    @cached_property
+    def _order(self) -> FloatArray:
+        """Where each candidate's direction is, over all parts."""
+        position: dict[int, int] = {}
+        for part in self._parts:
+            for direction in part.directions:
+                position[id(direction)] = len(position)
+        return np.array([position[id(candidate.direction)] for candidate in self.candidates])
+
+    @cached_property
+    def prior(self) -> MeanPrior:
+        """Prior of the population's mean."""
+        return mean_prior(self.law)
+
+    def scores(self, rows: Rows, points: FloatArray, population: Population) -> Scores:
+        """Efficient scores of all directions at the events' modes."""
+        around: list[Modes] = []
+        for part in self._parts:
+            around.append(look_around(part, rows, points, np.zeros(len(part.directions))))
+        by_strengths = np.concatenate([part.by_strengths for part in around], axis=2)
+        modes = around[0]._replace(by_strengths=by_strengths)
+        return efficient_scores(modes, rows, population, self.prior)
+
+    def of_candidates(self, scores: Scores) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Score, information kept and raw information of each candidate, (n_groups, n_candidates)."""
+        order = self._order
+        return scores.score[:, order], scores.own[:, order], scores.raw[:, order]
+
+    def log_factors(self, scores: Scores) -> FloatArray:
+        """Log Bayes factor of each candidate in the linear model, (n_groups, n_candidates)."""
+        score, information, _ = self.of_candidates(scores)
+        result = np.empty_like(score)
+        for k, candidate in enumerate(self.candidates):
+            added = candidate.mechanism.added
+            assert added is not None
+            precision = information[:, k] + added.scale**-2.0
+            result[:, k] = 0.5 * score[:, k] ** 2 / precision - 0.5 * np.log(added.scale**2 * precision)
+            if not added.either_sign:
+                result[:, k] += math.log(2.0) + log_ndtr(score[:, k] / np.sqrt(precision))
+        return result
+
+    def log_factor_of_unlisted(self, scores: Scores) -> FloatArray:
+        """Log Bayes factor of the unlisted force in the linear model, (n_groups,)."""
+        first = sum(not candidate.with_speed for candidate in self.candidates)
+        n = len(self.knots_m)
+        factors = []
+        for kind in KINDS:
+            start = first + n * self.columns.index(kind.column)
+            part = slice(start, start + n)
+            factors.append(
+                _of_profile(scores.score[:, part], scores.information[:, part, part], self._cover(kind))
+            )
+        result: FloatArray = logsumexp(np.array(factors), axis=0) - math.log(len(KINDS))
+        return result
+
+    def _cover(self, kind: Kind) -> FloatArray:
+        distance = (self.knots_m[:, None] - self.knots_m[None, :]) / kind.length_m
+        cover: FloatArray = kind.amplitude**2 * (np.exp(-0.5 * distance**2) + 1e-6 * np.eye(len(distance)))
+        return cover
+
+    def statistic(self, scores: Scores) -> FloatArray:
+        """Log odds that anything is missing against nothing, in the linear model, (n_groups,)."""
+        factors, unlisted = self.log_factors(scores), self.log_factor_of_unlisted(scores)
+        odds = prior_odds({candidate.mechanism for candidate in self.candidates})
+        ids = np.array([candidate.mechanism.id for candidate in self.candidates])
+        terms = [unlisted + math.log(odds["unlisted"])]
+        for name in dict.fromkeys(ids):
+            chosen = factors[:, ids == name]
+            terms.append(logsumexp(chosen, axis=1) - math.log(chosen.shape[1]) + math.log(odds[name]))
+        result: FloatArray = logsumexp(np.array(terms), axis=0) - math.log(odds["nothing"])
+        return result
+
+
+def _of_profile(score: FloatArray, information: FloatArray, cover: FloatArray) -> FloatArray:
+    """Log Bayes factor of a normal process in the linear model, (n_groups,)."""
+    inside = np.eye(len(cover)) + cover @ information
+    _, log_det = np.linalg.slogdet(inside)
+    pulled = np.linalg.solve(inside, np.einsum("ij,gj->gi", cover, score)[:, :, None])[:, :, 0]
+    result: FloatArray = 0.5 * np.einsum("gi,gi->g", score, pulled) - 0.5 * log_det
+    return result

@@ -1,0 +1,176 @@
+"""The unlisted force: a profile along the track, of no shape in particular, inside the equation of motion.
+
+A normal process for the missing retardation per unit mass, either independent of speed or in proportion to
+U^2, of several correlation lengths; its amplitude is what listed mechanisms do. It is the way out of the
+list, and it says where: missing forces estimated inside the equation, not in the residuals (Hooker, 2009,
+doi 10.1111/j.1541-0420.2008.01172.x), with base strengths, events' deviations and releases having their
+share first (orthogonal model error: Sargsyan, Huan and Najm, 2019, doi
+10.1615/Int.J.UncertaintyQuantification.2019027384).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.curves import Base, Fit, refit
+from skred.diagnosis.extension import Extension, extended
+from skred.diagnosis.mixed import efficient_scores, mean_prior
+from skred.diagnosis.modes import Population, look_around
+from skred.physics.columns import Column
+from skred.physics.mechanisms.spec import Direction, Setting
+from skred.physics.terrain import Terrain
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One prior of the profile.
+
+    Attributes
+    ----------
+    column : Column
+        CONSTANT or QUADRATIC: how it goes with speed.
+    unit : str
+    amplitude : float
+        Standard deviation of the profile.
+    length_m : float
+        Correlation length.
+    """
+
+    column: Column
+    unit: str
+    amplitude: float
+    length_m: float
+
+
+KINDS = tuple(
+    Kind(column, unit, amplitude, length)
+    for column, unit, amplitude in ((Column.CONSTANT, "m s-2", 0.8), (Column.QUADRATIC, "m-1", 1.5e-3))
+    for length in (80.0, 250.0)
+)
+_MOST_KNOTS, _LEAST_STEP_M = 16, 30.0
+_ROUNDS = 6
+_SHARES = (1.0, 0.4, 0.15, 0.05)
+_SETTLED = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A fitted profile of one kind.
+
+    Attributes
+    ----------
+    kind : Kind
+    knots_m : (n,) array
+        Between which it is linear; 0 outside.
+    mean : (n,) array
+        At the knots, in the kind's unit; positive retards.
+    covariance : (n, n) array
+    log_bayes_factor : float
+        Against no such force.
+    gain : float
+        Gain in log evidence at the mean itself, before the price of its freedom.
+    fit : Fit
+        Population and events with the mean in.
+    """
+
+    kind: Kind
+    knots_m: FloatArray
+    mean: FloatArray
+    covariance: FloatArray
+    log_bayes_factor: float
+    gain: float
+    fit: Fit
+
+
+def knots(setting: Setting) -> FloatArray:
+    """Places of the knots [m]: the recorded part of the track."""
+    first, last = setting.recorded_m
+    n = int(np.clip(round((last - first) / _LEAST_STEP_M), 4, _MOST_KNOTS))
+    return np.linspace(first, min(last, setting.terrain.length_m), n)
+
+
+def hats(terrain: Terrain, at: FloatArray) -> FloatArray:
+    """Piecewise linear basis, (n_knots, n_cells): 1 at its own knot, 0 at all others and outside."""
+    middle = 0.5 * (terrain.edge_s_m[1:] + terrain.edge_s_m[:-1])
+    inside = (middle >= at[0]) & (middle <= at[-1])
+    rows = [np.interp(middle, at, unit) * inside for unit in np.eye(len(at))]
+    return np.array(rows)
+
+
+def combined(setting: Setting, kind: Kind, at: FloatArray, values: FloatArray) -> Direction:
+    """The profile as one direction, of strength 1."""
+    return Direction((kind.column,), (values @ hats(setting.terrain, at))[None, :])
+
+
+def fit_profile(base: Base, kind: Kind) -> Profile:
+    """Fit the profile by Gauss-Newton steps around the events' modes; its evidence with nodes at the top."""
+    at = knots(base.setting)
+    basis = hats(base.setting.terrain, at)
+    directions = [Direction((kind.column,), row[None, :]) for row in basis]
+    wide = extended(base.problem, base.law, [*base.directions, *directions])
+    n_before = len(base.directions)
+    distance = (at[:, None] - at[None, :]) / kind.length_m
+    prior = kind.amplitude**2 * (np.exp(-0.5 * distance**2) + 1e-6 * np.eye(len(at)))
+    precision = np.linalg.inv(prior)
+    values, population, points = np.zeros(len(at)), base.population, base.fit.points
+    information = np.zeros_like(prior)
+    score, information = _scores(base, wide, n_before, values, population, points)
+    fit, height = base.fit, base.fit.found.log_evidence
+    for _ in range(_ROUNDS):
+        step = np.linalg.solve(information + precision, score - precision @ values)
+        for share in _SHARES:
+            new = values + share * step
+            tried = _fit_at(base, kind, at, new, (population, points))
+            gained = tried.found.log_evidence - 0.5 * float(new @ precision @ new) - height
+            if gained > 0.0:
+                break
+        else:
+            break
+        values, fit, height = new, tried, height + gained
+        population, points = fit.found.population(len(base.law.mechanisms)), fit.points
+        score, information = _scores(base, wide, n_before, values, population, points)
+        if gained < _SETTLED:
+            break
+    gain = fit.found.log_evidence - base.fit.found.log_evidence
+    _, log_det = np.linalg.slogdet(np.eye(len(at)) + prior @ information)
+    cover = np.linalg.inv(information + precision)
+    factor = gain - 0.5 * float(values @ precision @ values) - 0.5 * float(log_det)
+    return Profile(kind, at, values, 0.5 * (cover + cover.T), max(factor, -0.5 * float(log_det)), gain, fit)
+
+
+def _fit_at(
+    base: Base, kind: Kind, at: FloatArray, values: FloatArray, start: tuple[Population, FloatArray]
+) -> Fit:
+    """Population and events with the profile in."""
+    direction = combined(base.setting, kind, at, values)
+    extension = extended(base.problem, base.law, [*base.directions, direction])
+    strengths = np.append(base.strengths, 1.0)[None, :]
+    return refit(extension, base.rows, strengths, start, base.log_scale)[0]
+
+
+def _scores(
+    base: Base,
+    wide: Extension,
+    n_before: int,
+    values: FloatArray,
+    population: Population,
+    points: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Efficient score and information of the knots' values at what they are."""
+    strengths = np.concatenate([base.strengths, values])
+    around = look_around(wide, base.rows, points, strengths)
+    found = efficient_scores(around, base.rows, population, mean_prior(base.law))
+    return found.score[0, n_before:], found.information[0, n_before:, n_before:]
+
+
+def log_evidence_of(profiles: list[Profile]) -> float:
+    """Log Bayes factor of the unlisted force: the kinds with equal weights."""
+    factors = np.array([profile.log_bayes_factor for profile in profiles])
+    most = float(factors.max())
+    return most + math.log(float(np.exp(factors - most).mean()))
