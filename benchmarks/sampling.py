@@ -23,7 +23,6 @@ import peers.single_thread  # noqa: F401
 import hashlib
 import json
 import logging
-import os
 import traceback
 import warnings
 from importlib import import_module
@@ -43,6 +42,7 @@ from models.pcm import LAW
 from peers.common import PARAMETERS, Drawn
 from skred.campaign import find_campaign, read_campaign
 from skred.inference.problem import PooledProblem, pooled_problem
+from skred.work.output import write_text
 
 Run = dict[str, Any]
 """One finished (sampler, seed): its figures, or its error."""
@@ -120,9 +120,7 @@ class Results:
         """Store a run; the file is never seen half written."""
         self.runs.append(run)
         if self._file is not None:
-            partial = self._file.with_name(self._file.name + ".part")
-            partial.write_text(json.dumps({**self._header, "runs": self.runs}, indent=1) + "\n")
-            os.replace(partial, self._file)
+            write_text(self._file, json.dumps({**self._header, "runs": self.runs}, indent=1) + "\n")
 
 
 def settings_of(sampler: Sampler, quick: bool) -> dict[str, Any]:

@@ -240,6 +240,8 @@ def _calibrated(kind: str) -> str:
     settings, summary = result["settings"], result["summary"]
     if summary is None:
         return f"\n{kind.capitalize()}: not complete, {len(result['simulations'])} campaigns done.\n"
+    if not summary["uniformity"]:
+        return f"\n{kind.capitalize()}: all {summary['errors']} campaigns ended in an error.\n"
     rows = ""
     for name, row in summary["uniformity"].items():
         coverage = "- | "

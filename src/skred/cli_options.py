@@ -1,9 +1,13 @@
 """Options that commands share, each with its check and its help."""
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter, validators
+
+if TYPE_CHECKING:
+    from skred.inference.sampling import SamplerSettings
 
 Campaigns = Annotated[str, Parameter(help="A folder, or the name of an embedded campaign.")]
 Models = Annotated[str, Parameter(help="Laws, separated by commas.")]
@@ -63,3 +67,25 @@ Out = Annotated[
 Force = Annotated[bool, Parameter(name="--force", negative="", help="Use a folder that holds files.")]
 Quiet = Annotated[bool, Parameter(name="--quiet", negative="", help="Write nothing but errors.")]
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Write the result as JSON to stdout.")]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Sampling:
+    """Options of a command that samples: ``sampling: Sampling = SAMPLING`` gives it all of them."""
+
+    draws: Draws = 1000
+    tune: Tune = None
+    chains: Chains = 4
+    seed: Seed = 0
+
+    def settings(self, likelihood: str, sampler: Samplers = "metropolis") -> "SamplerSettings":
+        """As the sampler wants them, for a likelihood."""
+        from skred.inference.sampling import SamplerSettings
+
+        tune = self.tune or TUNE[likelihood]
+        return SamplerSettings(sampler, self.draws, tune, self.chains, self.seed)
+
+
+SAMPLING = Sampling()
+"""How a command samples unless told otherwise."""

@@ -10,7 +10,18 @@ from numpy.typing import NDArray
 from skred.report.draws import INTERVAL, chains_of, density, gate_text, interval
 from skred.report.labels import figure_text, parameter_label, population_label, symbol_label, symbol_text
 from skred.report.numbers import decimals_for, rounded
-from skred.report.style import GREY, INK, WIDTH, bare, law_colours, new_figure, shade_map, shades, styled
+from skred.report.style import (
+    GREY,
+    INK,
+    WIDTH,
+    bare,
+    law_colours,
+    new_figure,
+    panels_in,
+    shade_map,
+    shades,
+    styled,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -147,13 +158,10 @@ def marginals_figure(tree: xr.DataTree, law: Law, parameters: Sequence[Parameter
     rows = -(-n // columns)
     title = f"What the recordings say of each parameter, against the prior\n{figure_text(law.title, 80)}"
     figure = new_figure(0.9 + 2.4 * rows, title)
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes, parameter in zip(panels, shown, strict=False):
+    for axes, parameter in zip(panels_in(figure, n, columns), shown, strict=True):
         prior = chains_of(tree, parameter.name, "prior").ravel()
         _marginal(axes, chains_of(tree, parameter.name).ravel(), prior, law_colours([law.id])[law.id])
         axes.set_xlabel(_label(parameter, law, n).replace("\n", " "))
-    for axes in panels[n:]:
-        axes.remove()
     return figure
 
 

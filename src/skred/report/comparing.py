@@ -7,31 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skred.report.document import (
-    PRACTICAL_DIFFERENCE,
-    Document,
-    get,
-    is_hierarchical,
-    listed,
-    pareto_k_limit,
-    ranked,
-)
-from skred.report.draws import MAX_SENSORS
-from skred.report.labels import figure_text, unit_text
-from skred.report.numbers import fixed, floats, is_number
-from skred.report.style import (
-    GREY,
-    INK,
-    PALE,
-    RECORDED,
-    WIDTH,
-    law_colours,
-    law_markers,
-    legend_below,
-    new_figure,
-    styled,
-    write_png,
-)
+from skred.report.comparing_likelihoods import likelihoods_figure
+from skred.report.comparing_parts import law_axis, practical_band, styles, typeset
+from skred.report.comparing_sensors import new_avalanches_figure, predictions_figure
+from skred.report.document import Document, get, is_hierarchical, listed, pareto_k_limit, ranked
+from skred.report.labels import figure_text
+from skred.report.numbers import floats, is_number
+from skred.report.style import GREY, INK, legend_below, new_figure, styled, write_png
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,8 +32,6 @@ def save_comparison_figures(comparison: Document, folder: Path) -> dict[str, Pat
         By name: comparison_elpd, pointwise, pareto_k, predictions, evidence; of a hierarchical comparison
         that has a pooled one beside it also likelihoods.
     """
-    from skred.report.comparing_likelihoods import likelihoods_figure, new_avalanches_figure
-
     makers = {
         "comparison_elpd": elpd_figure,
         "pointwise": pointwise_figure,
@@ -68,25 +48,6 @@ def save_comparison_figures(comparison: Document, folder: Path) -> dict[str, Pat
     return files
 
 
-def law_axis(axes: Axes, laws: list[Document]) -> None:
-    """One row per law, best at the top."""
-    axes.set_yticks(range(len(laws)), [figure_text(law["id"], 24) for law in laws])
-    axes.set_ylim(len(laws) - 0.5, -0.5)
-    axes.spines["left"].set_visible(False)
-    axes.tick_params(axis="y", length=0)
-
-
-def styles(comparison: Document) -> tuple[dict[str, str], dict[str, str]]:
-    """Colour and marker of each law."""
-    ids = [str(law["id"]) for law in listed(comparison, "models")]
-    return law_colours(ids), law_markers(ids)
-
-
-def typeset(number: float) -> str:
-    """Two decimals, with the minus sign of the axes."""
-    return fixed(number).replace("-", "\N{MINUS SIGN}")
-
-
 @styled
 def elpd_figure(comparison: Document) -> Figure | None:
     """Differences of elpd to the best law, with their standard errors as given and doubled."""
@@ -98,9 +59,7 @@ def elpd_figure(comparison: Document) -> Figure | None:
     title = f"How much worse each law predicts an avalanche left out, against {best}"
     figure = new_figure(1.65 + 0.36 * len(laws), title)
     axes = figure.subplots()
-    label = f"no practical difference: less than {PRACTICAL_DIFFERENCE:.0f}"
-    axes.axvspan(-PRACTICAL_DIFFERENCE, PRACTICAL_DIFFERENCE, color=PALE, alpha=0.7, linewidth=0, label=label)
-    axes.axvline(0, color=GREY, linewidth=0.8)
+    practical_band(axes)
     for row, law in enumerate(laws):
         difference, se, doubled = floats([get(law, "difference", k) for k in ("elpd", "se", "se_doubled")])
         colour = colours[law["id"]]
@@ -202,54 +161,6 @@ def pareto_k_figure(comparison: Document) -> Figure | None:
     axes.set_ylabel("Pareto k")
     legend_below(figure, [axes], columns=5)
     return figure
-
-
-@styled
-def predictions_figure(comparison: Document) -> Figure | None:
-    """Interval of each law's mean response at each sensor, against the recorded mean."""
-    laws = [law for law in ranked(comparison) if listed(law, "response")]
-    if not laws:
-        return None
-    sensors = [(entry["sensor"], entry["unit"]) for entry in listed(laws[0], "response")]
-    shown = sensors[:MAX_SENSORS]
-    columns = 1 if len(shown) == 1 else 2 if len(shown) <= 4 else 3
-    rows = -(-len(shown) // columns)
-    more = f" (the first {MAX_SENSORS} of {len(sensors)} sensors)" if len(shown) < len(sensors) else ""
-    title = f"Mean response of each law against the recorded mean{more}"
-    figure = new_figure(0.9 + rows * (0.75 + 0.24 * len(laws)), title, width=WIDTH)
-    panels = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
-    for axes, (sensor, unit) in zip(panels, shown, strict=False):
-        _responses(axes, comparison, laws, sensor, unit)
-    for axes in panels[len(shown) :]:
-        axes.remove()
-    legend_below(figure, panels[: len(shown)], columns=3)
-    return figure
-
-
-def _responses(axes: Axes, comparison: Document, laws: list[Document], sensor: str, unit: str) -> None:
-    colours, markers = styles(comparison)
-    reference = get(comparison, "campaign", "reference_s_m")
-    from_reference = unit == "m" and is_number(reference)
-    offset = float(reference) if from_reference else 0.0
-    percent = 100 * (get(comparison, "interval", "probability") or 0.9)
-    keys = ("mean", "low", "high", "recorded_mean", "recorded_se")
-    for row, law in enumerate(laws):
-        found = [entry for entry in listed(law, "response") if entry["sensor"] == sensor]
-        mean, low, high, recorded, se = floats([get(found[0], key) for key in keys] if found else [None] * 5)
-        if row == 0 and np.isfinite(recorded):
-            axes.axvline(recorded - offset, color=RECORDED, linewidth=1.2, label="recorded mean")
-            if np.isfinite(se):
-                left, right = recorded - se - offset, recorded + se - offset
-                axes.axvspan(left, right, color=GREY, alpha=0.25, linewidth=0, label="its standard error")
-        colour = colours[law["id"]]
-        axes.hlines(row, low - offset, high - offset, color=colour, linewidth=2.2)
-        axes.plot(mean - offset, row, marker=markers[law["id"]], color=colour, markersize=5)
-    axes.plot([], [], color=GREY, linewidth=2.2, label=f"mean response, {percent:.0f} % interval")
-    law_axis(axes, laws)
-    axes.locator_params(axis="x", nbins=6)
-    axes.set_title(figure_text(sensor, 30))
-    quantity = "relative to the reference " if from_reference else ""
-    axes.set_xlabel(f"{quantity}[{figure_text(unit_text(unit), 20)}]")
 
 
 @styled

@@ -147,10 +147,9 @@ def shown_sensors(campaign: Campaign) -> tuple[Sensor, ...]:
     return campaign.sensors[:MAX_SENSORS]
 
 
-def left_out(campaign: Campaign) -> str:
+def left_out(n_sensors: int) -> str:
     """Says that sensors are left out; empty where none is."""
-    n = campaign.n_sensors
-    return f" (the first {MAX_SENSORS} of {n} sensors)" if n > MAX_SENSORS else ""
+    return f" (the first {MAX_SENSORS} of {n_sensors} sensors)" if n_sensors > MAX_SENSORS else ""
 
 
 def recorded_at(problem: Problem, sensor: Sensor) -> dict[str, Any]:

@@ -13,9 +13,9 @@ from skred.report.comparing import (
     evidence_figure,
     pareto_k_figure,
     pointwise_figure,
-    predictions_figure,
     save_comparison_figures,
 )
+from skred.report.comparing_sensors import predictions_figure
 from skred.report.new_avalanches import new_avalanche_figure, new_avalanche_track_figure
 from skred.report.population import events_figure, population_figure
 from skred.report.predictive import predictive_figure

@@ -19,7 +19,18 @@ from skred.report.draws import (
 )
 from skred.report.labels import figure_text
 from skred.report.predictive import recorded_marks
-from skred.report.style import INK, bare, law_colours, legend_below, new_figure, shades, styled, tint
+from skred.report.style import (
+    INK,
+    bare,
+    grid_for,
+    law_colours,
+    legend_below,
+    new_figure,
+    panels_in,
+    shades,
+    styled,
+    tint,
+)
 from skred.report.track_panels import highest_recorded, track_figure
 
 if TYPE_CHECKING:
@@ -41,23 +52,20 @@ _SHOWN = (0.002, 0.998)
 def new_avalanche_figure(tree: xr.DataTree, law: Law, problem: Problem) -> Figure:
     """Distribution of a new avalanche's reading against the recorded one, of each of up to twelve sensors."""
     sensors = shown_sensors(problem.campaign)
-    columns = 1 if len(sensors) == 1 else 2 if len(sensors) <= 4 else 3
-    rows = -(-len(sensors) // columns)
-    title = f"A new avalanche against the recorded ones{left_out(problem.campaign)}"
+    rows, columns = grid_for(len(sensors))
+    title = f"A new avalanche against the recorded ones{left_out(problem.campaign.n_sensors)}"
     height = 1.1 + (2.75 if columns > 2 else 2.5) * rows
     figure = new_figure(height, f"{title}\n{figure_text(law.title, 80)}")
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    panels = panels_in(figure, len(sensors), columns)
     colour = law_colours([law.id])[law.id]
-    for axes, sensor in zip(panels, sensors, strict=False):
+    for axes, sensor in zip(panels, sensors, strict=True):
         draws = new_avalanche(tree, problem, sensor)
         _reading_panel(axes, draws, colour)
         text = f"{sensor_title(sensor)}\n{reached_text(draws, problem.terrain.length_m)}"
         if columns > 2:
             text = text.replace(": ", "\n", 1)
         axes.set_title(text, fontsize=7.5 if columns > 2 else 8)
-    for axes in panels[len(sensors) :]:
-        axes.remove()
-    legend_below(figure, panels[: len(sensors)], columns=2)
+    legend_below(figure, panels, columns=2)
     return figure
 
 

@@ -17,7 +17,17 @@ from skred.report.draws import (
     shown_sensors,
 )
 from skred.report.labels import figure_text
-from skred.report.style import GREY, RECORDED, bare, law_colours, legend_below, new_figure, styled
+from skred.report.style import (
+    GREY,
+    RECORDED,
+    bare,
+    grid_for,
+    law_colours,
+    legend_below,
+    new_figure,
+    panels_in,
+    styled,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,16 +47,13 @@ _RESPONSE_HEIGHT = 1.25
 def predictive_figure(tree: xr.DataTree, law: Law, problem: PooledProblem) -> Figure:
     """One panel per sensor, up to twelve."""
     sensors = shown_sensors(problem.campaign)
-    columns = 1 if len(sensors) == 1 else 2 if len(sensors) <= 4 else 3
-    rows = -(-len(sensors) // columns)
-    title = f"Predicted against recorded{left_out(problem.campaign)}\n{figure_text(law.title, 80)}"
+    rows, columns = grid_for(len(sensors))
+    title = f"Predicted against recorded{left_out(problem.campaign.n_sensors)}\n{figure_text(law.title, 80)}"
     figure = new_figure(1.0 + (2.4 if columns > 2 else 2.15) * rows, title)
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes, sensor in zip(panels, sensors, strict=False):
+    panels = panels_in(figure, len(sensors), columns)
+    for axes, sensor in zip(panels, sensors, strict=True):
         _panel(axes, sensor_draws(tree, problem, sensor), law_colours([law.id])[law.id], small=columns > 2)
-    for axes in panels[len(sensors) :]:
-        axes.remove()
-    legend_below(figure, panels[: len(sensors)], columns=2)
+    legend_below(figure, panels, columns=2)
     return figure
 
 

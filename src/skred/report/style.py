@@ -133,6 +133,20 @@ def new_figure(height: float, title: str, width: float = WIDTH) -> Figure:
     return figure
 
 
+def grid_for(n: int) -> tuple[int, int]:
+    """Rows and columns of a figure with one panel for each of `n` sensors."""
+    columns = 1 if n == 1 else 2 if n <= 4 else 3
+    return -(-n // columns), columns
+
+
+def panels_in(figure: Figure, n: int, columns: int, *, sharey: bool = False) -> list[Axes]:
+    """`n` panels, row by row; the last row need not be full."""
+    panels = figure.subplots(-(-n // columns), columns, squeeze=False, sharey=sharey).ravel()
+    for axes in panels[n:]:
+        axes.remove()
+    return list(panels[:n])
+
+
 def bare(axes: Axes) -> None:
     """Take away the vertical axis, where heights have no unit worth reading."""
     axes.set_yticks([])

@@ -27,11 +27,10 @@ from skred.physics.law import Law
 from skred.work.alpha_beta_entry import alpha_beta_entry
 from skred.work.calibrate import Calibration, calibrate
 from skred.work.output import write_json, write_text
+from skred.work.paired import best_first, paired_difference, sum_se
 from skred.work.statement import statement
 
 EVIDENCE_SEEDS = 2
-PRACTICAL = 4.0
-"""A smaller difference in elpd is no practical difference."""
 Tell = Callable[[str], None]
 
 
@@ -188,7 +187,7 @@ def _exact_entry(
         pointwise[list(which)] = refits.pointwise
     return {
         "elpd": float(pointwise.sum()),
-        "se": float(np.sqrt(len(pointwise) * np.var(pointwise, ddof=1))),
+        "se": sum_se(pointwise),
         "mcse": refits.mcse if refits is not None else 0.0,
         "pointwise": pointwise.tolist(),
         "refitted": [events[k] for k in which],
@@ -201,20 +200,13 @@ def rank(entries: list[dict[str, Any]], trees: dict[str, Any]) -> list[dict[str,
 
     Entries whose gate failed come last and are not compared.
     """
-    valid = sorted((e for e in entries if e["gate"]["passed"]), key=lambda e: -e["exact"]["elpd"])
+    valid, failed = best_first(entries, lambda entry: entry["exact"]["elpd"])
     weights = _stacking([e["id"] for e in valid], trees)
     for entry in valid:
-        pairs = np.subtract(entry["exact"]["pointwise"], valid[0]["exact"]["pointwise"])
-        se = float(np.sqrt(len(pairs) * np.var(pairs, ddof=1)))
-        difference = float(pairs.sum())
-        entry["difference"] = {
-            "elpd": difference,
-            "se": se,
-            "se_doubled": 2.0 * se,
-            "practical": bool(abs(difference) >= PRACTICAL and abs(difference) > 2.0 * se),
-        }
+        difference = paired_difference(entry["exact"]["pointwise"], valid[0]["exact"]["pointwise"])
+        entry["difference"] = difference._asdict()
         entry["weight"] = weights[entry["id"]]
-    return valid + [e for e in entries if not e["gate"]["passed"]]
+    return valid + failed
 
 
 def _stacking(ids: Sequence[str], trees: dict[str, Any]) -> dict[str, float]:

@@ -7,15 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical import HierarchicalProblem
 from skred.inference.problem import PooledProblem
 from skred.inference.sampling import SamplerSettings
 from skred.physics.law import Law
 from skred.work.calibrate import calibrate
-from skred.work.compare import PRACTICAL, Tell, score, scores, write_comparison
+from skred.work.compare import Tell, score, scores, write_comparison
+from skred.work.paired import best_first, paired_difference
 from skred.work.statement import changes
 
 _ERROR_MODEL_SEEDS, _ERROR_MODEL_SMC_DRAWS = 1, 500
@@ -92,13 +91,11 @@ def _error_models(
                 seeds, draws = _ERROR_MODEL_SEEDS, _ERROR_MODEL_SMC_DRAWS
                 entry |= scores(calibration, exact=False, evidence_seeds=seeds, evidence_draws=draws)
         entries.append({"id": model.id, "title": model.title, **_error_model_scores(entry)})
-    valid = sorted((e for e in entries if e["gate"]["passed"]), key=lambda e: -e["elpd"])
+    valid, failed = best_first(entries, lambda entry: entry["elpd"])
     for entry in valid:
-        pairs = np.subtract(entry["pointwise"], valid[0]["pointwise"])
-        se, elpd = float(np.sqrt(len(pairs) * np.var(pairs, ddof=1))), float(pairs.sum())
-        practical = bool(abs(elpd) >= PRACTICAL and abs(elpd) > 2.0 * se)
-        entry["difference"] = {"elpd": elpd, "se": se, "practical": practical}
-    return valid + [entry for entry in entries if not entry["gate"]["passed"]]
+        difference = paired_difference(entry["pointwise"], valid[0]["pointwise"])
+        entry["difference"] = {key: getattr(difference, key) for key in ("elpd", "se", "practical")}
+    return valid + failed
 
 
 def _error_model_scores(entry: dict[str, Any]) -> dict[str, Any]:

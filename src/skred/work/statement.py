@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from skred.report.document import PRACTICAL_DIFFERENCE
+
 _NOTABLE_SHARE = 0.05
 
 
@@ -41,8 +43,8 @@ def _preference(valid: list[dict[str, Any]], n_events: int) -> list[str]:
         sentences.append(f"{model['title']} predicts worse by {_by(model)}.")
     for model in close:
         sentences.append(
-            f"{model['title']} is behind by {_by(model)}: no practical difference by the rule of at least 4"
-            " and more than twice the standard error."
+            f"{model['title']} is behind by {_by(model)}: no practical difference by the rule of at least"
+            f" {PRACTICAL_DIFFERENCE:.0f} and more than twice the standard error."
         )
     if n_events < 100:
         sentences.append(
