@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import Akima1DInterpolator
 
-from skred.diagnosis.event_nodes import USUAL, Budget, event_nodes
+from skred.diagnosis.event_nodes import FIRST, USUAL, Budget, event_nodes
 from skred.diagnosis.extension import Extension, extended, setting_of
 from skred.diagnosis.marginal import Evidence, coordinates, evidence, prior_log_scale
 from skred.diagnosis.mixed import mean_prior
@@ -25,9 +25,13 @@ from skred.physics.law import Law
 from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
 
 FloatArray = NDArray[np.float64]
-_GRID = (0.15, 0.4, 0.8, 1.4, 2.3, 3.5)
+_GRID = (0.2, 0.6, 1.2, 2.2, 3.5)
 """Strengths at first, in scales of the prior."""
-_ROUNDS = 2
+_NEAR = (-3.5, -2.0, -1.0, 0.0, 1.0, 2.0, 3.5)
+"""Strengths around what was found before, in its standard deviations."""
+_ROUNDS, _MOST_ROUNDS = 2, 6
+_FAR_MEAN, _FAR_SPREAD = 0.7, 0.35
+"""Change of a population after which nodes are made anew: of its mean in spreads, of a log spread."""
 _FINE = 401
 """Points at which a curve is integrated."""
 _DEEP = 40.0
@@ -89,6 +93,7 @@ def refit(
     start: tuple[Population, FloatArray],
     log_scale: FloatArray,
     budget: Budget = USUAL,
+    first_budget: Budget | None = None,
     n_rounds: int = _ROUNDS,
 ) -> list[Fit]:
     """Refit population and events at some strengths, one group of rows each.
@@ -100,31 +105,50 @@ def refit(
     strengths : (n_groups, n_directions) array
     start : (Population, (n_events, n_base + 1) array)
         Of one group.
+    first_budget : Budget, optional
+        Of the rounds before the last, which only move the population there.
     """
-    n_groups, n_events = len(strengths), len(rows.event)
-    many = _repeated(rows, n_groups)
-    given = np.repeat(strengths, n_events, axis=0)
-    population = Population(
-        np.repeat(start[0].mean, n_groups, axis=0), np.repeat(start[0].covariance, n_groups, axis=0)
-    )
-    points = np.tile(start[1], (n_groups, 1))
-    n = population.mean.shape[1]
-    psi = [coordinates(population, k) for k in range(n_groups)]
-    found: list[Evidence] = []
-    for _ in range(n_rounds):
-        modes = event_modes(extension, many, points, given, population, n_steps=8)
-        points = modes.points
-        nodes = event_nodes(extension, many, given, population, modes, budget)
-        found = [
-            evidence(part, log_scale, start_psi)
-            for part, start_psi in zip(_split(nodes, n_groups, n_events), psi, strict=True)
-        ]
-        psi = [one.psi for one in found]
-        parts = [one.population(n) for one in found]
-        population = Population(
-            np.concatenate([part.mean for part in parts]), np.concatenate([part.covariance for part in parts])
-        )
-    return [Fit(one, points[k * n_events : (k + 1) * n_events].copy()) for k, one in enumerate(found)]
+    n_groups, n_events, n = len(strengths), len(rows.event), start[0].mean.shape[1]
+    state = [Fit(_unfitted(start[0]), start[1])] * n_groups
+    active = list(range(n_groups))
+    for number in range(_MOST_ROUNDS):
+        many = _repeated(rows, len(active))
+        given = np.repeat(strengths[active], n_events, axis=0)
+        parts = [state[k].found.population(n) for k in active]
+        population = Population(*(np.concatenate([part[a] for part in parts]) for a in range(2)))
+        points = np.concatenate([state[k].points for k in active])
+        modes = event_modes(extension, many, points, given, population, n_steps=6)
+        spent = budget if number > 0 or first_budget is None else first_budget
+        nodes = event_nodes(extension, many, given, population, modes, spent)
+        moved = []
+        for k, part, own in zip(
+            active,
+            _split(nodes, len(active), n_events),
+            modes.points.reshape(len(active), n_events, -1),
+            strict=True,
+        ):
+            before = state[k].found.psi
+            found = evidence(part, log_scale, before)
+            state[k] = Fit(found, own)
+            if number + 1 < n_rounds or _moved(before, found.psi, n):
+                moved.append(k)
+        active = moved
+        if not active:
+            break
+    return state
+
+
+def _unfitted(population: Population) -> Evidence:
+    """A population to begin with."""
+    psi = coordinates(population)
+    return Evidence(-np.inf, psi, np.eye(len(psi)))
+
+
+def _moved(before: FloatArray, after: FloatArray, n: int) -> bool:
+    """Whether a population is far from the one that its nodes were made for."""
+    mean = np.abs(after[:n] - before[:n]) / np.exp(before[n : 2 * n])
+    spread = np.abs(after[n : 2 * n] - before[n : 2 * n])
+    return bool(mean.max() > _FAR_MEAN or spread.max() > _FAR_SPREAD)
 
 
 def _repeated(rows: Rows, n_groups: int) -> Rows:
@@ -178,7 +202,8 @@ class Curve:
         scale = added.scale if scale is None else scale
         strengths = np.linspace(self.strengths[0], self.strengths[-1], _FINE)
         floor = self.log_evidence.max() - _DEEP
-        spline = CubicSpline(self.strengths, np.maximum(self.log_evidence, floor))
+        heights = np.maximum(self.log_evidence, floor)
+        spline = Akima1DInterpolator(self.strengths, heights, method="makima")
         log_prior = -0.5 * (strengths / scale) ** 2 - 0.5 * math.log(2.0 * math.pi * scale**2)
         if not added.either_sign:
             log_prior = log_prior + math.log(2.0)
@@ -199,42 +224,45 @@ class Curve:
         return mean, math.sqrt(max(float(weights @ (strengths - mean) ** 2), 0.0))
 
 
-def curve(base: Base, mechanism: Mechanism, shape: Shape, *, refine: int = 0) -> Curve:
-    """Evidence along the strength of a mechanism, on a grid, with `refine` rounds of points near the top."""
+def curve(base: Base, mechanism: Mechanism, shape: Shape) -> Curve:
+    """Evidence along the strength of a mechanism, on a grid over its prior."""
+    added = mechanism.added
+    assert added is not None
+    grid = added.scale * np.array(_GRID)
+    return curve_at(
+        base, mechanism, shape, np.concatenate([-grid[::-1], grid]) if added.either_sign else grid
+    )
+
+
+def curve_near(
+    base: Base, mechanism: Mechanism, shape: Shape, near: tuple[float, float], budget: Budget = USUAL
+) -> Curve:
+    """Evidence along the strength of a mechanism, around a mean and a standard deviation found before."""
+    added = mechanism.added
+    assert added is not None
+    mean, sd = near[0], max(near[1], 0.03 * added.scale)
+    strengths = mean + sd * np.array(_NEAR)
+    if not added.either_sign:
+        strengths = strengths[strengths > 0.05 * sd]
+    return curve_at(base, mechanism, shape, strengths, budget)
+
+
+def curve_at(
+    base: Base, mechanism: Mechanism, shape: Shape, strengths: FloatArray, budget: Budget = USUAL
+) -> Curve:
+    """Evidence along the strength of a mechanism, at some strengths and at 0."""
     added = mechanism.added
     assert added is not None
     direction = added.direction(base.setting, shape)
     extension = extended(base.problem, base.law, (*base.directions, direction))
-    grid = added.scale * np.array(_GRID)
-    strengths = np.concatenate([-grid[::-1], grid]) if added.either_sign else grid
-    fits = dict(zip(strengths, _at(base, extension, strengths), strict=True))
-    fits[0.0] = base.fit
-    for _ in range(refine):
-        rough = _curve(base, mechanism, shape, direction, fits)
-        mean, sd = rough.moments()
-        new = np.array([mean - sd, mean + sd])
-        if not added.either_sign:
-            new = np.maximum(new, 0.02 * added.scale)
-        new = np.array([x for x in new if min(abs(x - y) for y in fits) > 0.02 * added.scale])
-        if len(new):
-            fits |= dict(zip(new, _at(base, extension, new), strict=True))
-    return _curve(base, mechanism, shape, direction, fits)
-
-
-def _at(base: Base, extension: Extension, strengths: FloatArray) -> list[Fit]:
+    # Strength 0 like all others, so that what is left of integration errors is the same there.
+    strengths = np.sort(np.append(strengths[np.abs(strengths) > 1e-3 * added.scale], 0.0))
     given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
     start = (base.population, base.fit.points)
-    return refit(extension, base.rows, given, start, base.log_scale)
-
-
-def _curve(
-    base: Base, mechanism: Mechanism, shape: Shape, direction: Direction, fits: dict[float, Fit]
-) -> Curve:
-    strengths = np.array(sorted(fits))
-    ordered = tuple(fits[x] for x in strengths)
-    heights = np.array([fit.found.log_evidence for fit in ordered]) - base.fit.found.log_evidence
-    heights = np.nan_to_num(heights, nan=-1e3, neginf=-1e3)
-    return Curve(mechanism, shape, direction, strengths, heights, ordered)
+    fits = refit(extension, base.rows, given, start, base.log_scale, budget, FIRST)
+    heights = np.array([fit.found.log_evidence for fit in fits])
+    heights = np.nan_to_num(heights - heights[strengths == 0.0], nan=-1e3, neginf=-1e3)
+    return Curve(mechanism, shape, direction, strengths, heights, tuple(fits))
 
 
 def fit_base(

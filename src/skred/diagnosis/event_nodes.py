@@ -35,7 +35,7 @@ class Budget(NamedTuple):
     population_wider: float = 1.6
 
 
-USUAL, FINE = Budget(), Budget(512, 128, 1.5, 1.8)
+USUAL, FIRST, FINE = Budget(), Budget(32, 16), Budget(256, 64, 1.5, 1.8)
 
 
 @cache

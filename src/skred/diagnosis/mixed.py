@@ -115,6 +115,21 @@ def efficient_scores(modes: Modes, rows: Rows, population: Population, prior: Me
     return Scores(result, efficient, raw)
 
 
+def without(scores: Scores, n_first: int) -> Scores:
+    """Scores after the first directions, which are in already and free, have had their share too."""
+    if n_first == 0:
+        return scores
+    first, rest = slice(0, n_first), slice(n_first, None)
+    own = scores.information[:, first, first]
+    crossed = scores.information[:, first, rest]
+    solved = np.linalg.solve(own + 1e-12 * np.eye(n_first) * own.max(), crossed)
+    return Scores(
+        scores.score[:, rest] - np.einsum("gij,gi->gj", solved, scores.score[:, first]),
+        scores.information[:, rest, rest] - np.einsum("gij,gik->gjk", crossed, solved),
+        scores.raw[:, rest],
+    )
+
+
 def fit_population(
     extension: Extension,
     rows: Rows,

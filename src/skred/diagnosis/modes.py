@@ -38,6 +38,10 @@ class Rows(NamedTuple):
     readings: EventReadings
     errors: Errors
 
+    def take(self, chosen: IntArray) -> Rows:
+        """Some of the rows, of the same groups."""
+        return Rows(self.event[chosen], self.group[chosen], take_rows(self.readings, chosen), self.errors)
+
     @property
     def n_groups(self) -> int:
         """Number of replicates."""
@@ -126,32 +130,35 @@ def event_modes(
 ) -> Modes:
     """Most probable points by damped Gauss-Newton steps; a step that makes a row worse is not taken."""
     points = start.copy()
-    precision = population.precision[rows.group]
-    best = log_joint(extension, rows, points, strengths, population)
+    precision = population.precision
+    given = np.broadcast_to(strengths, (len(points), len(extension.directions)))
+    best = log_joint(extension, rows, points, given, population)
     damping = np.full(len(points), _STARTING_DAMPING)
-    around = look_around(extension, rows, points, strengths)
+    active = np.arange(len(points))
     for _ in range(n_steps):
-        deviation = points.copy()
-        deviation[:, :-1] -= population.mean[rows.group]
+        part = rows.take(active)
+        around = look_around(extension, part, points[active], given[active])
+        deviation = points[active].copy()
+        deviation[:, :-1] -= population.mean[part.group]
+        prior = precision[part.group]
         gradient = np.einsum("ri,rij->rj", around.slope, around.by_points)
-        gradient -= np.einsum("rij,rj->ri", precision, deviation)
-        hessian = around.information + precision
-        diagonal = np.einsum("rii->ri", hessian)
-        damped = hessian.copy()
-        np.einsum("rii->ri", damped)[:] = diagonal * (1.0 + damping[:, None])
+        gradient -= np.einsum("rij,rj->ri", prior, deviation)
+        damped = around.information + prior
+        diagonal = np.einsum("rii->ri", damped)
+        diagonal *= 1.0 + damping[active][:, None]
         step = np.linalg.solve(damped, gradient[:, :, None])[:, :, 0]
         size = np.abs(step).max(axis=1)
         step *= np.minimum(1.0, _LARGEST_STEP / np.maximum(size, 1e-12))[:, None]
-        new = log_joint(extension, rows, points + step, strengths, population)
-        better = new >= best - 1e-9
-        points = np.where(better[:, None], points + step, points)
-        gained = np.where(better, new - best, 0.0)
-        best = np.where(better, new, best)
-        damping = np.where(better, 0.2 * damping, np.maximum(20.0 * damping, 0.1))
-        around = look_around(extension, rows, points, strengths)
-        if np.all(better & (gained < _SETTLED)):
+        new = log_joint(extension, part, points[active] + step, given[active], population)
+        gained = new - best[active]
+        better = gained >= -1e-9
+        points[active[better]] += step[better]
+        best[active[better]] = new[better]
+        damping[active] = np.where(better, 0.2 * damping[active], np.maximum(20.0 * damping[active], 0.1))
+        active = active[~better | (gained > _SETTLED)]
+        if len(active) == 0:
             break
-    return around
+    return look_around(extension, rows, points, given)
 
 
 def take_rows(readings: EventReadings, rows: IntArray) -> EventReadings:

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.extension import extended
 from skred.diagnosis.mixed import fit_population
 from skred.diagnosis.modes import Population, Rows
 from skred.diagnosis.replicas import replicas
@@ -42,7 +41,7 @@ class Omnibus:
 
     @property
     def p_value(self) -> float:
-        """Share of clean campaigns at least as odd; where sampling stopped early by Besag and Clifford's rule."""
+        """Share of clean campaigns at least as odd, by Besag and Clifford's rule where it stopped early."""
         above = int(np.sum(self.simulated >= self.statistic))
         if above >= _ENOUGH_ABOVE:
             return above / len(self.simulated)
@@ -73,12 +72,12 @@ def omnibus(
     """
     statistic = float(_refitted(screen, rows, start)[0])
     rng = np.random.default_rng([seed, 21])
-    extension = extended(screen.problem, screen.law)
+    extension = screen.extension
     simulated: list[FloatArray] = []
     for first in range(0, most, _BATCH):
         batch = slice(first, min(first + _BATCH, most))
         means, factors = draws[0][batch], draws[1][batch]
-        made, points = replicas(extension, np.empty(0), means, factors, rng)
+        made, points = replicas(extension, screen.strengths, means, factors, rng)
         population = Population(means.copy(), np.einsum("gij,gkj->gik", factors, factors))
         simulated.append(_refitted(screen, made, (population, points)))
         if np.sum(np.concatenate(simulated) >= statistic) >= _ENOUGH_ABOVE:
@@ -88,6 +87,5 @@ def omnibus(
 
 def _refitted(screen: Screen, rows: Rows, start: tuple[Population, FloatArray]) -> FloatArray:
     """The statistic after refitting populations and events, (n_groups,)."""
-    extension = extended(screen.problem, screen.law)
-    population, points = fit_population(extension, rows, np.empty(0), screen.prior, start)
+    population, points = fit_population(screen.extension, rows, screen.strengths, screen.prior, start)
     return screen.statistic(screen.scores(rows, points, population))

@@ -8,7 +8,7 @@ model. Being cheap, it is computed for the recordings and for simulated ones ali
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import log_ndtr, logsumexp
 
 from skred.diagnosis.extension import Extension
-from skred.diagnosis.mixed import MeanPrior, Scores, efficient_scores, mean_prior
+from skred.diagnosis.mixed import MeanPrior, Scores, efficient_scores, mean_prior, without
 from skred.diagnosis.modes import Modes, Population, Rows, look_around
 from skred.diagnosis.odds import prior_odds
 from skred.diagnosis.unlisted import KINDS, Kind, hats, knots
@@ -64,11 +64,16 @@ class Screen:
     problem : HierarchicalProblem
     law : Law
     setting : Setting
+    directions : tuple of Direction
+        Already in, with `strengths`; their share is taken from everything else.
+    strengths : (n_directions,) array
     """
 
     problem: HierarchicalProblem
     law: Law
     setting: Setting
+    directions: tuple[Direction, ...] = ()
+    strengths: FloatArray = field(default_factory=lambda: np.empty(0))
 
     @cached_property
     def candidates(self) -> list[Candidate]:
@@ -97,14 +102,19 @@ class Screen:
             if candidate.with_speed:
                 by_scale.setdefault(candidate.direction.weakening_speed, []).append(candidate.direction)
         parts += list(by_scale.values())
-        return [Extension(self.problem, self.law, tuple(part)) for part in parts]
+        return [Extension(self.problem, self.law, (*self.directions, *part)) for part in parts]
+
+    @property
+    def extension(self) -> Extension:
+        """The law itself."""
+        return Extension(self.problem, self.law, self.directions)
 
     @cached_property
-    def _order(self) -> FloatArray:
+    def order(self) -> NDArray[np.int64]:
         """Where each candidate's direction is, over all parts."""
         position: dict[int, int] = {}
         for part in self._parts:
-            for direction in part.directions:
+            for direction in part.directions[len(self.directions) :]:
                 position[id(direction)] = len(position)
         return np.array([position[id(candidate.direction)] for candidate in self.candidates])
 
@@ -115,16 +125,24 @@ class Screen:
 
     def scores(self, rows: Rows, points: FloatArray, population: Population) -> Scores:
         """Efficient scores of all directions at the events' modes."""
+        scores = efficient_scores(self.around(rows, points), rows, population, self.prior)
+        return without(scores, len(self.directions))
+
+    def around(self, rows: Rows, points: FloatArray) -> Modes:
+        """Tangents by all directions at the events' modes."""
         around: list[Modes] = []
+        n_in = len(self.directions)
         for part in self._parts:
-            around.append(look_around(part, rows, points, np.zeros(len(part.directions))))
-        by_strengths = np.concatenate([part.by_strengths for part in around], axis=2)
-        modes = around[0]._replace(by_strengths=by_strengths)
-        return efficient_scores(modes, rows, population, self.prior)
+            strengths = np.zeros(len(part.directions))
+            strengths[:n_in] = self.strengths
+            around.append(look_around(part, rows, points, strengths))
+        changes = [part.by_strengths[:, :, 0 if k == 0 else n_in :] for k, part in enumerate(around)]
+        by_strengths = np.concatenate(changes, axis=2)
+        return around[0]._replace(by_strengths=by_strengths)
 
     def of_candidates(self, scores: Scores) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Score, information kept and raw information of each candidate, (n_groups, n_candidates)."""
-        order = self._order
+        order = self.order
         return scores.score[:, order], scores.own[:, order], scores.raw[:, order]
 
     def log_factors(self, scores: Scores) -> FloatArray:

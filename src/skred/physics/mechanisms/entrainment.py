@@ -1,7 +1,14 @@
 """Mass picked up from a snow cover at rest, where there is snow to erode."""
 
 from skred.physics.columns import Column
-from skred.physics.mechanisms.spec import Added, Mechanism, Strength, along_a_stretch, stretches
+from skred.physics.mechanisms.spec import (
+    Added,
+    Mechanism,
+    Strength,
+    along_a_stretch,
+    split_stretch,
+    stretches,
+)
 
 MECHANISM = Mechanism(
     id="entrainment",
@@ -23,6 +30,7 @@ MECHANISM = Mechanism(
         reason="over 350 m the scale doubles the mass",
         direction=along_a_stretch(Column.QUADRATIC),
         shapes=stretches,
+        split=split_stretch,
     ),
     same_term_as="segment_drag",
 )

@@ -1,5 +1,7 @@
 """A dam, a wall, a step at one place: what climbing it takes, what its lee side gives back, what is lost."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from skred.physics.columns import GRAVITY, Column
@@ -29,6 +31,15 @@ def _shapes(setting: Setting) -> tuple[Shape, ...]:
         for place in np.linspace(first, last, n + 1)
         for loss in LOSSES_PER_M
         if HALF_WIDTH_M < place < setting.terrain.length_m - HALF_WIDTH_M
+    )
+
+
+def _split(setting: Setting, shape: Shape) -> tuple[Shape, ...]:
+    assert shape.s_from_m is not None and shape.s_to_m is not None
+    return tuple(
+        replace(shape, s_from_m=shape.s_from_m + shift, s_to_m=shape.s_to_m + shift)
+        for shift in (-_STEP_M / 3.0, _STEP_M / 3.0)
+        if shape.s_from_m + shift > 0.0 and shape.s_to_m + shift < setting.terrain.length_m
     )
 
 
@@ -63,5 +74,6 @@ MECHANISM = Mechanism(
         reason="dams and steps that matter to a front of 20-40 m/s are metres to tens of metres high",
         direction=_direction,
         shapes=_shapes,
+        split=_split,
     ),
 )

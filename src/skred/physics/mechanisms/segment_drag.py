@@ -1,7 +1,14 @@
 """Forest, boulders, roughness: extra drag quadratic in speed on a stretch."""
 
 from skred.physics.columns import Column
-from skred.physics.mechanisms.spec import Added, Mechanism, Strength, along_a_stretch, stretches
+from skred.physics.mechanisms.spec import (
+    Added,
+    Mechanism,
+    Strength,
+    along_a_stretch,
+    split_stretch,
+    stretches,
+)
 
 MECHANISM = Mechanism(
     id="segment_drag",
@@ -23,5 +30,6 @@ MECHANISM = Mechanism(
         reason="over 200 m the scale takes 63 % of U^2",
         direction=along_a_stretch(Column.QUADRATIC),
         shapes=stretches,
+        split=split_stretch,
     ),
 )

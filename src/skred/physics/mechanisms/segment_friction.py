@@ -1,7 +1,14 @@
 """Another surface on a stretch: extra retardation that does not depend on speed, of either sign."""
 
 from skred.physics.columns import Column
-from skred.physics.mechanisms.spec import Added, Mechanism, Strength, along_a_stretch, stretches
+from skred.physics.mechanisms.spec import (
+    Added,
+    Mechanism,
+    Strength,
+    along_a_stretch,
+    split_stretch,
+    stretches,
+)
 
 MECHANISM = Mechanism(
     id="segment_friction",
@@ -23,6 +30,7 @@ MECHANISM = Mechanism(
         reason="a change of dry friction by 0.13 on a gentle slope",
         direction=along_a_stretch(Column.CONSTANT),
         shapes=stretches,
+        split=split_stretch,
         either_sign=True,
     ),
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -155,6 +155,8 @@ class Added:
         Whether the strength may be negative.
     joins : callable
         Ids of the base law's mechanisms to whether it can be missing there.
+    split : callable
+        Setting and shape to finer shapes around it, which share its weight.
     """
 
     scale: float
@@ -163,6 +165,7 @@ class Added:
     shapes: Callable[[Setting], tuple[Shape, ...]]
     either_sign: bool = False
     joins: Callable[[tuple[str, ...]], bool] = lambda base: True
+    split: Callable[[Setting, Shape], tuple[Shape, ...]] = lambda setting, shape: ()
 
     @property
     def relevant(self) -> float:
@@ -278,6 +281,22 @@ def stretches(setting: Setting) -> tuple[Shape, ...]:
         for start in np.linspace(first, max(last - length, first), n + 1):
             shapes.append(Shape(float(start), float(min(start + length, setting.terrain.length_m))))
     return tuple(shapes)
+
+
+def split_stretch(setting: Setting, shape: Shape) -> tuple[Shape, ...]:
+    """The stretch moved by a fifth of its length, shortened, lengthened."""
+    assert shape.s_from_m is not None and shape.s_to_m is not None
+    length = shape.s_to_m - shape.s_from_m
+    changes = ((-0.2, -0.2), (0.2, 0.2), (0.15, -0.15), (-0.25, 0.25), (-0.4, 0.0), (0.0, 0.4))
+    end = setting.terrain.length_m
+    return tuple(
+        replace(
+            shape,
+            s_from_m=max(shape.s_from_m + first * length, 0.0),
+            s_to_m=min(shape.s_to_m + last * length, end),
+        )
+        for first, last in changes
+    )
 
 
 def lacking(*ids: str) -> Callable[[tuple[str, ...]], bool]:

@@ -1,0 +1,75 @@
+"""How probabilities become a verdict: the rule of the campaign format."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from skred.diagnosis.odds import NOTHING, UNLISTED
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.spec import Group
+
+HELD = 0.9
+"""Share of its group that a tie set holds."""
+NOTHING_AT_MOST = 0.5
+E_LIMIT = 0.01
+"""Probability of nothing below which the race alone raises the alarm: under a clean campaign the odds exceed
+1 / E_LIMIT in a share of at most E_LIMIT (Markov's inequality for a Bayes factor)."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What the probabilities say.
+
+    Attributes
+    ----------
+    verdict : str
+        As in the campaign format.
+    names : tuple of str
+        Most probable first; one is named, several are tied, none where nothing is.
+    """
+
+    verdict: str
+    names: tuple[str, ...]
+
+
+def alarmed(probability: Mapping[str, float], fired: bool) -> bool:
+    """Whether something is wrong: the calibrated limit is passed and the race agrees, or the race is sure."""
+    nothing = probability[NOTHING]
+    return (fired and nothing < NOTHING_AT_MOST) or nothing < E_LIMIT
+
+
+def decide(probability: Mapping[str, float], fired: bool, can_tell: bool) -> Decision:
+    """Verdict from probabilities.
+
+    Parameters
+    ----------
+    probability : mapping
+        Of each id.
+    fired : bool
+        Whether the omnibus check's limit is passed.
+    can_tell : bool
+        Whether relevant strengths would mostly have been found.
+    """
+    if not alarmed(probability, fired):
+        return Decision("nothing_missing" if can_tell else "cannot_tell", ())
+    groups: dict[str, dict[str, float]] = {UNLISTED: {UNLISTED: probability[UNLISTED]}}
+    for name, share in probability.items():
+        if name not in (NOTHING, UNLISTED):
+            groups.setdefault(mechanisms()[name].group, {})[name] = share
+    leading = max(groups, key=lambda group: sum(groups[group].values()))
+    if leading == UNLISTED:
+        return Decision("unexplained", ())
+    verdict = "missing_physics" if leading == Group.PHYSICS else "instrument"
+    return Decision(verdict, smallest_set(groups[leading]))
+
+
+def smallest_set(shares: Mapping[str, float]) -> tuple[str, ...]:
+    """The smallest set of ids that holds 0.9 of their group, most probable first."""
+    total, held, names = sum(shares.values()), 0.0, []
+    for name in sorted(shares, key=lambda name: -shares[name]):
+        names.append(name)
+        held += shares[name]
+        if held >= HELD * total:
+            break
+    return tuple(names)

@@ -1,0 +1,267 @@
+"""The race: nothing, every listed mechanism, every instrument fault and the unlisted force, refitted each.
+
+Two error models run: the robust one, and the one that the base law alone prefers if that is another, so that
+odd events, heavy tails and correlated errors stay error models and do not become findings.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from skred.diagnosis.curves import Base, Curve, curve, curve_near, fit_base
+from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, probabilities
+from skred.diagnosis.screen import candidates
+from skred.diagnosis.unlisted import KINDS, Profile, fit_profile, log_evidence_of
+from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.spec import Mechanism, Shape
+
+FloatArray = NDArray[np.float64]
+Tell = Callable[[int, int], None]
+ERROR_SHARES = {"robust": 0.55, "student": 0.15, "correlated": 0.15, "scaled": 0.15}
+"""Prior probability of each error model in the race."""
+_PREFERRED_BY = 1.0
+_WITHIN, _AT_MOST = 3.0, 2
+"""Curves of a mechanism that are looked at again: within so many nats of its best, and so many."""
+
+
+@dataclass(frozen=True, eq=False)
+class Entrant:
+    """One mechanism in the race, under one error model.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    curves : tuple of Curve
+        One for each shape.
+    log_weights : (n_curves,) array
+        Prior weight of each shape; they sum to 1.
+    """
+
+    mechanism: Mechanism
+    curves: tuple[Curve, ...]
+    log_weights: FloatArray
+
+    @property
+    def log_factors(self) -> FloatArray:
+        """Log Bayes factor of each shape, its prior weight included."""
+        return self.log_weights + np.array([one.log_bayes_factor() for one in self.curves])
+
+    @property
+    def log_bayes_factor(self) -> float:
+        """Against nothing, shapes and strength integrated over."""
+        return float(logsumexp(self.log_factors))
+
+    @property
+    def shape_weights(self) -> FloatArray:
+        """Posterior probability of each shape."""
+        factors = self.log_factors
+        weights: FloatArray = np.exp(factors - logsumexp(factors))
+        return weights
+
+    @property
+    def best(self) -> Curve:
+        """The curve of the highest Bayes factor."""
+        return self.curves[int(np.argmax([one.log_bayes_factor() for one in self.curves]))]
+
+    def strength(self) -> tuple[float, float]:
+        """Posterior mean and standard deviation of the strength over all shapes."""
+        moments = np.array([one.moments() for one in self.curves])
+        weights = self.shape_weights
+        mean = float(weights @ moments[:, 0])
+        return mean, math.sqrt(float(weights @ (moments[:, 1] ** 2 + (moments[:, 0] - mean) ** 2)))
+
+    def stretch(self) -> tuple[float, float] | None:
+        """Where it acts: weighted medians of both ends [m], None where it is not local."""
+        if self.best.shape.place_m is None:
+            return None
+        first = np.array([one.shape.s_from_m for one in self.curves], dtype=float)
+        last = np.array([one.shape.s_to_m for one in self.curves], dtype=float)
+        weights = self.shape_weights
+        return _weighted_median(first, weights), _weighted_median(last, weights)
+
+
+def _weighted_median(values: FloatArray, weights: FloatArray) -> float:
+    order = np.argsort(values)
+    share = np.cumsum(weights[order])
+    return float(values[order][min(int(np.searchsorted(share, 0.5 * share[-1])), len(values) - 1)])
+
+
+@dataclass(frozen=True, eq=False)
+class Heat:
+    """The race under one error model.
+
+    Attributes
+    ----------
+    error_model : str
+    base : Base
+    entrants : mapping of str to Entrant
+    profiles : list of Profile
+    """
+
+    error_model: str
+    base: Base
+    entrants: dict[str, Entrant]
+    profiles: list[Profile]
+
+    @property
+    def log_factors(self) -> dict[str, float]:
+        """Log Bayes factor of each id against nothing under the same error model."""
+        found = {name: entrant.log_bayes_factor for name, entrant in self.entrants.items()}
+        return found | {UNLISTED: log_evidence_of(self.profiles), NOTHING: 0.0}
+
+
+@dataclass(frozen=True, eq=False)
+class Race:
+    """All heats, and what they say together.
+
+    Attributes
+    ----------
+    heats : tuple of Heat
+    odds : mapping
+        Prior probability of each id.
+    base_evidence : mapping
+        Log evidence of the base law under each error model.
+    """
+
+    heats: tuple[Heat, ...]
+    odds: dict[str, float]
+    base_evidence: dict[str, float]
+
+    @property
+    def log_factors(self) -> dict[str, float]:
+        """Log Bayes factor of each id against nothing, over the error models."""
+        parts: dict[str, list[float]] = {}
+        for heat in self.heats:
+            prior = math.log(ERROR_SHARES[heat.error_model]) + self.base_evidence[heat.error_model]
+            for name, factor in heat.log_factors.items():
+                parts.setdefault(name, []).append(prior + factor)
+        nothing = float(logsumexp(parts[NOTHING]))
+        return {name: float(logsumexp(values)) - nothing for name, values in parts.items()}
+
+    @property
+    def probability(self) -> dict[str, float]:
+        """Posterior probability of each id."""
+        return probabilities(self.log_factors, self.odds)
+
+    @property
+    def log_odds(self) -> float:
+        """Of anything against nothing."""
+        nothing = self.probability[NOTHING]
+        return math.log(max(1.0 - nothing, 1e-300)) - math.log(max(nothing, 1e-300))
+
+    def leading(self, name: str) -> Heat:
+        """The heat in which an id has most of its evidence."""
+
+        def height(heat: Heat) -> float:
+            return (
+                math.log(ERROR_SHARES[heat.error_model])
+                + self.base_evidence[heat.error_model]
+                + heat.log_factors[name]
+            )
+
+        return max(self.heats, key=height)
+
+
+def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
+    """Run the race from a fitted base law.
+
+    Parameters
+    ----------
+    base : Base
+        Under the robust error model.
+    tell : callable
+        Told how many curves are done, and of how many.
+    """
+    bases = {DEFAULT_ERRORS: base} | {
+        name: with_errors(base, name) for name in ERROR_SHARES if name != DEFAULT_ERRORS
+    }
+    evidence = {name: one.fit.found.log_evidence for name, one in bases.items()}
+    height = {name: math.log(ERROR_SHARES[name]) + evidence[name] for name in bases}
+    preferred = max(height, key=lambda name: height[name])
+    chosen = [DEFAULT_ERRORS]
+    if height[preferred] > height[DEFAULT_ERRORS] + _PREFERRED_BY:
+        chosen.append(preferred)
+    heats = []
+    for number, name in enumerate(chosen):
+
+        def told(done: int, of: int, number: int = number) -> None:
+            tell(done + number * of, of * len(chosen))
+
+        heats.append(_heat(name, bases[name], told))
+    # The evidence of an error model without a heat counts for nothing and everything alike.
+    raced = [entrant.mechanism for entrant in heats[0].entrants.values()]
+    return Race(tuple(heats), prior_odds(raced), {name: evidence[name] for name in chosen})
+
+
+def with_errors(base: Base, error_model: str) -> Base:
+    """The base law fitted under another error model."""
+    problem = replace(base.problem, error_model=ERROR_MODELS[error_model])
+    found = fit_base(problem, base.law, base.population, base.fit.points)
+    return replace(found, directions=base.directions, strengths=base.strengths)
+
+
+def _heat(error_model: str, base: Base, tell: Tell) -> Heat:
+    todo = candidates(base.setting, ties=False)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        curves = []
+        for one in pool.map(lambda job: curve(base, job.mechanism, job.shape), todo):
+            curves.append(one)
+            tell(len(curves), len(todo))
+        again, parents = _again(base, curves)
+        finer = list(
+            pool.map(lambda job: curve_near(base, job[0].mechanism, job[1], job[0].moments()), again)
+        )
+        profiles = list(pool.map(lambda kind: fit_profile(base, kind), KINDS))
+    entrants = _entrants(curves, list(zip(parents, finer, strict=True)))
+    for mechanism in mechanisms().values():
+        other = entrants.get(mechanism.same_term_as)
+        if other is not None and mechanism.added is not None and mechanism.added.joins(base.setting.base):
+            same = tuple(replace(one, mechanism=mechanism) for one in other.curves)
+            entrants[mechanism.id] = Entrant(mechanism, same, other.log_weights)
+    return Heat(error_model, base, entrants, profiles)
+
+
+def _again(base: Base, curves: Sequence[Curve]) -> tuple[list[tuple[Curve, Shape]], list[int]]:
+    """Shapes to look at more finely, and which curve each stands in for."""
+    again: list[tuple[Curve, Shape]] = []
+    parents: list[int] = []
+    factors = np.array([one.log_bayes_factor() for one in curves])
+    for name in dict.fromkeys(one.mechanism.id for one in curves):
+        members = np.array([k for k, one in enumerate(curves) if one.mechanism.id == name])
+        best = members[np.argsort(-factors[members])][:_AT_MOST]
+        for k in best[factors[best] > factors[members].max() - _WITHIN]:
+            added = curves[k].mechanism.added
+            assert added is not None
+            for shape in (curves[k].shape, *added.split(base.setting, curves[k].shape)):
+                again.append((curves[k], shape))
+                parents.append(int(k))
+    return again, parents
+
+
+def _entrants(curves: Sequence[Curve], finer: Sequence[tuple[int, Curve]]) -> dict[str, Entrant]:
+    """Curves by mechanism; finer ones share the weight of the one that they stand in for."""
+    children: dict[int, list[Curve]] = {}
+    for parent, one in finer:
+        children.setdefault(parent, []).append(one)
+    gathered: dict[str, tuple[list[Curve], list[float]]] = {}
+    sizes: dict[str, int] = {}
+    for one in curves:
+        sizes[one.mechanism.id] = sizes.get(one.mechanism.id, 0) + 1
+    for k, one in enumerate(curves):
+        members, weights = gathered.setdefault(one.mechanism.id, ([], []))
+        stand_ins = children.get(k, [one])
+        members += stand_ins
+        weights += [-math.log(sizes[one.mechanism.id] * len(stand_ins))] * len(stand_ins)
+    return {
+        name: Entrant(members[0].mechanism, tuple(members), np.array(weights))
+        for name, (members, weights) in gathered.items()
+    }
