@@ -1,0 +1,96 @@
+"""Write trials to develop on: campaigns with concealed physics, and apart from them the truth.
+
+``python benchmarks/development_set.py --n 40 --seed 1000 --out DIR [--kind mixed] [--hidden two] [--snr 7]``.
+
+Trial i has the seed ``seed + i``; every other one is sparse, the rest dense, unless a kind is given. Folders:
+``DIR/trial-0001/campaign/`` is what a diagnosis may see, ``DIR/trial-0001/request.json`` which base law it is
+asked to calibrate, ``DIR/truth/trial-0001.json`` what it may not see. Trials that are there already are
+skipped, so the same command goes on with a run that was ended.
+
+These are for tuning. Seeds from 1000 to 999 999 are for development; sets whose results are reported use
+seeds outside, and so other tracks, avalanches and effects.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import Literal
+
+import cyclopts
+from rich.console import Console
+
+from skred.campaign import write_campaign
+from skred.trials.draw import draw_trial
+
+app = cyclopts.App(help=__doc__)
+KINDS: tuple[Literal["sparse", "dense"], ...] = ("sparse", "dense")
+
+
+def write_trial(
+    out: Path,
+    number: int,
+    seed: int,
+    kind: Literal["sparse", "dense"],
+    hidden: str | None,
+    snr: float | None,
+) -> str | None:
+    """Write one trial; a line about it, or None where it is there already."""
+    name = f"trial-{number:04d}"
+    truth_file = out / "truth" / f"{name}.json"
+    if truth_file.is_file():
+        return None
+    start = time.process_time()
+    trial = draw_trial(seed, kind=kind, hidden=hidden, snr=snr)
+    seconds = time.process_time() - start
+    write_campaign(trial.campaign, out / name / "campaign", force=True)
+    request = json.dumps({"base_model": trial.truth["base_model"]}) + "\n"
+    (out / name / "request.json").write_text(request, encoding="utf-8")
+    # The truth last, and whole or not at all: it says that the trial is complete.
+    unfinished = truth_file.with_suffix(".part")
+    unfinished.write_text(json.dumps(trial.truth, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    unfinished.rename(truth_file)
+    ids = " + ".join(m["id"] for m in trial.truth["mechanisms"]) or trial.truth["nasty"] or "-"
+    what = f"{trial.truth['base_model']} {trial.truth['hidden']}: {ids}"
+    return f"{name} {kind} {what}, snr {trial.truth['snr']} of {trial.truth['snr_asked']}, {seconds:.1f} s"
+
+
+@app.default
+def main(
+    *,
+    out: Path,
+    n: int = 40,
+    seed: int = 1000,
+    kind: Literal["sparse", "dense", "mixed"] = "mixed",
+    hidden: str | None = None,
+    snr: float | None = None,
+) -> None:
+    """Write trials to develop on.
+
+    Parameters
+    ----------
+    out
+        Folder of the set.
+    n
+        Number of trials.
+    seed
+        Seed of the first.
+    kind
+        What is recorded: few speeds of many avalanches, many of few, or each in turn.
+    hidden
+        What is hidden: a class or an id, see `skred.trials.draw`; by default drawn.
+    snr
+        Signal-to-noise; by default drawn evenly from 2 to 12.
+    """
+    console = Console()
+    (out / "truth").mkdir(parents=True, exist_ok=True)
+    for i in range(n):
+        drawn_kind = KINDS[i % 2] if kind == "mixed" else kind
+        line = write_trial(out, i + 1, seed + i, drawn_kind, hidden, snr)
+        if line is not None:
+            console.print(line, highlight=False, soft_wrap=True)
+
+
+if __name__ == "__main__":
+    app()
