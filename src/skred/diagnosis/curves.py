@@ -266,14 +266,20 @@ def curve_at(
 
 
 def fit_base(
-    problem: HierarchicalProblem, law: Law, population: Population, points: FloatArray | None = None
+    problem: HierarchicalProblem,
+    law: Law,
+    population: Population,
+    points: FloatArray | None = None,
+    directions: tuple[Direction, ...] = (),
+    strengths: FloatArray | None = None,
 ) -> Base:
-    """The base law fitted, from roughly where its population is."""
-    extension = extended(problem, law)
+    """The base law fitted, from roughly where its population is; perhaps with something in already."""
+    extension = extended(problem, law, directions)
     setting, rows = setting_of(problem, law), campaign_rows(extension)
     if points is None:
         points = np.zeros((len(rows.event), len(law.mechanisms) + 1))
         points[:, :-1] = population.mean[0]
+    given = np.empty(0) if strengths is None else strengths
     log_scale = prior_log_scale(mean_prior(law))
-    fit = refit(extension, rows, np.empty((1, 0)), (population, points), log_scale, n_rounds=4)[0]
-    return Base(problem, law, setting, rows, fit)
+    fit = refit(extension, rows, given[None, :], (population, points), log_scale, n_rounds=4)[0]
+    return Base(problem, law, setting, rows, fit, directions, given)

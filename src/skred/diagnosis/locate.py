@@ -1,4 +1,4 @@
-"""Where the mismatch is: in the equation of motion, as a force missing along the track, and as missing work."""
+"""Where the mismatch is: in the equation of motion, as a missing force, and as missing work."""
 
 from __future__ import annotations
 

@@ -205,8 +205,8 @@ def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
 def with_errors(base: Base, error_model: str) -> Base:
     """The base law fitted under another error model."""
     problem = replace(base.problem, error_model=ERROR_MODELS[error_model])
-    found = fit_base(problem, base.law, base.population, base.fit.points)
-    return replace(found, directions=base.directions, strengths=base.strengths)
+    found = fit_base(problem, base.law, base.population, base.fit.points, base.directions, base.strengths)
+    return replace(found, setting=base.setting)
 
 
 def _heat(error_model: str, base: Base, tell: Tell) -> Heat:

@@ -1,0 +1,358 @@
+"""A base law with mechanisms added to it, calibrated anew: all strengths, spreads and correlations together.
+
+The events' own strengths are integrated out as in any hierarchical calibration. What is added is the same
+for all events; at each of its strengths events look different, so their likelihoods are tabulated on a
+grid of strengths that covers the posterior, and interpolated between.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from skred.diagnosis.curves import Base, Curve
+from skred.diagnosis.event_nodes import Budget
+from skred.diagnosis.extension import Extension
+from skred.diagnosis.modes import Population, Rows, take_rows
+from skred.diagnosis.tables import BUDGETS, Located, Tables, build_tables, exact_nodes, locate
+from skred.diagnosis.tabulated_op import tabulated_log_densities
+from skred.inference.event_density import integrated_log_density
+from skred.inference.hierarchical import INTEGRATION_LIMIT, HierarchicalProblem
+from skred.inference.population import population_of, population_variables
+from skred.inference.surface import Surfaces
+from skred.physics.kernel import front_speeds
+from skred.physics.law import Law, Parameter
+from skred.physics.mechanisms.spec import Direction, Mechanism, Shape
+
+FloatArray = NDArray[np.float64]
+MOST_ADDED = 2
+_EXACT = Budget(1024, 256, 1.5, 1.8)
+_EXACT_RUNS = 16 * 22
+"""Events times draws up to which there are so many nodes; where there are fewer, more."""
+_EXACT_EVENTS, _EXACT_DRAWS = 24, 16
+_ROUGH_DRAWS, _ENOUGH = 8, 0.6
+
+
+@dataclass(frozen=True, eq=False)
+class AddedStrength:
+    """A mechanism of one shape that is added, its strength free.
+
+    Attributes
+    ----------
+    name : str
+        Of the parameter: the strength's own, numbered if two of a kind are added.
+    mechanism : Mechanism
+    shape : Shape
+    direction : Direction
+    """
+
+    name: str
+    mechanism: Mechanism
+    shape: Shape
+    direction: Direction
+
+    @property
+    def parameter(self) -> Parameter:
+        """As a free random variable."""
+        strength = self.mechanism.strength
+        return Parameter(self.name, strength.symbol, strength.unit, strength.paper_symbol)
+
+    @property
+    def scale(self) -> float:
+        """Scale of the prior: half-normal, or normal where either sign may be."""
+        assert self.mechanism.added is not None
+        return self.mechanism.added.scale
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AugmentedProblem(HierarchicalProblem):
+    """A campaign, and a base law with mechanisms added; calibrate the base law with it.
+
+    Attributes
+    ----------
+    base : Base
+    added : tuple of AddedStrength
+        One or two.
+    tables : Tables
+    """
+
+    base: Base
+    added: tuple[AddedStrength, ...]
+    tables: Tables = field(repr=False)
+
+    def __post_init__(self) -> None:
+        """Refuse recordings that the tables are not of."""
+        if self.campaign is not self.base.problem.campaign:
+            raise ValueError("the tables are of another campaign: make a new base and augmented_problem")
+
+    @property
+    def extension(self) -> Extension:
+        """The base law with what is added."""
+        return _extension(self.base, self.added)
+
+    @property
+    def range(self) -> tuple[FloatArray, FloatArray]:
+        """Between which values each added strength is sampled, (n_added,) each: all that counts."""
+        grid = self.tables.grid
+        either = [one.mechanism.added is not None and one.mechanism.added.either_sign for one in self.added]
+        return np.where(either, grid.least, np.maximum(grid.least, 0.0)), grid.most
+
+    def parameters(self, law: Law) -> tuple[Parameter, ...]:
+        """The base law's and its population's parameters, then the added strengths."""
+        return (*super().parameters(law), *(one.parameter for one in self.added))
+
+    def observe(self, mechanisms: Sequence[Mechanism], strengths: Sequence[Any]) -> Any:
+        """Added strengths, and the observed variable ``recordings``: one log density per event."""
+        import pymc as pm
+        import pytensor.tensor as pt
+
+        from skred.diagnosis.tabulated_op import TabulatedLogDensity
+
+        self._check(mechanisms)
+        tables, n_events = self.tables, self.campaign.n_events
+        # As data, so that one compiled model serves many campaigns of as many events.
+        data = tables.arrays
+        held = {name: pm.Data(f"table_{name}", value) for name, value in data.items()}
+        for name in ("size", "first"):
+            held[name] = pt.cast(held[name], "int64")  # PyMC makes integers int32
+        scales = pm.Data("added_scale", np.array([one.scale for one in self.added]))
+        low, high = pm.Data("added_low", self.range[0]), pm.Data("added_high", self.range[1])
+        added = [_truncated_normal(one.name, scales[k], low[k], high[k]) for k, one in enumerate(self.added)]
+        factor = population_variables(mechanisms)
+        means = pt.alloc(pt.log(pt.stack(list(strengths))), n_events, len(mechanisms))
+
+        def logp(event_number: Any, event_means: Any, event_factors: Any, event_added: Any) -> Any:
+            # The distribution's batch is the event; factor and added strengths are the same for all.
+            return TabulatedLogDensity()(event_means, event_factors[0], event_added[0], *held.values())
+
+        return pm.CustomDist(
+            "recordings",
+            means,
+            factor,
+            pt.stack(added),
+            logp=logp,
+            signature="(n),(n,m),(k)->()",
+            observed=np.arange(n_events, dtype=float),
+            dims="event",
+        )
+
+    def log_likelihood(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
+        """Log density of each event for many parameter vectors: arrays by name to (n, n_events)."""
+        self._check(law.mechanisms)
+        return self._tabulated(*population_of(law, samples), self.added_rows(samples))
+
+    def _tabulated(self, means: FloatArray, factors: FloatArray, added: FloatArray) -> FloatArray:
+        n_events, tables = self.campaign.n_events, self.tables
+        densities: FloatArray = tabulated_log_densities(
+            means, factors, added, n_events, *tables.arrays.values()
+        )
+        return densities
+
+    def added_rows(self, samples: Mapping[str, Any]) -> FloatArray:
+        """Added strengths of many parameter vectors: arrays by name to (n, n_added)."""
+        return np.column_stack([np.asarray(samples[one.name], dtype=float).ravel() for one in self.added])
+
+    def predictive(
+        self, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
+    ) -> dict[str, xr.Dataset]:
+        """Each recorded avalanche's own strengths, and new avalanches, all with what is added."""
+        from skred.diagnosis.augmented_results import predictive_groups
+
+        return predictive_groups(self, law, posterior, prior, seed)
+
+    def summary(self, law: Law, tree: xr.DataTree) -> dict[str, Any]:
+        """As of any hierarchical calibration, and what was added."""
+        return {**super().summary(law, tree), "added": [self._row(one) for one in self.added]}
+
+    def _row(self, one: AddedStrength) -> dict[str, Any]:
+        shape = one.shape
+        return {
+            "id": one.mechanism.id,
+            "title": one.mechanism.title,
+            "parameter": one.name,
+            "equation": one.mechanism.equation,
+            "s_from_m": shape.s_from_m,
+            "s_to_m": shape.s_to_m,
+            "covariate": shape.covariate,
+            "sensor": shape.sensor,
+            "constants": dict(shape.constants),
+        }
+
+    def constants(self) -> dict[str, Any]:
+        """How well the releases are known, and between which strengths there are tables."""
+        low, high = self.range
+        return {
+            **super().constants(),
+            "added_strength": ("added", [one.name for one in self.added]),
+            "added_scale": ("added", [one.scale for one in self.added]),
+            "added_from": ("added", low),
+            "added_to": ("added", high),
+        }
+
+    def integration_errors(self, law: Law, samples: Mapping[str, Any], seed: int = 0) -> FloatArray:
+        """Differences of event log densities to exact ones, (n, n_checked_events), of at most 16 draws.
+
+        Exact: nodes at the very strengths of the draw, 1280 or more, around its own population.
+        Of at most 24 events, drawn at random from larger campaigns; positive where the tables are larger.
+        """
+        n = len(next(iter(samples.values())))
+        draws = np.linspace(0, n - 1, min(n, _EXACT_DRAWS)).astype(int)
+        samples = {name: np.ravel(values)[draws] for name, values in samples.items()}
+        rng = np.random.default_rng([seed, 5])
+        chosen = np.sort(rng.permutation(self.campaign.n_events)[:_EXACT_EVENTS])
+        return self.errors_at(*population_of(law, samples), self.added_rows(samples), chosen)
+
+    def errors_at(
+        self, means: FloatArray, factors: FloatArray, added: FloatArray, chosen: NDArray[np.int64]
+    ) -> FloatArray:
+        """As `integration_errors`, of chosen events at some populations and added strengths."""
+        base = self.base
+        population = Population(means, np.einsum("nij,nkj->nik", factors, factors))
+        rows = Rows(chosen, np.zeros_like(chosen), take_rows(base.rows.readings, chosen), base.rows.errors)
+        start = self.tables.modes[self.tables.grid.nearest(added)][:, chosen]
+        given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
+        more = 2 ** int(np.clip(np.log2(_EXACT_RUNS / (len(added) * len(chosen))), 0, 3))
+        budget = _EXACT._replace(around_mode=more * 1024, over_population=more * 256)
+        nodes = exact_nodes(self.extension, rows, given, population, start, budget)
+        errors = self._tabulated(means, factors, added)[:, chosen]
+        for k in range(len(means)):
+            first = nodes.first[k * len(chosen) : (k + 1) * len(chosen) + 1]
+            of_event = np.tile(means[k], (len(chosen), 1))
+            errors[k] -= integrated_log_density(of_event, factors[k], first, nodes.points, nodes.log_weights)
+        return errors
+
+    def speeds(
+        self, mechanisms: Sequence[Mechanism], strengths: FloatArray, release_s_m: float | FloatArray
+    ) -> FloatArray:
+        """Front speed [m/s] at the cell edges, what is added as strong as its posterior mean."""
+        extension = self.extension
+        added = np.concatenate([self.base.strengths, self.tables.mean])
+        columns = np.repeat(added, [len(d.columns) for d in extension.directions])
+        rows = np.column_stack([np.asarray(strengths, float), np.tile(columns, (len(strengths), 1))])
+        releases = np.full(len(rows), release_s_m, dtype=float)  # where fronts start, an offset included
+        speeds: FloatArray = front_speeds(rows, releases, self.path, extension.contributions)
+        return speeds
+
+    def surfaces(self, mechanisms: Sequence[Mechanism]) -> Surfaces:
+        """Not there: surfaces would be those of the base law alone.
+
+        Raises
+        ------
+        NotImplementedError
+            Always.
+        """
+        raise NotImplementedError("a law with mechanisms added has tables, not surfaces")
+
+    def _check(self, mechanisms: Sequence[Mechanism]) -> None:
+        ids = [mechanism.id for mechanism in self.base.law.mechanisms]
+        if [mechanism.id for mechanism in mechanisms] != ids:
+            raise ValueError(f"mechanisms were added to {self.base.law.id}: calibrate that law")
+
+
+def augmented_problem(base: Base, curves: Sequence[Curve]) -> AugmentedProblem:
+    """Problem of a base law with the mechanisms of some curves added, one or two.
+
+    Calibrate it as any other: ``calibrate(augmented_problem(base, curves), base.law, settings)``. Their
+    strengths are parameters, by the names of the strengths.
+
+    Raises
+    ------
+    ValueError
+        If more are added than tables can be made for, or none; or if their constants exclude each other.
+    """
+    if not 1 <= len(curves) <= MOST_ADDED:
+        raise ValueError(f"expected one or {MOST_ADDED} mechanisms to add, found {len(curves)}")
+    added = _named(curves)
+    speeds = {
+        d.weakening_speed
+        for d in (*base.directions, *(one.direction for one in added))
+        if d.weakening_speed is not None
+    }
+    if len(speeds) > 1:
+        raise ValueError(f"mechanisms with different U_c cannot be added together: {sorted(speeds)} m/s")
+    extension = _extension(base, added)
+    located = locate(base, extension, curves)
+    for budget in BUDGETS:
+        problem = _with_tables(base, added, build_tables(base, extension, located, budget))
+        if _rough_error(problem, located) < _ENOUGH * INTEGRATION_LIMIT:
+            break
+    return problem
+
+
+def _with_tables(base: Base, added: tuple[AddedStrength, ...], tables: Tables) -> AugmentedProblem:
+    old = base.problem
+    return AugmentedProblem(
+        old.campaign,
+        old.terrain,
+        old.error_model,
+        old.place_sd_m,
+        base=base,
+        added=added,
+        tables=tables,
+    )
+
+
+def _extension(base: Base, added: Sequence[AddedStrength]) -> Extension:
+    directions = (*base.directions, *(one.direction for one in added))
+    return Extension(base.problem, base.law, directions)
+
+
+def _named(curves: Sequence[Curve]) -> tuple[AddedStrength, ...]:
+    count: Counter[str] = Counter()
+    added = []
+    for curve in curves:
+        name = curve.mechanism.strength.name
+        count[name] += 1
+        own = name if count[name] == 1 else f"{name}_{count[name]}"
+        added.append(AddedStrength(own, curve.mechanism, curve.shape, curve.direction))
+    return tuple(added)
+
+
+def _rough_error(problem: AugmentedProblem, located: Located) -> float:
+    """Error of 22 events [nats], at populations as the fits have them."""
+    rng = np.random.default_rng(17)
+    grid, n = located.grid, len(problem.base.law.mechanisms)
+    added = located.mean + rng.uniform(-2.0, 2.0, (_ROUGH_DRAWS, len(grid.size))) @ located.factor.T
+    added = np.clip(added, *problem.range)
+    populations = []
+    for table in grid.nearest(added):
+        found = located.fits[table].found
+        psi = rng.multivariate_normal(found.psi, found.covariance)
+        populations.append(found._replace(psi=psi).population(n))
+    means = np.concatenate([one.mean for one in populations])
+    factors = np.linalg.cholesky(np.concatenate([one.covariance for one in populations]))
+    chosen = np.sort(rng.permutation(problem.campaign.n_events)[:_EXACT_EVENTS])
+    return float(22.0 * np.abs(problem.errors_at(means, factors, added, chosen).mean(axis=1)).max())
+
+
+def _truncated_normal(name: str, scale: Any, low: Any, high: Any) -> Any:
+    """Normal variable around 0 between two values, as PyTensor's numba backend can draw it.
+
+    Half-normal where the lower one is 0: with the support's part that is left out, its density is only
+    higher by a factor.
+    """
+    import pymc as pm
+    import pytensor.tensor as pt
+    from pymc.distributions.transforms import Interval
+
+    root = np.sqrt(2.0)
+
+    def drawn(scale: Any, low: Any, high: Any, size: Any) -> Any:
+        share = pm.Uniform.dist(0.0, 1.0, size=size)
+        first, last = pt.erf(low / scale / root), pt.erf(high / scale / root)
+        inside: Any = pt.clip(scale * root * pt.erfinv(first + share * (last - first)), low, high)
+        return inside
+
+    def logp(value: Any, scale: Any, low: Any, high: Any) -> Any:
+        share = 0.5 * (pt.erf(high / scale / root) - pt.erf(low / scale / root))
+        density = -0.5 * (value / scale) ** 2 - pt.log(scale * share) - 0.5 * np.log(2.0 * np.pi)
+        return pt.switch((value >= low) & (value <= high), density, -np.inf)
+
+    between = Interval(bounds_fn=lambda *_: (low, high))
+    return pm.CustomDist(name, scale, low, high, dist=drawn, logp=logp, default_transform=between)

@@ -1,0 +1,306 @@
+"""The diagnosis, step by step: what can be told, is anything wrong, where, what, model it, show it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.augmented import AugmentedProblem, augmented_problem
+from skred.diagnosis.curves import Base, Curve, fit_base
+from skred.diagnosis.decide import Decision, alarmed, decide
+from skred.diagnosis.extension import Extension, extended
+from skred.diagnosis.held_out import HeldOut, held_out
+from skred.diagnosis.identify import Identifiability, identify
+from skred.diagnosis.locate import Location, locate
+from skred.diagnosis.modes import Population
+from skred.diagnosis.odds import UNLISTED
+from skred.diagnosis.omnibus import Omnibus, omnibus
+from skred.diagnosis.race import Entrant, Race, race
+from skred.diagnosis.screen import Screen
+from skred.inference.hierarchical import HierarchicalProblem
+from skred.inference.population import population_of
+from skred.inference.sampling import SamplerSettings
+from skred.physics.law import Law
+from skred.work.calibrate import Calibration, calibrate
+
+FloatArray = NDArray[np.float64]
+Tell = Callable[[str], None]
+LEAST_EVENTS = 6
+LEAST_SENSORS = 2
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is computed.
+
+    Attributes
+    ----------
+    replicas : int
+        Clean campaigns simulated at most for each check.
+    max_mechanisms : int
+        1 or 2.
+    exact_loo : bool
+        Refit without every event.
+    """
+
+    replicas: int = 300
+    max_mechanisms: int = 2
+    exact_loo: bool = False
+
+
+QUICK_REPLICAS = 120
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One mechanism let in.
+
+    Attributes
+    ----------
+    entrants : tuple of Entrant
+        Tied candidates, most probable first; the first is the one let in.
+    race : Race
+        In which it won.
+    calibration : Calibration
+        Of the augmented law.
+    check : Omnibus
+        The omnibus check of the augmented law.
+    """
+
+    entrants: tuple[Entrant, ...]
+    race: Race
+    calibration: Calibration
+    check: Omnibus
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """Everything a diagnosis found.
+
+    Attributes
+    ----------
+    problem, law :
+        What was asked about.
+    cannot : str
+        Why no diagnosis was possible, empty if one was; then what follows is None.
+    calibration : Calibration
+        Of the base law.
+    screen : Screen
+    table : Identifiability
+    check : Omnibus
+    race : Race
+    decision : Decision
+    location : Location
+    steps : tuple of Step
+    before, after : HeldOut
+        Predictions by the base law and, where something was let in, by the augmented one.
+    seconds : dict
+        Of each stage.
+    """
+
+    problem: HierarchicalProblem
+    law: Law
+    cannot: str = ""
+    calibration: Calibration | None = None
+    screen: Screen | None = None
+    table: Identifiability | None = None
+    check: Omnibus | None = None
+    race: Race | None = None
+    decision: Decision = Decision("cannot_tell", ())
+    location: Location | None = None
+    steps: tuple[Step, ...] = ()
+    before: HeldOut | None = None
+    after: HeldOut | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+class Clock:
+    """Seconds of each stage, told as they begin."""
+
+    def __init__(self, tell: Tell) -> None:
+        self.tell, self.seconds = tell, dict[str, float]()
+        self._last, self._name = time.monotonic(), ""
+
+    def stage(self, name: str, line: str) -> None:
+        """Begin a stage."""
+        self.end()
+        self._name = name
+        self.tell(line)
+
+    def end(self) -> None:
+        """End the present stage."""
+        now = time.monotonic()
+        if self._name:
+            self.seconds[self._name] = self.seconds.get(self._name, 0.0) + now - self._last
+        self._last, self._name = now, ""
+
+
+def too_little(problem: HierarchicalProblem) -> str:
+    """Why a campaign holds too little for a diagnosis; empty if it does not."""
+    seen = problem.observed
+    n_events = int(seen.any(axis=1).sum())
+    if n_events < LEAST_EVENTS:
+        return f"only {n_events} avalanches with a reading; at least {LEAST_EVENTS} are needed"
+    n_sensors = int((seen.sum(axis=0) >= 2).sum())
+    if n_sensors < LEAST_SENSORS:
+        return f"only {n_sensors} sensor with readings of two avalanches or more; at least {LEAST_SENSORS}"
+    return ""
+
+
+def diagnose(
+    problem: HierarchicalProblem,
+    law: Law,
+    settings: SamplerSettings,
+    effort: Effort,
+    tell: Tell = lambda line: None,
+) -> Diagnosis:
+    """Diagnose a base law on a campaign."""
+    clock = Clock(tell)
+    reason = too_little(problem)
+    if reason:
+        return Diagnosis(problem, law, cannot=reason)
+    clock.stage("base", f"{law.id}: calibrating the base law")
+    calibration = calibrate(problem, law, settings)
+    if not calibration.gate.passed:
+        clock.end()
+        why = "the gate of the base law's calibration failed: " + "; ".join(calibration.gate.problems)
+        return Diagnosis(problem, law, why, calibration, seconds=clock.seconds)
+    draws = population_draws(calibration, effort.replicas, settings.seed)
+    base = fit_base(problem, law, typical(draws))
+    screen = Screen(problem, law, base.setting)
+    clock.stage("identify", "what these recordings can tell")
+    start = (base.population, base.fit.points)
+    table = identify(screen, base.rows, base.fit.points, base.population)
+    clock.stage("check", "is anything wrong: clean campaigns simulated and refitted")
+    check = omnibus(screen, base.rows, start, draws, settings.seed, effort.replicas)
+    clock.stage("race", "what is missing: every candidate refitted")
+    raced = race(base)
+    decision = decide(raced.probability, check.fired, table.can_tell)
+    location = locate(raced.leading(UNLISTED)) if alarmed(raced.probability, check.fired) else None
+    steps: tuple[Step, ...] = ()
+    if decision.names:
+        clock.stage("augment", f"{law.id} + {decision.names[0]}: calibrating the augmented law")
+        steps = let_in(base, raced, decision, settings, effort, clock)
+        if not steps:
+            decision = Decision("unexplained", ())
+    clock.stage("held out", "predicting avalanches left out")
+    before = held_out(
+        calibration,
+        extended(problem, law),
+        _nothing_added(calibration),
+        settings.seed,
+        exact=effort.exact_loo,
+    )
+    after = _after(steps, settings.seed, effort) if steps else None
+    clock.end()
+    return Diagnosis(
+        problem, law, "", calibration, screen, table, check, raced, decision, location, steps,
+        before, after, clock.seconds,
+    )  # fmt: skip
+
+
+def population_draws(calibration: Calibration, n: int, seed: int) -> tuple[FloatArray, FloatArray]:
+    """Means and factors of populations from a posterior, drawn at random without replacement."""
+    posterior = calibration.tree["posterior"].to_dataset()
+    names = [parameter.name for parameter in calibration.problem.parameters(calibration.law)]
+    samples = {name: posterior[name].transpose("chain", "draw").values.ravel() for name in names}
+    means, factors = population_of(calibration.law, samples)
+    chosen = np.random.default_rng([seed, 41]).choice(len(means), size=min(n, len(means)), replace=False)
+    return means[chosen], factors[chosen]
+
+
+def typical(draws: tuple[FloatArray, FloatArray]) -> Population:
+    """Roughly the middle of a posterior of populations."""
+    means, factors = draws
+    covariance = np.einsum("gij,gkj->gik", factors, factors)
+    return Population(means.mean(axis=0)[None], np.median(covariance, axis=0)[None])
+
+
+def _nothing_added(calibration: Calibration) -> FloatArray:
+    sizes = calibration.tree["posterior"].to_dataset().sizes
+    return np.empty((sizes["chain"] * sizes["draw"], 0))
+
+
+def let_in(
+    base: Base, raced: Race, decision: Decision, settings: SamplerSettings, effort: Effort, clock: Clock
+) -> tuple[Step, ...]:
+    """Let the winner in, check again, and a second one only if it earns it given the first.
+
+    Returns nothing where the winner's own calibration fails its gate.
+    """
+    steps: list[Step] = []
+    names, chosen = decision.names, list[Curve]()
+    for number in range(effort.max_mechanisms):
+        heat = raced.leading(names[0])
+        entrants = tuple(heat.entrants[name] for name in names)
+        chosen.append(entrants[0].best)
+        problem = augmented_problem(_plain(heat.base), chosen)
+        calibration = calibrate(problem, base.law, settings)
+        if not calibration.gate.passed:
+            break
+        clock.stage("check again", "is anything wrong with the augmented law")
+        check, next_base = _check_again(heat.base, calibration, problem, chosen, settings, effort)
+        steps.append(Step(entrants, raced, calibration, check))
+        if not check.fired or number + 1 == effort.max_mechanisms:
+            break
+        clock.stage("second race", "something is left: every candidate refitted again")
+        raced = race(next_base)
+        second = decide(raced.probability, True, True)
+        if not second.names:
+            break
+        names = second.names
+        clock.stage("augment", f"calibrating with {names[0]} as well")
+    return tuple(steps)
+
+
+def _plain(base: Base) -> Base:
+    """The base law without what was let in before: the augmented problem holds that itself."""
+    return replace(base, directions=(), strengths=np.empty(0))
+
+
+def _check_again(
+    base: Base,
+    calibration: Calibration,
+    problem: AugmentedProblem,
+    chosen: list[Curve],
+    settings: SamplerSettings,
+    effort: Effort,
+) -> tuple[Omnibus, Base]:
+    """The omnibus check of the augmented law, and that law as a base for another race."""
+    directions = tuple(one.direction for one in chosen)
+    strengths = _added(calibration).mean(axis=0)
+    draws = population_draws(calibration, effort.replicas, settings.seed + 1)
+    setting = replace(base.setting, base=(*base.setting.base, *_global_ids(chosen)))
+    plain = replace(base.problem)
+    again = fit_base(plain, base.law, typical(draws), base.fit.points, directions, strengths)
+    again = replace(again, setting=setting)
+    screen = Screen(plain, base.law, setting, directions, strengths)
+    start = (again.population, again.fit.points)
+    check = omnibus(screen, again.rows, start, draws, settings.seed + 1, effort.replicas)
+    return check, again
+
+
+def _global_ids(chosen: list[Curve]) -> list[str]:
+    """Ids of mechanisms that act alike everywhere: they cannot be missing a second time."""
+    return [one.mechanism.id for one in chosen if one.shape.place_m is None]
+
+
+def _added(calibration: Calibration) -> FloatArray:
+    """Draws of the added strengths, (n_draws, n_added)."""
+    problem = calibration.problem
+    assert isinstance(problem, AugmentedProblem)
+    posterior = calibration.tree["posterior"].to_dataset()
+    columns = [posterior[one.name].transpose("chain", "draw").values.ravel() for one in problem.added]
+    return np.column_stack(columns)
+
+
+def _after(steps: tuple[Step, ...], seed: int, effort: Effort) -> HeldOut:
+    calibration = steps[-1].calibration
+    problem: Any = calibration.problem
+    extension: Extension = problem.extension
+    return held_out(calibration, extension, _added(calibration), seed, exact=effort.exact_loo)

@@ -1,0 +1,62 @@
+"""The one more sensor that would say most: that splits a tie, or that sees what these recordings cannot."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from skred.diagnosis.diagnose import Diagnosis
+from skred.diagnosis.extension import extended
+from skred.diagnosis.identify import with_sensors
+from skred.diagnosis.race import Entrant
+
+_PLACES = 16
+
+
+def next_sensor(found: Diagnosis) -> dict[str, Any] | None:
+    """A velocity sensor in the words of the campaign format; None where nothing is to be split or seen."""
+    if found.table is None:
+        return None
+    entrants = found.steps[0].entrants if found.steps else ()
+    rivals = [one for one in entrants[1:] if one.mechanism.same_term_as != entrants[0].mechanism.id]
+    rivals = [one for one in rivals if entrants[0].mechanism.same_term_as != one.mechanism.id]
+    if rivals:
+        place = _splitting(found, entrants[0], rivals[0])
+        return _sensor(place, [entrants[0].mechanism.id, rivals[0].mechanism.id])
+    if found.decision.verdict == "cannot_tell" and found.table.sensor_m is not None:
+        return _sensor(found.table.sensor_m, [])
+    return None
+
+
+def _sensor(place: float, splits: list[str]) -> dict[str, Any]:
+    return {"quantity": "front_velocity", "s_from_m": place, "s_to_m": place, "splits": splits}
+
+
+def _splitting(found: Diagnosis, first: Entrant, second: Entrant) -> float:
+    """Where two fitted candidates differ most in what one more sensor would read, in its standard deviations.
+
+    Each with the events' modes and the strength that fit the recordings best under it.
+    """
+    low, high = found.steps[0].race.heats[0].base.setting.recorded_m
+    release = float(found.problem.releases.mean.max()) + 20.0
+    places = np.linspace(max(release, low - 0.5 * (high - low)), high, _PLACES)
+    problem = with_sensors(found.problem, places)
+    columns = np.arange(_PLACES) + found.problem.campaign.n_sensors
+    speeds = []
+    for entrant in (first, second):
+        curve = entrant.best
+        at = int(np.argmax(curve.log_evidence))
+        direction = curve.direction
+        if direction.log_readings is not None:
+            padded = np.concatenate([direction.log_readings, np.zeros(_PLACES)])
+            direction = type(direction)(log_readings=padded)
+        extension = extended(problem, found.law, [direction])
+        points = curve.fits[at].points
+        events = np.arange(len(points))
+        speeds.append(extension.predict(events, points, curve.strengths[at : at + 1])[:, columns])
+    readings = problem.readings
+    typical = 0.5 * (speeds[0] + speeds[1])
+    sd = np.hypot(readings.relative_sd[columns] * typical, readings.absolute_sd[columns])
+    distance = (((speeds[0] - speeds[1]) / sd) ** 2).sum(axis=0)
+    return float(places[int(np.argmax(distance))])

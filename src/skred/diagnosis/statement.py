@@ -1,0 +1,141 @@
+"""The diagnosis in one paragraph of plain words: where, what, how sure, how much better."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from skred.diagnosis.diagnose import Diagnosis
+from skred.diagnosis.odds import NOTHING, UNLISTED
+from skred.physics.mechanisms import mechanisms
+from skred.report.document import PRACTICAL_DIFFERENCE
+
+
+def statement(found: Diagnosis, document: dict[str, Any]) -> str:
+    """One paragraph in plain words."""
+    parts = {
+        "missing_physics": _named,
+        "instrument": _named,
+        "unexplained": _unexplained,
+        "nothing_missing": _nothing,
+        "cannot_tell": _cannot,
+    }[found.decision.verdict](found, document)
+    return " ".join(part for part in parts if part)
+
+
+def _title(name: str) -> str:
+    return mechanisms()[name].title
+
+
+def _share(probability: float) -> str:
+    """A probability that is never rounded to certainty."""
+    if probability > 0.995:
+        return "more than 99 %"
+    return "less than 1 %" if probability < 0.005 else f"{100.0 * probability:.0f} %"
+
+
+def _where(location: dict[str, float] | None) -> str:
+    if location is None:
+        return ""
+    return f" between s = {location['s_from_m']:.0f} m and {location['s_to_m']:.0f} m"
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else f" {unit}"
+
+
+def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
+    name, ties = document["mechanism"], document["indistinguishable"]
+    strength, probability = document["strength"], document["probability"]
+    what = "The recordings are off" if found.decision.verdict == "instrument" else "Physics is missing"
+    subject = document["covariate"] or document["sensor"]
+    about = f" ({subject})" if subject else ""
+    sentences = [
+        f"{what}: {_title(name)}{about}{_where(document['location'])}, with a probability of"
+        f" {_share(probability[name])} (nothing: {_share(probability[NOTHING])}; a force not in the list:"
+        f" {_share(probability[UNLISTED])}).",
+        f"Its {strength['parameter'].replace('_', ' ')} is {strength['mean']:.3g} +- {strength['sd']:.2g}"
+        f"{_unit(strength['unit'])}.",
+    ]
+    if document["covariate"]:
+        sentences.append("Associated with, not necessarily caused by.")
+    if ties:
+        others = ", ".join(_title(other) for other in ties)
+        sentences.append(f"These recordings cannot tell it from: {others}.")
+        sentences.append(_split(document))
+    if len(document["mechanisms"]) > 1:
+        second = document["mechanisms"][1]
+        sentences.append(
+            f"Given that, a second one earned its place: {_title(second['id'])}{_where(second['location'])}."
+        )
+    sentences.append(_improvement(document))
+    last = found.steps[-1].check
+    if last.fired:
+        sentences.append(
+            f"The augmented law still fails the check (p = {last.p_value:.2g}): something more, or another"
+            " shape of the same, is left; do not take the name for the whole story."
+        )
+    return sentences
+
+
+def _split(document: dict[str, Any]) -> str:
+    sensor = document["next_sensor"]
+    if sensor is None or not sensor["splits"]:
+        return "No further speed would split them: the terms are the same." if sensor is None else ""
+    return f"A speed at s = {sensor['s_from_m']:.0f} m would split the first two best."
+
+
+def _improvement(document: dict[str, Any]) -> str:
+    evidence, held = document["evidence"], document["held_out"]
+    difference, se = evidence["elpd_diff"], evidence["elpd_se"]
+    if difference is None:
+        return ""
+    much = "" if abs(difference) >= PRACTICAL_DIFFERENCE else ", no practical difference"
+    text = (
+        f"For avalanches left out the log score changes by {difference:+.1f} (standard error, doubled,"
+        f" {2.0 * se:.1f}){much}"
+    )
+    if held["rmse_velocity_before"] is not None and held["rmse_velocity_after"] is not None:
+        text += (
+            f"; the error of speeds from {held['rmse_velocity_before']:.1f} to"
+            f" {held['rmse_velocity_after']:.1f} m/s"
+        )
+    if held["rmse_runout_before"] is not None and held["rmse_runout_after"] is not None:
+        text += f", of runout from {held['rmse_runout_before']:.0f} to {held['rmse_runout_after']:.0f} m"
+    return text + "."
+
+
+def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
+    assert found.check is not None
+    return [
+        f"Something is missing{_where(document['location'])} that no listed mechanism accounts for"
+        f" (p = {found.check.p_value:.2g}; probability of nothing {_share(document['probability'][NOTHING])}).",
+        "The force profile is the answer: see where it stands out and how much work it does.",
+    ]
+
+
+def _nothing(found: Diagnosis, document: dict[str, Any]) -> list[str]:
+    assert found.check is not None and found.table is not None
+    return [
+        f"The recordings give no reason to add anything (p = {found.check.p_value:.2g}; probability of nothing"
+        f" {_share(document['probability'][NOTHING])}).",
+        f"A relevant strength of what is listed would have been found in {100.0 * found.table.power:.0f} % of"
+        " cases on average; the table of detection limits says from where on each would have been seen.",
+    ]
+
+
+def _cannot(found: Diagnosis, document: dict[str, Any]) -> list[str]:
+    if found.cannot:
+        return [f"These recordings cannot tell: {found.cannot}."]
+    assert found.check is not None and found.table is not None
+    sentences = [
+        f"No alarm (p = {found.check.p_value:.2g}), but these recordings cannot tell: a relevant strength of"
+        f" what is listed would have been found in only {100.0 * found.table.power:.0f} % of cases on average,"
+        " so silence means little.",
+    ]
+    sensor = document["next_sensor"]
+    if sensor is not None:
+        sentences.append(
+            f"One more speed at s = {sensor['s_from_m']:.0f} m would raise that to"
+            f" {100.0 * found.table.power_with:.0f} %."
+        )
+    return sentences

@@ -1,0 +1,337 @@
+"""Tables of importance nodes on a grid of added strengths that covers their posterior."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RegularGridInterpolator
+
+from skred.diagnosis.curves import Base, Curve, Fit, _repeated, refit
+from skred.diagnosis.event_nodes import Budget, event_nodes
+from skred.diagnosis.extension import Extension
+from skred.diagnosis.modes import Population, Rows, event_modes
+from skred.inference.surface import Nodes
+from skred.physics.mechanisms.spec import Added
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BUDGETS = Budget(256, 64, 1.5, 1.8), Budget(512, 128, 1.5, 1.8), Budget(1024, 256, 1.5, 1.8)
+"""Of the tables: each where the one before is not good enough."""
+_LOOKING, _FINAL = {1: 11, 2: 6}, {1: 13, 2: 8}
+"""Strengths along each axis while the posterior is looked for, and of the tables, by the number of axes."""
+_COVERED_NATS = 11.0
+"""How far below its top the density of strengths still counts: 4.7 standard deviations."""
+_STARTING_REACH = 5.0
+_MOST_SCALES = 4.5
+_LOOKS, _SETTLED, _BEYOND, _FARTHEST = 6, 0.12, 0.25, 7.0
+_DEEP = 60.0
+_FINE = {1: 601, 2: 121}
+
+
+class Grid(NamedTuple):
+    """Regular grid of the added strengths, skewed where two go together.
+
+    Attributes
+    ----------
+    origin : (n_added,) array
+        Strengths of the first table.
+    steps : (n_added, n_added) array
+        Lower triangular: each column is the step from table to table along an axis.
+    size : (n_added,) integer array
+        Tables along each axis.
+    """
+
+    origin: FloatArray
+    steps: FloatArray
+    size: IntArray
+
+    @property
+    def points(self) -> FloatArray:
+        """All strengths, the last axis running fastest, (n_tables, n_added)."""
+        axes = [np.arange(n, dtype=float) for n in self.size]
+        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+        return self.strengths(places)
+
+    @property
+    def least(self) -> FloatArray:
+        """Smallest of each strength, (n_added,)."""
+        return self.points.min(axis=0)
+
+    @property
+    def most(self) -> FloatArray:
+        """Largest of each strength, (n_added,)."""
+        return self.points.max(axis=0)
+
+    def strengths(self, places: FloatArray) -> FloatArray:
+        """Strengths at places in steps from the first table, (n, n_added) both."""
+        return self.origin + places @ self.steps.T
+
+    def places(self, strengths: FloatArray) -> FloatArray:
+        """Places on the grid in steps from the first table, at its edge at most."""
+        places = np.linalg.solve(self.steps, (strengths - self.origin).T).T
+        return np.clip(places, 0.0, self.size - 1.0)
+
+    def table(self, index: IntArray) -> IntArray:
+        """Numbers of tables from places on the grid, (n, n_added) to (n,)."""
+        result: IntArray = np.ravel_multi_index(tuple(index.T), tuple(self.size)).astype(np.int64)
+        return result
+
+    def nearest(self, strengths: FloatArray) -> IntArray:
+        """Number of the nearest table, (n, n_added) to (n,)."""
+        return self.table(np.rint(self.places(strengths)).astype(np.int64))
+
+    def around(self, strengths: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Tables at the corners of a cell of the grid, and their linear weights, (n, 2^n_added)."""
+        place = self.places(strengths)
+        low = np.minimum(np.floor(place).astype(np.int64), self.size - 2)
+        tables, weights = [], []
+        for corner in range(2 ** len(self.size)):
+            side = (corner >> np.arange(len(self.size))) & 1
+            tables.append(self.table(low + side))
+            weights.append(np.where(side == 1, place - low, 1.0 - place + low).prod(axis=1))
+        return np.stack(tables, axis=1), np.stack(weights, axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """Nodes at each strength of a grid.
+
+    Attributes
+    ----------
+    grid : Grid
+    nodes : Nodes
+        Of all events at the first strengths, then at the next, ...
+    release : (n_nodes,) array
+        The release's deviation at each node, in standard deviations.
+    modes : (n_tables, n_events, n_base + 1) array
+        Most probable points of the events.
+    mean : (n_added,) array
+        Posterior mean of the strengths by the race's formula.
+    factor : (n_added, n_added) array
+        Lower Cholesky factor of their posterior covariance, by the same.
+    budget : Budget
+    """
+
+    grid: Grid
+    nodes: Nodes
+    release: FloatArray
+    modes: FloatArray
+    mean: FloatArray
+    factor: FloatArray
+    budget: Budget
+
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """What the compiled interpolation reads, by name."""
+        return {**self.grid._asdict(), **self.nodes._asdict()}
+
+
+class Located(NamedTuple):
+    """Fits on a grid that covers the posterior of the added strengths, with their mean and its factor."""
+
+    grid: Grid
+    fits: list[Fit]
+    mean: FloatArray
+    factor: FloatArray
+
+
+def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located:
+    """Look for the added strengths where their curves had them, and around, until the range is settled."""
+    priors = [_prior(curve) for curve in curves]
+    n_axes, n_base = len(curves), len(base.law.mechanisms)
+    scale = np.array([p.scale for p in priors])
+    lowest = np.array([-_MOST_SCALES * p.scale if p.either_sign else 0.0 for p in priors])
+    support = Support(lowest, _MOST_SCALES * scale)
+    mean, sd = (np.array(values) for values in zip(*(curve.moments() for curve in curves), strict=True))
+    factor = np.diag(np.clip(sd, 0.01 * scale, scale))
+    reach = np.full(n_axes, _STARTING_REACH)
+    start = (base.population, base.fit.points)
+    if n_axes == 1:
+        start = _nearest_fit(curves[0], float(mean[0]), n_base)
+    grid = _grid(mean, factor, -reach, reach, support, _LOOKING[n_axes])
+    for look in range(_LOOKS):
+        last = look == _LOOKS - 1
+        fits, heights = _look(base, extension, grid, scale, start)
+        best = int(heights.argmax())
+        start = fits[best].found.population(n_base), fits[best].points
+        mean, factor, low, high = _posterior(grid, heights, support)
+        new = _grid(mean, factor, low, high, support, _FINAL[n_axes])
+        settled = _moved(grid, new) < _SETTLED
+        if settled and len(grid.points) >= len(new.points):
+            break
+        refined = settled or last or look == _LOOKS - 2
+        grid = new if refined else _grid(mean, factor, low, high, support, _LOOKING[n_axes])
+    else:
+        fits, _ = _look(base, extension, grid, scale, start)
+    return Located(grid, _without_failures(fits, best), mean, factor)
+
+
+class Support(NamedTuple):
+    """Where strengths may be, (n_added,) each."""
+
+    low: FloatArray
+    high: FloatArray
+
+
+def _look(
+    base: Base, extension: Extension, grid: Grid, scale: FloatArray, start: tuple[Population, FloatArray]
+) -> tuple[list[Fit], FloatArray]:
+    """Fits at all strengths of a grid, and the log posterior densities there, not normalised."""
+    strengths = grid.points
+    given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
+    fits = refit(extension, base.rows, given, start, base.log_scale)
+    heights = np.array([fit.found.log_evidence for fit in fits])
+    heights = heights - 0.5 * np.sum((strengths / scale) ** 2, axis=1)
+    return fits, np.nan_to_num(heights, nan=-np.inf, posinf=-np.inf)
+
+
+def _moved(old: Grid, new: Grid) -> float:
+    """How far the new grid's corners are from the old one's, in widths of the new."""
+    ends = np.stack(np.meshgrid(*([[0.0, 1.0]] * len(new.size)), indexing="ij"), axis=-1)
+    ends = ends.reshape(-1, len(new.size))
+    difference = old.strengths(ends * (old.size - 1)) - new.strengths(ends * (new.size - 1))
+    in_steps = np.linalg.solve(new.steps, difference.T).T
+    return float(np.abs(in_steps / (new.size - 1)).max())
+
+
+def _prior(curve: Curve) -> Added:
+    added = curve.mechanism.added
+    assert added is not None
+    return added
+
+
+def _nearest_fit(curve: Curve, strength: float, n_base: int) -> tuple[Population, FloatArray]:
+    fit = curve.fits[int(np.abs(curve.strengths - strength).argmin())]
+    return fit.found.population(n_base), fit.points
+
+
+def _grid(
+    mean: FloatArray, factor: FloatArray, low: FloatArray, high: FloatArray, support: Support, size: int
+) -> Grid:
+    """A grid from `low` to `high`, in units of the factor's columns from the mean, inside the support.
+
+    A second strength that goes with the first can leave the support; its prior does not.
+    """
+    low, high = low.copy(), high.copy()
+    for axis in range(len(mean)):
+        if not factor[axis, :axis].any():
+            low[axis] = max(low[axis], (support.low[axis] - mean[axis]) / factor[axis, axis])
+            high[axis] = min(high[axis], (support.high[axis] - mean[axis]) / factor[axis, axis])
+    steps = factor * ((high - low) / (size - 1))
+    origin = mean + factor @ low
+    if len(mean) == 1 and low[0] * factor[0, 0] < -mean[0] < high[0] * factor[0, 0]:
+        # Shifted so that 0, where there is the base law alone, is on it.
+        n_below = math.ceil(-origin[0] / steps[0, 0] - 1e-6)
+        origin = -n_below * steps[0]
+        size += int(origin[0] + (size - 1) * steps[0, 0] < mean[0] + factor[0, 0] * high[0] * (1 - 1e-9))
+    return Grid(origin, steps, np.full(len(mean), size, dtype=np.int64))
+
+
+def _posterior(
+    grid: Grid, heights: FloatArray, support: Support
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Mean and covariance's factor of strengths from log densities on a grid; the range that counts.
+
+    The range is in units of the factor's columns from the mean; beyond an edge where there is still
+    something it goes on.
+    """
+    n_axes = len(grid.size)
+    table = np.maximum(heights - heights.max(), -_DEEP).reshape(grid.size)
+    axes = [np.arange(n, dtype=float) for n in grid.size]
+    between = RegularGridInterpolator(axes, table, method="cubic")
+    fine = [np.linspace(0.0, n - 1.0, _FINE[n_axes]) for n in grid.size]
+    places = np.stack(np.meshgrid(*fine, indexing="ij"), axis=-1).reshape(-1, n_axes)
+    strengths, density = grid.strengths(places), between(places)
+    slack = 1e-9 * (support.high - support.low)
+    allowed = np.all((strengths >= support.low - slack) & (strengths <= support.high + slack), axis=1)
+    density = np.where(allowed, density, -np.inf)
+    weights = np.exp(density - density.max())
+    weights /= weights.sum()
+    mean = weights @ strengths
+    deviation = strengths - mean
+    covariance = np.einsum("k,ki,kj->ij", weights, deviation, deviation)
+    factor = np.linalg.cholesky(covariance + 1e-6 * np.diag(np.diag(covariance)))
+    covered = density > density.max() - _COVERED_NATS
+    white = np.linalg.solve(factor, deviation[covered].T).T
+    low, high = white.min(axis=0), white.max(axis=0)
+    for axis in range(n_axes):
+        for edge in (0.0, grid.size[axis] - 1.0):
+            if covered[places[:, axis] == edge].any():
+                width = _BEYOND * (high - low)
+                at_edge = white[(places[covered, axis] == edge)].mean(axis=0)
+                low = np.where(at_edge < 0.0, low - width, low)
+                high = np.where(at_edge > 0.0, high + width, high)
+    return mean, factor, np.maximum(low, -_FARTHEST), np.minimum(high, _FARTHEST)
+
+
+def _without_failures(fits: Sequence[Fit], best: int) -> list[Fit]:
+    """Fits, those that came to nothing replaced by the best."""
+    return [
+        fit if np.isfinite(fit.found.psi).all() and np.isfinite(fit.found.covariance).all() else fits[best]
+        for fit in fits
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class _Remembering(Extension):
+    """An extension that keeps the points it was last asked about."""
+
+    asked: list[FloatArray] = field(default_factory=list)
+
+    def predict(self, events: IntArray, points: FloatArray, strengths: FloatArray) -> FloatArray:
+        self.asked[:] = [points]
+        return super().predict(events, points, strengths)
+
+
+def build_tables(base: Base, extension: Extension, located: Located, budget: Budget) -> Tables:
+    """Nodes of all events at all strengths of a grid, around populations as wide as what is known of them."""
+    grid, fits, mean, factor = located
+    n, n_tables, n_events = len(base.law.mechanisms), len(fits), len(base.rows.event)
+    rows = _repeated(base.rows, n_tables)
+    given = np.column_stack([np.tile(base.strengths, (n_tables, 1)), grid.points]).repeat(n_events, axis=0)
+    found = [fit.found.population(n) for fit in fits]
+    population = Population(
+        np.concatenate([one.mean for one in found]), np.concatenate([one.covariance for one in found])
+    )
+    start = np.concatenate([fit.points for fit in fits])
+    modes = event_modes(extension, rows, start, given, population, n_steps=8)
+    # Populations of the posterior differ in mean and in spread.
+    covariances = np.stack([fit.found.covariance for fit in fits])
+    wider = np.exp(np.minimum(np.sqrt(np.einsum("tii->ti", covariances)[:, n : 2 * n]), 0.7))
+    wide = population.covariance * wider[:, :, None] * wider[:, None, :]
+    wide = wide + np.clip(covariances[:, :n, :n], -1.0, 1.0)
+    remembering = _Remembering(extension.problem, extension.law, extension.directions)
+    nodes = event_nodes(remembering, rows, given, Population(population.mean, wide), modes, budget)
+    release = remembering.asked[0][:, n].copy()
+    points = modes.points.reshape(n_tables, n_events, n + 1)
+    return Tables(grid, nodes, release, points, mean, factor, budget)
+
+
+def exact_nodes(
+    extension: Extension,
+    rows: Rows,
+    strengths: FloatArray,
+    population: Population,
+    start: FloatArray,
+    budget: Budget,
+) -> Nodes:
+    """Nodes at some strengths for some populations themselves, one group of rows for each.
+
+    Parameters
+    ----------
+    rows : Rows
+        Of one group.
+    strengths : (n_groups, n_directions) array
+    population : Population
+    start : (n_groups, n_rows, n_base + 1) array
+        Points near the modes.
+    """
+    n_groups, n_rows = len(strengths), len(rows.event)
+    many, given = _repeated(rows, n_groups), strengths.repeat(n_rows, axis=0)
+    modes = event_modes(extension, many, start.reshape(n_groups * n_rows, -1), given, population)
+    return event_nodes(extension, many, given, population, modes, budget)

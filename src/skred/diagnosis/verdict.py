@@ -1,0 +1,169 @@
+"""The verdict as plain data: every key of the campaign format, and a statement in plain words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from skred.diagnosis.decide import alarmed
+from skred.diagnosis.diagnose import Diagnosis, Step
+from skred.diagnosis.held_out import errors, paired
+from skred.diagnosis.next_sensor import next_sensor
+from skred.diagnosis.race import Entrant
+from skred.diagnosis.statement import statement
+
+
+def verdict(found: Diagnosis) -> dict[str, Any]:
+    """The verdict of a diagnosis, as `verdict.json` holds it."""
+    entrant = found.steps[0].entrants[0] if found.steps else None
+    names = found.decision.names if found.steps else ()
+    document = {
+        "format": 1,
+        "campaign": found.problem.campaign.name,
+        "base_model": found.law.id,
+        "verdict": found.decision.verdict,
+        "mechanism": names[0] if names else None,
+        "mechanisms": [_mechanism(step, number) for number, step in enumerate(found.steps)],
+        "probability": found.race.probability if found.race is not None else {},
+        "indistinguishable": list(names[1:]),
+        "location": _location(found, entrant),
+        "strength": _strength(found.steps[0], 0) if found.steps else None,
+        "covariate": entrant.best.shape.covariate if entrant is not None else None,
+        "sensor": entrant.best.shape.sensor if entrant is not None else None,
+        "equation": entrant.mechanism.equation if entrant is not None else None,
+        "evidence": _evidence(found),
+        "held_out": _held_out(found),
+        "detection_limits": _detection_limits(found),
+        "next_sensor": next_sensor(found),
+        "diagnostics": _diagnostics(found),
+    }
+    document["statement"] = statement(found, document)
+    return document | _more(found)
+
+
+def _location(found: Diagnosis, entrant: Entrant | None) -> dict[str, float] | None:
+    if entrant is not None:
+        stretch = entrant.stretch()
+    elif found.decision.verdict == "unexplained" and found.location is not None:
+        stretch = found.location.stretch_m
+    else:
+        stretch = None
+    return None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]}
+
+
+def _strength(step: Step, number: int) -> dict[str, Any]:
+    """Posterior of an added strength in the augmented law: shrunk by its prior."""
+    problem: Any = step.calibration.problem
+    added = problem.added[number]
+    draws = np.asarray(step.calibration.tree["posterior"].to_dataset()[added.name].values)
+    return {
+        "parameter": added.name,
+        "unit": added.mechanism.strength.unit,
+        "mean": float(draws.mean()),
+        "sd": float(draws.std(ddof=1)),
+    }
+
+
+def _mechanism(step: Step, number: int) -> dict[str, Any]:
+    """One mechanism let in, its strength as the last calibration has it."""
+    entrant = step.entrants[0]
+    stretch = entrant.stretch()
+    shape = entrant.best.shape
+    return {
+        "id": entrant.mechanism.id,
+        "strength": _strength(step, number),
+        "location": None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]},
+        "equation": entrant.mechanism.equation,
+        "covariate": shape.covariate,
+        "sensor": shape.sensor,
+        "constants": dict(shape.constants),
+        "tied_with": [other.mechanism.id for other in step.entrants[1:]],
+        "log_bayes_factor": step.race.log_factors[entrant.mechanism.id],
+    }
+
+
+def _evidence(found: Diagnosis) -> dict[str, float | None]:
+    p_value = found.check.p_value if found.check is not None else None
+    factor = None
+    if found.race is not None and found.steps:
+        factor = found.race.log_factors[found.steps[0].entrants[0].mechanism.id]
+    elif found.race is not None:
+        factor = found.race.log_odds
+    difference, se = None, None
+    if found.before is not None and found.after is not None:
+        difference, se = paired(found.after, found.before)
+    return {"elpd_diff": difference, "elpd_se": se, "log_bayes_factor": factor, "p_value": p_value}
+
+
+def _held_out(found: Diagnosis) -> dict[str, Any]:
+    keys = ("rmse_velocity", "rmse_runout", "coverage_90")
+    result: dict[str, Any] = {"unit": "event"}
+    for when, one in (("before", found.before), ("after", found.after)):
+        values = errors(one, found.problem) if one is not None else dict.fromkeys(keys)
+        result |= {f"{key}_{when}": values[key] for key in keys}
+    return result
+
+
+def _detection_limits(found: Diagnosis) -> dict[str, Any]:
+    """The smallest strength found in 90 % of cases at a typical place."""
+    if found.table is None:
+        return {}
+    return {
+        row.mechanism.id: {
+            "parameter": row.mechanism.strength.name,
+            "unit": row.mechanism.strength.unit,
+            "value": row.limit,
+        }
+        for row in found.table.rows
+    }
+
+
+def _diagnostics(found: Diagnosis) -> dict[str, float | int | None]:
+    calibrations = [
+        one for one in (found.calibration, *(s.calibration for s in found.steps)) if one is not None
+    ]
+    if not calibrations:
+        return {"r_hat_max": None, "ess_min": None, "pareto_k_max": None, "divergences": None}
+    gates = [one.gate for one in calibrations]
+    held = [one.pareto_k.max() for one in (found.before, found.after) if one is not None]
+    return {
+        "r_hat_max": max(gate.r_hat_max for gate in gates),
+        "ess_min": min(min(gate.ess_bulk_min, gate.ess_tail_min) for gate in gates),
+        "pareto_k_max": float(np.max(held)) if held else None,
+        "divergences": sum(gate.divergences for gate in gates),
+    }
+
+
+def _more(found: Diagnosis) -> dict[str, Any]:
+    """Keys beyond the format's."""
+    more: dict[str, Any] = {"reason": found.cannot or None, "seconds": found.seconds}
+    if found.race is not None and found.check is not None:
+        more["alarm"] = alarmed(found.race.probability, found.check.fired)
+        more["log_bayes_factors"] = found.race.log_factors
+        more["error_models"] = [heat.error_model for heat in found.race.heats]
+    if found.steps:
+        more["p_value_augmented"] = found.steps[-1].check.p_value
+        more["refitted_events"] = list(found.after.refitted) if found.after is not None else []
+    if found.table is not None:
+        more["identifiability"] = [
+            {
+                "id": row.mechanism.id,
+                "kept": row.kept,
+                "limit": row.limit,
+                "best_limit": row.best_limit,
+                "best_stretch_m": row.limit_m,
+                "relevant": row.mechanism.added.relevant if row.mechanism.added is not None else None,
+                "unit": row.mechanism.strength.unit,
+                "power": row.power,
+                "alike": list(row.alike),
+            }
+            for row in found.table.rows
+        ]
+        more["power"] = found.table.power
+    if found.location is not None:
+        more["missing_work"] = [
+            {"s_from_m": a, "s_to_m": b, "mean": mean, "sd": sd, "unit": "J kg-1"}
+            for a, b, mean, sd in found.location.work.tolist()
+        ]
+    return more

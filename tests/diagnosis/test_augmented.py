@@ -1,0 +1,215 @@
+"""A law with mechanisms added: against a dense grid of everything, against exact integrals, and sampled."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytensor
+import pytensor.tensor as pt
+import pytest
+from numpy.testing import assert_allclose
+from scipy.special import logsumexp
+from scipy.stats import halfnorm, lognorm, norm
+
+from skred.campaign import find_campaign, read_campaign
+from skred.diagnosis.augmented import AugmentedProblem, augmented_problem
+from skred.diagnosis.curves import Base, Curve, curve, curve_near, fit_base
+from skred.diagnosis.extension import extended
+from skred.diagnosis.mixed import fit_population, mean_prior, starting_population
+from skred.diagnosis.modes import campaign_rows
+from skred.diagnosis.tabulated_op import TabulatedLogDensity, tabulated_log_density
+from skred.inference.event_density import integrated_log_density, log_likelihoods
+from skred.inference.hierarchical import hierarchical_problem
+from skred.inference.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
+from skred.inference.sampling import SamplerSettings
+from skred.laws import load_law
+from skred.physics.mechanisms import mechanisms
+from skred.work.calibrate import calibrate
+
+CAMPAIGN = read_campaign(find_campaign("ryggfonn"))
+DRAWS = {
+    "dry_friction": np.array([0.33, 0.36, 0.4]),
+    "dry_friction_spread": np.array([0.1, 0.15, 0.2]),
+}
+
+
+def base_of(rows: list[int], law_id: str = "coulomb") -> Base:
+    campaign = replace(
+        CAMPAIGN,
+        events=tuple(CAMPAIGN.events[row] for row in rows),
+        values=CAMPAIGN.values[rows],
+        status=CAMPAIGN.status[rows],
+        stated_sd=CAMPAIGN.stated_sd[rows],
+    )
+    problem, law = hierarchical_problem(campaign), load_law(law_id)
+    extension = extended(problem, law)
+    population = starting_population(law)
+    points = np.column_stack([np.tile(population.mean[0], (len(rows), 1)), np.zeros(len(rows))])
+    found, points = fit_population(
+        extension, campaign_rows(extension), np.zeros(0), mean_prior(law), (population, points), n_rounds=40
+    )
+    return fit_base(problem, law, found, points)
+
+
+def curve_of(base: Base, mechanism_id: str) -> Curve:
+    mechanism = mechanisms()[mechanism_id]
+    assert mechanism.added is not None
+    shape = mechanism.added.shapes(base.setting)[0]
+    return curve_near(base, mechanism, shape, curve(base, mechanism, shape).moments())
+
+
+@pytest.fixture(scope="module")
+def base() -> Base:
+    return base_of([0, 5, 8])
+
+
+@pytest.fixture(scope="module")
+def drag(base: Base) -> Curve:
+    return curve_of(base, "turbulent_drag")
+
+
+@pytest.fixture(scope="module")
+def problem(base: Base, drag: Curve) -> AugmentedProblem:
+    return augmented_problem(base, [drag])
+
+
+@pytest.fixture(scope="module")
+def calibration(problem: AugmentedProblem) -> Any:
+    return calibrate(problem, problem.base.law, SamplerSettings(draws=1500, tune=500, chains=4, seed=3))
+
+
+def event_likelihoods(problem: AugmentedProblem, logs: np.ndarray, strengths: np.ndarray) -> np.ndarray:
+    """Of each event on a grid of its own friction and the added drag, (n_strengths, n_events, n_logs)."""
+    extension, rows = problem.extension, problem.base.rows
+    n_events, n = len(rows.event), len(logs)
+    events = np.repeat(np.arange(n_events), n)
+    points = np.column_stack([np.tile(logs, n_events), np.zeros(n_events * n)])
+    found = [
+        log_likelihoods(events, extension.predict(events, points, np.array([x])), rows.readings, rows.errors)
+        for x in strengths
+    ]
+    return np.array(found).reshape(len(strengths), n_events, n)
+
+
+def test_densities_are_those_of_a_dense_sum(problem: AugmentedProblem) -> None:
+    """Of each event's own friction, at strengths between the tables."""
+    low, high = problem.range
+    added = low[0] + (high[0] - low[0]) * np.array([0.33, 0.48, 0.61])
+    logs = np.linspace(np.log(0.05), np.log(1.0), 6001)
+    likelihoods = event_likelihoods(problem, logs, added)
+    means, spreads = np.log(DRAWS["dry_friction"]), DRAWS["dry_friction_spread"]
+    log_population = norm.logpdf(logs, means[:, None], spreads[:, None]) + np.log(logs[1] - logs[0])
+    exact = logsumexp(likelihoods + log_population[:, None, :], axis=2)
+    samples = {**DRAWS, "turbulent_drag": added}
+    assert_allclose(problem.log_likelihood(problem.base.law, samples), exact, atol=0.02)
+    errors = problem.integration_errors(problem.base.law, samples)
+    assert errors.shape == (3, 3) and np.abs(errors).max() < 0.02
+
+
+def test_posterior_is_that_of_a_dense_grid(problem: AugmentedProblem, calibration: Any) -> None:
+    """Median friction, spread and added drag of three events, all on a grid, against the draws."""
+    assert calibration.gate.passed, calibration.gate.problems
+    low, high = problem.range
+    added = np.linspace(low[0], high[0], 41)
+    logs = np.linspace(np.log(0.03), np.log(1.5), 800)
+    likelihoods = event_likelihoods(problem, logs, added)
+    means, log_spreads = np.linspace(np.log(0.1), np.log(0.9), 120), np.linspace(-4.5, 0.5, 50)
+    mean, log_spread = (x.ravel() for x in np.meshgrid(means, log_spreads, indexing="ij"))
+    population = norm.pdf(logs, mean[:, None], np.exp(log_spread)[:, None]) * (logs[1] - logs[0])
+    prior = halfnorm.logpdf(np.exp(mean), scale=problem.base.law.mechanisms[0].strength.prior_scale) + mean
+    prior += lognorm.logpdf(np.exp(log_spread), SPREAD_LOG_SD, scale=SPREAD_MEDIAN) + log_spread
+    top = likelihoods.max(axis=2, keepdims=True)
+    integrated = np.log(np.einsum("ael,pl->aep", np.exp(likelihoods - top), population) + 1e-300) + top
+    joint = integrated.sum(axis=1) + prior - 0.5 * (added[:, None] / problem.added[0].scale) ** 2
+    weights = np.exp(joint - joint.max())
+    weights /= weights.sum()
+    posterior = calibration.tree["posterior"]
+    for name, values, of_values in (
+        ("turbulent_drag", added, weights.sum(axis=1)),
+        ("dry_friction", np.exp(mean), weights.sum(axis=0)),
+        ("dry_friction_spread", np.exp(log_spread), weights.sum(axis=0)),
+    ):
+        expected = of_values @ values
+        sd = np.sqrt(of_values @ (values - expected) ** 2)
+        draws = posterior[name].values
+        assert abs(draws.mean() - expected) < 0.12 * sd, name
+        assert abs(draws.std() / sd - 1.0) < 0.12, name
+
+
+def test_draws_agree_with_the_race(drag: Curve, calibration: Any) -> None:
+    mean, sd = drag.moments()
+    draws = calibration.tree["posterior"]["turbulent_drag"].values
+    assert abs(draws.mean() - mean) < 0.35 * sd  # three events: Laplace's formula is rough
+    assert 0.7 < draws.std() / sd < 1.4
+
+
+def test_the_tree_has_all_groups(problem: AugmentedProblem, calibration: Any) -> None:
+    tree, law = calibration.tree, problem.base.law
+    names = [parameter.name for parameter in problem.parameters(law)]
+    assert names == ["dry_friction", "dry_friction_spread", "turbulent_drag"]
+    assert tree["posterior"]["turbulent_drag"].attrs["units"] == "m-1"
+    for group in ("event_posterior", "posterior_predictive", "prior_predictive"):
+        assert np.isfinite(tree[group]["front"].values).all()
+    assert np.isfinite(tree["log_likelihood"]["recordings"].values).all()
+    assert tree["constant_data"]["added_strength"].values.tolist() == ["turbulent_drag"]
+    assert calibration.entry()["added"][0]["id"] == "turbulent_drag"
+
+
+def test_recorded_avalanches_do_what_was_recorded(problem: AugmentedProblem, calibration: Any) -> None:
+    """Fronts of the recorded avalanches are near their readings, at the draws' own added strengths."""
+    fronts = calibration.tree["event_posterior"]["front"].values
+    observed = problem.observed
+    difference = (np.median(fronts, axis=(0, 1)) - problem.values)[observed]
+    alone = np.nanstd(problem.values, axis=0)
+    assert np.sqrt(np.mean((difference / np.broadcast_to(alone, observed.shape)[observed]) ** 2)) < 1.0
+
+
+def test_two_mechanisms(base: Base, drag: Curve) -> None:
+    """Off the tables as exact as on them; the op is the compiled function, with and without numba."""
+    both = augmented_problem(base, [drag, curve_of(base, "release_offset")])
+    names = [parameter.name for parameter in both.parameters(base.law)]
+    assert names[-2:] == ["turbulent_drag", "release_offset"]
+    tables, n_events = both.tables, both.campaign.n_events
+    means, factor = np.full((n_events, 1), np.log(0.37)), np.array([[0.15]])
+    arrays = tuple(tables.arrays.values())
+    index = np.array([[3, 4]])
+    strengths = tables.grid.strengths(index.astype(float))[0]
+    table = int(tables.grid.table(index)[0])
+    first = tables.nodes.first[table * n_events : (table + 1) * n_events + 1]
+    expected = integrated_log_density(means, factor, first, *tables.nodes[1:])
+    assert_allclose(tabulated_log_density(means, factor, strengths, *arrays), expected, rtol=1e-10)
+    rng = np.random.default_rng(1)
+    added = tables.mean + rng.uniform(-1.0, 1.0, (4, 2)) @ tables.factor.T
+    added[:, 0] = np.maximum(added[:, 0], both.range[0][0])
+    population = (np.full((4, 1), np.log(0.37)), np.full((4, 1, 1), 0.25))
+    assert np.abs(both.errors_at(*population, added, np.arange(n_events))).max() < 0.1
+    inputs = [pt.as_tensor_variable(value) for value in (means, factor, strengths, *arrays)]
+    for mode in ("NUMBA", "FAST_COMPILE"):
+        value = pytensor.function([], TabulatedLogDensity()(*inputs), mode=mode)()
+        assert_allclose(value, expected, rtol=1e-10)
+
+
+def test_outside_the_tables_it_is_worse(problem: AugmentedProblem) -> None:
+    _, high = problem.range
+    added = high[0] * np.array([1.0, 1.5, 3.0])
+    samples = {name: np.full(3, values[1]) for name, values in DRAWS.items()} | {"turbulent_drag": added}
+    total = problem.log_likelihood(problem.base.law, samples).sum(axis=1)
+    assert np.isfinite(total).all() and np.all(np.diff(total) < -10.0)
+
+
+def test_what_cannot_be_is_refused(base: Base, drag: Curve, problem: AugmentedProblem) -> None:
+    with pytest.raises(ValueError, match="one or 2"):
+        augmented_problem(base, [])
+    with pytest.raises(ValueError, match="one or 2"):
+        augmented_problem(base, [drag] * 3)
+    with pytest.raises(ValueError, match="another campaign"):
+        replace(problem, campaign=CAMPAIGN)
+    with pytest.raises(ValueError, match="calibrate that law"):
+        problem.log_likelihood(load_law("pcm"), {})
+    with pytest.raises(NotImplementedError, match="metropolis"):
+        strengths = pt.vector()
+        inputs = [pt.as_tensor_variable(value) for value in problem.tables.arrays.values()]
+        density = TabulatedLogDensity()(np.zeros((3, 1)), np.ones((1, 1)), strengths, *inputs)
+        pt.grad(density.sum(), strengths)
