@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from scipy.special import logsumexp
 from scipy.stats import halfnorm, lognorm, norm
 
-from skred.campaign import find_campaign, read_campaign
+from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.diagnosis.augmented import AugmentedProblem, augmented_problem
 from skred.diagnosis.curves import Base, Curve, curve, curve_near, fit_base
 from skred.diagnosis.extension import extended
@@ -30,23 +30,36 @@ from skred.work.calibrate import calibrate
 
 CAMPAIGN = read_campaign(find_campaign("ryggfonn"))
 DRAWS = {
-    "dry_friction": np.array([0.33, 0.36, 0.4]),
+    "dry_friction": np.array([0.29, 0.3, 0.32]),
     "dry_friction_spread": np.array([0.1, 0.15, 0.2]),
 }
 
 
-def base_of(rows: list[int], law_id: str = "coulomb") -> Base:
-    campaign = replace(
+def made_campaign(friction: list[float], drag: float) -> Campaign:
+    """Avalanches of Ryggfonn's track with friction of their own and one drag, read with small errors."""
+    n = len(friction)
+    events = tuple(replace(CAMPAIGN.events[k], release_s_m=0.0, release_sd_m=None) for k in range(n))
+    blank = replace(
         CAMPAIGN,
-        events=tuple(CAMPAIGN.events[row] for row in rows),
-        values=CAMPAIGN.values[rows],
-        status=CAMPAIGN.status[rows],
-        stated_sd=CAMPAIGN.stated_sd[rows],
+        events=events,
+        values=CAMPAIGN.values[:n],
+        status=np.full_like(CAMPAIGN.status[:n], Status.OBSERVED),
+        stated_sd=CAMPAIGN.stated_sd[:n],
     )
+    law = load_law("pcm")
+    strengths = np.column_stack([friction, np.full(n, drag)])
+    fronts = hierarchical_problem(blank).predict(law.mechanisms, strengths, np.zeros(n))[:, :-1]
+    errors = 1.0 + 0.03 * np.random.default_rng(4).standard_normal(fronts.shape)
+    is_runout = np.array([sensor.is_runout for sensor in CAMPAIGN.sensors])
+    return replace(blank, values=np.where(is_runout, fronts, fronts * errors))
+
+
+def base_of(campaign: Campaign, law_id: str = "coulomb") -> Base:
+    n = campaign.n_events
     problem, law = hierarchical_problem(campaign), load_law(law_id)
     extension = extended(problem, law)
     population = starting_population(law)
-    points = np.column_stack([np.tile(population.mean[0], (len(rows), 1)), np.zeros(len(rows))])
+    points = np.column_stack([np.tile(population.mean[0], (n, 1)), np.zeros(n)])
     found, points = fit_population(
         extension, campaign_rows(extension), np.zeros(0), mean_prior(law), (population, points), n_rounds=40
     )
@@ -62,7 +75,7 @@ def curve_of(base: Base, mechanism_id: str) -> Curve:
 
 @pytest.fixture(scope="module")
 def base() -> Base:
-    return base_of([0, 5, 8])
+    return base_of(made_campaign([0.27, 0.3, 0.33], 1.5e-3))
 
 
 @pytest.fixture(scope="module")
@@ -160,10 +173,7 @@ def test_the_tree_has_all_groups(problem: AugmentedProblem, calibration: Any) ->
 def test_recorded_avalanches_do_what_was_recorded(problem: AugmentedProblem, calibration: Any) -> None:
     """Fronts of the recorded avalanches are near their readings, at the draws' own added strengths."""
     fronts = calibration.tree["event_posterior"]["front"].values
-    observed = problem.observed
-    difference = (np.median(fronts, axis=(0, 1)) - problem.values)[observed]
-    alone = np.nanstd(problem.values, axis=0)
-    assert np.sqrt(np.mean((difference / np.broadcast_to(alone, observed.shape)[observed]) ** 2)) < 1.0
+    assert_allclose(np.median(fronts, axis=(0, 1)), problem.values, rtol=0.12)
 
 
 def test_two_mechanisms(base: Base, drag: Curve) -> None:
@@ -172,7 +182,7 @@ def test_two_mechanisms(base: Base, drag: Curve) -> None:
     names = [parameter.name for parameter in both.parameters(base.law)]
     assert names[-2:] == ["turbulent_drag", "release_offset"]
     tables, n_events = both.tables, both.campaign.n_events
-    means, factor = np.full((n_events, 1), np.log(0.37)), np.array([[0.15]])
+    means, factor = np.full((n_events, 1), np.log(0.3)), np.array([[0.15]])
     arrays = tuple(tables.arrays.values())
     index = np.array([[3, 4]])
     strengths = tables.grid.strengths(index.astype(float))[0]
@@ -183,7 +193,7 @@ def test_two_mechanisms(base: Base, drag: Curve) -> None:
     rng = np.random.default_rng(1)
     added = tables.mean + rng.uniform(-1.0, 1.0, (4, 2)) @ tables.factor.T
     added[:, 0] = np.maximum(added[:, 0], both.range[0][0])
-    population = (np.full((4, 1), np.log(0.37)), np.full((4, 1, 1), 0.25))
+    population = (np.full((4, 1), np.log(0.3)), np.full((4, 1, 1), 0.25))
     assert np.abs(both.errors_at(*population, added, np.arange(n_events))).max() < 0.1
     inputs = [pt.as_tensor_variable(value) for value in (means, factor, strengths, *arrays)]
     for mode in ("NUMBA", "FAST_COMPILE"):

@@ -108,7 +108,8 @@ def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     assert found.check is not None
     return [
         f"Something is missing{_where(document['location'])} that no listed mechanism accounts for"
-        f" (p = {found.check.p_value:.2g}; probability of nothing {_share(document['probability'][NOTHING])}).",
+        f" (p = {found.check.p_value:.2g}; probability of nothing"
+        f" {_share(document['probability'][NOTHING])}).",
         "The force profile is the answer: see where it stands out and how much work it does.",
     ]
 
@@ -116,8 +117,8 @@ def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
 def _nothing(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     assert found.check is not None and found.table is not None
     return [
-        f"The recordings give no reason to add anything (p = {found.check.p_value:.2g}; probability of nothing"
-        f" {_share(document['probability'][NOTHING])}).",
+        f"The recordings give no reason to add anything (p = {found.check.p_value:.2g}; probability of"
+        f" nothing {_share(document['probability'][NOTHING])}).",
         f"A relevant strength of what is listed would have been found in {100.0 * found.table.power:.0f} % of"
         " cases on average; the table of detection limits says from where on each would have been seen.",
     ]
@@ -129,8 +130,8 @@ def _cannot(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     assert found.check is not None and found.table is not None
     sentences = [
         f"No alarm (p = {found.check.p_value:.2g}), but these recordings cannot tell: a relevant strength of"
-        f" what is listed would have been found in only {100.0 * found.table.power:.0f} % of cases on average,"
-        " so silence means little.",
+        f" what is listed would have been found in only {100.0 * found.table.power:.0f} % of cases on"
+        " average, so silence means little.",
     ]
     sensor = document["next_sensor"]
     if sensor is not None:

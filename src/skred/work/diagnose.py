@@ -25,7 +25,7 @@ def diagnose_to(
     folder: Path,
     tell: Tell = lambda line: None,
 ) -> dict[str, Any]:
-    """Diagnose, and write everything into a folder; the verdict first, so that it is there whatever follows."""
+    """Diagnose, and write everything into a folder; the verdict first, so that it is there in any case."""
     from skred.report.diagnosis import render_diagnosis, save_diagnosis_figures
 
     found = diagnose(problem, law, settings, effort, tell)
