@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import xarray as xr
@@ -32,6 +32,9 @@ from skred.physics.mechanisms.spec import Direction, Mechanism, Shape
 
 FloatArray = NDArray[np.float64]
 MOST_ADDED = 2
+AUGMENTED_LIMIT = 0.5
+"""Largest error of the log likelihood over 22 events, in nats: what is claimed of a mechanism rests on several
+nats, and the nodes that tables are compared with scatter by a tenth themselves."""
 _EXACT = Budget(1024, 256, 1.5, 1.8)
 _EXACT_RUNS = 16 * 22
 """Events times draws up to which there are so many nodes; where there are fewer, more."""
@@ -82,6 +85,7 @@ class AugmentedProblem(HierarchicalProblem):
     tables : Tables
     """
 
+    integration_limit: ClassVar[float] = AUGMENTED_LIMIT
     base: Base
     added: tuple[AddedStrength, ...]
     tables: Tables = field(repr=False)

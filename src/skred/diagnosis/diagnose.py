@@ -48,12 +48,12 @@ class Effort:
         Refit without every event.
     """
 
-    replicas: int = 300
+    replicas: int = 120
     max_mechanisms: int = 2
     exact_loo: bool = False
 
 
-QUICK_REPLICAS = 120
+QUICK_REPLICAS = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ class Diagnosis:
     problem, law :
         What was asked about.
     cannot : str
-        Why no diagnosis was possible, empty if one was; then what follows is None.
+        Why no diagnosis was possible, empty if one was; what follows is None as far as it did not get there.
     calibration : Calibration
         Of the base law.
     screen : Screen
@@ -182,12 +182,12 @@ def diagnose(
     raced = race(base)
     decision = decide(raced.probability, check.fired, table.can_tell)
     location = locate(raced.leading(UNLISTED)) if alarmed(raced.probability, check.fired) else None
-    steps: tuple[Step, ...] = ()
+    steps, cannot = tuple[Step, ...](), ""
     if decision.names:
         clock.stage("augment", f"{law.id} + {decision.names[0]}: calibrating the augmented law")
-        steps = let_in(base, raced, decision, settings, effort, clock)
+        steps, cannot = let_in(base, raced, decision, settings, effort, clock)
         if not steps:
-            decision = Decision("unexplained", ())
+            decision = Decision("cannot_tell", ())
     clock.stage("held out", "predicting avalanches left out")
     before = held_out(
         calibration,
@@ -199,7 +199,7 @@ def diagnose(
     after = _after(steps, settings.seed, effort) if steps else None
     clock.end()
     return Diagnosis(
-        problem, law, "", calibration, screen, table, check, raced, decision, location, steps,
+        problem, law, cannot, calibration, screen, table, check, raced, decision, location, steps,
         before, after, clock.seconds,
     )  # fmt: skip
 
@@ -228,12 +228,13 @@ def _nothing_added(calibration: Calibration) -> FloatArray:
 
 def let_in(
     base: Base, raced: Race, decision: Decision, settings: SamplerSettings, effort: Effort, clock: Clock
-) -> tuple[Step, ...]:
+) -> tuple[tuple[Step, ...], str]:
     """Let the winner in, check again, and a second one only if it earns it given the first.
 
-    Returns nothing where the winner's own calibration fails its gate.
+    Returns no steps, and why, where the winner's own calibration fails its gate.
     """
     steps: list[Step] = []
+    cannot = ""
     names, chosen = decision.names, list[Curve]()
     for number in range(effort.max_mechanisms):
         heat = raced.leading(names[0])
@@ -242,6 +243,8 @@ def let_in(
         problem = augmented_problem(_plain(heat.base), chosen)
         calibration = calibrate(problem, base.law, settings)
         if not calibration.gate.passed:
+            problems = "; ".join(calibration.gate.problems)
+            cannot = f"the gate of {base.law.id} + {names[0]} failed: {problems}"
             break
         clock.stage("check again", "is anything wrong with the augmented law")
         check, next_base = _check_again(heat.base, calibration, problem, chosen, settings, effort)
@@ -255,7 +258,7 @@ def let_in(
             break
         names = second.names
         clock.stage("augment", f"calibrating with {names[0]} as well")
-    return tuple(steps)
+    return tuple(steps), "" if steps else cannot
 
 
 def _plain(base: Base) -> Base:

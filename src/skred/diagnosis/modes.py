@@ -134,7 +134,7 @@ def event_modes(
     given = np.broadcast_to(strengths, (len(points), len(extension.directions)))
     best = log_joint(extension, rows, points, given, population)
     damping = np.full(len(points), _STARTING_DAMPING)
-    active = np.arange(len(points))
+    active, found = np.arange(len(points)), list[FloatArray]()
     for _ in range(n_steps):
         part = rows.take(active)
         around = look_around(extension, part, points[active], given[active])
@@ -155,10 +155,23 @@ def event_modes(
         points[active[better]] += step[better]
         best[active[better]] = new[better]
         damping[active] = np.where(better, 0.2 * damping[active], np.maximum(20.0 * damping[active], 0.1))
+        _store(found, active, around)
         active = active[~better | (gained > _SETTLED)]
         if len(active) == 0:
             break
-    return look_around(extension, rows, points, given)
+    # Tangents are those before each row's last, small step; the points are after it.
+    return Modes(points, *found[1:])
+
+
+def _store(found: list[FloatArray], active: IntArray, around: Modes) -> None:
+    """Keep what was found at the active rows."""
+    for k, values in enumerate(around):
+        if len(found) <= k:
+            found.append(np.empty((0, *values.shape[1:])))
+        if len(found[k]) == 0:
+            found[k] = values.copy()
+        else:
+            found[k][active] = values
 
 
 def take_rows(readings: EventReadings, rows: IntArray) -> EventReadings:

@@ -26,6 +26,8 @@ _LOOKING, _FINAL = {1: 11, 2: 6}, {1: 13, 2: 8}
 """Strengths along each axis while the posterior is looked for, and of the tables, by the number of axes."""
 _COVERED_NATS = 11.0
 """How far below its top the density of strengths still counts: 4.7 standard deviations."""
+_ENDS_NATS = 8.0
+"""How far below the top the edge of a grid must be to be the end."""
 _STARTING_REACH = 5.0
 _MOST_SCALES = 4.5
 _LOOKS, _SETTLED, _BEYOND, _FARTHEST = 6, 0.12, 0.25, 7.0
@@ -261,9 +263,9 @@ def _posterior(
     low, high = white.min(axis=0), white.max(axis=0)
     for axis in range(n_axes):
         for edge in (0.0, grid.size[axis] - 1.0):
-            if covered[places[:, axis] == edge].any():
+            if density[places[:, axis] == edge].max() > density.max() - _ENDS_NATS:
                 width = _BEYOND * (high - low)
-                at_edge = white[(places[covered, axis] == edge)].mean(axis=0)
+                at_edge = white[places[covered, axis] == edge].mean(axis=0)
                 low = np.where(at_edge < 0.0, low - width, low)
                 high = np.where(at_edge > 0.0, high + width, high)
     return mean, factor, np.maximum(low, -_FARTHEST), np.minimum(high, _FARTHEST)

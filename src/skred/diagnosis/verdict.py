@@ -9,9 +9,13 @@ import numpy as np
 from skred.diagnosis.decide import alarmed
 from skred.diagnosis.diagnose import Diagnosis, Step
 from skred.diagnosis.held_out import errors, paired
+from skred.diagnosis.identify import Told
 from skred.diagnosis.next_sensor import next_sensor
 from skred.diagnosis.race import Entrant
 from skred.diagnosis.statement import statement
+
+_NO_LIMIT = 20.0
+"""Strengths so many prior scales large are no limit: these recordings say nothing of the mechanism."""
 
 
 def verdict(found: Diagnosis) -> dict[str, Any]:
@@ -113,10 +117,15 @@ def _detection_limits(found: Diagnosis) -> dict[str, Any]:
         row.mechanism.id: {
             "parameter": row.mechanism.strength.name,
             "unit": row.mechanism.strength.unit,
-            "value": row.limit,
+            "value": row.limit if row.limit < _NO_LIMIT * _scale(row) else None,
         }
         for row in found.table.rows
     }
+
+
+def _scale(row: Told) -> float:
+    assert row.mechanism.added is not None
+    return row.mechanism.added.scale
 
 
 def _diagnostics(found: Diagnosis) -> dict[str, float | int | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import xarray as xr
@@ -71,6 +71,7 @@ class HierarchicalProblem(Problem):
     _errors: dict[tuple[str, ...], FloatArray] = field(init=False, default_factory=dict, repr=False)
 
     likelihood = "hierarchical"
+    integration_limit: ClassVar[float] = INTEGRATION_LIMIT
 
     def parameters(self, law: Law) -> tuple[Parameter, ...]:
         """The law's own parameters, here medians over events, then spreads and correlations."""
@@ -149,11 +150,11 @@ class HierarchicalProblem(Problem):
         chosen = np.linspace(0, n - 1, min(n, _CHECKED_DRAWS)).astype(int)
         errors = self.integration_errors(law, {name: values[chosen] for name, values in draws.items()})
         self._errors[_key(law.mechanisms)] = errors
-        if _of_22_events(errors) <= INTEGRATION_LIMIT:
+        if _of_22_events(errors) <= self.integration_limit:
             return ()
         return (
             f"the integration over events is wrong by {_of_22_events(errors):.2f} nats in 22 events (limit"
-            f" {INTEGRATION_LIMIT}): are recordings stated with errors far below what is possible?",
+            f" {self.integration_limit}): are recordings stated with errors far below what is possible?",
         )
 
     def constants(self) -> dict[str, Any]:
