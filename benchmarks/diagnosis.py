@@ -3,7 +3,8 @@
 ``python benchmarks/development_set.py --n 40 --seed 1000 --out DIR`` makes the campaigns;
 ``python benchmarks/diagnosis.py --trials DIR [--workers 2] [--json FILE]`` diagnoses them, each in a process
 that is told nothing but the campaign and the base law, and scores what came out. Each verdict is written
-as soon as it is there, and the same command goes on with a run that was ended. Signal-to-noise here: the square root of twice the expected log likelihood ratio.
+as soon as it is there, and the same command goes on with a run that was ended. Signal-to-noise is the
+square root of twice the expected log likelihood ratio.
 
 A crash is a wrong answer.
 """

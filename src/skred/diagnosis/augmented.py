@@ -33,7 +33,7 @@ from skred.physics.mechanisms.spec import Direction, Mechanism, Shape
 FloatArray = NDArray[np.float64]
 MOST_ADDED = 2
 AUGMENTED_LIMIT = 0.5
-"""Largest error of the log likelihood over 22 events, in nats: what is claimed of a mechanism rests on several
+"""Largest error of the log likelihood over 22 events, in nats: a claim of a mechanism rests on several
 nats, and the nodes that tables are compared with scatter by a tenth themselves."""
 _EXACT = Budget(1024, 256, 1.5, 1.8)
 _EXACT_RUNS = 16 * 22

@@ -119,7 +119,7 @@ def refit(
         points = np.concatenate([state[k].points for k in active])
         modes = event_modes(extension, many, points, given, population, n_steps=6)
         spent = budget if number > 0 or first_budget is None else first_budget
-        nodes = event_nodes(extension, many, given, population, modes, spent)
+        nodes = event_nodes(extension, many, given, population, modes, spent, start[0])
         moved = []
         for k, part, own in zip(
             active,
@@ -273,7 +273,10 @@ def fit_base(
     directions: tuple[Direction, ...] = (),
     strengths: FloatArray | None = None,
 ) -> Base:
-    """The base law fitted, from roughly where its population is; perhaps with something in already."""
+    """The base law fitted, from roughly where its population is; perhaps with something in already.
+
+    With nothing in, the population is that of the law's likelihood surfaces, in which no mode is missed.
+    """
     extension = extended(problem, law, directions)
     setting, rows = setting_of(problem, law), campaign_rows(extension)
     if points is None:
@@ -281,5 +284,11 @@ def fit_base(
         points[:, :-1] = population.mean[0]
     given = np.empty(0) if strengths is None else strengths
     log_scale = prior_log_scale(mean_prior(law))
-    fit = refit(extension, rows, given[None, :], (population, points), log_scale, n_rounds=4)[0]
+    if directions:
+        fit = refit(extension, rows, given[None, :], (population, points), log_scale, n_rounds=4)[0]
+    else:
+        found = evidence(problem.surfaces(law.mechanisms).nodes, log_scale, coordinates(population), 30)
+        exact = found.population(len(law.mechanisms))
+        modes = event_modes(extension, rows, points, given, exact, n_steps=20)
+        fit = Fit(found, modes.points)
     return Base(problem, law, setting, rows, fit, directions, given)

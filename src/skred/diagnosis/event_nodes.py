@@ -30,12 +30,12 @@ class Budget(NamedTuple):
     """How many nodes an event gets, and how much wider than the linear model the proposals are."""
 
     around_mode: int = 64
-    over_population: int = 16
+    over_population: int = 32
     wider: float = 1.35
     population_wider: float = 1.6
 
 
-USUAL, FIRST, FINE = Budget(), Budget(32, 16), Budget(256, 64, 1.5, 1.8)
+USUAL, FIRST, FINE = Budget(), Budget(32, 16), Budget(512, 256, 1.5, 1.8)
 
 
 @cache
@@ -53,6 +53,7 @@ def event_nodes(
     population: Population,
     modes: Modes,
     budget: Budget = USUAL,
+    reference: Population | None = None,
 ) -> Nodes:
     """Nodes of all rows, as the compiled sums over a population read them.
 
@@ -64,32 +65,33 @@ def event_nodes(
         Roughly where the events' strengths are.
     modes : Modes
         Around which most nodes are put.
+    reference : Population, optional
+        Of one group: another population that the nodes must cover, half of those over the population are
+        put there. Without it a population that has become too narrow would never see what it misses.
     """
     n_rows, n = len(rows.event), population.mean.shape[1]
     uncertain = extension.problem.releases.sd[rows.event] > 0.0
     axes = n + 1 if uncertain.any() else n
     cover = np.linalg.inv(modes.information + population.precision[rows.group])[:, :axes, :axes]
     around = budget.wider * np.linalg.cholesky(0.5 * (cover + cover.transpose(0, 2, 1)))
-    over = np.zeros((n_rows, axes, axes))
-    over[:, :n, :n] = budget.population_wider * np.linalg.cholesky(population.covariance)[rows.group]
-    if axes > n:
-        over[:, n, n] = 1.0
-    centre = np.zeros((n_rows, axes))
-    centre[:, :n] = population.mean[rows.group]
-    first = _normal_numbers(budget.around_mode, axes, 0)
-    second = _normal_numbers(budget.over_population, axes, 1)
+    both = [population] if reference is None else [population, reference]
+    sizes = [budget.around_mode, *[budget.over_population // len(both)] * len(both)]
+    centres, factors = [modes.points[:, :axes]], [around]
+    for one in both:
+        centre, over = _over(one, rows, axes, budget.population_wider)
+        centres.append(centre)
+        factors.append(over)
     points = np.concatenate(
         [
-            modes.points[:, None, :axes] + np.einsum("rij,kj->rki", around, first),
-            centre[:, None, :] + np.einsum("rij,kj->rki", over, second),
+            centre[:, None, :] + np.einsum("rij,kj->rki", factor, _normal_numbers(size, axes, k))
+            for k, (centre, factor, size) in enumerate(zip(centres, factors, sizes, strict=True))
         ],
         axis=1,
     )
-    share = budget.around_mode / (budget.around_mode + budget.over_population)
-    log_proposal = np.logaddexp(
-        math.log(share) + _log_normal(points, modes.points[:, :axes], around),
-        math.log(1.0 - share) + _log_normal(points, centre, over),
-    )
+    log_proposal = np.full(points.shape[:2], -np.inf)
+    for centre, factor, size in zip(centres, factors, sizes, strict=True):
+        part = math.log(size / points.shape[1]) + _log_normal(points, centre, factor)
+        log_proposal = np.logaddexp(log_proposal, part)
     n_nodes = points.shape[1]
     flat = np.zeros((n_rows * n_nodes, n + 1))
     flat[:, :axes] = points.reshape(-1, axes)
@@ -101,6 +103,18 @@ def event_nodes(
         log_weights = log_weights - 0.5 * flat[:, n] ** 2 - _LOG_SQRT_2PI
     log_weights = log_weights - log_proposal.ravel() - math.log(n_nodes)
     return Nodes(n_nodes * np.arange(n_rows + 1), np.ascontiguousarray(flat[:, :n].T), log_weights)
+
+
+def _over(population: Population, rows: Rows, axes: int, wider: float) -> tuple[FloatArray, FloatArray]:
+    """Centre and factor of a proposal over a whole population, for each row."""
+    n = population.mean.shape[1]
+    group = rows.group if len(population.mean) > 1 else np.zeros_like(rows.group)
+    centre, factor = np.zeros((len(group), axes)), np.zeros((len(group), axes, axes))
+    centre[:, :n] = population.mean[group]
+    factor[:, :n, :n] = wider * np.linalg.cholesky(population.covariance)[group]
+    if axes > n:
+        factor[:, n, n] = 1.0
+    return centre, factor
 
 
 def _log_normal(points: FloatArray, mean: FloatArray, factor: FloatArray) -> FloatArray:

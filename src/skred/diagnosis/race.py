@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from skred.diagnosis.curves import Base, Curve, curve, curve_near, fit_base
+from skred.diagnosis.curves import Base, Curve, Fit, curve, curve_near, fit_base, refit
+from skred.diagnosis.event_nodes import FINE
+from skred.diagnosis.extension import Extension, extended
 from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, probabilities
 from skred.diagnosis.screen import candidates
 from skred.diagnosis.unlisted import KINDS, Profile, fit_profile, log_evidence_of
@@ -29,6 +31,8 @@ Tell = Callable[[int, int], None]
 ERROR_SHARES = {"robust": 0.55, "student": 0.15, "correlated": 0.15, "scaled": 0.15}
 """Prior probability of each error model in the race."""
 _PREFERRED_BY = 1.0
+_CHECKED = 5
+"""Leading mechanisms whose best curve is looked at with many more nodes."""
 _WITHIN, _AT_MOST = 3.0, 2
 """Curves of a mechanism that are looked at again: within so many nats of its best, and so many."""
 
@@ -44,11 +48,14 @@ class Entrant:
         One for each shape.
     log_weights : (n_curves,) array
         Prior weight of each shape; they sum to 1.
+    correction : float
+        What many more nodes change at the top of the best curve, in nats; 0 where not looked at.
     """
 
     mechanism: Mechanism
     curves: tuple[Curve, ...]
     log_weights: FloatArray
+    correction: float = 0.0
 
     @property
     def log_factors(self) -> FloatArray:
@@ -58,7 +65,7 @@ class Entrant:
     @property
     def log_bayes_factor(self) -> float:
         """Against nothing, shapes and strength integrated over."""
-        return float(logsumexp(self.log_factors))
+        return float(logsumexp(self.log_factors)) + self.correction
 
     @property
     def shape_weights(self) -> FloatArray:
@@ -222,12 +229,37 @@ def _heat(error_model: str, base: Base, tell: Tell) -> Heat:
         )
         profiles = list(pool.map(lambda kind: fit_profile(base, kind), KINDS))
     entrants = _entrants(curves, list(zip(parents, finer, strict=True)))
+    for name, correction in _corrections(base, entrants).items():
+        entrants[name] = replace(entrants[name], correction=correction)
     for mechanism in mechanisms().values():
         other = entrants.get(mechanism.same_term_as)
         if other is not None and mechanism.added is not None and mechanism.added.joins(base.setting.base):
             same = tuple(replace(one, mechanism=mechanism) for one in other.curves)
-            entrants[mechanism.id] = Entrant(mechanism, same, other.log_weights)
+            entrants[mechanism.id] = Entrant(mechanism, same, other.log_weights, other.correction)
     return Heat(error_model, base, entrants, profiles)
+
+
+def _corrections(base: Base, entrants: dict[str, Entrant]) -> dict[str, float]:
+    """What many more nodes change at the top of the leading mechanisms' best curves, nothing included."""
+    leading = sorted(entrants, key=lambda name: -entrants[name].log_bayes_factor)[:_CHECKED]
+    plain = extended(base.problem, base.law, base.directions)
+    nothing = _finely(base, plain, base.strengths, base.fit)
+    found = {}
+    for name in leading:
+        best = entrants[name].best
+        top = int(np.argmax(best.log_evidence))
+        extension = extended(base.problem, base.law, (*base.directions, best.direction))
+        strengths = np.append(base.strengths, best.strengths[top])
+        fine = _finely(base, extension, strengths, best.fits[top])
+        found[name] = float(fine - nothing - best.log_evidence[top])
+    return found
+
+
+def _finely(base: Base, extension: Extension, strengths: FloatArray, fit: Fit) -> float:
+    """Log evidence with many nodes, from where a fit is."""
+    start = (fit.found.population(len(base.law.mechanisms)), fit.points)
+    fits = refit(extension, base.rows, strengths[None, :], start, base.log_scale, FINE, n_rounds=2)
+    return fits[0].found.log_evidence
 
 
 def _again(base: Base, curves: Sequence[Curve]) -> tuple[list[tuple[Curve, Shape]], list[int]]:
