@@ -13,18 +13,26 @@ from cyclopts import App, CycloptsError
 
 from skred.cli_inputs import campaign_of, hierarchical_of, laws_of, pooled_or_reason, problem_of
 from skred.cli_options import (
+    MAX_MECHANISMS,
     SAMPLING,
     BaseModel,
     Campaigns,
+    DiagnosedModel,
     Errors,
+    ExactHeldOut,
     ExactLoo,
+    IdleSeed,
     Json,
     Likelihoods,
+    MaxMechanisms,
+    MechanismIds,
     Models,
+    Quick,
     Quiet,
     Release,
     Samplers,
     Sampling,
+    Seed,
     Smoothing,
     TrackFile,
 )
@@ -204,6 +212,88 @@ def predict(
     )
     output.show(prediction, prediction_table, prediction["statement"], folder)
     return DONE if prediction["gate"]["passed"] else GATE_FAILED
+
+
+@app.command
+def diagnose(
+    campaign: Campaigns = "ryggfonn",
+    /,
+    *,
+    base_model: DiagnosedModel = "pcm",
+    max_mechanisms: MaxMechanisms = None,
+    exact_loo: ExactHeldOut = False,
+    quick: Quick = False,
+    errors: Errors = None,
+    seed: Seed = 0,
+    smoothing: Smoothing = 10.0,
+    output: Output = OUTPUT,
+) -> int:
+    """Say what physics a law leaves out, where and how surely, model it, and show what that improves."""
+    from skred.laws import load_law
+
+    law = load_law(base_model)
+    problem = hierarchical_of(campaign_of(campaign), errors, smoothing)
+    folder = output.folder("diagnose")
+
+    from skred.diagnosis.diagnose import QUICK_REPLICAS, Effort
+    from skred.report.diagnosis import diagnosis_table
+    from skred.work.diagnose import diagnose_to
+
+    replicas = QUICK_REPLICAS if quick else Effort.replicas
+    effort = Effort(replicas, max_mechanisms or MAX_MECHANISMS[quick], exact_loo)
+    settings = Sampling(seed=seed).settings("hierarchical")
+    document = diagnose_to(problem, law, settings, effort, folder, output.tell)
+    output.show(document, diagnosis_table, [], folder)  # the statement is in the table
+    return DONE if document["reason"] is None else GATE_FAILED
+
+
+@app.command
+def identify(
+    campaign: Campaigns = "ryggfonn",
+    /,
+    *,
+    base_model: DiagnosedModel = "pcm",
+    errors: Errors = None,
+    seed: IdleSeed = 0,
+    smoothing: Smoothing = 10.0,
+    output: Output = OUTPUT,
+) -> int:
+    """Say what these recordings can tell at all: from what strength on each mechanism would be seen."""
+    from skred.laws import load_law
+
+    law = load_law(base_model)
+    problem = hierarchical_of(campaign_of(campaign), errors, smoothing)
+    folder = output.folder("identify")
+
+    from skred.work.identify import identify_table, identify_to
+
+    document = identify_to(problem, law, folder, output.tell)
+    output.show(document, identify_table, document["statement"], folder)
+    return DONE if document["reason"] is None else GATE_FAILED
+
+
+@app.command
+def mechanisms(mechanism: MechanismIds = None, /, *, as_json: Json = False, quiet: Quiet = False) -> int:
+    """List the mechanisms that a law may lack, or show one of them in full."""
+    from skred.laws import law_ids, load_law
+    from skred.physics.mechanisms import mechanisms as library
+    from skred.report.mechanisms import mechanism_document, mechanism_table, mechanisms_table
+
+    known = library()
+    if mechanism is not None and mechanism not in known:
+        raise InputError(f"no mechanism named {mechanism!r}; there are: {', '.join(sorted(known))}")
+    laws = [load_law(law_id) for law_id in law_ids()]
+    documents = [mechanism_document(known[name], laws) for name in sorted(known)]
+    chosen = next((one for one in documents if one["id"] == mechanism), None)
+    if as_json:
+        write_json({"mechanisms": documents} if chosen is None else chosen)
+    elif not quiet:
+        from rich.console import Console
+
+        n_laws = len(laws)
+        table = mechanisms_table(documents, n_laws) if chosen is None else mechanism_table(chosen, n_laws)
+        Console().print(table)
+    return DONE
 
 
 def _calibrate(law_id: str, problem: "Problem", sampling: Sampling, sampler: Samplers, output: Output) -> int:

@@ -12,6 +12,27 @@ if TYPE_CHECKING:
 Campaigns = Annotated[str, Parameter(help="A folder, or the name of an embedded campaign.")]
 Models = Annotated[str, Parameter(help="Laws, separated by commas.")]
 BaseModel = Annotated[str, Parameter(help="The law to predict with.")]
+DiagnosedModel = Annotated[str, Parameter(help="The law that something may be missing from.")]
+MechanismIds = Annotated[
+    str | None, Parameter(name="mechanism", help="Id of the one to show in full; by default all, in a table.")
+]
+MaxMechanisms = Annotated[
+    int | None,
+    Parameter(
+        validator=validators.Number(gte=1, lte=2),
+        help="Mechanisms let in at most, one after the other; by default 2, with --quick 1.",
+    ),
+]
+MAX_MECHANISMS = {False: 2, True: 1}
+"""Mechanisms let in where no number is asked for, by whether it is to be quick."""
+Quick = Annotated[
+    bool,
+    Parameter(
+        name="--quick",
+        negative="",
+        help="Fewer simulated campaigns for the check, and one mechanism at most.",
+    ),
+]
 TrackFile = Annotated[
     Path | None,
     Parameter(help="Track to predict on: a table like a campaign's track.csv; by default the campaign's."),
@@ -52,6 +73,18 @@ ExactLoo = Annotated[
         negative="",
         help="Hierarchical: refit without every event, not only where importance sampling is unreliable.",
     ),
+]
+ExactHeldOut = Annotated[
+    bool,
+    Parameter(
+        name="--exact-loo",
+        negative="",
+        help="Refit without every event, not only where importance sampling is unreliable.",
+    ),
+]
+IdleSeed = Annotated[
+    int,
+    Parameter(validator=validators.Number(gte=0, lt=2**31), help="Without effect: nothing is random here."),
 ]
 Seed = Annotated[int, Parameter(validator=validators.Number(gte=0, lt=2**31), help="Seed of all randomness.")]
 Smoothing = Annotated[

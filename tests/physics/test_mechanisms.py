@@ -1,34 +1,102 @@
-"""Every mechanism of the library: a complete spec, a profile, and a retardation."""
+"""Every mechanism of the library: a complete spec, shapes, a retardation, and exact tangents where added."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import skred.physics.mechanisms
 from skred.campaign import find_campaign, read_campaign
+from skred.diagnosis.extension import Extension, extended, setting_of
+from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
+from skred.laws import law_ids, load_law
 from skred.physics.columns import Column
 from skred.physics.geometry import contributions_of, path_of
+from skred.physics.inputs import make_contributions
 from skred.physics.kernel import front_speeds
+from skred.physics.law import Law
 from skred.physics.mechanisms import Mechanism, mechanisms
-from skred.physics.terrain import Terrain, build_terrain
+from skred.physics.mechanisms.coulomb_friction import WITHOUT_CURVATURE
+from skred.physics.mechanisms.spec import Added, Direction, Group, Setting, Shape
+from skred.physics.terrain import Terrain
 
 ALL = mechanisms()
 FOLDER = Path(skred.physics.mechanisms.__file__).parent
+IN_THE_FORMAT = {
+    "coulomb_friction", "centrifugal", "turbulent_drag", "viscous_drag", "constant_retardation",
+    "velocity_weakening", "obstacle", "segment_drag", "segment_friction", "entrainment",
+    "covariate_friction", "sensor_bias", "release_offset",
+}  # fmt: skip
+IN_A_LAW = {name: one for name, one in ALL.items() if one.column is not None}
+ONLY_ADDED = {name: one for name, one in ALL.items() if one.column is None}
+ONE_SIGN = {
+    name: one
+    for name, one in ALL.items()
+    if one.group is Group.PHYSICS and one.added is not None and not one.added.either_sign
+}
+WHERE = {"pcm": (-1.14, -6.07), "voellmy": (-1.3, -6.07), "constant": (1.536,)}
+"""Logarithms of the strengths of base laws, roughly as on Ryggfonn."""
+
+
+def added_to(mechanism: Mechanism) -> Added:
+    assert mechanism.added is not None, f"{mechanism.id} cannot be added to a law"
+    return mechanism.added
+
+
+def base_of(mechanism: Mechanism) -> Law:
+    """A law that it may be missing from."""
+    laws = [load_law(name) for name in WHERE]
+    return next(law for law in laws if added_to(mechanism).joins(ids_of(law)))
+
+
+def ids_of(law: Law) -> tuple[str, ...]:
+    return tuple(part.id for part in law.mechanisms)
+
+
+def some(shapes: Sequence[Shape], most: int = 12) -> list[Shape]:
+    """Some of many shapes, from all parts of the list."""
+    return [shapes[k] for k in np.unique(np.linspace(0, len(shapes) - 1, most).astype(int))]
 
 
 @pytest.fixture(scope="module")
-def terrain() -> Terrain:
-    track = read_campaign(find_campaign("ryggfonn")).track
-    return build_terrain(track.x_m, track.z_m)
+def problem() -> HierarchicalProblem:
+    """Ryggfonn with releases that can move both ways: at the end of the track they cannot."""
+    campaign = read_campaign(find_campaign("ryggfonn"))
+    events = tuple(replace(event, release_s_m=60.0, release_sd_m=15.0) for event in campaign.events)
+    return hierarchical_problem(replace(campaign, events=events))
+
+
+@pytest.fixture(scope="module")
+def concave() -> Terrain:
+    """From 40 to 6 degrees at a constant rate: a positive curvature throughout."""
+    edge = np.linspace(0.0, 2000.0, 401)
+    phi = np.interp(0.5 * (edge[1:] + edge[:-1]), [0.0, 2000.0], [0.7, 0.1])
+    return Terrain(edge, np.sin(phi), np.cos(phi), np.full(400, 0.6 / 2000.0))
+
+
+@pytest.fixture(scope="module")
+def settings(problem: HierarchicalProblem, concave: Terrain) -> list[Setting]:
+    """Ryggfonn, and recordings along the whole of a track, up to both its ends."""
+    own = setting_of(problem, load_law("pcm"))
+    whole = replace(own, terrain=concave, recorded_m=(0.0, concave.length_m))
+    return [own, whole]
 
 
 def test_a_mechanism_is_found_by_its_file() -> None:
     assert set(ALL) == {file.stem for file in FOLDER.glob("*.py")} - {"__init__", "spec"}
-    assert {"coulomb_friction", "turbulent_drag", "constant_retardation"} <= set(ALL)
+
+
+def test_all_of_the_format_are_there() -> None:
+    assert set(ALL) == IN_THE_FORMAT
+    assert {one.id for one in ALL.values() if one.group is Group.INSTRUMENT} == {
+        "sensor_bias", "release_offset"
+    }  # fmt: skip
 
 
 def test_strengths_have_names_of_their_own() -> None:
@@ -37,31 +105,180 @@ def test_strengths_have_names_of_their_own() -> None:
 
 @pytest.mark.parametrize("mechanism", ALL.values(), ids=ALL)
 def test_the_spec_is_complete(mechanism: Mechanism) -> None:
-    strength = mechanism.strength
+    strength, added = mechanism.strength, added_to(mechanism)
     for text in (
         mechanism.title, mechanism.equation, mechanism.mark, mechanism.reference,
-        strength.name, strength.symbol, strength.unit, strength.prior_reason,
+        strength.name, strength.symbol, strength.unit, strength.prior_reason, added.reason,
     ):  # fmt: skip
         assert text.strip() == text != ""
     assert re.fullmatch(r"10\.\d{4,}/\S+", mechanism.doi)
     assert re.fullmatch(r"1|(m|s)(-?\d)?( (m|s)(-?\d)?)*", strength.unit)
-    assert np.isfinite(strength.prior_scale) and strength.prior_scale > 0
-    assert mechanism.equation.startswith("-") and strength.symbol in mechanism.equation
-    assert isinstance(mechanism.column, Column)
+    for scale in (strength.prior_scale, added.scale, added.relevant):
+        assert np.isfinite(scale) and scale > 0
+    assert re.search(rf"(?<!\w){re.escape(strength.symbol)}(?!\w)", mechanism.equation)
+    if mechanism.group is Group.PHYSICS:
+        assert mechanism.equation.startswith("-")
+    if mechanism.same_term_as:
+        assert mechanism.same_term_as in set(ALL) - {mechanism.id}
 
 
 @pytest.mark.parametrize("mechanism", ALL.values(), ids=ALL)
-def test_the_profile_has_one_value_per_cell(mechanism: Mechanism, terrain: Terrain) -> None:
-    profile = mechanism.profile(terrain)
-    assert profile.shape == (terrain.n_cells,) and np.all(np.isfinite(profile)) and np.any(profile)
+def test_where_it_can_be_missing(mechanism: Mechanism) -> None:
+    joins = added_to(mechanism).joins
+    assert any(joins(ids_of(load_law(name))) for name in law_ids())
+    if mechanism.column is not None:  # it is everywhere already where the law has it
+        assert not joins((mechanism.id,))
 
 
-@pytest.mark.parametrize("mechanism", ALL.values(), ids=ALL)
-def test_a_positive_strength_retards(mechanism: Mechanism, terrain: Terrain) -> None:
-    law = contributions_of([ALL["constant_retardation"], mechanism], terrain)
-    some = 0.1 * mechanism.strength.prior_scale
-    strengths = np.array([[0.5, 0.0], [0.5, some], [0.5, 2 * some]])
-    without, with_it, with_more = front_speeds(strengths, np.zeros(3), path_of(terrain), law)
+def test_parts_of_dry_friction() -> None:
+    """Friction without curvature lacks the curvature part, not friction; friction with it lacks neither."""
+    friction, centrifugal = added_to(ALL["coulomb_friction"]), added_to(ALL["centrifugal"])
+    for base, lacks in (((WITHOUT_CURVATURE.id,), True), (("coulomb_friction",), False)):
+        assert centrifugal.joins(base) is lacks
+        assert not friction.joins(base)
+
+
+@pytest.mark.parametrize("mechanism", ONLY_ADDED.values(), ids=ONLY_ADDED)
+def test_what_can_only_be_added_is_no_part_of_a_law(mechanism: Mechanism, concave: Terrain) -> None:
+    assert mechanism.profile is None
+    with pytest.raises(ValueError, match=mechanism.id):
+        mechanism.term(concave)
+    added = added_to(mechanism)  # one prior, said twice
+    assert (mechanism.strength.prior_scale, mechanism.strength.prior_reason) == (added.scale, added.reason)
+
+
+@pytest.mark.parametrize("mechanism", IN_A_LAW.values(), ids=IN_A_LAW)
+def test_the_profile_has_one_value_per_cell(mechanism: Mechanism, settings: list[Setting]) -> None:
+    for setting in settings:
+        column, profile = mechanism.term(setting.terrain)
+        assert isinstance(column, Column)
+        assert profile.shape == (setting.terrain.n_cells,)
+        assert np.all(np.isfinite(profile)) and np.any(profile)
+
+
+@pytest.mark.parametrize("mechanism", IN_A_LAW.values(), ids=IN_A_LAW)
+def test_a_positive_strength_retards_as_a_part_of_a_law(mechanism: Mechanism, concave: Terrain) -> None:
+    law = contributions_of([ALL["constant_retardation"], mechanism], concave)
+    little = 0.1 * mechanism.strength.prior_scale
+    strengths = np.array([[0.5, 0.0], [0.5, little], [0.5, 2 * little]])
+    without, with_it, with_more = front_speeds(strengths, np.zeros(3), path_of(concave), law)
     moving = (without > 0) & (np.arange(len(without)) > 2)
     assert np.all(with_it[moving] < without[moving])
     assert np.all(with_more[moving] <= with_it[moving])
+
+
+@pytest.mark.parametrize("mechanism", ONE_SIGN.values(), ids=ONE_SIGN)
+def test_a_positive_strength_retards_when_added(mechanism: Mechanism, settings: list[Setting]) -> None:
+    """Never a faster front than without it, as fast above it, slower below: on a concave track."""
+    setting, added = settings[1], added_to(mechanism)
+    edge = setting.terrain.edge_s_m
+    for shape in some(added.shapes(setting)):
+        direction = added.direction(setting, shape)
+        contributions = make_contributions(
+            np.array([Column.CONSTANT, *direction.columns], dtype=np.int64),
+            np.vstack([np.ones((1, setting.terrain.n_cells)), direction.profiles]),
+            direction.weakening_speed or 8.0,
+        )
+        sizes = added.scale * np.array([0.0, 0.25, 0.5])
+        strengths = np.column_stack([np.full(3, 0.5), *[sizes] * len(direction.columns)])
+        speeds = front_speeds(strengths, np.zeros(3), path_of(setting.terrain), contributions)
+        without, with_it, with_more = speeds
+        assert without[-1] > 0
+        assert np.all(with_it <= without * (1 + 1e-12)) and np.all(with_more <= with_it * (1 + 1e-12))
+        above = 0.0 if shape.s_from_m is None else shape.s_from_m
+        below = 15.0 if shape.s_to_m is None else shape.s_to_m
+        np.testing.assert_array_equal(with_it[edge <= above], without[edge <= above])
+        assert np.all(with_it[edge >= below] < without[edge >= below])
+
+
+@pytest.mark.parametrize("mechanism", ALL.values(), ids=ALL)
+def test_shapes_and_their_parts_are_on_the_track(mechanism: Mechanism, settings: list[Setting]) -> None:
+    added = added_to(mechanism)
+    for setting in settings:
+        shapes = added.shapes(setting)
+        assert shapes and len(set(shapes)) == len(shapes)
+        for shape in [*shapes, *(part for one in shapes for part in added.split(setting, one))]:
+            if shape.place_m is not None:
+                assert shape.s_from_m is not None and shape.s_to_m is not None
+                assert 0.0 <= shape.s_from_m < shape.s_to_m <= setting.terrain.length_m
+            assert shape.sensor is None or shape.sensor in setting.sensors
+            assert shape.covariate is None or shape.covariate in setting.covariates
+            assert_well_formed(added.direction(setting, shape), setting)
+
+
+def assert_well_formed(direction: Direction, setting: Setting) -> None:
+    """Arrays of the right shapes, finite, and something in them."""
+    changes = [direction.release != 0.0]
+    if direction.columns:
+        assert direction.profiles.shape == (len(direction.columns), setting.terrain.n_cells)
+        changes.append(bool(np.any(direction.profiles)))
+    assert (direction.weakening_speed is not None) == (Column.WEAKENING in direction.columns)
+    for values, n in (
+        (direction.log_strengths, setting.n_events), (direction.log_readings, len(setting.sensors))
+    ):  # fmt: skip
+        if values is not None:
+            assert values.shape == (n,)
+            changes.append(bool(np.any(values)))
+    for values in (direction.profiles, direction.log_strengths, direction.log_readings):
+        assert values is None or np.all(np.isfinite(values))
+    assert np.isfinite(direction.release) and any(changes)
+
+
+def test_parts_of_a_shape_are_near_it(settings: list[Setting]) -> None:
+    for mechanism in ALL.values():
+        added = added_to(mechanism)
+        for shape in added.shapes(settings[0]):
+            for part in added.split(settings[0], shape):
+                assert shape.s_from_m is not None and shape.s_to_m is not None
+                assert part.s_from_m is not None and part.s_to_m is not None
+                assert part != shape and part.constants == shape.constants
+                assert part.s_from_m < shape.s_to_m and part.s_to_m > shape.s_from_m
+
+
+def test_what_the_recordings_do_not_hold_is_not_looked_for(settings: list[Setting]) -> None:
+    setting = settings[0]
+    assert not added_to(ALL["covariate_friction"]).shapes(replace(setting, covariates={}))
+    one_velocity = tuple(k == 0 for k in range(len(setting.sensors)))
+    assert not added_to(ALL["sensor_bias"]).shapes(replace(setting, velocities=one_velocity))
+
+
+def central(extension: Extension, at: tuple[Any, ...], along: tuple[Any, ...], step: float) -> Any:
+    """Central difference of the readings by points and strengths along some direction, per its unit."""
+    events, points, strengths = at
+    ahead, behind = (
+        extension.predict(events, points + size * along[0], strengths + size * along[1])
+        for size in (step, -step)
+    )
+    return (ahead - behind) / (2.0 * step)
+
+
+@pytest.mark.parametrize("mechanism", ALL.values(), ids=ALL)
+def test_tangents_of_an_added_mechanism(mechanism: Mechanism, problem: HierarchicalProblem) -> None:
+    """Against central differences, wherever those of two step lengths agree: where fronts pass smoothly."""
+    added, law = added_to(mechanism), base_of(mechanism)
+    setting, n = setting_of(problem, law), problem.campaign.n_events
+    events, rng = np.arange(n), np.random.default_rng(1)
+    spreads = (0.03,) if law.id == "constant" else (0.05, 0.3)
+    logs = [rng.normal(mean, spread, n) for mean, spread in zip(WHERE[law.id], spreads, strict=True)]
+    points = np.column_stack([*logs, rng.normal(size=n)])
+    strengths = np.array([0.4 * added.scale])
+    units = [(axis, np.zeros(1)) for axis in np.eye(points.shape[1])]
+    units.append((np.zeros(points.shape[1]), np.array([added.scale])))
+    errors, n_all = [], 0
+    for shape in some(added.shapes(setting)):
+        extension = extended(problem, law, [added.direction(setting, shape)])
+        readings, by_points, by_strengths = extension.tangents(events, points, strengths)
+        np.testing.assert_allclose(readings, extension.predict(events, points, strengths), rtol=1e-12)
+        assert by_points.shape == (*readings.shape, points.shape[1])
+        assert by_strengths.shape == (*readings.shape, 1)
+        tangents = np.concatenate([by_points, added.scale * by_strengths], axis=2)
+        for k, unit in enumerate(units):
+            coarse, fine = (central(extension, (events, points, strengths), unit, h) for h in (1e-4, 5e-5))
+            size = np.abs(fine) + 1e-3 * np.abs(fine).max(axis=0) + 1e-9
+            smooth = np.abs(coarse - fine) < 1e-3 * size
+            errors.append((np.abs(tangents[:, :, k] - fine) / size)[smooth])
+            n_all += fine.size
+        assert np.any(by_points[:, :, :-1]) and np.any(by_points[:, :, -1])
+    error = np.concatenate(errors)
+    assert len(error) > 0.95 * n_all
+    assert error.max() < 0.05 and np.mean(error > 1e-3) < 0.002

@@ -29,6 +29,7 @@ _GRID = (0.2, 0.6, 1.2, 2.2, 3.5)
 """Strengths at first, in scales of the prior."""
 _NEAR = (-3.5, -2.0, -1.0, 0.0, 1.0, 2.0, 3.5)
 """Strengths around what was found before, in its standard deviations."""
+_PASSES = 3
 _ROUNDS, _MOST_ROUNDS = 2, 6
 _FAR_MEAN, _FAR_SPREAD = 0.7, 0.35
 """Change of a population after which nodes are made anew: of its mean in spreads, of a log spread."""
@@ -241,10 +242,19 @@ def curve_near(
     added = mechanism.added
     assert added is not None
     mean, sd = near[0], max(near[1], 0.03 * added.scale)
-    strengths = mean + sd * np.array(_NEAR)
-    if not added.either_sign:
-        strengths = strengths[strengths > 0.05 * sd]
-    return curve_at(base, mechanism, shape, strengths, budget)
+    for _ in range(_PASSES):
+        strengths = mean + sd * np.array(_NEAR)
+        if abs(mean) > 2.0 * abs(_NEAR[0]) * sd:  # nothing between 0 and there otherwise
+            strengths = np.append(strengths, 0.5 * (mean - math.copysign(abs(_NEAR[0]) * sd, mean)))
+        if not added.either_sign:
+            strengths = strengths[strengths > 0.05 * sd]
+        found = curve_at(base, mechanism, shape, strengths, budget)
+        before = (mean, sd)
+        mean, sd = found.moments()
+        sd = max(sd, 0.03 * added.scale)
+        if abs(mean - before[0]) < before[1] and 0.5 < sd / before[1] < 2.0:
+            break
+    return found
 
 
 def curve_at(

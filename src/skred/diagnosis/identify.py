@@ -19,7 +19,7 @@ from skred.diagnosis.mixed import Scores, efficient_scores, without
 from skred.diagnosis.modes import Modes, Population, Rows, campaign_rows
 from skred.diagnosis.screen import Screen
 from skred.inference.hierarchical import HierarchicalProblem
-from skred.physics.mechanisms.spec import Group, Mechanism
+from skred.physics.mechanisms.spec import Added, Group, Mechanism
 
 FloatArray = NDArray[np.float64]
 LIMIT_Z = 2.85
@@ -28,6 +28,8 @@ _NINE_IN_TEN = 1.2816
 ALIKE = 0.9
 """Size of the cosine between two efficient scores above which mechanisms look alike."""
 _PLACES = 12
+_NO_INFORMATION = 1e-6
+"""About a strength in scales of its prior."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +112,10 @@ def told(screen: Screen, scores: Scores) -> list[Told]:
     _, information, raw = screen.of_candidates(scores)
     order = screen.order
     cosine = scores.information[0][np.ix_(order, order)]
-    cosine = cosine / np.sqrt(np.outer(information[0], information[0]))
+    scales = np.array([_added(candidate.mechanism).scale for candidate in screen.candidates])
+    informed = information[0] * scales**2 > _NO_INFORMATION
+    own_or_one = np.where(informed, information[0], 1.0)
+    cosine = np.where(np.outer(informed, informed), cosine / np.sqrt(np.outer(own_or_one, own_or_one)), 0.0)
     ids = np.array([candidate.mechanism.id for candidate in screen.candidates])
     table = []
     for name in dict.fromkeys(ids):
@@ -119,22 +124,32 @@ def told(screen: Screen, scores: Scores) -> list[Told]:
         best = members[int(np.argmax(own))]
         typical = members[int(np.argsort(own)[len(own) // 2])]
         mechanism, shape = screen.candidates[best].mechanism, screen.candidates[best].shape
-        added = mechanism.added
-        assert added is not None
+        added = _added(mechanism)
         alike = {str(ids[k]) for k in np.flatnonzero(np.abs(cosine[best]) > ALIKE)} - {name}
         stretch = None if shape.s_from_m is None or shape.s_to_m is None else (shape.s_from_m, shape.s_to_m)
+        kept = information[0, typical] / raw[0, typical] if informed[typical] else 0.0
         table.append(
             Told(
                 mechanism,
-                float(np.clip(information[0, typical] / max(raw[0, typical], 1e-300), 0.0, 1.0)),
-                float((LIMIT_Z + _NINE_IN_TEN) / np.sqrt(information[0, typical])),
-                float((LIMIT_Z + _NINE_IN_TEN) / np.sqrt(information[0, best])),
+                float(np.clip(kept, 0.0, 1.0)),
+                _limit(information[0, typical], informed[typical]),
+                _limit(information[0, best], informed[best]),
                 stretch,
                 float(np.mean(ndtr(np.sqrt(own) * added.relevant - LIMIT_Z))),
                 tuple(sorted(alike)),
             )
         )
     return table
+
+
+def _added(mechanism: Mechanism) -> Added:
+    assert mechanism.added is not None
+    return mechanism.added
+
+
+def _limit(information: float, informed: bool) -> float:
+    """Strength found in 90 % of cases; infinite where the recordings say nothing."""
+    return (LIMIT_Z + _NINE_IN_TEN) / float(np.sqrt(information)) if informed else float("inf")
 
 
 def extra_sensors(

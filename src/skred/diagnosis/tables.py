@@ -308,7 +308,9 @@ def build_tables(base: Base, extension: Extension, located: Located, budget: Bud
     wide = population.covariance * wider[:, :, None] * wider[:, None, :]
     wide = wide + np.clip(covariances[:, :n, :n], -1.0, 1.0)
     remembering = _Remembering(extension.problem, extension.law, extension.directions)
-    nodes = event_nodes(remembering, rows, given, Population(population.mean, wide), modes, budget)
+    nodes = event_nodes(
+        remembering, rows, given, Population(population.mean, wide), modes, budget, base.population
+    )
     release = remembering.asked[0][:, n].copy()
     points = modes.points.reshape(n_tables, n_events, n + 1)
     return Tables(grid, nodes, release, points, mean, factor, budget)

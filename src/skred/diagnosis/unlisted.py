@@ -121,7 +121,9 @@ def fit_profile(base: Base, kind: Kind) -> Profile:
     values, population, points = np.zeros(len(at)), base.population, base.fit.points
     information = np.zeros_like(prior)
     score, information = _scores(base, wide, n_before, values, population, points)
-    fit, height = base.fit, base.fit.found.log_evidence
+    # Nothing like everything else, so that what is left of integration errors is the same there.
+    nothing = fit = _fit_at(base, kind, at, values, (population, points))
+    height = nothing.found.log_evidence
     for _ in range(_ROUNDS):
         step = np.linalg.solve(information + precision, score - precision @ values)
         for share in _SHARES:
@@ -137,7 +139,7 @@ def fit_profile(base: Base, kind: Kind) -> Profile:
         score, information = _scores(base, wide, n_before, values, population, points)
         if gained < _SETTLED:
             break
-    gain = fit.found.log_evidence - base.fit.found.log_evidence
+    gain = fit.found.log_evidence - nothing.found.log_evidence
     _, log_det = np.linalg.slogdet(np.eye(len(at)) + prior @ information)
     cover = np.linalg.inv(information + precision)
     factor = gain - 0.5 * float(values @ precision @ values) - 0.5 * float(log_det)

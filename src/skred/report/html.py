@@ -79,14 +79,14 @@ def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> 
     hierarchical = doc.is_hierarchical(comparison)
     sections = _sections(comparison)
     return (
-        _environment()
+        environment()
         .get_template("compare.html.jinja")
         .render(
             c=comparison,
             models=doc.models(comparison),
             ranked=doc.ranked(comparison),
             failed=doc.failed(comparison),
-            figures={name: _data_uri(file) for name, file in figures.items()},
+            figures={name: picture(file) for name, file in figures.items()},
             sensors=_sensors(comparison),
             hierarchical=hierarchical,
             sections=sections,
@@ -137,12 +137,13 @@ def _within_factor(parameter: doc.Document) -> str:
     return rounded(factor, decimals_for(_NORMAL_90 * sd * factor))
 
 
-def _data_uri(file: Path) -> str:
+def picture(file: Path) -> str:
+    """A picture as a data URI."""
     return "data:image/png;base64," + base64.b64encode(file.read_bytes()).decode("ascii")
 
 
 @cache
-def _environment() -> Environment:
+def environment() -> Environment:
     """Templates of this package, with every value escaped unless a template says otherwise."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 

@@ -25,8 +25,8 @@ def comparison_table(comparison: doc.Document) -> Table:
     """
     own = "with every avalanche its own friction" if doc.is_hierarchical(comparison) else ""
     name = shortened(doc.get(comparison, "campaign", "name"), 36 if own else 60)
-    table = _table(
-        _text(f"{name}: laws compared {own or 'by leave-one-event-out'}"),
+    table = plain_table(
+        plain_text(f"{name}: laws compared {own or 'by leave-one-event-out'}"),
         left=("law",),
         right=(
             "\nelpd" if own else "exact\nelpd",
@@ -45,9 +45,11 @@ def comparison_table(comparison: doc.Document) -> Table:
         table.add_row(*_ranked_row(model, best=place == 0))
     failed = doc.failed(comparison)
     for model in failed:
-        table.add_row(_text(shortened(doc.get(model, "id"))), _text("gate failed", "red"), *["-"] * 8)
+        table.add_row(
+            plain_text(shortened(doc.get(model, "id"))), plain_text("gate failed", "red"), *["-"] * 8
+        )
     lines = [_explanation(comparison), *_pooled_line(comparison), *map(_failure, failed)]
-    table.caption = _text("\n".join(lines))
+    table.caption = plain_text("\n".join(lines))
     table.caption_justify = "left"
     return table
 
@@ -66,49 +68,50 @@ def summary_table(model: doc.Document, *, probability: float = 0.9) -> Renderabl
     from rich.console import Group
 
     of_population = bool(doc.listed(model, "new_avalanche"))
-    table = _table(
-        _text(shortened(doc.get(model, "title") or doc.get(model, "id") or "", 76)),
+    table = plain_table(
+        plain_text(shortened(doc.get(model, "title") or doc.get(model, "id") or "", 76)),
         left=("parameter", "symbol\n(paper)", "unit"),
         right=("mean", "sd", f"{100 * probability:.0f} % interval", "ESS\nbulk", "ESS\ntail", "r-hat"),
     )
     for parameter in doc.listed(model, "parameters"):
         table.add_row(*_parameter_row(parameter, of_population=of_population))
     of_what = "across avalanches: see below" if of_population else "of the mean response"
-    table.caption = _text(f"Interval equal-tailed, {of_what}. {_gate(model)}")
+    table.caption = plain_text(f"Interval equal-tailed, {of_what}. {_gate(model)}")
     table.caption_justify = "left"
     if not of_population:
         return table
     kind = f"{100 * probability:.0f} % interval"
-    table.caption = _text(
+    table.caption = plain_text(
         "Every avalanche has its own friction: spread is the standard deviation of its logarithm across"
         f" avalanches. Intervals equal-tailed. {_gate(model)}"
     )
-    return Group(table, _text(""), _new_avalanche_table(model, kind))
+    return Group(table, plain_text(""), _new_avalanche_table(model, kind))
 
 
 def _new_avalanche_table(model: doc.Document, kind: str) -> Table:
-    table = _table(
-        _text("A new avalanche, beside the recorded ones"),
+    table = plain_table(
+        plain_text("A new avalanche, beside the recorded ones"),
         left=("sensor", "unit"),
         right=("gets\nthere", f"reading,\n{kind}", "mean", "recorded:\nthere", f"\n{kind}", "mean", "n"),
     )
     for entry in doc.listed(model, "new_avalanche"):
         row = relative_new_avalanche({}, entry)
         table.add_row(
-            _text(shortened(row["sensor"], 24)),
-            _text(shortened(row["unit"], 12)),
+            plain_text(shortened(row["sensor"], 24)),
+            plain_text(shortened(row["unit"], 12)),
             *(row[k] for k in ("reached", "interval", "mean", "recorded_reached", "recorded_interval")),
             *(row[k] for k in ("recorded_mean", "n_recorded")),
         )
     errors = shortened(doc.get(model, "error_model", "title") or "n/a", 100)
-    table.caption = _text(
+    table.caption = plain_text(
         f"Readings of avalanches that get there; the runout is the length along the track. Errors: {errors}."
     )
     table.caption_justify = "left"
     return table
 
 
-def _table(title: Text, left: tuple[str, ...], right: tuple[str, ...]) -> Table:
+def plain_table(title: Text, left: tuple[str, ...], right: tuple[str, ...]) -> Table:
+    """A table without rows: columns of words, then columns of numbers."""
     from rich import box
     from rich.table import Table
 
@@ -121,7 +124,8 @@ def _table(title: Text, left: tuple[str, ...], right: tuple[str, ...]) -> Table:
     return table
 
 
-def _text(value: Any, style: str = "") -> Text:
+def plain_text(value: Any, style: str = "") -> Text:
+    """A value as text that steers neither rich nor the terminal."""
     from rich.text import Text
 
     lines = [printable(line) for line in str(value).split("\n")]
@@ -132,7 +136,7 @@ def _ranked_row(model: doc.Document, *, best: bool) -> list[Any]:
     practical = doc.get(model, "difference", "practical")
     counts = "best" if best else {True: "yes", False: "no"}.get(practical, "n/a")
     return [
-        _text(shortened(doc.get(model, "id"))),
+        plain_text(shortened(doc.get(model, "id"))),
         fixed(doc.get(model, "exact", "elpd")),
         fixed(doc.get(model, "difference", "elpd")),
         fixed(doc.get(model, "difference", "se_doubled")),
@@ -184,9 +188,9 @@ def _parameter_row(parameter: doc.Document, *, of_population: bool) -> list[Any]
         role = population_role(doc.get(parameter, "name"))
         name = f"median {name}" if role == "median" else role
     return [
-        _text(name),
-        _text(shortened(symbol)),
-        _text(shortened(doc.get(parameter, "unit"), 20)),
+        plain_text(name),
+        plain_text(shortened(symbol)),
+        plain_text(shortened(doc.get(parameter, "unit"), 20)),
         rounded(doc.get(parameter, "mean"), by_both),
         rounded(sd, by_sd),
         f"{low} to {high}",

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from skred.campaign import Sensor
     from skred.inference.problem import Problem
 
-_MAX_NAMED = 30
+_MAX_NAMED = 20
+"""Names that stand beside each other; of more sensors one in two, one in three, ... is named."""
 _ZOOM_BELOW = 0.6
 """Where all recordings lie in less than this share of the track, that part is shown enlarged."""
 
@@ -42,17 +43,17 @@ def track_figure(
         Where the track is shown from [m], and what is said of the release.
     """
     figure = new_figure(5.7, title)
-    windows = _windows(problem, start[0])
+    shown = windows(problem, start[0])
     layout: dict[str, Any] = {"height_ratios": [2.1, 1]}
-    panels = figure.subplots(2, len(windows), sharex="col", sharey="row", squeeze=False, gridspec_kw=layout)
-    for column, (low, high) in enumerate(windows):
-        in_detail = column == len(windows) - 1
+    panels = figure.subplots(2, len(shown), sharex="col", sharey="row", squeeze=False, gridspec_kw=layout)
+    for column, (low, high) in enumerate(shown):
+        in_detail = column == len(shown) - 1
         speed, profile = panels[:, column]
         draw(speed)
         if in_detail:
             _readings(speed, problem)
         _runouts(speed, problem)
-        _profile(profile, problem, (low, high), named=in_detail)
+        terrain_profile(profile, problem, (low, high), named=in_detail)
         _reference(speed, profile, problem)
         speed.set_xlim(low, high)
     panels[0, 0].set_ylabel(f"front speed [{unit_text('m s-1')}]")
@@ -78,7 +79,7 @@ def placed_sensors(problem: Problem) -> list[tuple[int, Sensor, float]]:
     return [(k, s, (s.s_from_m + s.s_to_m) / 2) for k, s in sensors if not s.is_runout]
 
 
-def _windows(problem: Problem, release: float) -> list[tuple[float, float]]:
+def windows(problem: Problem, release: float) -> list[tuple[float, float]]:
     """Stretches of the track to show: all of it, and the one with recordings if that is short."""
     length = problem.terrain.length_m
     whole = (min(release, length), length)
@@ -130,7 +131,7 @@ def _runouts(axes: Axes, problem: Problem) -> None:
             label = "_not in the legend"
 
 
-def _profile(axes: Axes, problem: Problem, window: tuple[float, float], *, named: bool) -> None:
+def terrain_profile(axes: Axes, problem: Problem, window: tuple[float, float], *, named: bool) -> None:
     """Terrain with the sensors on it; spans as thick lines."""
     track = problem.campaign.track
     s_m, z_m = np.asarray(track.s_m), np.asarray(track.z_m)
@@ -149,11 +150,15 @@ def _profile(axes: Axes, problem: Problem, window: tuple[float, float], *, named
 
 def _names(axes: Axes, problem: Problem, window: tuple[float, float]) -> None:
     """Names of the sensors above the panel, moved apart where they would overlap."""
-    placed = placed_sensors(problem)[:_MAX_NAMED]
+    placed = placed_sensors(problem)
+    placed = placed[:: -(-len(placed) // _MAX_NAMED) or 1]
     track = problem.campaign.track
     gap = 0.045 * (window[1] - window[0])
-    middles = np.array([middle for _, _, middle in placed])
-    for (_, sensor, middle), x in zip(placed, spread(middles, gap), strict=True):
+    middles = spread(np.array([middle for _, _, middle in placed]), gap)
+    if len(middles):  # moved apart, but not out of the window
+        middles = middles + max(window[0] - middles.min(), 0.0)
+        middles = middles - max(middles.max() - window[1], 0.0)
+    for (_, sensor, middle), x in zip(placed, middles, strict=True):
         z = float(np.interp(middle, track.s_m, track.z_m))
         axes.annotate(
             figure_text(sensor.id, 14),

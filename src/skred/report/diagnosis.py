@@ -1,0 +1,76 @@
+"""The report of a diagnosis: figures, a page that needs nothing else, and a table for the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from skred.report import document as doc
+from skred.report.diagnosis_evidence import check_figure, probabilities_figure, strength_figure
+from skred.report.diagnosis_held_out import left_out_figure, scores_figure
+from skred.report.diagnosis_places import local_names, places_figure, where_figure
+from skred.report.diagnosis_terminal import diagnosis_table
+from skred.report.diagnosis_words import races
+from skred.report.style import write_png
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from skred.diagnosis.diagnose import Diagnosis
+
+__all__ = ["diagnosis_table", "render_diagnosis", "save_diagnosis_figures"]
+
+
+def save_diagnosis_figures(found: Diagnosis, folder: Path) -> dict[str, Path]:
+    """Write the figures of a diagnosis as PNG.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    folder : Path
+        An existing folder.
+
+    Returns
+    -------
+    dict of str to Path
+        Those that apply of: check, where, probabilities, strength, places, left_out, scores; of a second
+        race also probabilities_2, strength_2 and places_2.
+    """
+    makers: dict[str, Callable[[], Figure]] = {}
+    if found.check is not None:
+        makers["check"] = partial(check_figure, found)
+    makers["where"] = partial(where_figure, found)
+    for number, race in enumerate(races(found)):
+        ending = f"_{number + 1}" if number else ""
+        makers[f"probabilities{ending}"] = partial(probabilities_figure, found, race, number)
+        makers[f"strength{ending}"] = partial(strength_figure, found, race, number)
+        if local_names(race):
+            makers[f"places{ending}"] = partial(places_figure, found, race, number)
+    if found.before is not None:
+        makers["left_out"] = partial(left_out_figure, found)
+    if found.before is not None and found.after is not None:
+        makers["scores"] = partial(scores_figure, found)
+    return {name: write_png(make(), folder / f"{name}.png") for name, make in makers.items()}
+
+
+def render_diagnosis(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) -> str:
+    """Render the report of a diagnosis.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    document : mapping
+        The verdict that is also written as ``verdict.json``.
+    figures : mapping of str to Path
+        As `save_diagnosis_figures` returns them; what is missing is left out.
+
+    Returns
+    -------
+    str
+        A self-contained page: style inside, pictures as data URIs.
+    """
+    from skred.report.diagnosis_page import page
+
+    return page(found, document, figures)

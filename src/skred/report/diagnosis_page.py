@@ -1,0 +1,155 @@
+"""The page of a diagnosis: what its template is given."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from skred.diagnosis.decide import E_LIMIT, decide
+from skred.diagnosis.held_out import K_LIMIT, paired
+from skred.diagnosis.omnibus import LIMIT
+from skred.diagnosis.unlisted import KINDS
+from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
+from skred.report import diagnosis_rows as rows
+from skred.report import document as doc
+from skred.report.diagnosis_equation import equations, parameter_rows, symbol_rows
+from skred.report.diagnosis_words import (
+    VERDICTS,
+    leading_name,
+    profile_of,
+    races,
+    short_title,
+    stretch_of,
+)
+from skred.report.html import environment, picture
+from skred.report.labels import unit_text
+from skred.report.numbers import fixed
+
+if TYPE_CHECKING:
+    from skred.diagnosis.diagnose import Diagnosis
+    from skred.diagnosis.locate import Location
+
+_NO_FORCE = 1e-6
+"""Retardation that is none [m s-2]."""
+_SECTIONS = {
+    "recorded": "What was recorded",
+    "can-tell": "What these recordings can tell",
+    "wrong": "Is anything wrong?",
+    "where": "Where?",
+    "what": "What?",
+    "equation": "The equation with its new term",
+    "before-after": "Before and after",
+    "trust": "How far to trust it",
+}
+
+
+def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) -> str:
+    """Render the report of a diagnosis, see `skred.report.diagnosis.render_diagnosis`."""
+    campaign = found.problem.campaign
+    sections = dict(_SECTIONS)
+    if not found.steps:
+        sections["equation"] = "The equation"
+        sections["before-after"] = "How well avalanches left out are predicted"
+    return (
+        environment()
+        .get_template("diagnosis.html.jinja")
+        .render(
+            d=document,
+            found=found,
+            campaign=campaign,
+            sections=sections,
+            number={name: place for place, name in enumerate(sections, start=1)},
+            figures={name: picture(file) for name, file in figures.items()},
+            verdict=VERDICTS[found.decision.verdict],
+            facts=rows.recorded_facts(found),
+            sensors=rows.sensor_rows(found),
+            told=rows.told_rows(found),
+            work=rows.work_rows(found),
+            profile=profile_of(found),
+            stretch=stretch_of(found),
+            races=[_race(found, number, race) for number, race in enumerate(races(found))],
+            equations=equations(found),
+            symbols=symbol_rows(found),
+            parameters=parameter_rows(found),
+            held=rows.held_out_rows(found),
+            difference=_difference(found),
+            trust=rows.trust_rows(found),
+            priors=rows.prior_rows(found),
+            settings=rows.settings_rows(document),
+            profile_priors=[
+                f"{kind.amplitude:g} {unit_text(kind.unit)} over {kind.length_m:.0f} m" for kind in KINDS
+            ],
+            limits={
+                "p": LIMIT, "e": E_LIMIT, "k": K_LIMIT, "r_hat": R_HAT_LIMIT, "ess": ESS_LIMIT,
+                "practical": doc.PRACTICAL_DIFFERENCE,
+            },
+            too_few=_too_few(found),
+            dropped=_dropped(found),
+            flat=_flat(profile_of(found)),
+            short_title=short_title,
+        )
+    )  # fmt: skip
+
+
+def _race(found: Diagnosis, number: int, race: Any) -> dict[str, Any]:
+    """A race, with the ending of its figures' names."""
+    step = found.steps[number] if number < len(found.steps) else None
+    ties = [one.mechanism for one in step.entrants[1:]] if step is not None else []
+    winner = step.entrants[0].mechanism if step is not None else None
+    same = [
+        one.id
+        for one in ties
+        if winner is not None
+        and winner.id in (one.same_term_as,)
+        or one.id == getattr(winner, "same_term_as", "")
+    ]
+    return {
+        "ending": f"_{number + 1}" if number else "",
+        "rows": rows.race_rows(race),
+        "errors": rows.error_rows(race),
+        "winner": winner,
+        "leading": leading_name(race),
+        "ties": [one.id for one in ties],
+        "same": same,
+    }
+
+
+def _flat(profile: Location | None) -> bool:
+    """Whether the free force did not move from nothing."""
+    return profile is not None and not bool(np.any(np.abs(profile.mean) > _NO_FORCE))
+
+
+def _too_few(found: Diagnosis) -> bool:
+    """Whether the check cannot reach its limit because too few clean campaigns were simulated."""
+    check = found.check
+    if check is None or check.fired:
+        return False
+    n = len(check.simulated)
+    return 1.0 / (n + 1) > LIMIT and bool(check.statistic > check.simulated.max(initial=-math.inf))
+
+
+def _dropped(found: Diagnosis) -> tuple[str, ...]:
+    """What the race would have named, had its own calibration passed the gate."""
+    if found.race is None or found.check is None or found.table is None or found.steps:
+        return ()
+    return decide(found.race.probability, found.check.fired, found.table.can_tell).names
+
+
+def _difference(found: Diagnosis) -> dict[str, Any] | None:
+    """The difference of the log scores, its doubled standard error, and whether it counts."""
+    if found.before is None or found.after is None:
+        return None
+    value, se = paired(found.after, found.before)
+    better = found.after.pointwise > found.before.pointwise
+    return {
+        "value": fixed(value, 1, signed=True),
+        "doubled": fixed(2.0 * se, 1),
+        "practical": abs(value) >= doc.PRACTICAL_DIFFERENCE,
+        "clear": abs(value) > 2.0 * se,
+        "better": int(better.sum()),
+        "of": len(better),
+    }

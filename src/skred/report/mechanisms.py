@@ -1,0 +1,194 @@
+"""The library of mechanisms for the terminal: one table over all of them, and one of each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.spec import Group, Mechanism, Setting
+from skred.physics.terrain import Terrain
+from skred.report.tables import plain_table, plain_text
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.table import Table
+
+    from skred.physics.law import Law
+
+_BLAMES = {
+    Group.PHYSICS: "the physics: a term of the equation of motion",
+    Group.INSTRUMENT: "the instruments: the recordings are off",
+}
+_CELL_M, _N_CELLS, _SLOPE_RAD = 5.0, 800, 0.5
+
+
+def mechanism_document(mechanism: Mechanism, laws: Sequence[Law]) -> dict[str, Any]:
+    """What a mechanism says of itself, as plain data.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        One that can be added to a law, as all of the library can.
+    laws : sequence of Law
+        Base laws that it may be missing from.
+    """
+    added, strength = mechanism.added, mechanism.strength
+    assert added is not None
+    ids = [(law.id, tuple(part.id for part in law.mechanisms)) for law in laws]
+    return {
+        "id": mechanism.id,
+        "title": mechanism.title,
+        "group": str(mechanism.group),
+        "equation": mechanism.equation,
+        "strength": {
+            "parameter": strength.name,
+            "symbol": strength.symbol,
+            "paper_symbol": strength.paper_symbol or None,
+            "unit": strength.unit,
+            "either_sign": added.either_sign,
+        },
+        "prior": {
+            "kind": "normal" if added.either_sign else "half-normal",
+            "scale": added.scale,
+            "relevant": added.relevant,
+            "reason": added.reason,
+        },
+        "prior_in_a_base_law": None
+        if mechanism.column is None
+        else {"kind": "half-normal", "scale": strength.prior_scale, "reason": strength.prior_reason},
+        "looked_for": looked_for(mechanism),
+        "missing_from": [law_id for law_id, base in ids if added.joins(base)],
+        "mark": mechanism.mark,
+        "reference": mechanism.reference,
+        "doi": mechanism.doi,
+        "same_term": same_term(mechanism),
+    }
+
+
+def same_term(mechanism: Mechanism) -> list[str]:
+    """Ids of the mechanisms that no recording can tell from it."""
+    pairs = [(other.id, other.same_term_as) for other in mechanisms().values() if other.same_term_as]
+    return [b if a == mechanism.id else a for a, b in pairs if mechanism.id in (a, b)]
+
+
+def looked_for(mechanism: Mechanism) -> str:
+    """The shapes that it is looked for in, in words; read off its shapes on a made-up track."""
+    added, setting = mechanism.added, _example()
+    assert added is not None
+    shapes = added.shapes(setting)
+    first = shapes[0]
+    if first.place_m is not None:
+        lengths = sorted(
+            {round(s.s_to_m - s.s_from_m) for s in shapes if s.s_to_m and s.s_from_m is not None}
+        )
+        where = f"stretches of {_either(lengths)} m over the recorded part of the track"
+        if added.split(setting, first):
+            where += ", finer around the likeliest"
+    elif first.sensor is not None:
+        where = "each sensor of front velocity, where there are several"
+    elif first.covariate is not None:
+        where = "each covariate of the events that is a number, or a text of two kinds"
+    elif added.direction(setting, first).columns:
+        where = "the whole track"
+    else:
+        where = "all avalanches alike"
+    names = dict.fromkeys(name for shape in shapes for name, _ in shape.constants)
+    values = {name: sorted({dict(shape.constants)[name] for shape in shapes}) for name in names}
+    return "; ".join([where, *(f"{name} of {_either(found)}" for name, found in values.items())])
+
+
+def _example() -> Setting:
+    """A straight slope with something of everything that a mechanism can refer to."""
+    ones = np.ones(_N_CELLS)
+    terrain = Terrain(
+        edge_s_m=_CELL_M * np.arange(_N_CELLS + 1.0),
+        sin_slope=np.sin(_SLOPE_RAD) * ones,
+        cos_slope=np.cos(_SLOPE_RAD) * ones,
+        curvature=0.0 * ones,
+    )
+    return Setting(
+        terrain=terrain,
+        base=(),
+        recorded_m=(0.25 * terrain.length_m, 0.75 * terrain.length_m),
+        sensors=("first", "second"),
+        velocities=(True, True),
+        covariates={"covariate": np.array([-1.0, 1.0])},
+        n_events=2,
+    )
+
+
+def _either(values: Sequence[float]) -> str:
+    words = [f"{value:g}" for value in values]
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
+
+
+def mechanisms_table(documents: Sequence[dict[str, Any]], n_laws: int) -> Table:
+    """All mechanisms.
+
+    Parameters
+    ----------
+    documents : sequence of dict
+        As `mechanism_document` makes them.
+    n_laws : int
+        Number of laws that were asked about.
+    """
+    columns = ("mechanism", "what it is", "blames", "strength", "prior\nscale", "missing\nfrom")
+    table = plain_table(plain_text("Mechanisms"), left=columns, right=())
+    for column in (0, 2, 3, 4):
+        table.columns[column].no_wrap = True
+    table.columns[4].justify = "right"
+    table.columns[5].max_width = 9
+    for one in documents:
+        strength = one["strength"]
+        symbol = f"{strength['symbol']} [{strength['unit']}]"
+        scale = ("± " if strength["either_sign"] else "") + f"{one['prior']['scale']:g}"
+        words = (one["id"], one["title"], one["group"], symbol, scale, _missing_from(one, n_laws))
+        table.add_row(*map(plain_text, words))
+    table.caption = plain_text(
+        "Prior scale: of the strength as an added mechanism; half-normal, or with ± normal, either sign."
+        " Missing from: base laws that may leave it out. One in full: skred mechanisms ID."
+    )
+    table.caption_justify = "left"
+    return table
+
+
+def mechanism_table(document: dict[str, Any], n_laws: int) -> RenderableType:
+    """One mechanism in full; parameters as `mechanisms_table`."""
+    from rich.console import Group as Lines
+    from rich.table import Table
+
+    strength, prior, in_base = document["strength"], document["prior"], document["prior_in_a_base_law"]
+    paper = f", in the paper {strength['paper_symbol']}" if strength["paper_symbol"] else ""
+    unit = "" if strength["unit"] == "1" else f" {strength['unit']}"
+    rows = {
+        "blames": _BLAMES[document["group"]],
+        "enters as": document["equation"],
+        "strength": f"{strength['parameter']}, symbol {strength['symbol']}{paper}",
+        "unit": strength["unit"],
+        "sign": "either" if strength["either_sign"] else "positive only",
+        "prior": f"{prior['kind']}, scale {prior['scale']:g}{unit}: {prior['reason']}",
+        "relevant": f"{prior['relevant']:.2g}{unit} or more: the median size under that prior",
+        "in a base law": "cannot be part of one"
+        if in_base is None
+        else f"{in_base['kind']}, scale {in_base['scale']:g}{unit}: {in_base['reason']}",
+        "missing from": _missing_from(document, n_laws),
+        "looked for in": document["looked_for"],
+        "mark": document["mark"],
+        "same term as": ", ".join(document["same_term"]) or "none other",
+        "reference": document["reference"],
+        "doi": f"https://doi.org/{document['doi']}",
+    }
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    for name, text in rows.items():
+        table.add_row(plain_text(name, "bold"), plain_text(text))
+    return Lines(plain_text(f"{document['id']}: {document['title']}", "bold"), table)
+
+
+def _missing_from(document: dict[str, Any], n_laws: int) -> str:
+    laws = document["missing_from"]
+    return "all laws" if len(laws) == n_laws else ", ".join(laws) or "none"

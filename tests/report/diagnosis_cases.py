@@ -1,0 +1,173 @@
+"""A diagnosis made up quickly: no sampler runs, and nothing is refitted."""
+
+from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+import xarray as xr
+from hierarchical_cases import hierarchical_calibration, hierarchical_ryggfonn
+
+from skred.diagnosis.curves import Curve
+from skred.diagnosis.decide import Decision
+from skred.diagnosis.diagnose import Diagnosis, Step
+from skred.diagnosis.extension import setting_of
+from skred.diagnosis.held_out import HeldOut
+from skred.diagnosis.identify import Identifiability, Told
+from skred.diagnosis.locate import Location
+from skred.diagnosis.odds import prior_odds
+from skred.diagnosis.omnibus import Omnibus
+from skred.diagnosis.race import Entrant, Heat, Race
+from skred.inference.gate import Gate
+from skred.inference.hierarchical import HierarchicalProblem
+from skred.laws import load_law
+from skred.physics.law import Parameter
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.spec import Direction
+
+GATE = Gate(1.0021, 912.0, 803.0, 0, ())
+LAW = load_law("coulomb")
+
+
+def hostile_problem(text: str) -> HierarchicalProblem:
+    """Ryggfonn with names that attack."""
+    problem = hierarchical_ryggfonn()
+    campaign = problem.campaign
+    sensors = tuple(replace(one, id=f"{text}{k}") for k, one in enumerate(campaign.sensors))
+    events = tuple(
+        replace(one, id=f"{text}{k}", covariates={text: float(k)}) for k, one in enumerate(campaign.events)
+    )
+    attacked = replace(campaign, name=text, description=text, source=text, sensors=sensors, events=events)
+    return replace(problem, campaign=attacked)
+
+
+def curves_of(mechanism, setting, top: float, at: float) -> Entrant:
+    """A parabola of evidence for each shape, highest near a place."""
+    added = mechanism.added
+    curves = []
+    shapes = added.shapes(setting)
+    for shape in shapes[:: max(1, len(shapes) // 5)]:
+        far = 0.0 if shape.place_m is None else abs(shape.place_m - at) / 100.0
+        height = top - far
+        strengths = added.scale * np.array([0.0, 0.3, 0.7, 1.0, 1.4, 2.0])
+        heights = height - 20.0 * (strengths / added.scale - 1.0) ** 2
+        heights[0] = 0.0
+        curves.append(Curve(mechanism, shape, Direction(), strengths, heights, ()))
+    return Entrant(mechanism, tuple(curves), np.full(len(curves), -np.log(len(curves))))
+
+
+def race_of(problem: HierarchicalProblem, tops: dict[str, float], n_heats: int = 1) -> Race:
+    """A race in which some candidates have evidence."""
+    setting = setting_of(problem, LAW)
+    entrants = {
+        name: curves_of(mechanism, setting, tops.get(name, -2.0), 1800.0)
+        for name, mechanism in mechanisms().items()
+        if mechanism.added is not None
+        and mechanism.added.joins(setting.base)
+        and mechanism.added.shapes(setting)
+    }
+    profile = SimpleNamespace(log_bayes_factor=tops.get("unlisted", -1.0))
+    heats = tuple(
+        Heat(name, SimpleNamespace(), entrants, [profile]) for name in ("robust", "student")[:n_heats]
+    )
+    odds = prior_odds(entrant.mechanism for entrant in entrants.values())
+    return Race(heats, odds, {"robust": -100.0, "student": -103.0})
+
+
+def told(problem: HierarchicalProblem, power: float) -> Identifiability:
+    setting = setting_of(problem, LAW)
+    rows = tuple(
+        Told(one, 0.3, 2.0 * one.added.scale, one.added.scale, (1700.0, 1800.0), power, ("obstacle",))
+        for one in mechanisms().values()
+        if one.added is not None and one.added.joins(setting.base)
+    )
+    return Identifiability(rows, 1750.0, power, 0.5 + 0.5 * power)
+
+
+def location() -> Location:
+    s_m = np.linspace(1620.0, 2200.0, 60)
+    mean = 0.8 * np.exp(-(((s_m - 1800.0) / 80.0) ** 2))
+    work = np.array([[1650.0, 1810.0, 61.3, 12.1], [1810.0, 1910.0, 12.2, 14.0]])
+    return Location(
+        s_m, mean, mean - 0.3, mean + 0.3, np.linspace(1, 0, 60), 140.0, (1750.0, 1850.0), work, 9.0
+    )
+
+
+def held(problem: HierarchicalProblem, better: float) -> HeldOut:
+    rng = np.random.default_rng(5)
+    n = problem.campaign.n_events
+    noise = rng.normal(0.0, 3.0, problem.values.shape)
+    predicted = np.where(problem.observed, problem.values + noise, np.nan)
+    covered = np.where(problem.observed, 1.0, np.nan)
+    pointwise = rng.normal(-12.0, 2.0, n) + better
+    return HeldOut(pointwise, np.full(n, 0.4), problem.campaign.event_ids[:2], (), predicted, covered)
+
+
+def calibration(problem: HierarchicalProblem, added: tuple = (), gate: Gate = GATE) -> SimpleNamespace:
+    """What the report reads of a calibration; with added strengths, of an augmented law's."""
+    tree = hierarchical_calibration(problem, LAW)
+    posterior = tree["posterior"].to_dataset()
+    rng = np.random.default_rng(4)
+    for one in added:
+        scale = one.mechanism.added.scale
+        draws = rng.normal(scale, 0.1 * scale, tuple(posterior.sizes[d] for d in ("chain", "draw")))
+        posterior[one.name] = (("chain", "draw"), draws)
+    tree = xr.DataTree.from_dict({"posterior": posterior})
+    strengths = [
+        Parameter(one.name, one.mechanism.strength.symbol, one.mechanism.strength.unit) for one in added
+    ]
+    shown = SimpleNamespace(parameters=lambda law: (*problem.parameters(law), *strengths), added=added)
+    return SimpleNamespace(problem=shown, law=LAW, tree=tree, gate=gate)
+
+
+@cache
+def diagnosis(kind: str, text: str = "") -> Diagnosis:
+    """A diagnosis of each kind; of a campaign with hostile names where `text` is given."""
+    problem = hostile_problem(text) if text else hierarchical_ryggfonn()
+    if kind == "cannot":
+        return Diagnosis(problem, LAW, "only 3 avalanches with a reading; at least 6 are needed")
+    if kind == "gate":
+        failed = Gate(1.3, 12.0, 9.0, 0, ("r-hat 1.300 exceeds 1.01: more --tune",))
+        why = "the gate of the base law's calibration failed"
+        return Diagnosis(problem, LAW, why, calibration(problem, gate=failed), seconds={"base": 3.0})
+    tops = {
+        "tie": {"entrainment": 40.0, "segment_drag": 39.6},
+        "two": {"covariate_friction": 40.0},
+        "sensor": {"sensor_bias": 40.0},
+        "unexplained": {"unlisted": 30.0},
+    }.get(kind, {})
+    race = race_of(problem, tops, 2 if kind in ("tie", "sensor") else 1)
+    names = {
+        "tie": ("entrainment", "segment_drag"), "two": ("covariate_friction",), "sensor": ("sensor_bias",),
+    }.get(kind, ())  # fmt: skip
+    verdicts = {
+        "tie": "missing_physics", "two": "missing_physics", "sensor": "instrument",
+        "unexplained": "unexplained", "nothing": "nothing_missing", "silent": "cannot_tell",
+    }  # fmt: skip
+    clean = np.random.default_rng(1).normal(0.0, 1.0, 120)
+    steps = _steps(problem, race, names, clean, second=kind == "two")
+    alarm = kind in ("tie", "two", "sensor", "unexplained")
+    table = told(problem, 0.3 if kind == "silent" else 0.8)
+    return Diagnosis(
+        problem, LAW, "", calibration(problem), SimpleNamespace(), table,
+        Omnibus(30.0 if alarm else 0.3, clean), race, Decision(verdicts[kind], names),
+        location() if alarm else None, steps, held(problem, 0.0), held(problem, 1.1) if steps else None,
+        {"base": 12.3, "race": 45.6},
+    )  # fmt: skip
+
+
+def _steps(problem, race, names, clean, *, second):
+    if not names:
+        return ()
+    entrants = tuple(race.heats[0].entrants[name] for name in names)
+    raced = [(entrants, race)]
+    if second:
+        again = race_of(problem, {"obstacle": 30.0})
+        raced.append(((again.heats[0].entrants["obstacle"],), again))
+    added, steps = (), []
+    for let_in, its_race in raced:
+        best = let_in[0].best
+        name = best.mechanism.strength.name
+        added += (SimpleNamespace(name=name, mechanism=best.mechanism, shape=best.shape),)
+        steps.append(Step(let_in, its_race, calibration(problem, added), Omnibus(0.1, clean)))
+    return tuple(steps)
