@@ -32,10 +32,13 @@ from skred.physics.mechanisms.spec import Direction, Mechanism, Shape
 
 FloatArray = NDArray[np.float64]
 MOST_ADDED = 2
-AUGMENTED_LIMIT = 0.5
-"""Largest error of the log likelihood over 22 events, in nats: a claim of a mechanism rests on several
-nats, and the nodes that tables are compared with scatter by a tenth themselves."""
-_EXACT = Budget(1024, 256, 1.5, 1.8)
+AUGMENTED_LIMIT = 1.0
+"""Largest error of the log likelihood over 22 events, in nats, at the worst of some draws.
+
+A claim of a mechanism rests on several nats; where fronts stop on a stretch that is added, an event's
+likelihood bends sharply with the strength, and more nodes do not help.
+"""
+_EXACT = Budget(1024, 512, 1.5, 1.8)
 _EXACT_RUNS = 16 * 22
 """Events times draws up to which there are so many nodes; where there are fewer, more."""
 _EXACT_EVENTS, _EXACT_DRAWS = 24, 16
@@ -222,8 +225,8 @@ class AugmentedProblem(HierarchicalProblem):
         start = self.tables.modes[self.tables.grid.nearest(added)][:, chosen]
         given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
         more = 2 ** int(np.clip(np.log2(_EXACT_RUNS / (len(added) * len(chosen))), 0, 3))
-        budget = _EXACT._replace(around_mode=more * 1024, over_population=more * 256)
-        nodes = exact_nodes(self.extension, rows, given, population, start, budget)
+        budget = _EXACT._replace(around_mode=more * 1024, over_population=more * 512)
+        nodes = exact_nodes(self.extension, rows, given, population, start, budget, base.population)
         errors = self._tabulated(means, factors, added)[:, chosen]
         for k in range(len(means)):
             first = nodes.first[k * len(chosen) : (k + 1) * len(chosen) + 1]

@@ -20,7 +20,7 @@ from skred.physics.mechanisms.spec import Added
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-BUDGETS = Budget(256, 64, 1.5, 1.8), Budget(512, 128, 1.5, 1.8), Budget(1024, 256, 1.5, 1.8)
+BUDGETS = Budget(256, 128, 1.5, 1.8), Budget(512, 256, 1.5, 1.8), Budget(1024, 512, 1.5, 1.8)
 """Of the tables: each where the one before is not good enough."""
 _LOOKING, _FINAL = {1: 11, 2: 6}, {1: 13, 2: 8}
 """Strengths along each axis while the posterior is looked for, and of the tables, by the number of axes."""
@@ -323,6 +323,7 @@ def exact_nodes(
     population: Population,
     start: FloatArray,
     budget: Budget,
+    reference: Population,
 ) -> Nodes:
     """Nodes at some strengths for some populations themselves, one group of rows for each.
 
@@ -334,8 +335,10 @@ def exact_nodes(
     population : Population
     start : (n_groups, n_rows, n_base + 1) array
         Points near the modes.
+    reference : Population
+        As in `event_nodes`.
     """
     n_groups, n_rows = len(strengths), len(rows.event)
     many, given = _repeated(rows, n_groups), strengths.repeat(n_rows, axis=0)
     modes = event_modes(extension, many, start.reshape(n_groups * n_rows, -1), given, population)
-    return event_nodes(extension, many, given, population, modes, budget)
+    return event_nodes(extension, many, given, population, modes, budget, reference)
