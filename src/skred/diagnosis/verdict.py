@@ -11,7 +11,7 @@ from skred.diagnosis.diagnose import Diagnosis, Step
 from skred.diagnosis.held_out import errors, paired
 from skred.diagnosis.identify import Told
 from skred.diagnosis.next_sensor import next_sensor
-from skred.diagnosis.race import Entrant
+from skred.diagnosis.race import Entrant, Race
 from skred.diagnosis.statement import statement
 
 _NO_LIMIT = 20.0
@@ -144,6 +144,26 @@ def _diagnostics(found: Diagnosis) -> dict[str, float | int | None]:
     }
 
 
+def _candidate(race: Race, name: str) -> dict[str, Any]:
+    """One mechanism in the race, where and how strong it is if it is there."""
+    entrant = race.leading(name).entrants[name]
+    mean, sd = entrant.strength()
+    stretch, shape = entrant.stretch(), entrant.best.shape
+    return {
+        "id": name,
+        "log_bayes_factor": race.log_factors[name],
+        "strength": {
+            "parameter": entrant.mechanism.strength.name,
+            "unit": entrant.mechanism.strength.unit,
+            "mean": mean,
+            "sd": sd,
+        },
+        "location": None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]},
+        "covariate": shape.covariate,
+        "sensor": shape.sensor,
+    }
+
+
 def _more(found: Diagnosis) -> dict[str, Any]:
     """Keys beyond the format's."""
     more: dict[str, Any] = {"reason": found.cannot or None, "seconds": found.seconds}
@@ -151,6 +171,7 @@ def _more(found: Diagnosis) -> dict[str, Any]:
         more["alarm"] = alarmed(found.race.probability, found.check.fired)
         more["log_bayes_factors"] = found.race.log_factors
         more["error_models"] = [heat.error_model for heat in found.race.heats]
+        more["candidates"] = [_candidate(found.race, name) for name in found.race.heats[0].entrants]
     if found.steps:
         more["p_value_augmented"] = found.steps[-1].check.p_value
         more["refitted_events"] = list(found.after.refitted) if found.after is not None else []

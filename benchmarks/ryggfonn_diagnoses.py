@@ -1,0 +1,116 @@
+"""The real recordings diagnosed: what each base law leaves out at Ryggfonn, and what that depends on.
+
+``python benchmarks/ryggfonn_diagnoses.py`` diagnoses each case that has no result yet, writes
+``results/ryggfonn/<case>.json`` and figures, and then ``docs/ryggfonn.md``; the same command goes on with a
+run that was ended. Delete a result to have it made again.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated, Any, NamedTuple
+
+import cyclopts
+import ryggfonn_page
+
+from skred.work.output import write_json, write_text
+
+ROOT = Path(__file__).resolve().parent.parent
+RESULTS = ROOT / "benchmarks" / "results" / "ryggfonn"
+FIGURES = ROOT / "docs" / "figures"
+PRIOR_FACTORS = (0.5, 1.0, 2.0)
+SHOWN = ("where", "probabilities", "places")
+
+
+class Case(NamedTuple):
+    """One diagnosis: a base law, and what is different from the usual settings."""
+
+    name: str
+    base_model: str
+    campaign: str = "ryggfonn"
+    smoothing_m: float = 10.0
+    errors: str = "robust"
+    spans: bool = False
+
+
+CASES = (
+    Case("coulomb", "coulomb"),
+    Case("pcm", "pcm"),
+    Case("constant", "constant"),
+    Case("pcm-smoothing-5", "pcm", smoothing_m=5.0),
+    Case("pcm-smoothing-20", "pcm", smoothing_m=20.0),
+    Case("pcm-student", "pcm", errors="student"),
+    Case("pcm-spans", "pcm", spans=True),
+    Case("pcm-with-dam", "pcm", campaign="ryggfonn-with-dam"),
+)
+
+
+def campaign_of(case: Case) -> Any:
+    """The recordings of a case."""
+    from skred.campaign import find_campaign, read_campaign
+    from skred.campaign.ryggfonn import build
+
+    if not case.spans:
+        return read_campaign(find_campaign(case.campaign))
+    return build(find_campaign("ryggfonn") / "raw", spans=True)
+
+
+def diagnose_case(case: Case, replicas: int) -> dict[str, Any]:
+    """Diagnose one case; its verdict, and the evidence of each mechanism under other scales of its prior."""
+    from skred.diagnosis.diagnose import Effort, diagnose
+    from skred.diagnosis.verdict import verdict
+    from skred.inference.hierarchical import hierarchical_problem
+    from skred.inference.sampling import SamplerSettings
+    from skred.laws import load_law
+    from skred.report.diagnosis import save_diagnosis_figures
+
+    problem = hierarchical_problem(campaign_of(case), error_model=case.errors, smoothing_m=case.smoothing_m)
+    settings = SamplerSettings("metropolis", 1000, 1000, 4, 0)
+    found = diagnose(problem, load_law(case.base_model), settings, Effort(replicas=replicas), print)
+    document = verdict(found) | {"case": case._asdict()}
+    if found.race is not None:
+        document["prior_scales"] = {
+            name: {str(factor): _best_factor(found.race, name, factor) for factor in PRIOR_FACTORS}
+            for name in found.race.heats[0].entrants
+        }
+    if case.name == case.base_model:
+        with TemporaryDirectory() as folder:
+            figures = save_diagnosis_figures(found, Path(folder))
+            for name in SHOWN:
+                if name in figures:
+                    shutil.copy(figures[name], FIGURES / f"ryggfonn-{case.name}-{name}.png")
+    return document
+
+
+def _best_factor(race: Any, name: str, factor: float) -> float:
+    """Log Bayes factor of a mechanism's best shape if its prior were wider or narrower."""
+    entrant = race.leading(name).entrants[name]
+    return float(entrant.best.log_bayes_factor(factor * entrant.mechanism.added.scale))
+
+
+app = cyclopts.App(help=__doc__)
+
+
+@app.default
+def main(
+    *,
+    replicas: Annotated[int, cyclopts.Parameter(help="Clean campaigns simulated for each check.")] = 120,
+) -> None:
+    """Diagnose what has no result yet, and write the page."""
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    for case in CASES:
+        file = RESULTS / f"{case.name}.json"
+        if not file.exists():
+            print(f"== {case.name}", flush=True)
+            write_json(file, diagnose_case(case, replicas))
+    found = {
+        case.name: json.loads((RESULTS / f"{case.name}.json").read_text(encoding="utf-8")) for case in CASES
+    }
+    write_text(ROOT / "docs" / "ryggfonn.md", ryggfonn_page.page(found))
+
+
+if __name__ == "__main__":
+    app()
