@@ -114,8 +114,8 @@ def _answer(found: Mapping[str, Found]) -> str:
         "The diagnosis does not name the dam under either law: something else explains more of the same\n"
         "recordings first. So from these recordings, with these laws, it cannot be told whether the dam\n"
         "stopped the avalanches that rest at it. What it would take: speeds just above the foot and just\n"
-        "below the crown of the same avalanche (the dam's mark is the threshold v = 2 g h between those that\n"
-        "pass and those that stop), and places of the upper sensors better known than ±20 and ±40 m.\n"
+        "below the crown of the same avalanche (the dam's mark is the threshold v = 2 g h between those\n"
+        "that pass and those that stop), and the upper sensors' places better known than ±20 and ±40 m.\n"
     )
 
 
@@ -161,7 +161,8 @@ def _left(found: Mapping[str, Found]) -> str:
         runout = f"{held['rmse_runout_before']:.0f} to {held['rmse_runout_after']:.0f} m"
         lines.append(
             f"- `{name}` with {names}: the check gives p = {_number(one.get('p_value_augmented'))}; for"
-            f" avalanches left out the log score changes by {one['evidence']['elpd_diff']:+.1f} (doubled standard error"
-            f" {2.0 * one['evidence']['elpd_se']:.1f}), the error of runout from {runout}."
+            f" avalanches left out the log score changes by {one['evidence']['elpd_diff']:+.1f}"
+            f" (doubled standard error {2.0 * one['evidence']['elpd_se']:.1f}), the error of runout from"
+            f" {runout}."
         )
     return "## What is left when it is in\n\n" + "\n".join(lines) + "\n"

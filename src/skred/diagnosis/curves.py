@@ -18,7 +18,7 @@ from skred.diagnosis.event_nodes import FIRST, USUAL, Budget, event_nodes
 from skred.diagnosis.extension import Extension, extended, setting_of
 from skred.diagnosis.marginal import Evidence, coordinates, evidence, prior_log_scale
 from skred.diagnosis.mixed import mean_prior
-from skred.diagnosis.modes import Population, Rows, campaign_rows, event_modes, take_rows
+from skred.diagnosis.modes import Population, Rows, campaign_rows, event_modes, log_joint, take_rows
 from skred.inference.hierarchical import HierarchicalProblem
 from skred.inference.surface import Nodes
 from skred.physics.law import Law
@@ -299,6 +299,17 @@ def fit_base(
     else:
         found = evidence(problem.surfaces(law.mechanisms).nodes, log_scale, coordinates(population), 30)
         exact = found.population(len(law.mechanisms))
-        modes = event_modes(extension, rows, points, given, exact, n_steps=20)
-        fit = Fit(found, modes.points)
+        starts = (points, _best_nodes(problem.surfaces(law.mechanisms).nodes, exact))
+        tried = [event_modes(extension, rows, start, given, exact, n_steps=20).points for start in starts]
+        heights = [log_joint(extension, rows, one, given, exact) for one in tried]
+        fit = Fit(found, np.where((heights[1] > heights[0])[:, None], tried[1], tried[0]))
     return Base(problem, law, setting, rows, fit, directions, given)
+
+
+def _best_nodes(nodes: Nodes, population: Population) -> FloatArray:
+    """The node of each event's surface that the population makes most likely; releases as noted."""
+    deviation = nodes.points - population.mean[0][:, None]
+    white = np.linalg.solve(np.linalg.cholesky(population.covariance[0]), deviation)
+    height = nodes.log_weights - 0.5 * np.sum(white**2, axis=0)
+    best = [int(a + np.argmax(height[a:b])) for a, b in zip(nodes.first[:-1], nodes.first[1:], strict=True)]
+    return np.column_stack([nodes.points[:, best].T, np.zeros(len(best))])

@@ -2,14 +2,14 @@
 
 A mixture of two proposals, most nodes around the event's own mode, some over the whole population, weighs
 each node by the mixture's density; so a second mode (reached, not reached) that the first proposal misses
-is still counted. The same quasi-random numbers serve every event and every strength, which makes
-differences between strengths smoother than the integrals themselves.
+is still counted. The same quasi-random numbers serve every strength, which makes differences between
+strengths smoother than the integrals themselves.
 """
 
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -39,10 +39,16 @@ USUAL, FIRST, FINE = Budget(), Budget(32, 16), Budget(512, 256, 1.5, 1.8)
 
 
 @cache
-def _normal_numbers(n: int, n_axes: int, seed: int) -> FloatArray:
-    """Quasi-random standard normal numbers, (n, n_axes)."""
-    uniforms = qmc.Sobol(n_axes, scramble=True, rng=np.random.default_rng(seed)).random(n)
-    numbers: FloatArray = ndtri(np.clip(uniforms, 1e-12, 1.0 - 1e-12))
+def _normal_numbers(n_events: int, n: int, n_axes: int, seed: int) -> FloatArray:
+    """Quasi-random standard normal numbers, (n_events, n, n_axes): of its own for each event.
+
+    With the same for all events, what is left of the integration errors would add up in one direction.
+    """
+    uniforms = [
+        qmc.Sobol(n_axes, scramble=True, rng=np.random.default_rng([seed, event])).random(n)
+        for event in range(n_events)
+    ]
+    numbers: FloatArray = ndtri(np.clip(np.array(uniforms), 1e-12, 1.0 - 1e-12))
     return numbers
 
 
@@ -81,9 +87,10 @@ def event_nodes(
         centre, over = _over(one, rows, axes, budget.population_wider)
         centres.append(centre)
         factors.append(over)
+    numbers = partial(_normal_numbers, extension.problem.campaign.n_events)
     points = np.concatenate(
         [
-            centre[:, None, :] + np.einsum("rij,kj->rki", factor, _normal_numbers(size, axes, k))
+            centre[:, None, :] + np.einsum("rij,rkj->rki", factor, numbers(size, axes, k)[rows.event])
             for k, (centre, factor, size) in enumerate(zip(centres, factors, sizes, strict=True))
         ],
         axis=1,

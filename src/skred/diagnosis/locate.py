@@ -128,6 +128,8 @@ def _work(
 ) -> FloatArray:
     """Missing specific work between neighbouring sensors, and its standard deviation."""
     ends = sorted({0.5 * (place[0] + place[1]) for place in places if place is not None})
+    if not ends:
+        return np.empty((0, 4))
     ends = [*ends, float(profile.knots_m[-1])] if profile.knots_m[-1] > ends[-1] + 1.0 else ends
     middle = 0.5 * (edge[1:] + edge[:-1])
     rows = []

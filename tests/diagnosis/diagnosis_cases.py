@@ -1,0 +1,87 @@
+"""Campaigns of the independent simulator, and base laws fitted to them, shared by the tests here."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any, Literal
+
+import numpy as np
+
+from skred.campaign import Campaign, find_campaign, read_campaign
+from skred.diagnosis.curves import Base, fit_base
+from skred.diagnosis.extension import extended
+from skred.diagnosis.mixed import fit_population, mean_prior, starting_population
+from skred.diagnosis.modes import campaign_rows
+from skred.diagnosis.screen import Screen
+from skred.inference.error_model import ERROR_MODELS
+from skred.inference.hierarchical import hierarchical_problem
+from skred.laws import load_law
+from skred.trials.draw import draw_trial
+
+Kind = Literal["sparse", "dense"]
+
+
+@cache
+def trial(seed: int, kind: Kind, hidden: str, base: str, snr: float | None = None) -> Any:
+    return draw_trial(seed, kind=kind, hidden=hidden, base=base, snr=snr)
+
+
+def first_events(campaign: Campaign, n: int) -> Campaign:
+    return with_events(campaign, list(range(n)))
+
+
+def with_events(campaign: Campaign, chosen: list[int]) -> Campaign:
+    """Some events of a campaign, in this order."""
+    return replace(
+        campaign,
+        events=tuple(campaign.events[k] for k in chosen),
+        values=campaign.values[chosen],
+        status=campaign.status[chosen],
+        stated_sd=campaign.stated_sd[chosen],
+    )
+
+
+def with_sensors(campaign: Campaign, chosen: list[int]) -> Campaign:
+    """Some sensors of a campaign, in this order."""
+    return replace(
+        campaign,
+        sensors=tuple(campaign.sensors[k] for k in chosen),
+        values=campaign.values[:, chosen],
+        status=campaign.status[:, chosen],
+        stated_sd=campaign.stated_sd[:, chosen],
+    )
+
+
+def base_of(campaign: Campaign, law_id: str, error_model: str = "robust") -> Base:
+    """A base law fitted as the diagnosis does, but without sampling."""
+    problem = replace(hierarchical_problem(campaign), error_model=ERROR_MODELS[error_model])
+    law = load_law(law_id)
+    extension, population = extended(problem, law), starting_population(law)
+    points = np.column_stack(
+        [np.tile(population.mean[0], (campaign.n_events, 1)), np.zeros(campaign.n_events)]
+    )
+    rows = campaign_rows(extension)
+    found, points = fit_population(extension, rows, np.zeros(0), mean_prior(law), (population, points))
+    return fit_base(problem, law, found, points)
+
+
+def screen_of(base: Base) -> Screen:
+    return Screen(base.problem, base.law, base.setting)
+
+
+@cache
+def ryggfonn_base(law_id: str) -> Base:
+    return base_of(read_campaign(find_campaign("ryggfonn")), law_id)
+
+
+@cache
+def sparse_base() -> Base:
+    """Clean, three speeds and a runout, dry friction."""
+    return base_of(trial(1001, "sparse", "nothing", "coulomb").campaign, "coulomb")
+
+
+@cache
+def dense_base() -> Base:
+    """Clean, eight avalanches, dry friction and drag."""
+    return base_of(first_events(trial(1003, "dense", "nothing", "pcm").campaign, 8), "pcm")

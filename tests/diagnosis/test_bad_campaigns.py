@@ -1,0 +1,195 @@
+"""Campaigns that cannot be diagnosed: a reason or silence, never a name, never a traceback."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnosis_cases import base_of, first_events, trial, with_sensors
+
+from skred.campaign import Campaign, CampaignError, Sensor, Status, write_campaign
+from skred.diagnosis.curves import Base
+from skred.diagnosis.decide import decide
+from skred.diagnosis.diagnose import Effort, diagnose
+from skred.diagnosis.extension import setting_of
+from skred.diagnosis.identify import told
+from skred.diagnosis.locate import locate
+from skred.diagnosis.odds import UNLISTED
+from skred.diagnosis.race import race
+from skred.diagnosis.screen import Screen
+from skred.diagnosis.verdict import verdict
+from skred.inference.hierarchical import hierarchical_problem
+from skred.inference.sampling import SamplerSettings
+from skred.laws import load_law
+
+
+def small(n_events: int = 8) -> Campaign:
+    """Clean: four gates and a runout."""
+    campaign = first_events(trial(1003, "dense", "nothing", "constant").campaign, n_events)
+    return with_sensors(campaign, [18, 20, 22, 24, campaign.n_sensors - 1])
+
+
+def diagnosed(campaign: Campaign, problem: Any = None) -> dict[str, Any]:
+    settings = SamplerSettings("metropolis", 300, 300, 4, 0)
+    problem = problem or hierarchical_problem(campaign)
+    found = diagnose(problem, load_law("constant"), settings, Effort(replicas=25, max_mechanisms=1))
+    return verdict(found)
+
+
+def assert_refused(document: dict[str, Any], words: str) -> None:
+    assert document["verdict"] == "cannot_tell" and document["mechanism"] is None
+    assert document["mechanisms"] == [] and document["indistinguishable"] == []
+    assert words in document["reason"] and words in document["statement"]
+
+
+def outcome(base: Base) -> tuple[str, tuple[str, ...]]:
+    """Screen, race, place and rule without the sampler."""
+    screen = Screen(base.problem, base.law, base.setting)
+    scores = screen.scores(base.rows, base.fit.points, base.population)
+    assert np.isfinite(screen.statistic(scores)).all()
+    for row in told(screen, scores):
+        assert 0.0 <= row.power <= 1.0
+    raced = race(base)
+    assert sum(raced.probability.values()) == pytest.approx(1.0)
+    assert np.isfinite(list(raced.log_factors.values())).all()
+    place = locate(raced.leading(UNLISTED))
+    assert np.isfinite(place.mean).all() and np.isfinite(place.work).all()
+    found = decide(raced.probability, False, False)
+    return found.verdict, found.names
+
+
+def test_too_few_events() -> None:
+    assert_refused(diagnosed(small(3)), "only 3 avalanches")
+
+
+def test_one_sensor_only() -> None:
+    assert_refused(diagnosed(with_sensors(small(), [2])), "only 1 sensor")
+
+
+def test_no_reading_at_all() -> None:
+    """Every avalanche stopped above every sensor: the problem says so before anything is tried."""
+    campaign = small()
+    values = np.full(campaign.values.shape, np.nan)
+    is_runout = np.array([sensor.is_runout for sensor in campaign.sensors])
+    status = np.where(is_runout, Status.MISSING, Status.NOT_REACHED) * np.ones((8, 1), dtype=int)
+    with pytest.raises(ValueError, match="no reading is observed"):
+        hierarchical_problem(replace(campaign, values=values, status=status, stated_sd=values))
+
+
+def test_a_gate_that_fails_gives_no_name() -> None:
+    """Forty draws are not enough: a verdict all the same, which says why."""
+    settings = SamplerSettings("metropolis", 40, 40, 2, 0)
+    found = diagnose(
+        hierarchical_problem(small()), load_law("constant"), settings, Effort(replicas=25, max_mechanisms=1)
+    )
+    assert_refused(verdict(found), "the gate of the base law's calibration failed")
+
+
+def test_all_runouts_censored() -> None:
+    campaign = small()
+    status, values = np.array(campaign.status), np.array(campaign.values)
+    status[:, -1], values[:, -1] = Status.MISSING, np.nan
+    kind, names = outcome(base_of(replace(campaign, values=values, status=status), "constant"))
+    assert kind in ("cannot_tell", "nothing_missing") and names == ()
+
+
+def test_constant_covariate() -> None:
+    """It divides by nothing: left out; one that differs is kept, standardised."""
+    campaign = small()
+    events = tuple(
+        replace(event, covariates={"density_kg_m3": 250.0, "snow_type": "dry", "volume_m3": float(k)})
+        for k, event in enumerate(campaign.events)
+    )
+    setting = setting_of(hierarchical_problem(replace(campaign, events=events)), load_law("constant"))
+    assert list(setting.covariates) == ["volume_m3"]
+    volume = setting.covariates["volume_m3"]
+    assert volume.mean() == pytest.approx(0.0, abs=1e-12) and volume.std() == pytest.approx(1.0)
+
+
+def test_two_sensors_at_the_same_place() -> None:
+    campaign = small()
+    sensors = list(campaign.sensors)
+    sensors[1] = replace(sensors[2], id=sensors[1].id)
+    values, status = np.array(campaign.values), np.array(campaign.status)
+    rng = np.random.default_rng(0)
+    values[:, 1] = values[:, 2] * np.exp(0.03 * rng.standard_normal(len(values)))
+    status[:, 1] = status[:, 2]
+    kind, names = outcome(
+        base_of(replace(campaign, sensors=tuple(sensors), values=values, status=status), "constant")
+    )
+    assert kind in ("cannot_tell", "nothing_missing") and names == ()
+
+
+def flat(campaign: Campaign) -> Campaign:
+    """A level stretch above: the first avalanche is released there and never starts."""
+    x, z = np.array(campaign.track.x_m), np.array(campaign.track.z_m)
+    level = 300.0
+    track = replace(
+        campaign.track,
+        x_m=np.concatenate([[0.0], x + level]),
+        z_m=np.concatenate([[z[0]], z]),
+        width_m=None,
+    )
+
+    def moved(sensor: Sensor) -> Sensor:
+        if sensor.is_runout:
+            return sensor
+        assert sensor.s_from_m is not None and sensor.s_to_m is not None
+        return replace(sensor, s_from_m=sensor.s_from_m + level, s_to_m=sensor.s_to_m + level)
+
+    values, status = np.array(campaign.values), np.array(campaign.status)
+    values[:, -1] += level
+    values[0], status[0] = np.nan, Status.NOT_REACHED
+    status[0, -1] = Status.MISSING
+    events = [replace(event, release_s_m=event.release_s_m + level) for event in campaign.events]
+    events[0] = replace(events[0], release_s_m=100.0)
+    return replace(
+        campaign,
+        track=track,
+        sensors=tuple(moved(sensor) for sensor in campaign.sensors),
+        events=tuple(events),
+        values=values,
+        status=status,
+    )
+
+
+def test_an_event_that_never_starts() -> None:
+    kind, names = outcome(base_of(flat(small()), "constant"))
+    assert kind in ("cannot_tell", "nothing_missing") and names == ()
+
+
+def two_runouts() -> Campaign:
+    """No speed at all: how far each avalanche came, seen by two observers."""
+    campaign = small()
+    runout = campaign.sensors[-1]
+    made = replace(with_sensors(campaign, [4, 4]), sensors=(runout, replace(runout, id="another runout")))
+    values = np.array(made.values)
+    values[:, 1] += 5.0 * np.random.default_rng(0).standard_normal(len(values))
+    return replace(made, values=values)
+
+
+def test_two_runouts_and_no_speed() -> None:
+    kind, names = outcome(base_of(two_runouts(), "constant"))
+    assert kind in ("cannot_tell", "nothing_missing") and names == ()
+
+
+def test_absurd_speeds() -> None:
+    """Half of the readings a hundred times too fast: no finite sense, no traceback, no piece of physics."""
+    campaign = small()
+    values = np.array(campaign.values)
+    values[::2, :-1] *= 100.0
+    document = diagnosed(replace(campaign, values=values))
+    assert document["verdict"] in ("cannot_tell", "unexplained"), document["statement"]
+    assert document["mechanism"] is None and document["statement"]
+
+
+def test_readings_against_the_order_of_the_track_are_refused(tmp_path: Path) -> None:
+    """Stopped above a sensor and yet fast at one further down: the reader says where."""
+    campaign = small()
+    values, status = np.array(campaign.values), np.array(campaign.status)
+    values[0, 1], status[0, 1] = np.nan, Status.NOT_REACHED
+    with pytest.raises(CampaignError, match=f"did not reach sensor '{campaign.sensors[1].id}'"):
+        write_campaign(replace(campaign, values=values, status=status), tmp_path / "bad")

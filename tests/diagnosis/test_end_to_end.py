@@ -1,0 +1,153 @@
+"""Whole diagnoses of an independent simulator's campaigns, and the predictions of what was left out."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnosis_cases import first_events, trial, with_sensors
+from numpy.testing import assert_allclose
+
+from skred.campaign import Campaign, Status
+from skred.diagnosis.diagnose import Diagnosis, Effort, diagnose
+from skred.diagnosis.held_out import HeldOut, errors, paired
+from skred.diagnosis.verdict import verdict
+from skred.inference.hierarchical import hierarchical_problem
+from skred.inference.leave_one_out import exact_leave_one_out
+from skred.inference.sampling import SamplerSettings
+from skred.laws import load_law
+from skred.physics.mechanisms import mechanisms
+
+KEYS = {
+    "format", "campaign", "base_model", "verdict", "mechanism", "mechanisms", "probability",
+    "indistinguishable", "location", "strength", "covariate", "sensor", "equation", "evidence", "held_out",
+    "detection_limits", "next_sensor", "diagnostics", "statement",
+}  # fmt: skip
+GATE = 2
+FACTOR = 1.45
+
+
+def clean_campaign() -> Campaign:
+    """Eight avalanches past five gates, a runout each; nothing hidden."""
+    campaign = first_events(trial(1003, "dense", "nothing", "constant").campaign, 8)
+    return with_sensors(campaign, [12, 15, 18, 21, 24, campaign.n_sensors - 1])
+
+
+def diagnosed(campaign: Campaign) -> Diagnosis:
+    settings = SamplerSettings("metropolis", 500, 500, 4, 0)
+    effort = Effort(replicas=40, max_mechanisms=1)
+    return diagnose(hierarchical_problem(campaign), load_law("constant"), settings, effort)
+
+
+@pytest.fixture(scope="module")
+def clean() -> Diagnosis:
+    return diagnosed(clean_campaign())
+
+
+@pytest.fixture(scope="module")
+def biased() -> Diagnosis:
+    """The third gate reads 45 % too high."""
+    campaign = clean_campaign()
+    values = np.array(campaign.values)
+    values[:, GATE] *= FACTOR
+    return diagnosed(replace(campaign, values=values))
+
+
+@pytest.mark.parametrize("which", ["clean", "biased"])
+def test_verdict_has_every_key(which: str, request: pytest.FixtureRequest) -> None:
+    document = json.loads(json.dumps(verdict(request.getfixturevalue(which)), allow_nan=False))
+    assert set(document) >= KEYS
+    probability = document["probability"]
+    assert sum(probability.values()) == pytest.approx(1.0)
+    assert {"nothing", "unlisted"} < set(probability) and set(probability) - {"nothing", "unlisted"} <= set(
+        mechanisms()
+    )
+    assert set(document["detection_limits"]) == set(probability) - {"nothing", "unlisted"}
+    assert set(document["evidence"]) == {"elpd_diff", "elpd_se", "log_bayes_factor", "p_value"}
+    assert set(document["diagnostics"]) == {"r_hat_max", "ess_min", "pareto_k_max", "divergences"}
+    held = document["held_out"]
+    assert held["unit"] == "event" and {"rmse_velocity_before", "rmse_velocity_after"} <= set(held)
+    assert document["diagnostics"]["r_hat_max"] < 1.02 and document["statement"].endswith(".")
+
+
+def test_nothing_is_named_where_nothing_is(clean: Diagnosis) -> None:
+    document = verdict(clean)
+    assert document["verdict"] in ("nothing_missing", "cannot_tell")
+    assert (document["verdict"] == "nothing_missing") == clean.table.can_tell  # type: ignore[union-attr]
+    assert document["mechanism"] is None and document["mechanisms"] == [] and document["strength"] is None
+    assert document["evidence"]["p_value"] > 0.01 and clean.steps == () and clean.after is None
+    assert document["held_out"]["rmse_velocity_after"] is None
+
+
+def test_a_biased_sensor_is_named(biased: Diagnosis) -> None:
+    document = verdict(biased)
+    assert document["verdict"] == "instrument" and document["mechanism"] == "sensor_bias"
+    assert document["sensor"] == clean_campaign().sensors[GATE].id and document["indistinguishable"] == []
+    strength = document["strength"]
+    assert abs(strength["mean"] - np.log(FACTOR)) < 4.0 * strength["sd"] + 0.02
+    assert strength["parameter"] == "log_sensor_factor" and document["location"] is None
+    assert document["mechanisms"][0]["id"] == "sensor_bias"
+    assert document["evidence"]["elpd_diff"] > 20.0 and document["evidence"]["log_bayes_factor"] > 20.0
+    held = document["held_out"]
+    assert held["rmse_velocity_after"] < held["rmse_velocity_before"]
+    assert document["sensor"] in document["statement"]
+
+
+def test_limits_are_those_of_the_table(clean: Diagnosis) -> None:
+    assert clean.table is not None
+    for row in clean.table.rows:
+        found = verdict(clean)["detection_limits"][row.mechanism.id]
+        assert found["unit"] == row.mechanism.strength.unit
+        assert found["value"] is None or found["value"] == row.limit
+    assert clean.table.power_with >= clean.table.power and clean.table.sensor_m is not None
+
+
+def test_importance_sampling_agrees_with_refits(clean: Diagnosis) -> None:
+    calibration: Any = clean.calibration
+    assert clean.before is not None and clean.before.refitted == ()
+    events = list(clean.problem.campaign.event_ids)
+    exact = exact_leave_one_out(calibration.model, calibration.step, events, 5, which=[1, 4])
+    assert exact.failed == ()
+    assert_allclose(clean.before.pointwise[[1, 4]], exact.pointwise, atol=0.2)
+
+
+def test_predictions_are_of_the_readings(clean: Diagnosis) -> None:
+    found, problem = clean.before, clean.problem
+    assert found is not None
+    seen = problem.observed
+    assert np.isfinite(found.predicted[seen]).all() and np.isnan(found.predicted[~seen]).all()
+    assert np.isnan(found.covered[~seen]).all() and 0.6 < found.covered[seen].mean() <= 1.0
+    assert found.elpd == pytest.approx(found.pointwise.sum())
+
+
+def held(pointwise: list[float], predicted: Any = None, covered: Any = None) -> HeldOut:
+    return HeldOut(np.array(pointwise), np.zeros(len(pointwise)), (), (), predicted, covered)
+
+
+def test_paired_by_hand() -> None:
+    difference, se = paired(held([1.0, 2.0, 6.0]), held([0.0, 2.0, 4.0]))
+    assert difference == pytest.approx(3.0)
+    assert se == pytest.approx(np.sqrt(3.0) * 1.0)  # differences 1, 0, 2: standard deviation 1
+
+
+def test_errors_by_hand() -> None:
+    campaign = clean_campaign()
+    problem = hierarchical_problem(campaign)
+    predicted, covered = np.array(campaign.values), np.full(campaign.values.shape, np.nan)
+    seen = np.asarray(campaign.status) == Status.OBSERVED
+    predicted[:, :-1] += 3.0
+    predicted[:, -1] -= 20.0
+    first = np.flatnonzero(seen[:, 0])
+    predicted[first[0], 0] += 4.0  # 7 instead of 3
+    covered[seen] = 1.0
+    covered[first[0], 0] = 0.0
+    n_speeds = int(seen[:, :-1].sum())
+    found = errors(held([0.0] * 8, predicted, covered), problem)
+    assert found["rmse_velocity"] == pytest.approx(np.sqrt((9.0 * (n_speeds - 1) + 49.0) / n_speeds))
+    assert found["rmse_runout"] == pytest.approx(20.0)
+    assert found["coverage_90"] == pytest.approx(1.0 - 1.0 / seen.sum())
+    nothing = errors(held([0.0] * 8, np.full_like(predicted, np.nan), np.full_like(covered, np.nan)), problem)
+    assert set(nothing.values()) == {None}

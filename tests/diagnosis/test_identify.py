@@ -1,0 +1,120 @@
+"""What recordings can tell, by simulation: detection limits, more events, one more sensor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_cases import base_of, first_events, screen_of, trial, with_events, with_sensors
+
+from skred.diagnosis.curves import Base
+from skred.diagnosis.extension import extended
+from skred.diagnosis.identify import LIMIT_Z, Told, extra_sensors, mean_power, told
+from skred.diagnosis.mixed import efficient_scores, fit_population, mean_prior
+from skred.diagnosis.modes import Population, campaign_rows, look_around
+from skred.diagnosis.replicas import replicas
+from skred.diagnosis.screen import Candidate, Screen, candidates
+from skred.inference.error_model import ERROR_MODELS
+
+NONE = np.zeros(0)
+
+
+@pytest.fixture(scope="module")
+def base() -> Base:
+    campaign = first_events(trial(1003, "dense", "nothing", "constant").campaign, 10)
+    return base_of(with_sensors(campaign, [4, 10, 16, 22, 28, campaign.n_sensors - 1]), "constant", "normal")
+
+
+@pytest.fixture(scope="module")
+def table(base: Base) -> dict[str, Told]:
+    screen = screen_of(base)
+    scores = screen.scores(base.rows, base.fit.points, base.population)
+    return {row.mechanism.id: row for row in told(screen, scores)}
+
+
+def typical(base: Base, name: str) -> Candidate:
+    """The candidate of middling information, as the table takes it."""
+    own = [c for c in candidates(base.setting) if c.mechanism.id == name]
+    extension = extended(base.problem, base.law, [c.direction for c in own])
+    around = look_around(extension, base.rows, base.fit.points, np.zeros(len(own)))
+    found = efficient_scores(around, base.rows, base.population, mean_prior(base.law))
+    return own[int(np.argsort(found.own[0])[len(own) // 2])]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "segment_drag",
+        "sensor_bias",
+        "release_offset",
+        pytest.param(
+            "turbulent_drag",
+            marks=pytest.mark.xfail(
+                strict=True,
+                reason="found in 75 % of cases, not 90: null scores are centred at -0.34 (1.5 % kept)",
+            ),
+        ),
+    ],
+)
+def test_detection_limit_by_simulation(base: Base, table: dict[str, Told], name: str) -> None:
+    """Campaigns with the limit's strength: their refitted scores are 2.85 + 1.28 in the null's deviations."""
+    chosen = typical(base, name)
+    alone, with_it = extended(base.problem, base.law), extended(base.problem, base.law, [chosen.direction])
+    n_groups, strength = 200, table[name].limit
+    means = np.tile(base.population.mean, (n_groups, 1))
+    factors = np.tile(np.linalg.cholesky(base.population.covariance), (n_groups, 1, 1))
+    errors, found = ERROR_MODELS["normal"].errors, []
+    for value in (0.0, strength):
+        rng = np.random.default_rng(4)
+        rows, points = replicas(with_it, np.array([value]), means, factors, rng, errors)
+        start = Population(means.copy(), np.tile(base.population.covariance, (n_groups, 1, 1)))
+        population, modes = fit_population(alone, rows, NONE, mean_prior(base.law), (start, points))
+        around = look_around(with_it, rows, modes, np.zeros(1))
+        found.append(efficient_scores(around, rows, population, mean_prior(base.law)).z[:, 0])
+    null, effect = found
+    assert abs(null.mean()) < 0.6 and 0.7 < null.std() < 1.35
+    assert (effect.mean() - null.mean()) / null.std() == pytest.approx(LIMIT_Z + 1.2816, rel=0.15)
+    assert np.mean(effect > LIMIT_Z) > 0.8  # stated: 0.9
+
+
+def test_more_events_tell_more(base: Base, table: dict[str, Told]) -> None:
+    """Every event four times: limits halve, but for the population mean's prior."""
+    campaign = base.problem.campaign
+    four = with_events(campaign, list(range(campaign.n_events)) * 4)
+    events = tuple(replace(event, id=f"{event.id} {k}") for k, event in enumerate(four.events))
+    problem = replace(base.problem, campaign=replace(four, events=events))
+    screen = Screen(problem, base.law, replace(base.setting, n_events=4 * campaign.n_events))
+    kept = [c for c in screen.candidates if c.direction.log_strengths is None]
+    screen.__dict__["candidates"] = kept
+    rows = campaign_rows(screen.extension)
+    scores = screen.scores(rows, np.tile(base.fit.points, (4, 1)), base.population)
+    for row in told(screen, scores):
+        before = table[row.mechanism.id]
+        assert row.limit < before.limit
+        assert row.limit / before.limit == pytest.approx(0.5, abs=0.06), row.mechanism.id
+        assert row.power >= before.power - 1e-9
+
+
+def test_an_extra_sensor_never_tells_less(base: Base, table: dict[str, Told]) -> None:
+    screen = screen_of(base)
+    places, scores = extra_sensors(screen, base.fit.points, base.population)
+    before = {name: row for name, row in table.items()}
+    power = mean_power(list(table.values()))
+    assert len(places) == len(scores) and np.all(np.diff(places) > 0.0)
+    for one in scores:
+        rows = told(screen, one)
+        assert mean_power(rows) >= power - 1e-6
+        for row in rows:
+            assert row.power >= before[row.mechanism.id].power - 1e-6, row.mechanism.id
+            assert row.best_limit <= before[row.mechanism.id].best_limit * (1.0 + 1e-6), row.mechanism.id
+
+
+def test_table(base: Base, table: dict[str, Told]) -> None:
+    """Each candidate once; limits positive; the best place never worse; ties mutual terms at least."""
+    assert set(table) == {c.mechanism.id for c in candidates(base.setting)}
+    assert "constant_retardation" not in table  # in the base law
+    for row in table.values():
+        assert 0.0 <= row.kept <= 1.0 and 0.0 <= row.power <= 1.0
+        assert 0.0 < row.best_limit <= row.limit
+    assert "entrainment" in table["segment_drag"].alike and "segment_drag" in table["entrainment"].alike

@@ -1,0 +1,131 @@
+"""Prior odds, probabilities, the omnibus check's p-value and the verdict: the campaign format, by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from skred.diagnosis.decide import decide, smallest_set
+from skred.diagnosis.odds import prior_odds, probabilities
+from skred.diagnosis.omnibus import LIMIT, Omnibus
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.spec import Group
+
+ALL = [m for m in mechanisms().values() if m.added is not None]
+PHYSICS = [m.id for m in ALL if m.group is Group.PHYSICS]
+INSTRUMENT = [m.id for m in ALL if m.group is Group.INSTRUMENT]
+
+
+def test_prior_odds_of_the_whole_library() -> None:
+    odds = prior_odds(ALL)
+    assert INSTRUMENT == ["release_offset", "sensor_bias"] and len(PHYSICS) >= 8
+    assert odds["nothing"] == pytest.approx(0.5) and odds["unlisted"] == pytest.approx(0.05)
+    for name in PHYSICS:
+        assert odds[name] == pytest.approx(0.35 / len(PHYSICS))
+    assert odds["sensor_bias"] == odds["release_offset"] == pytest.approx(0.05)
+    assert sum(odds.values()) == pytest.approx(1.0)
+
+
+def test_prior_odds_of_groups_without_members() -> None:
+    odds = prior_odds([mechanisms()["obstacle"], mechanisms()["segment_drag"]])
+    assert odds == pytest.approx(
+        {"nothing": 0.5 / 0.9, "unlisted": 0.05 / 0.9, "obstacle": 0.175 / 0.9, "segment_drag": 0.175 / 0.9}
+    )
+    assert prior_odds([]) == pytest.approx({"nothing": 10.0 / 11.0, "unlisted": 1.0 / 11.0})
+
+
+def test_probabilities_by_hand() -> None:
+    odds = {"nothing": 0.5, "obstacle": 0.3, "unlisted": 0.2}
+    found = probabilities({"obstacle": np.log(10.0), "unlisted": np.log(0.5)}, odds)
+    assert found == pytest.approx({"nothing": 0.5 / 3.6, "obstacle": 3.0 / 3.6, "unlisted": 0.1 / 3.6})
+    extreme = probabilities({"obstacle": 2000.0, "unlisted": -2000.0}, odds)
+    assert extreme["obstacle"] == pytest.approx(1.0) and 0.0 <= extreme["unlisted"] < 1e-200
+    assert sum(extreme.values()) == pytest.approx(1.0)
+
+
+def test_p_value_of_besag_and_clifford() -> None:
+    """Few above after all: (above + 1) / (n + 1); eight above, stopped: above / n."""
+    clean = np.arange(300.0)
+    assert Omnibus(1000.0, clean).p_value == pytest.approx(1.0 / 301.0)
+    assert Omnibus(298.0, clean).p_value == pytest.approx(3.0 / 301.0)
+    assert Omnibus(293.0, clean).p_value == pytest.approx(8.0 / 301.0)  # seven above
+    assert Omnibus(292.0, clean).p_value == pytest.approx(8.0 / 300.0)
+    assert Omnibus(15.0, np.arange(25.0)).p_value == pytest.approx(10.0 / 25.0)
+    assert Omnibus(0.0, np.zeros(25)).p_value == 1.0  # ties count as above
+
+
+def test_limit_of_the_check() -> None:
+    assert LIMIT == 0.01
+    assert Omnibus(9.0, np.zeros(99)).fired and not Omnibus(9.0, np.zeros(98)).fired
+    assert Omnibus(9.0, np.append(np.zeros(298), [10.0, 10.0])).fired
+    assert not Omnibus(9.0, np.append(np.zeros(297), [10.0] * 3)).fired
+
+
+def shares(nothing: float, unlisted: float, **named: float) -> dict[str, float]:
+    found = {"nothing": nothing, "unlisted": unlisted, **named}
+    assert sum(found.values()) == pytest.approx(1.0)
+    return found
+
+
+def test_silence() -> None:
+    quiet = shares(0.7, 0.05, obstacle=0.2, sensor_bias=0.05)
+    for can_tell, expected in ((True, "nothing_missing"), (False, "cannot_tell")):
+        found = decide(quiet, fired=False, can_tell=can_tell)
+        assert (found.verdict, found.names) == (expected, ())
+    # Not fired: a race at three to one is no alarm.
+    loud = shares(0.25, 0.05, obstacle=0.65, sensor_bias=0.05)
+    assert decide(loud, fired=False, can_tell=True).verdict == "nothing_missing"
+
+
+def test_one_name() -> None:
+    found = decide(shares(0.02, 0.02, obstacle=0.9, segment_drag=0.05, sensor_bias=0.01), True, True)
+    assert (found.verdict, found.names) == ("missing_physics", ("obstacle",))
+    # What cannot be told in general may still show.
+    assert decide(shares(0.02, 0.02, obstacle=0.96), True, False).names == ("obstacle",)
+
+
+def test_ties_by_the_share_of_the_group() -> None:
+    """0.9 of the group, not of everything: 0.50 + 0.13 of 0.70 is exactly that."""
+    found = decide(
+        shares(0.2, 0.05, obstacle=0.13, segment_drag=0.5, segment_friction=0.07, sensor_bias=0.05),
+        True,
+        True,
+    )
+    assert (found.verdict, found.names) == ("missing_physics", ("segment_drag", "obstacle"))
+    assert smallest_set({"a": 0.5, "b": 0.4, "c": 0.1}) == ("a", "b")
+    assert smallest_set({"a": 0.449, "b": 0.449, "c": 0.102})[-1] == "c"
+    assert smallest_set({"a": 0.2}) == ("a",)
+
+
+def test_groups_before_names() -> None:
+    """`unlisted` is the most probable single id, yet six mechanisms together are more probable."""
+    many = dict.fromkeys(PHYSICS[:6], 0.1)
+    found = decide(shares(0.05, 0.3, sensor_bias=0.05, **many), True, True)
+    assert found.verdict == "missing_physics" and set(found.names) == set(many)
+
+
+def test_unlisted_wins_over_single_mechanisms() -> None:
+    few = dict.fromkeys(PHYSICS[:6], 0.05)
+    found = decide(shares(0.05, 0.6, sensor_bias=0.05, **few), True, True)
+    assert (found.verdict, found.names) == ("unexplained", ())
+
+
+def test_instruments() -> None:
+    found = decide(shares(0.05, 0.05, obstacle=0.25, sensor_bias=0.6, release_offset=0.05), True, True)
+    assert (found.verdict, found.names) == ("instrument", ("sensor_bias",))
+    found = decide(shares(0.05, 0.05, obstacle=0.3, sensor_bias=0.35, release_offset=0.25), True, True)
+    assert (found.verdict, found.names) == ("instrument", ("sensor_bias", "release_offset"))
+
+
+def test_no_instrument_in_the_race() -> None:
+    assert decide(shares(0.1, 0.2, obstacle=0.7), True, True).names == ("obstacle",)
+    assert decide(shares(0.1, 0.9), True, True).verdict == "unexplained"
+
+
+def test_the_race_alone_and_the_check_alone() -> None:
+    """A race that leaves nothing less than 1 % is an alarm; a check that fires against it is none."""
+    sure = shares(0.009, 0.001, obstacle=0.99)
+    assert decide(sure, fired=False, can_tell=True).names == ("obstacle",)
+    assert decide(shares(0.011, 0.0, obstacle=0.989), False, True).verdict == "nothing_missing"
+    assert decide(shares(0.51, 0.0, obstacle=0.49), True, True).verdict == "nothing_missing"
+    assert decide(shares(0.49, 0.0, obstacle=0.51), True, True).names == ("obstacle",)

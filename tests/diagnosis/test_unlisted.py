@@ -1,0 +1,162 @@
+"""The unlisted force and its place: basis, linear evidence, a planted force, missing work and bands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_cases import base_of, first_events, trial, with_sensors
+from numpy.testing import assert_allclose
+from scipy.stats import multivariate_normal, norm
+
+from skred.campaign import Status
+from skred.diagnosis.curves import Base
+from skred.diagnosis.extension import extended
+from skred.diagnosis.locate import _band, _resolution, _stretch, _work
+from skred.diagnosis.screen import _of_profile
+from skred.diagnosis.unlisted import KINDS, Profile, combined, fit_profile, hats, knots, log_evidence_of
+from skred.physics.columns import Column
+
+
+@pytest.fixture(scope="module")
+def base() -> Base:
+    """Eight clean avalanches past sixteen gates, constant retardation."""
+    campaign = first_events(trial(1003, "dense", "nothing", "constant").campaign, 8)
+    gates = [*range(0, campaign.n_sensors - 1, 2), campaign.n_sensors - 1]
+    return base_of(with_sensors(campaign, gates), "constant")
+
+
+def planted(base: Base, kind: int, centre: float, size: float) -> Base:
+    """The same avalanches with a force on 200 m, read with the stated errors."""
+    at = np.array([centre - 100.0, centre - 50.0, centre + 50.0, centre + 100.0])
+    direction = combined(base.setting, KINDS[kind], at, size * np.array([0.0, 1.0, 1.0, 0.0]))
+    extension, problem = extended(base.problem, base.law, [direction]), base.problem
+    n, campaign = len(base.rows.event), base.problem.campaign
+    fronts = extension.predict(np.arange(n), base.fit.points, np.array([1.0]))[:, :-1]
+    readings = problem.readings
+    sd = np.hypot(readings.relative_sd * fronts, readings.absolute_sd)
+    noisy = fronts + sd * np.random.default_rng(1).standard_normal(fronts.shape)
+    stops = fronts[:, [-1]]
+    ends = np.array([-np.inf if s.is_runout else s.s_to_m for s in campaign.sensors], dtype=float)
+    came = stops > ends
+    status = np.where(came, Status.OBSERVED, Status.NOT_REACHED)
+    values = np.where(came, np.maximum(noisy, 0.0), np.nan)
+    made = replace(campaign, values=values, status=status, stated_sd=np.full(values.shape, np.nan))
+    return base_of(made, base.law.id)
+
+
+def test_hats_sum_to_one_inside(base: Base) -> None:
+    terrain, at = base.setting.terrain, knots(base.setting)
+    middle = 0.5 * (terrain.edge_s_m[1:] + terrain.edge_s_m[:-1])
+    basis = hats(terrain, at)
+    inside = (middle >= at[0]) & (middle <= at[-1])
+    assert basis.shape == (len(at), terrain.n_cells) and inside.any() and not inside.all()
+    assert_allclose(basis.sum(axis=0)[inside], 1.0)
+    assert np.all(basis[:, ~inside] == 0.0) and np.all(basis >= 0.0)
+    values = np.random.default_rng(0).standard_normal(len(at))
+    assert_allclose((values @ basis)[inside], np.interp(middle[inside], at, values))
+    direction = combined(base.setting, KINDS[0], at, values)
+    assert direction.columns == (Column.CONSTANT,)
+    assert_allclose(direction.profiles[0], values @ basis)
+
+
+@pytest.mark.parametrize("n_groups", [1, 3])
+def test_linear_evidence_of_a_profile(n_groups: int) -> None:
+    """Score and information against the normal density of the readings, with the profile and without."""
+    rng = np.random.default_rng(n_groups)
+    n, n_data = 4, 9
+    factor = rng.standard_normal((n, n))
+    cover = 0.3 * factor @ factor.T + 0.05 * np.eye(n)
+    scores, informations, expected = [], [], []
+    for _ in range(n_groups):
+        design, sd = rng.standard_normal((n_data, n)), rng.uniform(0.5, 2.0, n_data)
+        data = design @ rng.multivariate_normal(np.zeros(n), cover) + sd * rng.standard_normal(n_data)
+        scores.append(design.T @ (data / sd**2))
+        informations.append(design.T @ (design / sd[:, None] ** 2))
+        there = multivariate_normal(np.zeros(n_data), np.diag(sd**2) + design @ cover @ design.T)
+        expected.append(there.logpdf(data) - norm.logpdf(data, scale=sd).sum())
+    assert_allclose(_of_profile(np.array(scores), np.array(informations), cover), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("kind", [1, 3])
+def test_a_planted_force_is_found(base: Base, kind: int, sign: float) -> None:
+    """Where it is, which way it acts, and how much work it does; the clean campaign shows none."""
+    centre = 800.0
+    size = sign * (1.6 if KINDS[kind].column is Column.CONSTANT else 2.5e-3)
+    changed = planted(base, kind, centre, size)
+    found = fit_profile(changed, KINDS[kind])
+    assert found.log_bayes_factor > 5.0 and found.gain > found.log_bayes_factor
+    z = found.mean / np.sqrt(np.diag(found.covariance))
+    top = int(np.argmax(np.abs(z)))
+    assert abs(found.knots_m[top] - centre) < 120.0 and np.sign(found.mean[top]) == sign
+    first, last = _stretch(found)
+    assert first < centre < last
+    at = np.linspace(found.knots_m[0], found.knots_m[-1], 2001)
+    work = np.trapezoid(np.interp(at, found.knots_m, found.mean) * (np.abs(at - centre) < 200.0), at)
+    assert 0.5 < work / (size * 150.0) < 1.6
+    assert fit_profile(base, KINDS[kind]).log_bayes_factor < 2.0
+
+
+def made_profile(base: Base, kind: int) -> Profile:
+    at = knots(base.setting)
+    rng = np.random.default_rng(7)
+    factor = 0.3 * rng.standard_normal((len(at), len(at)))
+    mean = np.sin(at / 90.0)
+    return Profile(KINDS[kind], at, mean, factor @ factor.T + 0.02 * np.eye(len(at)), 0.0, 0.0, base.fit)
+
+
+def test_work_is_the_integral_of_the_force(base: Base) -> None:
+    """Between neighbouring sensors, and from the last to the last knot; its standard deviation by draws."""
+    profile, terrain = made_profile(base, 0), base.setting.terrain
+    edge, basis = terrain.edge_s_m, hats(terrain, profile.knots_m)
+    work = _work(base.problem.sensor_places, profile, basis, np.diff(edge), edge)
+    ends = sorted(float(s.s_from_m) for s in base.problem.campaign.sensors if not s.is_runout)
+    if profile.knots_m[-1] > ends[-1] + 1.0:
+        ends = [*ends, profile.knots_m[-1]]
+    assert_allclose(work[:, 0], ends[:-1])
+    assert_allclose(work[:, 1], ends[1:])
+    draws = np.random.default_rng(0).multivariate_normal(profile.mean, profile.covariance, 4000)
+    for first, last, mean, sd in work:
+        at = np.linspace(first, last, 2001)
+        exact = np.trapezoid(np.interp(at, profile.knots_m, profile.mean), at)
+        assert mean == pytest.approx(exact, abs=1.2 * np.diff(edge).max())  # a cell at each end
+        unit = np.trapezoid(
+            [np.interp(at, profile.knots_m, row) for row in np.eye(len(profile.knots_m))], at, axis=1
+        )
+        assert sd == pytest.approx((draws @ unit).std(), rel=0.12, abs=0.6)
+    whole = np.interp(edge, profile.knots_m, profile.mean, 0.0, 0.0)
+    inside = (edge >= ends[0]) & (edge <= ends[-1])
+    assert work[:, 2].sum() == pytest.approx(np.trapezoid(whole[inside], edge[inside]), abs=8.0)
+
+
+def test_band_holds_the_whole_profile(base: Base) -> None:
+    """Nine draws in ten, everywhere at once; wider than pointwise, narrower than Bonferroni's."""
+    profile = made_profile(base, 0)
+    basis = hats(base.setting.terrain, profile.knots_m)
+    basis = basis[:, basis.sum(axis=0) > 0.0]
+    mean, sd, factor = _band(profile, basis)
+    assert_allclose(mean, profile.mean @ basis)
+    assert norm.ppf(0.95) < factor < norm.ppf(1.0 - 0.05 / basis.shape[1])
+    draws = np.random.default_rng(9).multivariate_normal(profile.mean, profile.covariance, 4000) @ basis
+    held = np.all(np.abs(draws - mean) <= factor * sd, axis=1).mean()
+    assert held == pytest.approx(0.9, abs=0.03)
+
+
+def test_resolution(base: Base) -> None:
+    """What is told of nothing is smeared over everything; of everything, over the knots' distance."""
+    profile = made_profile(base, 0)
+    at, kind = profile.knots_m, profile.kind
+    distance = (at[:, None] - at[None, :]) / kind.length_m
+    prior = kind.amplitude**2 * (np.exp(-0.5 * distance**2) + 1e-6 * np.eye(len(at)))
+    length = at[-1] - at[0]
+    assert _resolution(replace(profile, covariance=prior)) == pytest.approx(length)
+    assert _resolution(replace(profile, covariance=0.0 * prior)) == pytest.approx(length / len(at))
+
+
+def test_evidence_of_all_kinds_is_their_mean(base: Base) -> None:
+    profile = made_profile(base, 0)
+    some = [replace(profile, log_bayes_factor=value) for value in (2.0, -1.0, 0.5, 900.0)]
+    assert log_evidence_of(some) == pytest.approx(900.0 - np.log(4.0))
+    assert log_evidence_of(some[:3]) == pytest.approx(np.log(np.exp([2.0, -1.0, 0.5]).mean()))
