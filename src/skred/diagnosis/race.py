@@ -21,7 +21,7 @@ from skred.diagnosis.event_nodes import FINE
 from skred.diagnosis.extension import Extension, extended
 from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, probabilities
 from skred.diagnosis.screen import candidates
-from skred.diagnosis.unlisted import KINDS, Profile, fit_profile, log_evidence_of
+from skred.diagnosis.unlisted import KINDS, Kind, Profile, fit_profile, log_evidence_of
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Mechanism, Shape
@@ -227,8 +227,8 @@ def _heat(error_model: str, base: Base, tell: Tell) -> Heat:
         finer = list(
             pool.map(lambda job: curve_near(base, job[0].mechanism, job[1], job[0].moments()), again)
         )
-        profiles = list(pool.map(lambda kind: fit_profile(base, kind), KINDS))
-    entrants = _entrants(curves, list(zip(parents, finer, strict=True)))
+        entrants = _entrants(curves, list(zip(parents, finer, strict=True)))
+        profiles = list(pool.map(lambda kind: _profile(base, kind, entrants), KINDS))
     for name, correction in _corrections(base, entrants).items():
         entrants[name] = replace(entrants[name], correction=correction)
     for mechanism in mechanisms().values():
@@ -237,6 +237,18 @@ def _heat(error_model: str, base: Base, tell: Tell) -> Heat:
             same = tuple(replace(one, mechanism=mechanism) for one in other.curves)
             entrants[mechanism.id] = Entrant(mechanism, same, other.log_weights, other.correction)
     return Heat(error_model, base, entrants, profiles)
+
+
+def _profile(base: Base, kind: Kind, entrants: dict[str, Entrant]) -> Profile:
+    """The unlisted force of one kind: from no force, and from the best listed one that enters alike."""
+    found = fit_profile(base, kind)
+    alike = [one for one in entrants.values() if kind.column in one.best.direction.columns]
+    if alike:
+        best = max(alike, key=lambda one: one.log_bayes_factor)
+        if best.log_bayes_factor > found.log_bayes_factor:
+            other = fit_profile(base, kind, best.best)
+            found = max(found, other, key=lambda one: one.log_bayes_factor)
+    return found
 
 
 def _corrections(base: Base, entrants: dict[str, Entrant]) -> dict[str, float]:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.curves import Base, Fit, refit
+from skred.diagnosis.curves import Base, Curve, Fit, refit
 from skred.diagnosis.extension import Extension, extended
 from skred.diagnosis.mixed import efficient_scores, mean_prior
 from skred.diagnosis.modes import Population, look_around
@@ -108,8 +108,15 @@ def combined(setting: Setting, kind: Kind, at: FloatArray, values: FloatArray) -
     return Direction((kind.column,), (values @ hats(setting.terrain, at))[None, :])
 
 
-def fit_profile(base: Base, kind: Kind) -> Profile:
-    """Fit the profile by Gauss-Newton steps around the events' modes; its evidence with nodes at the top."""
+def fit_profile(base: Base, kind: Kind, near: Curve | None = None) -> Profile:
+    """Fit the profile by Gauss-Newton steps around the events' modes; its evidence with nodes at the top.
+
+    Parameters
+    ----------
+    near : Curve, optional
+        A listed mechanism in the kind's column: where to begin, instead of at no force. Far from what was
+        recorded, robust errors see outliers and no direction to go.
+    """
     at = knots(base.setting)
     basis = hats(base.setting.terrain, at)
     directions = [Direction((kind.column,), row[None, :]) for row in basis]
@@ -120,10 +127,13 @@ def fit_profile(base: Base, kind: Kind) -> Profile:
     precision = np.linalg.inv(prior)
     values, population, points = np.zeros(len(at)), base.population, base.fit.points
     information = np.zeros_like(prior)
-    score, information = _scores(base, wide, n_before, values, population, points)
     # Nothing like everything else, so that what is left of integration errors is the same there.
     nothing = fit = _fit_at(base, kind, at, values, (population, points))
-    height = nothing.found.log_evidence
+    if near is not None:
+        values, fit = _begin(base, kind, at, near)
+        population, points = fit.found.population(len(base.law.mechanisms)), fit.points
+    height = fit.found.log_evidence - 0.5 * float(values @ precision @ values)
+    score, information = _scores(base, wide, n_before, values, population, points)
     for _ in range(_ROUNDS):
         step = np.linalg.solve(information + precision, score - precision @ values)
         for share in _SHARES:
@@ -144,6 +154,18 @@ def fit_profile(base: Base, kind: Kind) -> Profile:
     cover = np.linalg.inv(information + precision)
     factor = gain - 0.5 * float(values @ precision @ values) - 0.5 * float(log_det)
     return Profile(kind, at, values, 0.5 * (cover + cover.T), max(factor, -0.5 * float(log_det)), gain, fit)
+
+
+def _begin(base: Base, kind: Kind, at: FloatArray, near: Curve) -> tuple[FloatArray, Fit]:
+    """A listed mechanism's own profile at its best strength, at the knots, and the fit with it in."""
+    top = int(np.argmax(near.log_evidence))
+    edge = np.asarray(base.setting.terrain.edge_s_m)
+    profile = near.direction.profiles[near.direction.columns.index(kind.column)]
+    cells = hats(base.setting.terrain, at) * np.diff(edge)
+    values = near.strengths[top] * (cells @ profile) / np.maximum(cells.sum(axis=1), 1e-9)
+    fit = near.fits[top]
+    start = (fit.found.population(len(base.law.mechanisms)), fit.points)
+    return values, _fit_at(base, kind, at, values, start)
 
 
 def _fit_at(
