@@ -10,13 +10,15 @@ from diagnosis_cases import base_of, first_events, trial, with_sensors
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal, norm
 
-from skred.campaign import Status
-from skred.diagnosis.curves import Base
+from skred.campaign import Status, find_campaign, read_campaign
+from skred.diagnosis.curves import Base, curve
 from skred.diagnosis.extension import extended
 from skred.diagnosis.locate import _band, _resolution, _stretch, _work
 from skred.diagnosis.screen import _of_profile
 from skred.diagnosis.unlisted import KINDS, Profile, combined, fit_profile, hats, knots, log_evidence_of
 from skred.physics.columns import Column
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.spec import Shape
 
 
 @pytest.fixture(scope="module")
@@ -160,3 +162,14 @@ def test_evidence_of_all_kinds_is_their_mean(base: Base) -> None:
     some = [replace(profile, log_bayes_factor=value) for value in (2.0, -1.0, 0.5, 900.0)]
     assert log_evidence_of(some) == pytest.approx(900.0 - np.log(4.0))
     assert log_evidence_of(some[:3]) == pytest.approx(np.log(np.exp([2.0, -1.0, 0.5]).mean()))
+
+
+def test_profile_is_found_from_a_listed_mechanism_where_nothing_is_too_far() -> None:
+    """At Ryggfonn without drag most readings are outliers: there is no slope to follow from no force."""
+    base = base_of(read_campaign(find_campaign("ryggfonn")), "coulomb")
+    drag = mechanisms()["segment_drag"]
+    listed = curve(base, drag, Shape(1600.0, 1700.0))
+    kind = next(kind for kind in KINDS if kind.column is Column.QUADRATIC and kind.length_m < 100.0)
+    from_nothing, from_listed = fit_profile(base, kind), fit_profile(base, kind, listed)
+    assert listed.log_bayes_factor() > 20.0
+    assert from_listed.log_bayes_factor > max(from_nothing.log_bayes_factor, 0.0) + 10.0
