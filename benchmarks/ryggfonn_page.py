@@ -27,7 +27,7 @@ def page(found: Mapping[str, Found]) -> str:
         ("constant", "Base M3, constant retardation"),
     ):
         parts.append(_base(title, found[name]))
-    parts += [_dam(found), _robust(found), _left(found)]
+    parts += [_growing(found), _dam(found), _between(found), _robust(found), _left(found)]
     return "\n".join(parts)
 
 
@@ -82,6 +82,44 @@ def _number(value: float | None) -> str:
 
 def _candidate(one: Found, name: str) -> Found | None:
     return next((row for row in one.get("candidates", []) if row["id"] == name), None)
+
+
+def _growing(found: Mapping[str, Found]) -> str:
+    """Whether M1 is found to lack a drag that grows with speed."""
+    factors = found["coulomb"]["log_bayes_factors"]
+    drags = ("turbulent_drag", "viscous_drag", "segment_drag")
+    others = ("constant_retardation", "segment_friction", "velocity_weakening", "covariate_friction")
+    said = ", ".join(f"`{name}` {factors[name]:.1f}" for name in drags)
+    against = ", ".join(f"`{name}` {factors[name]:.1f}" for name in others)
+    best = max(factors, key=lambda name: factors[name])
+    word = "is one of them" if best in (*drags, "entrainment") else "is none of them"
+    return (
+        "## Does M1 lack a drag that grows with speed?\n\n"
+        f"Terms that grow with speed: {said}. Others: {against}. The most probable candidate, `{best}`,\n"
+        f"{word}.\n"
+    )
+
+
+def _between(found: Mapping[str, Found]) -> str:
+    """The missing work between the sensors, where the data's README tells of two groups of retardation."""
+    rows = "".join(
+        f"| {name} | {row['s_from_m']:.0f}-{row['s_to_m']:.0f} | {row['mean']:.0f} ± {row['sd']:.0f} |\n"
+        for name in ("coulomb", "pcm", "constant")
+        for row in found[name].get("missing_work", [])
+    )
+    stretch = _candidate(found["pcm"], "segment_friction")
+    said = ""
+    if stretch is not None:
+        said = (
+            f"Under M2 the leading stretch, {_where(stretch['location'])}, takes"
+            f" {stretch['strength']['mean']:.2g} ± {stretch['strength']['sd']:.1g} m/s² more than dry"
+            " friction and drag do.\n"
+        )
+    return (
+        "## Between LC and CD\n\nMissing specific work between sensors (positive: the law brakes too little),"
+        f" with the unlisted force of the highest evidence. {said}\n"
+        "| base | s [m] | missing work [J/kg] |\n| --- | --- | --- |\n" + rows
+    )
 
 
 def _dam(found: Mapping[str, Found]) -> str:

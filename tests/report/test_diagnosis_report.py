@@ -3,7 +3,7 @@ import json
 import re
 
 import pytest
-from diagnosis_cases import diagnosis, location
+from diagnosis_report_cases import diagnosis, location
 from rich.console import Console
 from test_report_html import Page, nulls
 

@@ -26,7 +26,7 @@ MECHANISM = Mechanism(
         prior_scale=0.15,
         prior_reason="a calibration or a place that is off by 15 % of the reading",
     ),
-    equation="-0 m s-2: reading = exp(a) times the front's speed, at one sensor",
+    equation="reading = exp(a) times the front's speed, at one sensor",
     mark="equal and opposite work in the two stretches beside the sensor",
     reference="Sargsyan, Najm and Ghanem (2015), International Journal of Chemical Kinetics 47, 246-276",
     doi="10.1002/kin.20906",
