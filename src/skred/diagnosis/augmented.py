@@ -251,10 +251,10 @@ class AugmentedProblem(HierarchicalProblem):
 
         Raises
         ------
-        NotImplementedError
+        TypeError
             Always.
         """
-        raise NotImplementedError("a law with mechanisms added has tables, not surfaces")
+        raise TypeError("a law with mechanisms added has tables, not surfaces")
 
     def _check(self, mechanisms: Sequence[Mechanism]) -> None:
         ids = [mechanism.id for mechanism in self.base.law.mechanisms]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -148,11 +147,3 @@ def paired(after: HeldOut, before: HeldOut) -> tuple[float, float]:
     """Difference of the log scores and its standard error, from paired differences per event."""
     difference = after.pointwise - before.pointwise
     return float(difference.sum()), float(np.sqrt(len(difference)) * difference.std(ddof=1))
-
-
-def pointwise_rows(events: Sequence[str], before: HeldOut, after: HeldOut) -> list[dict[str, Any]]:
-    """Per-event log scores before and after."""
-    return [
-        {"event": event, "before": float(b), "after": float(a)}
-        for event, b, a in zip(events, before.pointwise, after.pointwise, strict=True)
-    ]

@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from skred.diagnosis.curves import Base, Curve, Fit, curve, curve_near, fit_base, refit
-from skred.diagnosis.event_nodes import FINE
+from skred.diagnosis.event_nodes import FINE, event_nodes
 from skred.diagnosis.extension import Extension, extended
+from skred.diagnosis.marginal import evidence, importance_evidence
+from skred.diagnosis.modes import event_modes
 from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, probabilities
 from skred.diagnosis.screen import candidates
 from skred.diagnosis.unlisted import KINDS, Kind, Profile, fit_profile, log_evidence_of
@@ -31,7 +33,7 @@ Tell = Callable[[int, int], None]
 ERROR_SHARES = {"robust": 0.55, "student": 0.15, "correlated": 0.15, "scaled": 0.15}
 """Prior probability of each error model in the race."""
 _PREFERRED_BY = 1.0
-_CHECKED = 5
+_CHECKED, _DRAWS = 5, 500
 """Leading mechanisms whose best curve is looked at with many more nodes."""
 _WITHIN, _AT_MOST = 3.0, 2
 """Curves of a mechanism that are looked at again: within so many nats of its best, and so many."""
@@ -49,13 +51,17 @@ class Entrant:
     log_weights : (n_curves,) array
         Prior weight of each shape; they sum to 1.
     correction : float
-        What many more nodes change at the top of the best curve, in nats; 0 where not looked at.
+        What many more nodes, and importance sampling over the population, change at the top of the best
+        curve, in nats; 0 where not looked at.
+    disagreement : float or None
+        Importance sampling less Laplace's formula there, nothing's subtracted; None where not looked at.
     """
 
     mechanism: Mechanism
     curves: tuple[Curve, ...]
     log_weights: FloatArray
     correction: float = 0.0
+    disagreement: float | None = None
 
     @property
     def log_factors(self) -> FloatArray:
@@ -191,8 +197,8 @@ def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
     bases = {DEFAULT_ERRORS: base} | {
         name: with_errors(base, name) for name in ERROR_SHARES if name != DEFAULT_ERRORS
     }
-    evidence = {name: one.fit.found.log_evidence for name, one in bases.items()}
-    height = {name: math.log(ERROR_SHARES[name]) + evidence[name] for name in bases}
+    heights = {name: one.fit.found.log_evidence for name, one in bases.items()}
+    height = {name: math.log(ERROR_SHARES[name]) + heights[name] for name in bases}
     preferred = max(height, key=lambda name: height[name])
     chosen = [DEFAULT_ERRORS]
     if height[preferred] > height[DEFAULT_ERRORS] + _PREFERRED_BY:
@@ -206,7 +212,7 @@ def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
         heats.append(_heat(name, bases[name], told))
     # The evidence of an error model without a heat counts for nothing and everything alike.
     raced = [entrant.mechanism for entrant in heats[0].entrants.values()]
-    return Race(tuple(heats), prior_odds(raced), {name: evidence[name] for name in chosen})
+    return Race(tuple(heats), prior_odds(raced), {name: heights[name] for name in chosen})
 
 
 def with_errors(base: Base, error_model: str) -> Base:
@@ -229,13 +235,13 @@ def _heat(error_model: str, base: Base, tell: Tell) -> Heat:
         )
         entrants = _entrants(curves, list(zip(parents, finer, strict=True)))
         profiles = list(pool.map(lambda kind: _profile(base, kind, entrants), KINDS))
-    for name, correction in _corrections(base, entrants).items():
-        entrants[name] = replace(entrants[name], correction=correction)
+    for name, (correction, disagreement) in _corrections(base, entrants).items():
+        entrants[name] = replace(entrants[name], correction=correction, disagreement=disagreement)
     for mechanism in mechanisms().values():
         other = entrants.get(mechanism.same_term_as)
         if other is not None and mechanism.added is not None and mechanism.added.joins(base.setting.base):
             same = tuple(replace(one, mechanism=mechanism) for one in other.curves)
-            entrants[mechanism.id] = Entrant(mechanism, same, other.log_weights, other.correction)
+            entrants[mechanism.id] = replace(other, mechanism=mechanism, curves=same)
     return Heat(error_model, base, entrants, profiles)
 
 
@@ -251,8 +257,8 @@ def _profile(base: Base, kind: Kind, entrants: dict[str, Entrant]) -> Profile:
     return found
 
 
-def _corrections(base: Base, entrants: dict[str, Entrant]) -> dict[str, float]:
-    """What many more nodes change at the top of the leading mechanisms' best curves, nothing included."""
+def _corrections(base: Base, entrants: dict[str, Entrant]) -> dict[str, tuple[float, float]]:
+    """Correction and disagreement of the leading mechanisms, at the top of their best curves."""
     leading = sorted(entrants, key=lambda name: -entrants[name].log_bayes_factor)[:_CHECKED]
     plain = extended(base.problem, base.law, base.directions)
     nothing = _finely(base, plain, base.strengths, base.fit)
@@ -262,16 +268,22 @@ def _corrections(base: Base, entrants: dict[str, Entrant]) -> dict[str, float]:
         top = int(np.argmax(best.log_evidence))
         extension = extended(base.problem, base.law, (*base.directions, best.direction))
         strengths = np.append(base.strengths, best.strengths[top])
-        fine = _finely(base, extension, strengths, best.fits[top])
-        found[name] = float(fine - nothing - best.log_evidence[top])
+        laplace, sampled = _finely(base, extension, strengths, best.fits[top])
+        correction = float(sampled - nothing[1] - best.log_evidence[top])
+        found[name] = (correction, (sampled - laplace) - (nothing[1] - nothing[0]))
     return found
 
 
-def _finely(base: Base, extension: Extension, strengths: FloatArray, fit: Fit) -> float:
-    """Log evidence with many nodes, from where a fit is."""
+def _finely(base: Base, extension: Extension, strengths: FloatArray, fit: Fit) -> tuple[float, float]:
+    """Log evidence with many nodes, from where a fit is: by Laplace's formula, by importance sampling."""
     start = (fit.found.population(len(base.law.mechanisms)), fit.points)
     fits = refit(extension, base.rows, strengths[None, :], start, base.log_scale, FINE, n_rounds=2)
-    return fits[0].found.log_evidence
+    population = fits[0].found.population(len(base.law.mechanisms))
+    modes = event_modes(extension, base.rows, fits[0].points, strengths, population)
+    nodes = event_nodes(extension, base.rows, strengths, population, modes, FINE, base.population)
+    found = evidence(nodes, base.log_scale, fits[0].found.psi)
+    sampled, _ = importance_evidence(nodes, base.log_scale, found, _DRAWS, seed=0)
+    return found.log_evidence, sampled
 
 
 def _again(base: Base, curves: Sequence[Curve]) -> tuple[list[tuple[Curve, Shape]], list[int]]:

@@ -156,10 +156,10 @@ class TabulatedLogDensity(ArrayOp):
 
         Raises
         ------
-        NotImplementedError
+        TypeError
             Always.
         """
-        raise NotImplementedError(
+        raise TypeError(
             "TabulatedLogDensity has no gradient: use --sampler metropolis for a law with mechanisms added"
         )
 

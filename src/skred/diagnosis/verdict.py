@@ -161,6 +161,7 @@ def _candidate(race: Race, name: str) -> dict[str, Any]:
         "location": None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]},
         "covariate": shape.covariate,
         "sensor": shape.sensor,
+        "estimators_differ_by": entrant.disagreement,
     }
 
 
