@@ -168,7 +168,8 @@ def _robust(found: Mapping[str, Found]) -> str:
             f"`{row['id']}` {row['log_bayes_factor']:.1f} at {_where(row['location']) or 'all'}"
             for row in listed
         )
-        rows.append(f"| {name} | {one['verdict']} | {_number(one['evidence']['p_value'])} | {what} |")
+        said = one["verdict"] + (f": {one['reason']}" if one.get("reason") else "")
+        rows.append(f"| {name} | {said} | {_number(one['evidence']['p_value'])} | {what} |")
     scales = found["pcm"].get("prior_scales", {})
     priors = "; ".join(
         f"`{name}` {values['0.5']:.1f} / {values['1.0']:.1f} / {values['2.0']:.1f}"
