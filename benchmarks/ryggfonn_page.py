@@ -14,7 +14,8 @@ Written by `python benchmarks/ryggfonn_diagnoses.py` from `benchmarks/results/ry
 is the tool's own. 22 avalanches on the natural terrain, the catching dam (15 m high, crown at s = 1940 m,
 upstream foot at 1910 m) withheld. Log Bayes factors are against nothing, in nats, shapes and strengths
 integrated over, under the error models that were raced; probabilities use the prior odds of the campaign
-format.
+format. Left-out gains compare the augmented law under the error model it leads in with the base law under the
+default one: where both were raced, part of a gain can be the error model's.
 """
 
 
