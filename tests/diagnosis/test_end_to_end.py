@@ -12,9 +12,10 @@ from diagnosis_cases import first_events, trial, with_sensors
 from numpy.testing import assert_allclose
 
 from skred.campaign import Campaign, Status
-from skred.diagnosis.diagnose import Diagnosis, Effort, diagnose
+from skred.diagnosis.diagnose import Diagnosis, Effort, diagnose, reference_of
 from skred.diagnosis.held_out import HeldOut, errors, paired
 from skred.diagnosis.verdict import verdict
+from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical import hierarchical_problem
 from skred.inference.leave_one_out import exact_leave_one_out
 from skred.inference.sampling import SamplerSettings
@@ -121,6 +122,22 @@ def test_predictions_are_of_the_readings(clean: Diagnosis) -> None:
     assert np.isfinite(found.predicted[seen]).all() and np.isnan(found.predicted[~seen]).all()
     assert np.isnan(found.covered[~seen]).all() and 0.6 < found.covered[seen].mean() <= 1.0
     assert found.elpd == pytest.approx(found.pointwise.sum())
+
+
+@pytest.mark.parametrize("name", ["robust", "scaled"])
+def test_before_and_after_stand_under_one_error_model(biased: Diagnosis, name: str) -> None:
+    """Else a left-out gain is the error model's as well as the mechanism's."""
+    calibration: Any = biased.calibration
+    base = replace(biased.problem, error_model=ERROR_MODELS[name])
+    (step,) = biased.steps
+    under: Any = replace(step.calibration.problem, error_model=base.error_model)
+    under = replace(under, base=replace(under.base, problem=base))
+    step = replace(step, calibration=replace(step.calibration, problem=under))
+    found, cannot = reference_of(calibration, step)
+    problem: Any = found.problem
+    assert problem.error_model.id == name and (cannot == "") == found.gate.passed
+    assert (found is calibration) == (name == "robust")
+    assert verdict(replace(biased, steps=(step,)))["error_model"] == name
 
 
 def held(pointwise: list[float], predicted: Any = None, covered: Any = None) -> HeldOut:

@@ -97,6 +97,9 @@ class Diagnosis:
     decision : Decision
     location : Location
     steps : tuple of Step
+    reference : Calibration
+        Of the base law under the error model of the last step, where something was let in: before and after
+        then differ by what was let in alone. The same as `calibration` where that error model is its own.
     before, after : HeldOut
         Predictions by the base law and, where something was let in, by the augmented one.
     seconds : dict
@@ -114,6 +117,7 @@ class Diagnosis:
     decision: Decision = Decision("cannot_tell", ())
     location: Location | None = None
     steps: tuple[Step, ...] = ()
+    reference: Calibration | None = None
     before: HeldOut | None = None
     after: HeldOut | None = None
     seconds: dict[str, float] = field(default_factory=dict)
@@ -182,26 +186,36 @@ def diagnose(
     raced = race(base)
     decision = decide(raced.probability, check.fired, table.can_tell)
     location = locate(raced.leading(UNLISTED)) if alarmed(raced.probability, check.fired) else None
-    steps, cannot = tuple[Step, ...](), ""
+    steps, reference, cannot = tuple[Step, ...](), calibration, ""
     if decision.names:
         clock.stage("augment", f"{law.id} + {decision.names[0]}: calibrating the augmented law")
         steps, cannot = let_in(base, raced, decision, settings, effort, clock)
-        if not steps:
-            decision = Decision("cannot_tell", ())
+    if steps:
+        reference, cannot = reference_of(calibration, steps[-1])
+        steps = steps if not cannot else ()
+    if cannot:
+        decision = Decision("cannot_tell", ())
     clock.stage("held out", "predicting avalanches left out")
-    before = held_out(
-        calibration,
-        extended(problem, law),
-        _nothing_added(calibration),
-        settings.seed,
-        exact=effort.exact_loo,
-    )
+    before = _before(reference, settings.seed, effort)
     after = _after(steps, settings.seed, effort) if steps else None
     clock.end()
     return Diagnosis(
         problem, law, cannot, calibration, screen, table, check, raced, decision, location, steps,
-        before, after, clock.seconds,
+        reference, before, after, clock.seconds,
     )  # fmt: skip
+
+
+def reference_of(calibration: Calibration, step: Step) -> tuple[Calibration, str]:
+    """The base law calibrated under a step's error model, and why it cannot be trusted if it cannot."""
+    problem, own = step.calibration.problem, calibration.problem
+    assert isinstance(problem, AugmentedProblem) and isinstance(own, HierarchicalProblem)
+    if problem.error_model.id == own.error_model.id:
+        return calibration, ""
+    again = calibrate(problem.base.problem, calibration.law, calibration.settings)
+    problems = "; ".join(again.gate.problems)
+    if again.gate.passed:
+        return again, ""
+    return again, f"the gate of {calibration.law.id} under {problem.error_model.id} errors failed: {problems}"
 
 
 def population_draws(calibration: Calibration, n: int, seed: int) -> tuple[FloatArray, FloatArray]:
@@ -279,10 +293,9 @@ def _check_again(
     strengths = _added(calibration).mean(axis=0)
     draws = population_draws(calibration, effort.replicas, settings.seed + 1)
     setting = replace(base.setting, base=(*base.setting.base, *_global_ids(chosen)))
-    plain = replace(base.problem)
-    again = fit_base(plain, base.law, typical(draws), base.fit.points, directions, strengths)
+    again = fit_base(base.problem, base.law, typical(draws), base.fit.points, directions, strengths)
     again = replace(again, setting=setting)
-    screen = Screen(plain, base.law, setting, directions, strengths)
+    screen = Screen(base.problem, base.law, setting, directions, strengths)
     start = (again.population, again.fit.points)
     check = omnibus(screen, again.rows, start, draws, settings.seed + 1, effort.replicas)
     return check, again
@@ -300,6 +313,12 @@ def _added(calibration: Calibration) -> FloatArray:
     posterior = calibration.tree["posterior"].to_dataset()
     columns = [posterior[one.name].transpose("chain", "draw").values.ravel() for one in problem.added]
     return np.column_stack(columns)
+
+
+def _before(reference: Calibration, seed: int, effort: Effort) -> HeldOut:
+    problem: Any = reference.problem
+    extension = extended(problem, reference.law)
+    return held_out(reference, extension, _nothing_added(reference), seed, exact=effort.exact_loo)
 
 
 def _after(steps: tuple[Step, ...], seed: int, effort: Effort) -> HeldOut:

@@ -190,13 +190,11 @@ def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
     Parameters
     ----------
     base : Base
-        Under the robust error model.
+        Under any error model.
     tell : callable
         Told how many curves are done, and of how many.
     """
-    bases = {DEFAULT_ERRORS: base} | {
-        name: with_errors(base, name) for name in ERROR_SHARES if name != DEFAULT_ERRORS
-    }
+    bases = {name: with_errors(base, name) for name in ERROR_SHARES}
     heights = {name: one.fit.found.log_evidence for name, one in bases.items()}
     height = {name: math.log(ERROR_SHARES[name]) + heights[name] for name in bases}
     preferred = max(height, key=lambda name: height[name])
@@ -216,7 +214,9 @@ def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
 
 
 def with_errors(base: Base, error_model: str) -> Base:
-    """The base law fitted under another error model."""
+    """The base law fitted under an error model; itself where that is its own."""
+    if base.problem.error_model.id == error_model:
+        return base
     problem = replace(base.problem, error_model=ERROR_MODELS[error_model])
     found = fit_base(problem, base.law, base.population, base.fit.points, base.directions, base.strengths)
     return replace(found, setting=base.setting)

@@ -130,7 +130,9 @@ def _scale(row: Told) -> float:
 
 def _diagnostics(found: Diagnosis) -> dict[str, float | int | None]:
     calibrations = [
-        one for one in (found.calibration, *(s.calibration for s in found.steps)) if one is not None
+        one
+        for one in (found.calibration, found.reference, *(s.calibration for s in found.steps))
+        if one is not None
     ]
     if not calibrations:
         return {"r_hat_max": None, "ess_min": None, "pareto_k_max": None, "divergences": None}
@@ -174,6 +176,8 @@ def _more(found: Diagnosis) -> dict[str, Any]:
         more["error_models"] = [heat.error_model for heat in found.race.heats]
         more["candidates"] = [_candidate(found.race, name) for name in found.race.heats[0].entrants]
     if found.steps:
+        problem: Any = found.steps[-1].calibration.problem
+        more["error_model"] = problem.error_model.id
         more["p_value_augmented"] = found.steps[-1].check.p_value
         more["refitted_events"] = list(found.after.refitted) if found.after is not None else []
     if found.table is not None:

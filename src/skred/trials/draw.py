@@ -5,7 +5,8 @@ Seeds: 1000 and up are for development; reported results use others, and so othe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from skred.campaign import Campaign
 from skred.errors import InputError
 from skred.trials.effects import Effect
+from skred.trials.fresh import Source, draw_fresh
 from skred.trials.listed import BASES, INSTRUMENT, LISTED, PHYSICS, fits
 from skred.trials.masked import draw_masked, largest_mean
 from skred.trials.observe import NASTY, observe
@@ -40,10 +42,18 @@ class Trial:
         What a diagnosis may see.
     truth : dict
         What it may not; plain data.
+    source : Source
+        What further avalanches come from.
     """
 
     campaign: Campaign
     truth: dict[str, Any]
+    source: Source = field(repr=False)
+
+    @cached_property
+    def fresh(self) -> Campaign:
+        """Twelve further avalanches, for predictions made before they are looked at; drawn when asked for."""
+        return draw_fresh(self.source)
 
 
 def draw_trial(
@@ -101,7 +111,7 @@ def draw_trial(
     campaign, facts = observe(rng, truth, nasty)
     record = _record(truth, alone, group, asked)
     record.update(seed=seed, kind=drawn_kind, nasty=nasty, campaign=campaign.name, **facts)
-    return Trial(campaign, record)
+    return Trial(campaign, record, Source(seed, truth, nasty, campaign.name))
 
 
 def _distance(truth: Truth, asked: float) -> float:

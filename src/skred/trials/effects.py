@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -13,6 +13,13 @@ from skred.trials.forces import TERM_WIDTH, Kind
 
 FloatArray = NDArray[np.float64]
 Target = Literal["force", "friction", "sensor", "release"]
+Weigh = Callable[[np.random.Generator, Mapping[str, FloatArray], int], FloatArray]
+"""Weights of further avalanches, from their covariates and their number."""
+
+
+def evenly(rng: np.random.Generator, covariates: Mapping[str, FloatArray], n: int) -> FloatArray:
+    """The same strength for every avalanche."""
+    return np.ones(n)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +52,8 @@ class Effect:
         Where it acts, from and to [m on the true track].
     details : mapping
         What else the truth should tell.
+    weigh : callable
+        Gives the weights of further avalanches.
     """
 
     id: str
@@ -61,6 +70,7 @@ class Effect:
     retuned: bool = False
     place_m: tuple[float, float] | None = None
     details: Mapping[str, Any] = field(default_factory=dict)
+    weigh: Weigh = evenly
 
 
 @dataclass(frozen=True, eq=False)

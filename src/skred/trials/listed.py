@@ -6,7 +6,8 @@ exponents that are not whole.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,18 +113,52 @@ def _entrainment(rng: np.random.Generator, scene: Scene) -> Effect:
     )
 
 
+@dataclass(frozen=True)
+class Response:
+    """How friction answers to a covariate: saturating, standardised over the events of the trial.
+
+    Attributes
+    ----------
+    covariate : str
+    centre, scale : float
+        Of the covariate, of its logarithm for a volume.
+    saturation : float
+    offset, spread : float
+        Of the response to it.
+    """
+
+    covariate: str
+    centre: float
+    scale: float
+    saturation: float
+    offset: float
+    spread: float
+
+    def __call__(
+        self, rng: np.random.Generator, covariates: Mapping[str, FloatArray], n: int
+    ) -> FloatArray:
+        """The weights of avalanches with some covariates."""
+        score = (_on_scale(self.covariate, covariates) - self.centre) / self.scale
+        response = np.tanh(self.saturation * score) / self.saturation
+        return np.asarray((response - self.offset) / self.spread)
+
+
+def _on_scale(name: str, covariates: Mapping[str, FloatArray]) -> FloatArray:
+    return np.log(covariates[name]) if name == "release_volume_m3" else covariates[name]
+
+
 def _covariate_friction(rng: np.random.Generator, scene: Scene) -> Effect:
     name = str(rng.choice(sorted(scene.covariates)))
-    values = scene.covariates[name]
-    values = np.log(values) if name == "release_volume_m3" else values
-    score = (values - values.mean()) / values.std()
+    values = _on_scale(name, scene.covariates)
     saturation = float(rng.choice([0.05, 0.7, 1.4]))
-    response = np.tanh(saturation * score) / saturation
-    response = (response - response.mean()) / response.std()
+    plain = Response(name, float(values.mean()), float(values.std()), saturation, 0.0, 1.0)
+    response = plain(rng, scene.covariates, scene.n_events)
+    weigh = replace(plain, offset=float(response.mean()), spread=float(response.std()))
     return Effect(
-        "covariate_friction", "log friction per standard deviation", "1", 0.01, 0.4, response,
+        "covariate_friction", "log friction per standard deviation", "1", 0.01, 0.4,
+        weigh(rng, scene.covariates, scene.n_events),
         sign=float(rng.choice([-1.0, 1.0])), target="friction",
-        details={"covariate": name, "saturation": saturation},
+        details={"covariate": name, "saturation": saturation}, weigh=weigh,
     )  # fmt: skip
 
 

@@ -97,21 +97,26 @@ def _typical(
     return drawn[first], float(found.values[first, -1])
 
 
-def _scores(rng: np.random.Generator, n: int, k: int, correlation: float) -> FloatArray:
+def draw_scores(rng: np.random.Generator, n: int, k: int, correlation: float) -> FloatArray:
     """Correlated standard normal deviations."""
     matrix = np.full((k, k), correlation)
     np.fill_diagonal(matrix, 1.0)
     return np.asarray(rng.standard_normal((n, k)) @ np.linalg.cholesky(matrix).T)
 
 
-def _covariates(rng: np.random.Generator, n: int) -> dict[str, FloatArray]:
-    """One to three properties of the events, at the resolution they would be noted with."""
-    drawn = {
+def noted_covariates(rng: np.random.Generator, n: int) -> dict[str, FloatArray]:
+    """All properties that may be noted of events, at the resolution they would be noted with."""
+    return {
         "snow_temperature_degC": np.round(-np.abs(rng.normal(6.0, 3.5, n)), 1),
         "release_volume_m3": np.round(np.exp(rng.normal(10.0, 0.8, n)), -2) + 100.0,
         "new_snow_depth_m": np.round(np.exp(rng.normal(-0.4, 0.4, n)), 2),
         "snow_density_kg_m3": np.round(rng.normal(180.0, 40.0, n).clip(60.0, 400.0)),
     }
+
+
+def _covariates(rng: np.random.Generator, n: int) -> dict[str, FloatArray]:
+    """One to three properties of the events."""
+    drawn = noted_covariates(rng, n)
     names = rng.permutation(sorted(drawn))[: rng.integers(1, 4)]
     return {str(name): drawn[str(name)] for name in names}
 
@@ -154,7 +159,7 @@ def _errors(rng: np.random.Generator, kind: TrialKind, n_speeds: int) -> tuple[F
     return np.append(np.full(n_speeds, relative), 0.0), np.append(np.full(n_speeds, absolute), runout)
 
 
-def _recorded(rng: np.random.Generator, n_events: int, n_speeds: int) -> NDArray[np.bool_]:
+def draw_recorded(rng: np.random.Generator, n_events: int, n_speeds: int) -> NDArray[np.bool_]:
     """Which readings there are; every event has at least one speed and one more reading."""
     share = np.append(np.full(n_speeds, rng.uniform(0.02, 0.12)), rng.uniform(0.0, 0.08))
     recorded = rng.random((n_events, n_speeds + 1)) >= share
@@ -194,9 +199,9 @@ def draw_scene(rng: np.random.Generator, kind: TrialKind, base: str, family: str
         sensors = _on_grid(ground, draw_sensors(rng, kind, release, runout, lowest))
         n_speeds = len(sensors.s_from_m)
         relative, absolute = _errors(rng, kind, n_speeds)
-        recorded = _recorded(rng, n, n_speeds)
+        recorded = draw_recorded(rng, n, n_speeds)
         setting = Setting(ground, base, sensors, noted, release_sd, relative, absolute, recorded, median)
-        scores, release_scores = _scores(rng, n, k, correlation), rng.standard_normal(n).clip(-2.5, 2.5)
+        scores, release_scores = draw_scores(rng, n, k, correlation), rng.standard_normal(n).clip(-2.5, 2.5)
         covariates = _covariates(rng, n)
         scene = Scene(
             setting, median, spread, correlation, scores, release_scores, release, runout, covariates
@@ -208,18 +213,20 @@ def draw_scene(rng: np.random.Generator, kind: TrialKind, base: str, family: str
 
 def runs_plausibly(scene: Scene, theta: FloatArray) -> bool:
     """Whether no front of the base law leaves the track, stops high up, or is far too fast."""
+    each, runout = plausible_runs(scene, theta)
+    return bool(each.all() and np.mean(runout > scene.place(0.75)) > 0.7)
+
+
+def plausible_runs(scene: Scene, theta: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Which fronts of the base law stay on the track, stop not high up, and are not far too fast; runouts."""
     setting, k = scene.setting, len(scene.median)
     deviation = scene.release_scores * setting.release_sd_m
     found = read(
         setting.ground, setting.base, np.exp(theta[:, :k]), setting.releases_m + deviation, _NO_SENSORS
     )
     runout = found.values[:, -1]
-    return bool(
-        runout.max() < setting.ground.length_m - TAIL_M
-        and runout.min() > scene.place(0.3)
-        and np.mean(runout > scene.place(0.75)) > 0.7
-        and found.peak_m_s.max() < 70.0
-    )
+    on_track = (runout < setting.ground.length_m - TAIL_M) & (runout > scene.place(0.3))
+    return on_track & (found.peak_m_s < 70.0), runout
 
 
 def with_reference_speed(scene: Scene, cubics: FloatArray) -> Scene:

@@ -103,14 +103,18 @@ def assemble(
 def _is_plausible(scene: Scene, theta: FloatArray, hidden: Hidden) -> bool:
     """Whether fronts stay on the track, most are recorded, and none is far too fast."""
     values, reached = predict(scene.setting, theta, hidden)
-    runout = values[:, -1]
     return bool(
-        runout.max() < scene.setting.ground.length_m - TAIL_M
-        and np.median(runout) > scene.place(0.7)
-        and runout.min() > scene.nominal_release_m + 30.0
+        plausible_readings(scene, values).all()
+        and np.median(values[:, -1]) > scene.place(0.7)
         and np.mean(reached[:, :-1]) > 0.5
-        and values[:, :-1].max() < 75.0
     )
+
+
+def plausible_readings(scene: Scene, values: FloatArray) -> NDArray[np.bool_]:
+    """Which fronts stay on the track, start at all and are not far too fast, from their exact readings."""
+    runout = values[:, -1]
+    moves = (runout > scene.nominal_release_m + 30.0) & (values[:, :-1].max(axis=1) < 75.0)
+    return np.asarray(moves & (runout < scene.setting.ground.length_m - TAIL_M))
 
 
 def nothing(scene: Scene) -> Truth:

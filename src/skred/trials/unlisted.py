@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -105,14 +107,20 @@ def _threshold_drag(rng: np.random.Generator, scene: Scene) -> Effect:
     )  # fmt: skip
 
 
+def _in_between(rng: np.random.Generator, covariates: Mapping[str, FloatArray], n: int) -> FloatArray:
+    """Weights of avalanches that came in between those of the trial, in order."""
+    return np.sort(rng.uniform(-1.0, 1.0, n))
+
+
 def _deposit_history(rng: np.random.Generator, scene: Scene) -> Effect:
     """A stretch that earlier avalanches smooth or roughen: its retardation changes sign with their order."""
     place = draw_stretch(rng, scene, 150.0, 400.0)
     order = np.linspace(-1.0, 1.0, scene.n_events)
     row = force_row(Kind.STRETCH_DRAG, *place, 25.0, 1.4, 0.0)
-    return _unlisted(
+    effect = _unlisted(
         "deposit_history", "D_f at 20 m/s, of the last event", "m-1", 1e-4, 1.5e-2, order, row, place_m=place
     )
+    return replace(effect, weigh=_in_between)
 
 
 UNLISTED: dict[str, Draw] = {

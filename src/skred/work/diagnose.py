@@ -33,6 +33,8 @@ def diagnose_to(
     write_json(folder / "verdict.json", document)
     if found.calibration is not None:
         save(found.calibration.tree, folder / "base.nc")
+    if found.reference is not None and found.reference is not found.calibration:
+        save(found.reference.tree, folder / "base_same_errors.nc")
     if found.steps:
         save(found.steps[-1].calibration.tree, folder / "augmented.nc")
     tell("writing the report")
