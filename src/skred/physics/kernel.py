@@ -11,8 +11,10 @@ import numpy as np
 from skred.physics.columns import Column
 from skred.physics.compiled import compiled
 from skred.physics.inputs import cell_of
-from skred.physics.march import fill_increments, fill_steps, fill_table, march, march_tangents, scale_ground
+from skred.physics.march import fill_increments, fill_steps, fill_table, march, march_tangents
+from skred.physics.march_speed import fill_sources
 from skred.physics.reading import read, read_tangents
+from skred.physics.scaled_ground import scale_ground
 
 _N_COLUMNS = len(Column)
 
@@ -37,18 +39,22 @@ def _simulate(strengths, releases, path, law, sensors, readings, jacobian):  # t
     scaled, cells = scale_ground(edge, ground), _cells_of(sensors, edge)
     table = np.zeros((_N_COLUMNS, n_cells))
     keep, gain, v = np.empty(n_cells), np.empty(n_cells), np.empty(n_cells + 1)
+    per_source = np.empty(n_cells if speed_terms else 0)
     # All that only tangents need is empty without them.
     n_rows = n_cells if n_tangents > 0 else 0
     increment, dv = np.zeros((n_tangents, n_rows)), np.zeros((n_tangents, n_rows + 1))
-    by_source, by_decay = np.empty(n_rows), np.empty(n_rows)
+    by_source, by_decay, carry = np.empty(n_rows), np.empty(n_rows), np.empty(n_rows)
+    mean, soften = np.zeros(n_rows), np.ones(n_rows)
     step, shift = np.zeros(n_tangents), np.zeros(n_tangents)
     d_time, d_runout = np.zeros(n_tangents), np.zeros(n_tangents)
     for run in range(releases.size):
         release = releases[run]
         fill_table(run, strengths, columns, profiles, table)
         halvings = fill_steps(scaled, table, keep, gain)
+        if speed_terms:
+            fill_sources(scaled, table, per_source)
         runout, last, first = march(
-            release, edge, ground, barriers, limits, u_c, speed_terms, table, keep, gain, v
+            release, edge, ground, barriers, limits, u_c, speed_terms, table, keep, gain, per_source, v
         )
         read(
             run, sensors, cells, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms,
@@ -56,11 +62,12 @@ def _simulate(strengths, releases, path, law, sensors, readings, jacobian):  # t
         )  # fmt: skip
         if n_tangents > 0:
             fill_increments(
-                halvings, scaled, table, keep, v, columns, profiles, by_source, by_decay, increment
-            )
+                halvings, scaled, ground, table, keep, v, columns, profiles, u_c, speed_terms,
+                by_source, by_decay, mean, soften, carry, increment,
+            )  # fmt: skip
             march_tangents(
                 release, last, first, edge, ground, barriers, limits, columns, profiles, u_c, speed_terms,
-                table, keep, v, increment, dv, step, shift, d_time, d_runout,
+                table, carry, v, increment, dv, step, shift, d_time, d_runout,
             )  # fmt: skip
             read_tangents(
                 run, sensors, cells, release, runout, first, edge, ground, barriers, limits, columns,
@@ -118,13 +125,16 @@ def front_speeds(strengths, releases, path, law):  # type: ignore[no-untyped-def
     n_cells = ground.shape[1]
     scaled, table = scale_ground(edge, ground), np.zeros((_N_COLUMNS, n_cells))
     keep, gain = np.empty(n_cells), np.empty(n_cells)
+    per_source = np.empty(n_cells if law.speed_terms else 0)
     speeds = np.empty((releases.size, n_cells + 1))
     for run in range(releases.size):
         fill_table(run, strengths, law.columns, law.profiles, table)
         fill_steps(scaled, table, keep, gain)
+        if law.speed_terms:
+            fill_sources(scaled, table, per_source)
         march(
             releases[run], edge, ground, barriers, limits, law.weakening_speed, law.speed_terms,
-            table, keep, gain, speeds[run],
+            table, keep, gain, per_source, speeds[run],
         )  # fmt: skip
         speeds[run] = np.sqrt(speeds[run])
     return speeds

@@ -16,8 +16,10 @@ import numpy as np
 from skred.physics.cell import (
     CONSTANT,
     FRICTION,
+    LINEAR,
     QUADRATIC,
     SERIES_LIMIT,
+    WEAKENING,
     cell_at,
     cross,
     distance_to,
@@ -28,25 +30,12 @@ from skred.physics.cell_tangents import cross_tangents
 from skred.physics.columns import GRAVITY
 from skred.physics.compiled import compiled
 from skred.physics.inputs import cell_of
+from skred.physics.march_speed import fill_speed_changes, recur_with_speed
+from skred.physics.scaled_ground import BEND, DOUBLE, DRIVE, WEIGHT
 
 _FAST = {"contract", "nsz", "arcp", "nnan"}
 _MAX_HALVINGS = 60
-DRIVE, WEIGHT, BEND, DOUBLE = 0, 1, 2, 3
-"""Rows of the scaled ground: 2 g sin(phi), 2 g cos(phi), 2 kappa and 2, times the cell's length."""
 _ONE, _TWO = np.uint64(1), np.uint64(2)
-
-
-@compiled()
-def scale_ground(edge, ground):  # type: ignore[no-untyped-def]
-    """What the equation of motion makes of the ground, times length: the same for all runs."""
-    scaled = np.empty((4, ground.shape[1]))
-    for i in range(ground.shape[1]):
-        double = 2.0 * (edge[i + 1] - edge[i])
-        scaled[DRIVE, i] = double * GRAVITY * ground[0, i]
-        scaled[WEIGHT, i] = double * GRAVITY * ground[1, i]
-        scaled[BEND, i] = double * ground[2, i]
-        scaled[DOUBLE, i] = double
-    return scaled
 
 
 @compiled(fastmath=_FAST)
@@ -206,7 +195,7 @@ def contact_law(i, ground, table):  # type: ignore[no-untyped-def]
 
 @compiled()
 def march(  # type: ignore[no-untyped-def]
-    release, edge, ground, barriers, limits, u_c, speed_terms, table, keep, gain, v
+    release, edge, ground, barriers, limits, u_c, speed_terms, table, keep, gain, per_source, v
 ):
     """Fill v at every edge; returns (runout [m], last cell entered, cell of the release)."""
     n_cells = keep.size
@@ -216,8 +205,11 @@ def march(  # type: ignore[no-untyped-def]
     i, start, stopped, s = first, release, False, release
     while not stopped and i < n_cells:
         at_edge = i > first or release == edge[i]
-        if at_edge and not speed_terms:
-            i = _recur(i, keep, gain, limits, v)
+        if at_edge:
+            if speed_terms:
+                i = recur_with_speed(i, ground, table, keep, gain, per_source, u_c, limits, v)
+            else:
+                i = _recur(i, keep, gain, limits, v)
             if i == n_cells:
                 break
         if i > first:
@@ -241,9 +233,9 @@ def march(  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def is_regular(i, first, limits, speed_terms, v):  # type: ignore[no-untyped-def]
-    """Whether nothing happens in cell i: it is crossed whole, in contact, in closed form."""
-    if i <= first or speed_terms:
+def is_regular(i, first, limits, v):  # type: ignore[no-untyped-def]
+    """Whether nothing happens in cell i: it is crossed whole, in contact."""
+    if i <= first:
         return False
     return v[i] <= limits[i] and 0.0 < v[i + 1] <= limits[i + 1]
 
@@ -273,7 +265,7 @@ def fill_changes(halvings, scaled, table, keep, v, by_source, by_decay):  # type
 
 
 @compiled(fastmath=_FAST)
-def _fill_increment(column, profile, scaled, by_source, by_decay, increment):  # type: ignore[no-untyped-def]
+def _fill_increment(column, profile, scaled, u_c, mean, by_source, by_decay, increment):  # type: ignore[no-untyped-def]
     """What each whole cell adds to the tangent of v by one strength."""
     weight, bend, double = scaled[WEIGHT], scaled[BEND], scaled[DOUBLE]
     if column == CONSTANT:
@@ -282,6 +274,12 @@ def _fill_increment(column, profile, scaled, by_source, by_decay, increment):  #
     elif column == QUADRATIC:
         for i in range(increment.size):
             increment[i] = double[i] * by_decay[i] * profile[i]
+    elif column == LINEAR:
+        for i in range(increment.size):
+            increment[i] = -double[i] * by_source[i] * mean[i] * profile[i]
+    elif column == WEAKENING:
+        for i in range(increment.size):
+            increment[i] = -weight[i] * by_source[i] / (1.0 + mean[i] / u_c) * profile[i]
     else:
         for i in range(increment.size):
             increment[i] = (bend[i] * by_decay[i] - weight[i] * by_source[i]) * profile[i]
@@ -315,21 +313,21 @@ def _recur_tangent(k, first, last, keep, increment, dv):  # type: ignore[no-unty
 @compiled()
 def march_tangents(  # type: ignore[no-untyped-def]
     release, last, first, edge, ground, barriers, limits, columns, profiles, u_c, speed_terms,
-    table, keep, v, increment, dv, step, shift, d_time, d_runout,
+    table, carry, v, increment, dv, step, shift, d_time, d_runout,
 ):  # fmt: skip
     """Fill dv (n_tangents, n_cells + 1) and d_runout: by each strength and, last, by the release.
 
-    `increment` (n_tangents, n_cells) holds what regular cells add; edges above the release or
-    below the stop are left alone.
+    `carry` (n_cells) and `increment` (n_tangents, n_cells) hold what regular cells keep and add; edges
+    above the release or below the stop are left alone.
     """
     n_tangents = d_runout.size
     d_runout[:] = 0.0
     i = first
     while i <= last:
-        regular_to = i if i == first or speed_terms else _regular_until(i, last + 1, limits, v)
+        regular_to = i if i == first else _regular_until(i, last + 1, limits, v)
         if regular_to > i:
             for k in range(n_tangents):
-                _recur_tangent(k, i, regular_to, keep, increment, dv)
+                _recur_tangent(k, i, regular_to, carry, increment, dv)
             i = regular_to
             continue
         start = start_tangents(i, first, release, edge, dv, step, shift)
@@ -362,9 +360,17 @@ def start_tangents(i, first, release, edge, dv, step, shift):  # type: ignore[no
 
 @compiled(fastmath=_FAST)
 def fill_increments(  # type: ignore[no-untyped-def]
-    halvings, scaled, table, keep, v, columns, profiles, by_source, by_decay, increment
-):
-    """What regular cells add to the tangents of v: rows as the strengths, and 0 for the release."""
+    halvings, scaled, ground, table, keep, v, columns, profiles, u_c, speed_terms,
+    by_source, by_decay, mean, soften, carry, increment,
+):  # fmt: skip
+    """What regular cells keep of the tangents of v, and add: rows as the strengths, 0 for the release."""
     fill_changes(halvings, scaled, table, keep, v, by_source, by_decay)
+    if speed_terms:
+        fill_speed_changes(scaled, ground, table, u_c, keep, v, by_source, by_decay, mean, soften, carry)
+    else:
+        carry[:] = keep
     for k in range(columns.size):
-        _fill_increment(columns[k], profiles[k], scaled, by_source, by_decay, increment[k])
+        _fill_increment(columns[k], profiles[k], scaled, u_c, mean, by_source, by_decay, increment[k])
+        if speed_terms:
+            for i in range(carry.size):
+                increment[k, i] *= soften[i]

@@ -46,7 +46,7 @@ def span_speed(  # type: ignore[no-untyped-def]
         return 0.0
     time = 0.0
     while i < edge.size - 1 and edge[i] < end:
-        if s_from <= edge[i] and edge[i + 1] <= end and is_regular(i, first, limits, speed_terms, v):
+        if s_from <= edge[i] and edge[i + 1] <= end and is_regular(i, first, limits, v):
             time += 2.0 * (edge[i + 1] - edge[i]) / (np.sqrt(v[i]) + np.sqrt(v[i + 1]))
         else:
             cell = cell_at(i, ground, table, u_c, speed_terms)
@@ -154,7 +154,7 @@ def read_tangents(  # type: ignore[no-untyped-def]
                 s_from, s_to, i, speed, release, runout, first, edge, ground, barriers, u_c, speed_terms,
                 columns, profiles, table, v, dv, step, shift, d_time, d_runout, tangents,
             )  # fmt: skip
-        elif is_regular(i, first, limits, speed_terms, v):
+        elif not speed_terms and is_regular(i, first, limits, v):
             _regular_speed_tangents(
                 speed, s_from - edge[i], i, ground, table, columns, profiles, v, dv, tangents
             )
