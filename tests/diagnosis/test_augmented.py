@@ -16,6 +16,7 @@ from scipy.stats import halfnorm, lognorm, norm
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.diagnosis.augmented import AugmentedProblem, augmented_problem
 from skred.diagnosis.curves import Base, Curve, curve, curve_near, fit_base
+from skred.diagnosis.event_nodes import ROUGH
 from skred.diagnosis.extension import extended
 from skred.diagnosis.mixed import fit_population, mean_prior, starting_population
 from skred.diagnosis.modes import campaign_rows
@@ -70,7 +71,7 @@ def curve_of(base: Base, mechanism_id: str) -> Curve:
     mechanism = mechanisms()[mechanism_id]
     assert mechanism.added is not None
     shape = mechanism.added.shapes(base.setting)[0]
-    return curve_near(base, mechanism, shape, curve(base, mechanism, shape).moments())
+    return curve_near(base, mechanism, shape, curve(base, mechanism, shape, ROUGH), ROUGH)
 
 
 @pytest.fixture(scope="module")

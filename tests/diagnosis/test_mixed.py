@@ -26,8 +26,10 @@ def random_inputs(n: int, n_groups: int, seed: int) -> tuple[Modes, Rows, Popula
     population = Population(
         rng.standard_normal((n_groups, n)), 0.05 * np.einsum("gij,gkj->gik", factor, factor)
     )
+    points = rng.standard_normal((n_rows, n + 1))
     modes = Modes(
-        rng.standard_normal((n_rows, n + 1)),
+        points,
+        points,
         np.zeros((n_rows, N_COLUMNS)),
         rng.standard_normal((n_rows, N_COLUMNS, n + 1)),
         rng.standard_normal((n_rows, N_COLUMNS, N_DIRECTIONS)),

@@ -12,6 +12,7 @@ from scipy.stats import multivariate_normal, norm
 
 from skred.campaign import Status, find_campaign, read_campaign
 from skred.diagnosis.curves import Base, curve
+from skred.diagnosis.event_nodes import USUAL
 from skred.diagnosis.extension import extended
 from skred.diagnosis.locate import _band, _resolution, _stretch, _work
 from skred.diagnosis.screen import _of_profile
@@ -168,7 +169,7 @@ def test_profile_is_found_from_a_listed_mechanism_where_nothing_is_too_far() -> 
     """At Ryggfonn without drag most readings are outliers: there is no slope to follow from no force."""
     base = base_of(read_campaign(find_campaign("ryggfonn")), "coulomb")
     drag = mechanisms()["segment_drag"]
-    listed = curve(base, drag, Shape(1600.0, 1700.0))
+    listed = curve(base, drag, Shape(1600.0, 1700.0), USUAL)
     kind = next(kind for kind in KINDS if kind.column is Column.QUADRATIC and kind.length_m < 100.0)
     from_nothing, from_listed = fit_profile(base, kind), fit_profile(base, kind, listed)
     assert listed.log_bayes_factor() > 20.0

@@ -7,6 +7,7 @@ and scatter that absorb it, and show only when it is let in.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import Akima1DInterpolator
 
-from skred.diagnosis.event_nodes import FIRST, USUAL, Budget, event_nodes
+from skred.diagnosis.event_nodes import FIRST, ROUGH, USUAL, Budget, event_nodes
 from skred.diagnosis.extension import Extension, extended, setting_of
 from skred.diagnosis.marginal import Evidence, coordinates, evidence, prior_log_scale
 from skred.diagnosis.mixed import mean_prior
@@ -29,13 +30,15 @@ _GRID = (0.2, 0.6, 1.2, 2.2, 3.5)
 """Strengths at first, in scales of the prior."""
 _NEAR = (-3.5, -2.0, -1.0, 0.0, 1.0, 2.0, 3.5)
 """Strengths around what was found before, in its standard deviations."""
-_PASSES = 3
+_PASSES = 4
 _ROUNDS, _MOST_ROUNDS = 2, 6
 _FAR_MEAN, _FAR_SPREAD = 0.7, 0.35
 """Change of a population after which nodes are made anew: of its mean in spreads, of a log spread."""
 _FINE = 401
 """Points at which a curve is integrated."""
 _DEEP = 40.0
+_FAR_OFF, _FAR_SHARE = 4.0, 0.02
+"""Standard deviations beyond which a reading is far off, and the share of such readings that is many."""
 
 
 class Fit(NamedTuple):
@@ -96,6 +99,7 @@ def refit(
     budget: Budget = USUAL,
     first_budget: Budget | None = None,
     n_rounds: int = _ROUNDS,
+    fits: Sequence[Fit] | None = None,
 ) -> list[Fit]:
     """Refit population and events at some strengths, one group of rows each.
 
@@ -105,12 +109,14 @@ def refit(
         The campaign's rows.
     strengths : (n_groups, n_directions) array
     start : (Population, (n_events, n_base + 1) array)
-        Of one group.
+        Of one group: where to begin, and a population that nodes cover in any case.
     first_budget : Budget, optional
         Of the rounds before the last, which only move the population there.
+    fits : sequence of Fit, optional
+        Where to begin instead, one for each group.
     """
     n_groups, n_events, n = len(strengths), len(rows.event), start[0].mean.shape[1]
-    state = [Fit(_unfitted(start[0]), start[1])] * n_groups
+    state = list(fits) if fits is not None else [Fit(_unfitted(start[0]), start[1])] * n_groups
     active = list(range(n_groups))
     for number in range(_MOST_ROUNDS):
         many = _repeated(rows, len(active))
@@ -196,6 +202,10 @@ class Curve:
     log_evidence: FloatArray
     fits: tuple[Fit, ...]
 
+    def nearest(self, strength: float) -> Fit:
+        """The fit at the strength closest to one."""
+        return self.fits[int(np.abs(self.strengths - strength).argmin())]
+
     def fine(self, scale: float | None = None) -> tuple[FloatArray, FloatArray]:
         """Strengths on a fine grid, and the log posterior density there, not normalised."""
         added = self.mechanism.added
@@ -225,42 +235,87 @@ class Curve:
         return mean, math.sqrt(max(float(weights @ (strengths - mean) ** 2), 0.0))
 
 
-def curve(base: Base, mechanism: Mechanism, shape: Shape) -> Curve:
-    """Evidence along the strength of a mechanism, on a grid over its prior."""
+def first_look(base: Base) -> Budget:
+    """Nodes for a look at every place: readings along tangents, unless many readings are far off.
+
+    Robust errors take what is far from a front for outliers and see no direction to go; only fronts
+    themselves tell then that a strong effect brings them back.
+    """
+    extension = extended(base.problem, base.law, base.directions)
+    predictions = extension.predict(base.rows.event, base.fit.points, base.strengths)[:, :-1]
+    readings = base.rows.readings
+    stated = np.hypot(readings.relative_sd * predictions, readings.absolute_sd)
+    sd = np.where(readings.stated_sd > 0.0, readings.stated_sd, stated)
+    far = np.abs(readings.values - predictions) > _FAR_OFF * sd
+    return USUAL if far[readings.observed].mean() > _FAR_SHARE else ROUGH
+
+
+def curve(base: Base, mechanism: Mechanism, shape: Shape, budget: Budget) -> Curve:
+    """Evidence along the strength of a mechanism, on a grid over its prior.
+
+    With the budget ``ROUGH`` quick enough for every place, and wrong by nats where fronts stop near sensors.
+    """
     added = mechanism.added
     assert added is not None
     grid = added.scale * np.array(_GRID)
-    return curve_at(
-        base, mechanism, shape, np.concatenate([-grid[::-1], grid]) if added.either_sign else grid
-    )
+    strengths = np.concatenate([-grid[::-1], grid]) if added.either_sign else grid
+    return curve_at(base, mechanism, shape, strengths, budget)
 
 
-def curve_near(
-    base: Base, mechanism: Mechanism, shape: Shape, near: tuple[float, float], budget: Budget = USUAL
-) -> Curve:
-    """Evidence along the strength of a mechanism, around a mean and a standard deviation found before."""
-    added = mechanism.added
-    assert added is not None
-    mean, sd = near[0], max(near[1], 0.03 * added.scale)
-    for _ in range(_PASSES):
-        strengths = mean + sd * np.array(_NEAR)
-        if abs(mean) > 2.0 * abs(_NEAR[0]) * sd:  # nothing between 0 and there otherwise
-            strengths = np.append(strengths, 0.5 * (mean - math.copysign(abs(_NEAR[0]) * sd, mean)))
-        if not added.either_sign:
-            strengths = strengths[strengths > 0.05 * sd]
-        found = curve_at(base, mechanism, shape, strengths, budget)
-        before = (mean, sd)
-        mean, sd = found.moments()
-        sd = max(sd, 0.03 * added.scale)
-        if abs(mean - before[0]) < before[1] and 0.5 < sd / before[1] < 2.0:
+def curve_near(base: Base, mechanism: Mechanism, shape: Shape, near: Curve, first: Budget) -> Curve:
+    """Evidence along the strength of a mechanism, around where another curve, perhaps a rough one, has it.
+
+    Parameters
+    ----------
+    near : Curve
+        Of the same mechanism and nearly the same shape.
+    first : Budget
+        For finding where to look; what counts is computed there with fronts.
+    """
+    least = 0.03 * _scale(mechanism)
+    for number in range(_PASSES):
+        budget = first if number == 0 and first.linear else USUAL
+        before = near.moments()
+        near = curve_at(base, mechanism, shape, _strengths_near(near), budget, near)
+        after = near.moments()
+        sd = max(before[1], least), max(after[1], least)
+        if budget is USUAL and abs(after[0] - before[0]) < sd[0] and 0.5 < sd[1] / sd[0] < 2.0:
             break
-    return found
+    return near
+
+
+def _scale(mechanism: Mechanism) -> float:
+    assert mechanism.added is not None
+    return mechanism.added.scale
+
+
+def _strengths_near(near: Curve) -> FloatArray:
+    """Strengths around the mean of a curve, without 0."""
+    added = near.mechanism.added
+    assert added is not None
+    mean, sd = near.moments()
+    sd = max(sd, 0.03 * added.scale)
+    strengths = mean + sd * np.array(_NEAR)
+    if abs(mean) > 2.0 * abs(_NEAR[0]) * sd:  # nothing between 0 and there otherwise
+        strengths = np.append(strengths, 0.5 * (mean - math.copysign(abs(_NEAR[0]) * sd, mean)))
+    return strengths if added.either_sign else strengths[strengths > 0.05 * sd]
 
 
 def curve_at(
-    base: Base, mechanism: Mechanism, shape: Shape, strengths: FloatArray, budget: Budget = USUAL
+    base: Base,
+    mechanism: Mechanism,
+    shape: Shape,
+    strengths: FloatArray,
+    budget: Budget = USUAL,
+    near: Curve | None = None,
 ) -> Curve:
-    """Evidence along the strength of a mechanism, at some strengths and at 0."""
+    """Evidence along the strength of a mechanism, at some strengths and at 0.
+
+    Parameters
+    ----------
+    near : Curve, optional
+        Whose fits are where to begin; else the base's.
+    """
     added = mechanism.added
     assert added is not None
     direction = added.direction(base.setting, shape)
@@ -269,10 +324,13 @@ def curve_at(
     strengths = np.sort(np.append(strengths[np.abs(strengths) > 1e-3 * added.scale], 0.0))
     given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
     start = (base.population, base.fit.points)
-    fits = refit(extension, base.rows, given, start, base.log_scale, budget, FIRST)
-    heights = np.array([fit.found.log_evidence for fit in fits])
+    fits = None if near is None else [near.nearest(strength) for strength in strengths]
+    first = None if budget.linear or near is not None else FIRST
+    n_rounds = 1 if near is not None else _ROUNDS
+    found = refit(extension, base.rows, given, start, base.log_scale, budget, first, n_rounds, fits)
+    heights = np.array([fit.found.log_evidence for fit in found])
     heights = np.nan_to_num(heights - heights[strengths == 0.0], nan=-1e3, neginf=-1e3)
-    return Curve(mechanism, shape, direction, strengths, heights, tuple(fits))
+    return Curve(mechanism, shape, direction, strengths, heights, tuple(found))
 
 
 def fit_base(

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
 from skred.diagnosis.extension import Extension
@@ -27,15 +27,24 @@ _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 
 
 class Budget(NamedTuple):
-    """How many nodes an event gets, and how much wider than the linear model the proposals are."""
+    """How many nodes an event gets, and how much wider than the linear model the proposals are.
+
+    Attributes
+    ----------
+    linear : bool
+        Take readings at the nodes from the tangents at the mode instead of from fronts: quick, and wrong
+        where a front stops near a sensor.
+    """
 
     around_mode: int = 64
     over_population: int = 32
     wider: float = 1.35
     population_wider: float = 1.6
+    linear: bool = False
 
 
 USUAL, FIRST, FINE = Budget(), Budget(32, 16), Budget(512, 256, 1.5, 1.8)
+ROUGH = Budget(32, 16, linear=True)
 
 
 @cache
@@ -60,6 +69,7 @@ def event_nodes(
     modes: Modes,
     budget: Budget = USUAL,
     reference: Population | None = None,
+    shifts: FloatArray | None = None,
 ) -> Nodes:
     """Nodes of all rows, as the compiled sums over a population read them.
 
@@ -74,6 +84,9 @@ def event_nodes(
     reference : Population, optional
         Of one group: another population that the nodes must cover, half of those over the population are
         put there. Without it a population that has become too narrow would never see what it misses.
+    shifts : (n_rows, n_base + 1) array, optional
+        By which each row's quasi-random numbers are moved round along each axis, 0 to 1. For means over
+        rows, not differences: what is left of the integration errors then averages out.
     """
     n_rows, n = len(rows.event), population.mean.shape[1]
     uncertain = extension.problem.releases.sd[rows.event] > 0.0
@@ -90,7 +103,8 @@ def event_nodes(
     numbers = partial(_normal_numbers, extension.problem.campaign.n_events)
     points = np.concatenate(
         [
-            centre[:, None, :] + np.einsum("rij,rkj->rki", factor, numbers(size, axes, k)[rows.event])
+            centre[:, None, :]
+            + np.einsum("rij,rkj->rki", factor, _rotated(numbers(size, axes, k)[rows.event], shifts))
             for k, (centre, factor, size) in enumerate(zip(centres, factors, sizes, strict=True))
         ],
         axis=1,
@@ -103,13 +117,32 @@ def event_nodes(
     flat = np.zeros((n_rows * n_nodes, n + 1))
     flat[:, :axes] = points.reshape(-1, axes)
     which = np.repeat(np.arange(n_rows), n_nodes)
-    given = np.broadcast_to(strengths, (n_rows, len(extension.directions)))
-    predictions = extension.predict(rows.event[which], flat, given[which])
+    if budget.linear:
+        predictions = _linear_predictions(modes, flat, which)
+    else:
+        given = np.broadcast_to(strengths, (n_rows, len(extension.directions)))
+        predictions = extension.predict(rows.event[which], flat, given[which])
     log_weights = log_likelihoods(which, predictions, rows.readings, rows.errors)
     if axes > n:
         log_weights = log_weights - 0.5 * flat[:, n] ** 2 - _LOG_SQRT_2PI
     log_weights = log_weights - log_proposal.ravel() - math.log(n_nodes)
     return Nodes(n_nodes * np.arange(n_rows + 1), np.ascontiguousarray(flat[:, :n].T), log_weights)
+
+
+def _rotated(numbers: FloatArray, shifts: FloatArray | None) -> FloatArray:
+    """Normal numbers, (n_rows, n, n_axes), their quantiles moved round by each row's shifts."""
+    if shifts is None:
+        return numbers
+    quantiles = (ndtr(numbers) + shifts[:, None, : numbers.shape[2]]) % 1.0
+    rotated: FloatArray = ndtri(np.clip(quantiles, 1e-12, 1.0 - 1e-12))
+    return rotated
+
+
+def _linear_predictions(modes: Modes, points: FloatArray, which: NDArray[np.int64]) -> FloatArray:
+    """Readings along the tangents at each row's mode; a speed below zero is none."""
+    change = np.einsum("pij,pj->pi", modes.by_points[which], points - modes.tangents_at[which])
+    result: FloatArray = np.maximum(modes.predictions[which] + change, 0.0)
+    return result
 
 
 def _over(population: Population, rows: Rows, axes: int, wider: float) -> tuple[FloatArray, FloatArray]:

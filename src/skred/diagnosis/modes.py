@@ -76,6 +76,8 @@ class Modes(NamedTuple):
     Attributes
     ----------
     points : (n_rows, n_base + 1) array
+    tangents_at : (n_rows, n_base + 1) array
+        Where what follows was computed: at the points, or a last, small step before them.
     predictions : (n_rows, n_columns) array
     by_points : (n_rows, n_columns, n_base + 1) array
     by_strengths : (n_rows, n_columns, n_directions) array
@@ -84,6 +86,7 @@ class Modes(NamedTuple):
     """
 
     points: FloatArray
+    tangents_at: FloatArray
     predictions: FloatArray
     by_points: FloatArray
     by_strengths: FloatArray
@@ -104,7 +107,7 @@ def look_around(extension: Extension, rows: Rows, points: FloatArray, strengths:
     predictions, by_points, by_strengths = extension.tangents(rows.event, points, strengths)
     at = np.arange(len(points))
     slope, curvature = reading_slopes(at, predictions, rows.readings, rows.errors)
-    return Modes(points, predictions, by_points, by_strengths, slope, curvature)
+    return Modes(points, points, predictions, by_points, by_strengths, slope, curvature)
 
 
 def log_joint(

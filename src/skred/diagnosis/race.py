@@ -2,25 +2,28 @@
 
 Two error models run: the robust one, and the one that the base law alone prefers if that is another, so that
 odd events, heavy tails and correlated errors stay error models and do not become findings.
+
+Curves are computed in threads. scipy's `logsumexp` asks there for JAX, which ArviZ loads only when asked, and
+two threads that ask at once find half of it; NumPy's does not.
 """
 
 from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
 
-from skred.diagnosis.curves import Base, Curve, Fit, curve, curve_near, fit_base, refit
-from skred.diagnosis.event_nodes import FINE, event_nodes
+from skred.diagnosis.curves import Base, Curve, Fit, curve, curve_near, first_look, refit
+from skred.diagnosis.event_nodes import FINE, USUAL, Budget, event_nodes
 from skred.diagnosis.extension import Extension, extended
 from skred.diagnosis.marginal import evidence, importance_evidence
-from skred.diagnosis.modes import event_modes
+from skred.diagnosis.modes import campaign_rows, event_modes
 from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, probabilities
 from skred.diagnosis.screen import candidates
 from skred.diagnosis.unlisted import KINDS, Kind, Profile, fit_profile, log_evidence_of
@@ -35,8 +38,8 @@ ERROR_SHARES = {"robust": 0.55, "student": 0.15, "correlated": 0.15, "scaled": 0
 _PREFERRED_BY = 1.0
 _CHECKED, _DRAWS = 5, 500
 """Leading mechanisms whose best curve is looked at with many more nodes."""
-_WITHIN, _AT_MOST = 3.0, 2
-"""Curves of a mechanism that are looked at again: within so many nats of its best, and so many."""
+_WITHIN, _AT_MOST, _TURNS = 3.0, 2, 3
+"""Places of a mechanism that are looked at again: within so many nats of its best, so many, so many times."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,13 +74,13 @@ class Entrant:
     @property
     def log_bayes_factor(self) -> float:
         """Against nothing, shapes and strength integrated over."""
-        return float(logsumexp(self.log_factors)) + self.correction
+        return float(np.logaddexp.reduce(self.log_factors)) + self.correction
 
     @property
     def shape_weights(self) -> FloatArray:
         """Posterior probability of each shape."""
         factors = self.log_factors
-        weights: FloatArray = np.exp(factors - logsumexp(factors))
+        weights: FloatArray = np.exp(factors - np.logaddexp.reduce(factors))
         return weights
 
     @property
@@ -157,8 +160,8 @@ class Race:
             prior = math.log(ERROR_SHARES[heat.error_model]) + self.base_evidence[heat.error_model]
             for name, factor in heat.log_factors.items():
                 parts.setdefault(name, []).append(prior + factor)
-        nothing = float(logsumexp(parts[NOTHING]))
-        return {name: float(logsumexp(values)) - nothing for name, values in parts.items()}
+        nothing = float(np.logaddexp.reduce(parts[NOTHING]))
+        return {name: float(np.logaddexp.reduce(values)) - nothing for name, values in parts.items()}
 
     @property
     def probability(self) -> dict[str, float]:
@@ -214,26 +217,25 @@ def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
 
 
 def with_errors(base: Base, error_model: str) -> Base:
-    """The base law fitted under an error model; itself where that is its own."""
-    if base.problem.error_model.id == error_model:
-        return base
-    problem = replace(base.problem, error_model=ERROR_MODELS[error_model])
-    found = fit_base(problem, base.law, base.population, base.fit.points, base.directions, base.strengths)
-    return replace(found, setting=base.setting)
+    """The base law refitted under an error model, with nodes around its own fit."""
+    problem = base.problem
+    if problem.error_model.id != error_model:
+        problem = replace(problem, error_model=ERROR_MODELS[error_model])
+    extension = extended(problem, base.law, base.directions)
+    rows = campaign_rows(extension)
+    start = (base.population, base.fit.points)
+    fit = refit(extension, rows, base.strengths[None, :], start, base.log_scale, FINE, USUAL, 3)[0]
+    return replace(base, problem=problem, rows=rows, fit=fit)
 
 
 def _heat(error_model: str, base: Base, tell: Tell) -> Heat:
-    todo = candidates(base.setting, ties=False)
+    todo, budget = candidates(base.setting, ties=False), first_look(base)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         curves = []
-        for one in pool.map(lambda job: curve(base, job.mechanism, job.shape), todo):
+        for one in pool.map(lambda job: curve(base, job.mechanism, job.shape, budget), todo):
             curves.append(one)
             tell(len(curves), len(todo))
-        again, parents = _again(base, curves)
-        finer = list(
-            pool.map(lambda job: curve_near(base, job[0].mechanism, job[1], job[0].moments()), again)
-        )
-        entrants = _entrants(curves, list(zip(parents, finer, strict=True)))
+        entrants = _looked_at_again(base, curves, budget, pool)
         profiles = list(pool.map(lambda kind: _profile(base, kind, entrants), KINDS))
     for name, (correction, disagreement) in _corrections(base, entrants).items():
         entrants[name] = replace(entrants[name], correction=correction, disagreement=disagreement)
@@ -286,35 +288,60 @@ def _finely(base: Base, extension: Extension, strengths: FloatArray, fit: Fit) -
     return found.log_evidence, sampled
 
 
-def _again(base: Base, curves: Sequence[Curve]) -> tuple[list[tuple[Curve, Shape]], list[int]]:
-    """Shapes to look at more finely, and which curve each stands in for."""
-    again: list[tuple[Curve, Shape]] = []
-    parents: list[int] = []
-    factors = np.array([one.log_bayes_factor() for one in curves])
+def _looked_at_again(
+    base: Base, curves: Sequence[Curve], budget: Budget, pool: ThreadPoolExecutor
+) -> dict[str, Entrant]:
+    """Entrants whose leading places are split and computed with fronts; rough curves for the others.
+
+    Once a place is looked at it may fall behind others that then lead, and are looked at in their turn.
+    """
+    finer: dict[int, list[Curve]] = {}
+    for _ in range(_TURNS):
+        todo = [k for k in _leading(curves, finer) if k not in finer]
+        if not todo:
+            break
+        jobs = [(k, shape) for k in todo for shape in _split(base, curves[k])]
+
+        def look(job: tuple[int, Shape]) -> Curve:
+            near = curves[job[0]]
+            return curve_near(base, near.mechanism, job[1], near, budget)
+
+        found = pool.map(look, jobs)
+        for (k, _), one in zip(jobs, found, strict=True):
+            finer.setdefault(k, []).append(one)
+    return _entrants(curves, finer)
+
+
+def _leading(curves: Sequence[Curve], finer: Mapping[int, list[Curve]]) -> list[int]:
+    """The places of each mechanism that lead it, as far as is known."""
+    own = [one.log_bayes_factor() for one in curves]
+    height = np.array([_mean_log_factor(finer[k]) if k in finer else own[k] for k in range(len(curves))])
+    leading: list[int] = []
     for name in dict.fromkeys(one.mechanism.id for one in curves):
         members = np.array([k for k, one in enumerate(curves) if one.mechanism.id == name])
-        best = members[np.argsort(-factors[members])][:_AT_MOST]
-        for k in best[factors[best] > factors[members].max() - _WITHIN]:
-            added = curves[k].mechanism.added
-            assert added is not None
-            for shape in (curves[k].shape, *added.split(base.setting, curves[k].shape)):
-                again.append((curves[k], shape))
-                parents.append(int(k))
-    return again, parents
+        best = members[np.argsort(-height[members])][:_AT_MOST]
+        leading += [int(k) for k in best if height[k] > height[members].max() - _WITHIN]
+    return leading
 
 
-def _entrants(curves: Sequence[Curve], finer: Sequence[tuple[int, Curve]]) -> dict[str, Entrant]:
+def _mean_log_factor(curves: Sequence[Curve]) -> float:
+    return float(np.logaddexp.reduce([one.log_bayes_factor() for one in curves])) - math.log(len(curves))
+
+
+def _split(base: Base, curve: Curve) -> tuple[Shape, ...]:
+    """A curve's own shape and the finer ones that it stands for."""
+    added = curve.mechanism.added
+    assert added is not None
+    return (curve.shape, *added.split(base.setting, curve.shape))
+
+
+def _entrants(curves: Sequence[Curve], finer: Mapping[int, list[Curve]]) -> dict[str, Entrant]:
     """Curves by mechanism; finer ones share the weight of the one that they stand in for."""
-    children: dict[int, list[Curve]] = {}
-    for parent, one in finer:
-        children.setdefault(parent, []).append(one)
     gathered: dict[str, tuple[list[Curve], list[float]]] = {}
-    sizes: dict[str, int] = {}
-    for one in curves:
-        sizes[one.mechanism.id] = sizes.get(one.mechanism.id, 0) + 1
+    sizes = Counter(one.mechanism.id for one in curves)
     for k, one in enumerate(curves):
         members, weights = gathered.setdefault(one.mechanism.id, ([], []))
-        stand_ins = children.get(k, [one])
+        stand_ins = finer.get(k, [one])
         members += stand_ins
         weights += [-math.log(sizes[one.mechanism.id] * len(stand_ins))] * len(stand_ins)
     return {

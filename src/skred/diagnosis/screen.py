@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import log_ndtr, logsumexp
+from scipy.special import log_ndtr
 
 from skred.diagnosis.extension import Extension
 from skred.diagnosis.mixed import MeanPrior, Scores, efficient_scores, mean_prior, without
@@ -169,7 +169,7 @@ class Screen:
             factors.append(
                 _of_profile(scores.score[:, part], scores.information[:, part, part], self._cover(kind))
             )
-        result: FloatArray = logsumexp(np.array(factors), axis=0) - math.log(len(KINDS))
+        result: FloatArray = np.logaddexp.reduce(np.array(factors), axis=0) - math.log(len(KINDS))
         return result
 
     def _cover(self, kind: Kind) -> FloatArray:
@@ -185,8 +185,10 @@ class Screen:
         terms = [unlisted + math.log(odds["unlisted"])]
         for name in dict.fromkeys(ids):
             chosen = factors[:, ids == name]
-            terms.append(logsumexp(chosen, axis=1) - math.log(chosen.shape[1]) + math.log(odds[name]))
-        result: FloatArray = logsumexp(np.array(terms), axis=0) - math.log(odds["nothing"])
+            terms.append(
+                np.logaddexp.reduce(chosen, axis=1) - math.log(chosen.shape[1]) + math.log(odds[name])
+            )
+        result: FloatArray = np.logaddexp.reduce(np.array(terms), axis=0) - math.log(odds["nothing"])
         return result
 
 

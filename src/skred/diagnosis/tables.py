@@ -208,7 +208,7 @@ def _prior(curve: Curve) -> Added:
 
 
 def _nearest_fit(curve: Curve, strength: float, n_base: int) -> tuple[Population, FloatArray]:
-    fit = curve.fits[int(np.abs(curve.strengths - strength).argmin())]
+    fit = curve.nearest(strength)
     return fit.found.population(n_base), fit.points
 
 
@@ -324,6 +324,7 @@ def exact_nodes(
     start: FloatArray,
     budget: Budget,
     reference: Population,
+    shifts: FloatArray | None = None,
 ) -> Nodes:
     """Nodes at some strengths for some populations themselves, one group of rows for each.
 
@@ -337,8 +338,10 @@ def exact_nodes(
         Points near the modes.
     reference : Population
         As in `event_nodes`.
+    shifts : (n_groups * n_rows, n_base + 1) array, optional
+        As in `event_nodes`.
     """
     n_groups, n_rows = len(strengths), len(rows.event)
     many, given = _repeated(rows, n_groups), strengths.repeat(n_rows, axis=0)
     modes = event_modes(extension, many, start.reshape(n_groups * n_rows, -1), given, population)
-    return event_nodes(extension, many, given, population, modes, budget, reference)
+    return event_nodes(extension, many, given, population, modes, budget, reference, shifts)

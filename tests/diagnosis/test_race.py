@@ -1,0 +1,92 @@
+"""The race's two looks: rough ones at every place, and fronts where a place leads."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
+
+from skred.diagnosis.curves import Base, Curve, curve, curve_at, curve_near, first_look
+from skred.diagnosis.event_nodes import FINE, ROUGH, USUAL
+from skred.diagnosis.race import _entrants, _leading, with_errors
+from skred.diagnosis.screen import candidates
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.spec import Direction, Shape
+
+
+@pytest.fixture(scope="module")
+def base() -> Base:
+    """A drag is left out, at a signal-to-noise of 7."""
+    return base_of(trial(1013, "sparse", "turbulent_drag", "coulomb", 7.0).campaign, "coulomb")
+
+
+@pytest.mark.parametrize("name", ["turbulent_drag", "viscous_drag", "sensor_bias"])
+def test_second_look_against_many_nodes_on_a_dense_grid(base: Base, name: str) -> None:
+    job = next(one for one in candidates(base.setting) if one.mechanism.id == name)
+    found = curve_near(base, job.mechanism, job.shape, curve(base, job.mechanism, job.shape, ROUGH), ROUGH)
+    assert job.mechanism.added is not None
+    reach = job.mechanism.added.scale * np.linspace(0.0, 3.5, 24)
+    grid = np.concatenate([-reach[:0:-1], reach]) if job.mechanism.added.either_sign else reach
+    exact = curve_at(base, job.mechanism, job.shape, grid, FINE)
+    assert found.log_bayes_factor() == pytest.approx(exact.log_bayes_factor(), abs=0.4)
+    mean, sd = exact.moments()
+    assert abs(found.moments()[0] - mean) < 0.25 * sd
+
+
+def test_rough_look_finds_what_is_missing(base: Base) -> None:
+    assert first_look(base) is ROUGH
+    for job in candidates(base.setting):
+        if job.mechanism.id in ("turbulent_drag", "viscous_drag"):
+            assert curve(base, job.mechanism, job.shape, ROUGH).log_bayes_factor() > 5.0
+
+
+def test_fronts_are_looked_at_where_readings_are_far_off() -> None:
+    """At Ryggfonn without drag a third of the readings are outliers: tangents miss what ends that."""
+    base = ryggfonn_base("coulomb")
+    assert first_look(base) is USUAL
+    drag = mechanisms()["velocity_weakening"]
+    assert drag.added is not None
+    found = [curve(base, drag, shape, USUAL) for shape in drag.added.shapes(base.setting)]
+    rough = [curve(base, drag, shape, ROUGH) for shape in drag.added.shapes(base.setting)]
+    heights = [max(one.log_bayes_factor() for one in curves) for curves in (found, rough)]
+    assert heights[0] > 30.0 > heights[1] + 10.0
+
+
+def made(name: str, place: float, height: float) -> Curve:
+    """A curve with a certain Bayes factor, nearly."""
+    mechanism = mechanisms()[name]
+    assert mechanism.added is not None
+    strengths = mechanism.added.scale * np.array([0.0, 0.5, 1.0, 2.0, 3.5])
+    shape = Shape(place, place + 50.0)
+    return Curve(mechanism, shape, Direction(), strengths, height + 0.0 * strengths, ())
+
+
+def test_those_that_lead_after_a_second_look_are_looked_at_too() -> None:
+    curves = [made("segment_drag", 100.0 * k, height) for k, height in enumerate([9.0, 7.5, 8.0, 5.0, 1.0])]
+    assert _leading(curves, {}) == [0, 2]
+    # The first falls behind, so the next ones lead.
+    finer = {0: [made("segment_drag", 0.0, 2.0)], 2: [made("segment_drag", 200.0, 7.0)]}
+    assert _leading(curves, finer) == [1, 2]
+    # Far behind the best is not looked at.
+    assert _leading(curves, {1: [made("segment_drag", 100.0, 20.0)]}) == [1]
+
+
+def test_finer_curves_share_the_weight_of_their_place() -> None:
+    curves = [made("segment_drag", 100.0 * k, 1.0) for k in range(3)]
+    (entrant,) = _entrants(curves, {1: [made("segment_drag", 100.0, 1.0)] * 4}).values()
+    assert len(entrant.curves) == 6 and np.exp(entrant.log_weights).sum() == pytest.approx(1.0)
+    assert entrant.log_bayes_factor == pytest.approx(curves[0].log_bayes_factor())
+
+
+def test_other_error_models_start_from_any() -> None:
+    """The evidence of an error model does not depend on the one that it was reached from."""
+    base = sparse_base()
+    student = with_errors(base, "student")
+    there, again = with_errors(base, "robust"), with_errors(student, "robust")
+    assert student.problem.error_model.id == "student"
+    assert again.fit.found.log_evidence == pytest.approx(there.fit.found.log_evidence, abs=0.1)
+    assert replace(again, fit=there.fit).problem.error_model.id == "robust"
+    # Two routes: nodes around modes, and the law's likelihood surfaces.
+    assert there.fit.found.log_evidence == pytest.approx(base.fit.found.log_evidence, abs=0.3)
