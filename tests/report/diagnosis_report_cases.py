@@ -116,7 +116,11 @@ def calibration(problem: HierarchicalProblem, added: tuple = (), gate: Gate = GA
     strengths = [
         Parameter(one.name, one.mechanism.strength.symbol, one.mechanism.strength.unit) for one in added
     ]
-    shown = SimpleNamespace(parameters=lambda law: (*problem.parameters(law), *strengths), added=added)
+    shown = SimpleNamespace(
+        parameters=lambda law: (*problem.parameters(law), *strengths),
+        added=added,
+        error_model=problem.error_model,
+    )
     return SimpleNamespace(problem=shown, law=LAW, tree=tree, gate=gate)
 
 
@@ -151,8 +155,9 @@ def diagnosis(kind: str, text: str = "") -> Diagnosis:
     return Diagnosis(
         problem, LAW, "", calibration(problem), SimpleNamespace(), table,
         Omnibus(30.0 if alarm else 0.3, clean), race, Decision(verdicts[kind], names),
-        location() if alarm else None, steps, held(problem, 0.0), held(problem, 1.1) if steps else None,
-        {"base": 12.3, "race": 45.6},
+        location() if alarm else None, steps,
+        before=held(problem, 0.0), after=held(problem, 1.1) if steps else None,
+        seconds={"base": 12.3, "race": 45.6},
     )  # fmt: skip
 
 

@@ -196,9 +196,11 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch) -> Diagnosed:
     asked: list[dict[str, Any]] = []
 
     def with_reason(reason: str | None) -> list[dict[str, Any]]:
-        def made_up(problem: Any, law: Any, settings: Any, effort: Any, folder: Any, tell: Any) -> Any:
+        def made_up(
+            problem: Any, law: Any, settings: Any, effort: Any, folder: Any, tell: Any, **more: Any
+        ) -> Any:
             tell("a stage")
-            asked.append({"problem": problem, "law": law, "settings": settings, "effort": effort})
+            asked.append({"problem": problem, "law": law, "settings": settings, "effort": effort, **more})
             return {"verdict": "cannot_tell", "reason": reason, "statement": "What [it] says."}
 
         monkeypatch.setattr(module, "diagnose_to", made_up)

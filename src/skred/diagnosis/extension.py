@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.diagnosis.covariates import standard_of
 from skred.inference.hierarchical import HierarchicalProblem
 from skred.physics.geometry import WEAKENING_SPEED_M_S
 from skred.physics.inputs import Contributions, make_contributions
@@ -18,21 +19,18 @@ from skred.physics.mechanisms.spec import Direction, Setting
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-_LEAST_KNOWN = 4
-"""Events whose covariate is known, below which it is left out."""
 
 
 def setting_of(problem: HierarchicalProblem, law: Law) -> Setting:
     """What mechanisms added to a law on a campaign can refer to."""
     campaign = problem.campaign
-    covariates = {}
-    for name in sorted({name for event in campaign.events for name in event.covariates}):
-        values = _numbers([event.covariates.get(name) for event in campaign.events])
-        known = np.isfinite(values)
-        spread = float(np.std(values[known])) if known.sum() >= _LEAST_KNOWN else 0.0
-        if spread > 1e-9 * (1.0 + float(np.abs(values[known]).max(initial=0.0))):
-            # An event whose value is not known counts as an average one.
-            covariates[name] = np.where(known, (values - values[known].mean()) / spread, 0.0)
+    names = sorted({name for event in campaign.events for name in event.covariates})
+    standards = {name: standard_of(campaign.events, name) for name in names}
+    covariates = {
+        name: standard.standardised(campaign.events, name)
+        for name, standard in standards.items()
+        if standard is not None
+    }
     return Setting(
         terrain=problem.terrain,
         base=tuple(mechanism.id for mechanism in law.mechanisms),
@@ -42,16 +40,6 @@ def setting_of(problem: HierarchicalProblem, law: Law) -> Setting:
         covariates=covariates,
         n_events=campaign.n_events,
     )
-
-
-def _numbers(values: Sequence[float | str | None]) -> FloatArray:
-    """Covariates as numbers, NaN where not known; of two kinds of text one is 0 and the other 1."""
-    kinds = sorted({value for value in values if isinstance(value, str)})
-    if not kinds:
-        return np.array([np.nan if value is None else float(value) for value in values])
-    if len(kinds) != 2:
-        return np.full(len(values), np.nan)
-    return np.array([float(kinds.index(v)) if isinstance(v, str) else np.nan for v in values])
 
 
 def recorded_range(problem: HierarchicalProblem) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from skred.diagnosis.extension import Extension
+from skred.diagnosis.predictive import predict_event
 from skred.inference.leave_one_out import exact_leave_one_out
 from skred.inference.population import population_of
 
@@ -110,18 +111,10 @@ def _predictions(
     for event in range(n_events):
         drawn = rng.choice(len(weights), size=_DRAWS, p=weights[:, event])
         drawn = np.repeat(drawn, _FRONTS)
-        normal = rng.standard_normal((len(drawn), means.shape[1]))
-        logs = means[drawn] + np.einsum("rij,rj->ri", factors[drawn], normal)
-        points = np.column_stack([logs, rng.standard_normal(len(drawn))])
-        fronts = extension.predict(np.full(len(drawn), event), points, added[drawn])[:, :-1]
-        own = readings.stated_sd[event]
-        sd = np.where(own > 0.0, own, np.hypot(readings.relative_sd * fronts, readings.absolute_sd))
-        noisy = fronts + sd * rng.standard_normal(fronts.shape)
+        found = predict_event(extension, event, means[drawn], factors[drawn], added[drawn], rng)
         seen = readings.observed[event]
-        predicted[event, seen] = fronts.mean(axis=0)[seen]
-        low, high = np.quantile(noisy, [0.05, 0.95], axis=0)
-        value = readings.values[event]
-        covered[event, seen] = ((value >= low) & (value <= high))[seen]
+        predicted[event, seen] = found.mean[seen]
+        covered[event, seen] = found.holds(readings.values[event])[seen]
     return predicted, covered
 
 

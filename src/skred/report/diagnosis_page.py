@@ -15,6 +15,7 @@ from skred.diagnosis.omnibus import LIMIT
 from skred.diagnosis.unlisted import KINDS
 from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
 from skred.report import diagnosis_rows as rows
+from skred.report import diagnosis_unseen as unseen
 from skred.report import document as doc
 from skred.report.diagnosis_equation import equations, parameter_rows, symbol_rows
 from skred.report.diagnosis_words import (
@@ -43,6 +44,7 @@ _SECTIONS = {
     "what": "What?",
     "equation": "The equation with its new term",
     "before-after": "Before and after",
+    "unseen": "Avalanches set aside",
     "trust": "How far to trust it",
 }
 
@@ -54,6 +56,9 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
     if not found.steps:
         sections["equation"] = "The equation"
         sections["before-after"] = "How well avalanches left out are predicted"
+    locked, folds = unseen.locked(document), unseen.outer_folds(document)
+    if locked is None and folds is None:
+        del sections["unseen"]
     return (
         environment()
         .get_template("diagnosis.html.jinja")
@@ -77,6 +82,8 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
             parameters=parameter_rows(found),
             held=rows.held_out_rows(found),
             difference=_difference(found),
+            locked=locked,
+            folds=folds,
             trust=rows.trust_rows(found),
             priors=rows.prior_rows(found),
             settings=rows.settings_rows(document),

@@ -199,17 +199,21 @@ def error_rows(race: Race) -> Rows:
     ]
 
 
+PREDICTION_ERRORS = (
+    ("rmse_velocity", "error of speeds, root mean square [m/s]", 1),
+    ("rmse_runout", "error of runouts, root mean square [m]", 0),
+    ("coverage_90", "readings inside their 90 % intervals [%]", 0),
+)
+"""Keys of the verdict less before and after, words, decimals; coverage as a share."""
+
+
 def held_out_rows(found: Diagnosis) -> Rows:
     """Errors and coverage before and after."""
     before, after = (
         errors(one, found.problem) if one is not None else {} for one in (found.before, found.after)
     )
     rows = []
-    for key, words, decimals in (
-        ("rmse_velocity", "error of speeds, root mean square [m/s]", 1),
-        ("rmse_runout", "error of runouts, root mean square [m]", 0),
-        ("coverage_90", "readings inside their 90 % intervals [%]", 0),
-    ):
+    for key, words, decimals in PREDICTION_ERRORS:
         factor = 100.0 if key == "coverage_90" else 1.0
         values = [one.get(key) for one in (before, after)]
         texts = [fixed(None if value is None else factor * value, decimals) for value in values]

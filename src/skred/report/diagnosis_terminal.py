@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from skred.report import document as doc
+from skred.report.diagnosis_unseen import difference_text
 from skred.report.labels import name_text, printable, shortened, unit_text
 from skred.report.numbers import decimals_for, fixed, is_number, rounded, share, whole
 from skred.report.tables import plain_table, plain_text
@@ -49,6 +50,9 @@ def _rows(document: doc.Document) -> list[tuple[str, str]]:
     rows += [("location", _location(document))] if doc.get(document, "location") else []
     rows += [("probability", line) for line in [_probabilities(document)] if line]
     rows.append(("elpd difference", _difference(document)))
+    for key, words in (("locked", "locked avalanches"), ("outer_folds", "outer folds")):
+        if document.get(key):
+            rows.append((words, difference_text(doc.get(document, key))))
     rows.append(("p-value", fixed_p(doc.get(document, "evidence", "p_value"))))
     return rows
 

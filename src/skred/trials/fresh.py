@@ -1,6 +1,6 @@
-"""Further avalanches of a trial: the same path, sensors, population and hidden effects, from chance of its own.
+"""Further avalanches of a trial: the same path, sensors, population and hidden effects.
 
-Nothing of what a trial's campaign and truth are drawn with is used up here, so that they stay what they are.
+They come from a random stream of their own, so that a seed's campaign and truth stay what they are.
 """
 
 from __future__ import annotations

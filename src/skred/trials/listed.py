@@ -134,9 +134,7 @@ class Response:
     offset: float
     spread: float
 
-    def __call__(
-        self, rng: np.random.Generator, covariates: Mapping[str, FloatArray], n: int
-    ) -> FloatArray:
+    def __call__(self, rng: np.random.Generator, covariates: Mapping[str, FloatArray], n: int) -> FloatArray:
         """The weights of avalanches with some covariates."""
         score = (_on_scale(self.covariate, covariates) - self.centre) / self.scale
         response = np.tanh(self.saturation * score) / self.saturation

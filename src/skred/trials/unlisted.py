@@ -108,8 +108,8 @@ def _threshold_drag(rng: np.random.Generator, scene: Scene) -> Effect:
 
 
 def _in_between(rng: np.random.Generator, covariates: Mapping[str, FloatArray], n: int) -> FloatArray:
-    """Weights of avalanches that came in between those of the trial, in order."""
-    return np.sort(rng.uniform(-1.0, 1.0, n))
+    """Weights of avalanches that came in between those of the trial."""
+    return rng.uniform(-1.0, 1.0, n)
 
 
 def _deposit_history(rng: np.random.Generator, scene: Scene) -> Effect:

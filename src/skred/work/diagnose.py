@@ -13,6 +13,7 @@ from skred.inference.results import save
 from skred.inference.sampling import SamplerSettings
 from skred.physics.law import Law
 from skred.work.output import write_json, write_text
+from skred.work.unseen_diagnoses import folds_of, open_locked, outer_folds, set_aside
 
 Tell = Callable[[str], None]
 
@@ -24,13 +25,36 @@ def diagnose_to(
     effort: Effort,
     folder: Path,
     tell: Tell = lambda line: None,
+    *,
+    lock: int = 0,
+    folds: int = 0,
 ) -> dict[str, Any]:
-    """Diagnose, and write everything into a folder; the verdict first, so that it is there in any case."""
+    """Diagnose, and write everything into a folder; the verdict first, so that it is there in any case.
+
+    Parameters
+    ----------
+    lock : int
+        Avalanches set aside before anything is looked at, and opened once at the end.
+    folds : int
+        Parts of the others without which the whole diagnosis is repeated, one by one; 0 for none.
+    """
     from skred.report.diagnosis import render_diagnosis, save_diagnosis_figures
 
+    locked = None
+    if lock:
+        problem, locked = set_aside(problem, lock, settings.seed)
+    if folds:
+        folds_of(problem, folds, settings.seed)  # refused now rather than after the diagnosis
     found = diagnose(problem, law, settings, effort, tell)
     document = verdict(found) | {"settings": settings.as_dict() | {"replicas": effort.replicas}}
     write_json(folder / "verdict.json", document)
+    if locked is not None:
+        tell(f"opening {lock} locked avalanches")
+        document["locked"] = open_locked(found, locked, settings.seed)
+    if folds:
+        document["outer_folds"] = outer_folds(problem, law, settings, effort, folds, tell)
+    if lock or folds:
+        write_json(folder / "verdict.json", document)
     if found.calibration is not None:
         save(found.calibration.tree, folder / "base.nc")
     if found.reference is not None and found.reference is not found.calibration:

@@ -1,0 +1,61 @@
+"""Covariates of events as numbers of mean 0 and standard deviation 1, here and in other campaigns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.campaign import Event
+
+FloatArray = NDArray[np.float64]
+_LEAST_KNOWN = 4
+"""Events whose covariate is known, below which it is left out."""
+
+
+@dataclass(frozen=True)
+class Standard:
+    """What a covariate is standardised by.
+
+    Attributes
+    ----------
+    centre, scale : float
+        Mean and standard deviation over the events whose value is known.
+    kinds : tuple of str
+        The two kinds of text, of which the first counts as 0 and the second as 1; none for numbers.
+    """
+
+    centre: float
+    scale: float
+    kinds: tuple[str, ...] = ()
+
+    def standardised(self, events: Sequence[Event], name: str) -> FloatArray:
+        """The covariate of some events; one whose value is not known counts as an average one."""
+        values = _numbers([event.covariates.get(name) for event in events], self.kinds)
+        return np.where(np.isfinite(values), (values - self.centre) / self.scale, 0.0)
+
+
+def standard_of(events: Sequence[Event], name: str) -> Standard | None:
+    """What a covariate is standardised by.
+
+    None where it is constant, or hardly known, or text of one kind or of more than two.
+    """
+    given = [event.covariates.get(name) for event in events]
+    kinds = tuple(sorted({value for value in given if isinstance(value, str)}))
+    if len(kinds) not in (0, 2):
+        return None
+    values = _numbers(given, kinds)
+    known = np.isfinite(values)
+    spread = float(np.std(values[known])) if known.sum() >= _LEAST_KNOWN else 0.0
+    if spread > 1e-9 * (1.0 + float(np.abs(values[known]).max(initial=0.0))):
+        return Standard(float(values[known].mean()), spread, kinds)
+    return None
+
+
+def _numbers(values: Sequence[float | str | None], kinds: Sequence[str]) -> FloatArray:
+    """Covariates as numbers, NaN where not known."""
+    if kinds:
+        return np.array([float(kinds.index(v)) if v in kinds else np.nan for v in values])
+    return np.array([np.nan if v is None or isinstance(v, str) else float(v) for v in values])
