@@ -24,9 +24,11 @@ from skred.cli_options import (
     IdleSeed,
     Json,
     Likelihoods,
+    Lock,
     MaxMechanisms,
     MechanismIds,
     Models,
+    OuterFolds,
     Quick,
     Quiet,
     Release,
@@ -37,6 +39,7 @@ from skred.cli_options import (
     TrackFile,
 )
 from skred.cli_output import OUTPUT, Output, write_json
+from skred.cli_prove import prove_app
 from skred.errors import InputError
 
 if TYPE_CHECKING:
@@ -58,6 +61,7 @@ def _program(name: str, purpose: str) -> App:
 
 
 app = _program("skred", "Calibrate avalanche models against recordings, and find the physics that they miss.")
+app.command(prove_app)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -222,6 +226,8 @@ def diagnose(
     base_model: DiagnosedModel = "pcm",
     max_mechanisms: MaxMechanisms = None,
     exact_loo: ExactHeldOut = False,
+    outer_folds: OuterFolds = None,
+    lock: Lock = None,
     quick: Quick = False,
     errors: Errors = None,
     seed: Seed = 0,
@@ -242,7 +248,9 @@ def diagnose(
     replicas = QUICK_REPLICAS if quick else Effort.replicas
     effort = Effort(replicas, max_mechanisms or MAX_MECHANISMS[quick], exact_loo)
     settings = Sampling(seed=seed).settings("hierarchical")
-    document = diagnose_to(problem, law, settings, effort, folder, output.tell)
+    document = diagnose_to(
+        problem, law, settings, effort, folder, output.tell, lock=lock or 0, folds=outer_folds or 0
+    )
     output.show(document, diagnosis_table, [], folder)  # the statement is in the table
     return DONE if document["reason"] is None else GATE_FAILED
 

@@ -82,6 +82,20 @@ ExactHeldOut = Annotated[
         help="Refit without every event, not only where importance sampling is unreliable.",
     ),
 ]
+Lock = Annotated[
+    int | None,
+    Parameter(
+        validator=validators.Number(gte=1, lte=10_000),
+        help="Avalanches set aside by chance before anything is looked at, and opened once at the end.",
+    ),
+]
+OuterFolds = Annotated[
+    int | None,
+    Parameter(
+        validator=validators.Number(gte=2, lte=10_000),
+        help="Repeat the whole diagnosis so often, each time without some avalanches, to predict those.",
+    ),
+]
 IdleSeed = Annotated[
     int,
     Parameter(validator=validators.Number(gte=0, lt=2**31), help="Without effect: nothing is random here."),

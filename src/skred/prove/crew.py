@@ -1,0 +1,148 @@
+"""Who does the work: Dask workers, here or elsewhere; and one command at a time in a folder."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import uuid
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from skred.errors import InputError
+
+_PATIENCE_S = 60
+"""How long to wait for the first worker."""
+_MANY = 1_000_000
+Job = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Crew:
+    """How many work, and where.
+
+    Attributes
+    ----------
+    workers : int
+        Processes of a cluster on this machine.
+    scheduler : str, optional
+        Address of a Dask scheduler instead. Its workers must see the same files and have the same code.
+    """
+
+    workers: int = 2
+    scheduler: str | None = None
+
+    @contextmanager
+    def client(self) -> Iterator[Any]:
+        """A Dask client; a cluster on this machine is gone afterwards, whatever happened."""
+        with _client_of(self.scheduler) if self.scheduler else _local_client(self.workers) as client:
+            yield client
+
+    def carry_out(
+        self,
+        work: Callable[[Job], Job],
+        jobs: Sequence[Job],
+        done: Callable[[Job, Job], None],
+        lost: Callable[[Job], None],
+    ) -> None:
+        """Do jobs, in order of their list as far as workers are free.
+
+        Parameters
+        ----------
+        work : callable
+            What a worker does with a job; small plain data go in and come out.
+        jobs : sequence of dict
+            Each with the name of its trial.
+        done : callable
+            Told of each job and what came out as it is finished.
+        lost : callable
+            Told of a job that Dask has given up, because every worker that took it died.
+        """
+        if not jobs:
+            return
+        with self.client() as client:
+            dask = _distributed()
+            futures = {
+                client.submit(work, job, key=f"{job['trial']}-{uuid.uuid4().hex}", pure=False): job
+                for job in jobs
+            }
+            for future in dask.as_completed(list(futures)):
+                job = futures.pop(future)
+                try:
+                    result = future.result()
+                except dask.KilledWorker:
+                    lost(job)
+                    continue
+                future.release()
+                done(job, result)
+
+
+def _distributed() -> Any:
+    """Dask's scheduler, which has no types."""
+    import distributed
+
+    return distributed
+
+
+@contextmanager
+def _local_client(workers: int) -> Iterator[Any]:
+    """A cluster of processes on this machine; each worker does one job at a time."""
+    import dask
+
+    distributed = _distributed()
+    settings = {
+        # What was only waiting on a worker that died is not to blame; the jobs count their own deaths.
+        "distributed.scheduler.allowed-failures": _MANY,
+        "distributed.scheduler.worker-saturation": 1.0,
+        "distributed.comm.timeouts.connect": f"{_PATIENCE_S}s",
+    }
+    with (
+        dask.config.set(settings),
+        distributed.LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            memory_limit=0,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield client
+
+
+@contextmanager
+def _client_of(scheduler: str) -> Iterator[Any]:
+    """A client of a scheduler that is there already."""
+    try:
+        client = _distributed().Client(scheduler, timeout=f"{_PATIENCE_S}s")
+        client.wait_for_workers(1, timeout=_PATIENCE_S)
+    except (OSError, TimeoutError, ValueError) as error:
+        message = f"--scheduler {scheduler}: no Dask scheduler with a worker answers there"
+        raise InputError(message) from error
+    with client:
+        yield client
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Refuse a second command at work in the same folder; the first one's claim ends with its process."""
+    if sys.platform == "win32":
+        yield
+        return
+    import fcntl
+
+    with (folder / ".lock").open("w") as claim:
+        try:
+            fcntl.flock(claim, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(f"{folder}: another `skred prove` is at work here; wait for it") from None
+        except OSError:
+            pass  # some network file systems know no locks
+        try:
+            yield
+        finally:
+            with suppress(OSError):
+                fcntl.flock(claim, fcntl.LOCK_UN)
