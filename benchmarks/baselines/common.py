@@ -1,7 +1,10 @@
 """What every baseline returns, and how evidence, probabilities or a guess become a verdict.
 
-Limits of the alarm are apart for sparse and dense recordings, each at about 5 % false alarms on development
-trials with nothing hidden; where a baseline's numbers come from stands beside them.
+What is tuned is tuned on development trials and frozen: ``python benchmarks/development_set.py`` with
+``--n 30 --seed 5000``, ``--n 60 --seed 5100 --hidden nothing`` and ``--n 40 --seed 5200 --hidden listed``.
+Limits of the alarm are apart for sparse and dense recordings, each the 95 % quantile of the scores of those
+trials in which nothing is hidden (32 sparse, 36 dense; nasty ones left out). Temperatures give the best mean
+log score.
 """
 
 from __future__ import annotations
@@ -61,7 +64,9 @@ class Answer:
 
     def as_dict(self) -> dict[str, Any]:
         """The answer in the words of verdict.json; score and leading are further keys."""
-        place = None if self.location is None else dict(zip(("s_from_m", "s_to_m"), self.location, strict=True))
+        place = None
+        if self.location is not None:
+            place = {"s_from_m": self.location[0], "s_to_m": self.location[1]}
         return {
             "verdict": self.verdict,
             "mechanism": self.mechanism,

@@ -42,7 +42,7 @@ _EXACT = Budget(1024, 512, 1.5, 1.8)
 _EXACT_RUNS = 16 * 22
 """Events times draws up to which there are so many nodes; where there are fewer, more."""
 _EXACT_EVENTS, _EXACT_DRAWS = 24, 16
-_ROUGH_DRAWS, _ENOUGH = 8, 0.6
+_ROUGH_DRAWS, _ROUGH_RUNS, _ENOUGH = 4, 4 * 22, 0.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,15 +216,23 @@ class AugmentedProblem(HierarchicalProblem):
         return self.errors_at(*population_of(law, samples), self.added_rows(samples), chosen)
 
     def errors_at(
-        self, means: FloatArray, factors: FloatArray, added: FloatArray, chosen: NDArray[np.int64]
+        self,
+        means: FloatArray,
+        factors: FloatArray,
+        added: FloatArray,
+        chosen: NDArray[np.int64],
+        runs: int = _EXACT_RUNS,
     ) -> FloatArray:
-        """As `integration_errors`, of chosen events at some populations and added strengths."""
+        """As `integration_errors`, of chosen events at some populations and added strengths.
+
+        Where there are fewer of them than `runs`, with more nodes each.
+        """
         base = self.base
         population = Population(means, np.einsum("nij,nkj->nik", factors, factors))
         rows = Rows(chosen, np.zeros_like(chosen), take_rows(base.rows.readings, chosen), base.rows.errors)
         start = self.tables.modes[self.tables.grid.nearest(added)][:, chosen]
         given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
-        more = 2 ** int(np.clip(np.log2(_EXACT_RUNS / (len(added) * len(chosen))), 0, 3))
+        more = 2 ** int(np.clip(np.log2(runs / (len(added) * len(chosen))), 0, 3))
         budget = _EXACT._replace(around_mode=more * 1024, over_population=more * 512)
         nodes = exact_nodes(self.extension, rows, given, population, start, budget, base.population)
         errors = self._tabulated(means, factors, added)[:, chosen]
@@ -335,7 +343,9 @@ def _rough_error(problem: AugmentedProblem, located: Located) -> float:
     means = np.concatenate([one.mean for one in populations])
     factors = np.linalg.cholesky(np.concatenate([one.covariance for one in populations]))
     chosen = np.sort(rng.permutation(problem.campaign.n_events)[:_EXACT_EVENTS])
-    return float(22.0 * np.abs(problem.errors_at(means, factors, added, chosen).mean(axis=1)).max())
+    return float(
+        22.0 * np.abs(problem.errors_at(means, factors, added, chosen, _ROUGH_RUNS).mean(axis=1)).max()
+    )
 
 
 def _truncated_normal(name: str, scale: Any, low: Any, high: Any) -> Any:
