@@ -6,8 +6,8 @@ from typing import Any
 
 from skred.diagnosis.diagnose import Diagnosis
 from skred.diagnosis.odds import NOTHING, UNLISTED
+from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.physics.mechanisms import mechanisms
-from skred.report.document import PRACTICAL_DIFFERENCE
 
 
 def statement(found: Diagnosis, document: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""The kind of interval in all tables and files."""
+"""What is told of numbers: the kind of interval in all tables and files, and which differences count."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 
 INTERVAL_KIND, INTERVAL_PROBABILITY = "equal-tailed", 0.9
+PRACTICAL_DIFFERENCE = 4.0
+"""Differences of elpd below this are called no practical difference."""
 
 
 def interval(values: Any) -> tuple[float, float]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from skred.report.document import PRACTICAL_DIFFERENCE, Document, listed
+from skred.inference.intervals import PRACTICAL_DIFFERENCE
+from skred.report.document import Document, listed
 from skred.report.labels import figure_text
 from skred.report.numbers import fixed
 from skred.report.style import GREY, PALE, law_colours, law_markers

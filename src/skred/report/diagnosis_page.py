@@ -14,6 +14,7 @@ from skred.diagnosis.held_out import K_LIMIT, paired
 from skred.diagnosis.omnibus import LIMIT
 from skred.diagnosis.unlisted import KINDS
 from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
+from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.report import diagnosis_rows as rows
 from skred.report import diagnosis_unseen as unseen
 from skred.report import document as doc
@@ -92,7 +93,7 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
             ],
             limits={
                 "p": LIMIT, "e": E_LIMIT, "k": K_LIMIT, "r_hat": R_HAT_LIMIT, "ess": ESS_LIMIT,
-                "practical": doc.PRACTICAL_DIFFERENCE,
+                "practical": PRACTICAL_DIFFERENCE,
             },
             too_few=_too_few(found),
             dropped=_dropped(found),
@@ -155,7 +156,7 @@ def _difference(found: Diagnosis) -> dict[str, Any] | None:
     return {
         "value": fixed(value, 1, signed=True),
         "doubled": fixed(2.0 * se, 1),
-        "practical": abs(value) >= doc.PRACTICAL_DIFFERENCE,
+        "practical": abs(value) >= PRACTICAL_DIFFERENCE,
         "clear": abs(value) > 2.0 * se,
         "better": int(better.sum()),
         "of": len(better),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.report import document as doc
 from skred.report.diagnosis_unseen import difference_text
 from skred.report.labels import name_text, printable, shortened, unit_text
@@ -83,7 +84,7 @@ def _difference(document: doc.Document) -> str:
     if not is_number(difference):
         return "n/a (nothing was let in)"
     doubled = f"{fixed(difference, 1, signed=True)} (2 se {fixed(2.0 * se, 1) if is_number(se) else 'n/a'})"
-    return doubled + ("" if abs(difference) >= doc.PRACTICAL_DIFFERENCE else ", no practical difference")
+    return doubled + ("" if abs(difference) >= PRACTICAL_DIFFERENCE else ", no practical difference")
 
 
 def fixed_p(value: object) -> str:

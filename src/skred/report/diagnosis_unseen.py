@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.report import document as doc
 from skred.report.diagnosis_rows import PREDICTION_ERRORS
 from skred.report.numbers import fixed, is_number
@@ -57,5 +58,5 @@ def difference_text(found: doc.Document) -> str:
     if not is_number(value):
         return fixed(None)
     doubled = f" (2 se {fixed(2.0 * se, 1)})" if is_number(se) else ""
-    practical = "" if abs(value) >= doc.PRACTICAL_DIFFERENCE else ", no practical difference"
+    practical = "" if abs(value) >= PRACTICAL_DIFFERENCE else ", no practical difference"
     return f"{fixed(value, 1, signed=True)}{doubled}{practical}"

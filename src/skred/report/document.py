@@ -10,8 +10,6 @@ from skred.report.numbers import is_number
 Document = Mapping[str, Any]
 
 PARETO_K_LIMIT = 0.7
-PRACTICAL_DIFFERENCE = 4.0
-"""Differences of elpd below this are called no practical difference."""
 
 
 def get(document: Any, *keys: str) -> Any:

@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.report import document as doc
 from skred.report.labels import name_text, population_role, printable, symbol_text, unit_text
 from skred.report.numbers import decimals_for, fixed, is_number, rounded, share, whole
@@ -97,7 +98,7 @@ def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> 
             of_a_population=_OF_A_POPULATION,
             integration_limit=_integration_limit() if hierarchical else None,
             k_limit=doc.pareto_k_limit(comparison),
-            practical=doc.PRACTICAL_DIFFERENCE,
+            practical=PRACTICAL_DIFFERENCE,
             r_hat_limit=R_HAT_LIMIT,
             ess_limit=ESS_LIMIT,
         )

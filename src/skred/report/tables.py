@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.report import document as doc
 from skred.report.labels import population_role, printable, shortened
 from skred.report.numbers import decimals_for, fixed, is_number, rounded, share, whole
@@ -152,7 +153,7 @@ def _ranked_row(model: doc.Document, *, best: bool) -> list[Any]:
 def _explanation(comparison: doc.Document) -> str:
     n_events = doc.get(comparison, "campaign", "n_events")
     few = f" with {whole(n_events)} events" if is_number(n_events) and n_events < 100 else ""
-    limit = f"{doc.PRACTICAL_DIFFERENCE:.0f}"
+    limit = f"{PRACTICAL_DIFFERENCE:.0f}"
     how = (
         "by importance sampling, refitted where that cannot be trusted"
         if doc.is_hierarchical(comparison)

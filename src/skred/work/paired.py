@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from skred.report.document import PRACTICAL_DIFFERENCE
+from skred.inference.intervals import PRACTICAL_DIFFERENCE
 
 Entry = dict[str, Any]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from skred.report.document import PRACTICAL_DIFFERENCE
+from skred.inference.intervals import PRACTICAL_DIFFERENCE
 
 _NOTABLE_SHARE = 0.05
 
