@@ -140,13 +140,6 @@ class Bisection:
         result: FloatArray = simulate(strengths, releases, fronts.path, fronts.law, fronts.sensors)
         return result
 
-    def predict_corners(self, event: IntArray, low: FloatArray, width: FloatArray) -> FloatArray:
-        """Readings at all corners of boxes, (n, n_corners, n_sensors + 1)."""
-        sides = _sides(low.shape[1])
-        points = low[:, None, :] + sides * width[:, None, :]
-        rows = self.predict(np.repeat(event, len(sides)), points.reshape(-1, low.shape[1]))
-        return rows.reshape(len(event), len(sides), -1)
-
     def log_envelope(self, points: FloatArray) -> FloatArray:
         """Logarithm of the envelope at points (..., n_axes)."""
         if self.envelope is None:
@@ -173,19 +166,36 @@ class Bisection:
         Edges on the axes of the strengths are staggered, see `stagger`; those on the axis of the
         release, if there is one, are shares of the range it is looked for in.
         """
-        corners = np.stack(np.meshgrid(*(e[:-1] for e in edges), indexing="ij"), axis=-1).reshape(
-            -1, len(edges)
-        )
-        widths = np.stack(np.meshgrid(*(np.diff(e) for e in edges), indexing="ij"), axis=-1)
+        n_axes = len(edges)
+        corners = _grid([e[:-1] for e in edges])
         event = np.repeat(events, len(corners))
         low = np.tile(corners, (len(events), 1))
-        width = np.tile(widths.reshape(-1, len(edges)), (len(events), 1))
-        low[:, : self.n_strengths] += stagger(event, width[0, : self.n_strengths])
-        if len(edges) > self.n_strengths:
+        width = np.tile(_grid([np.diff(e) for e in edges]), (len(events), 1))
+        step = width[0, : self.n_strengths]
+        low = self._placed(event, low, step)
+        if n_axes > self.n_strengths:
             first, last = (ends[event] for ends in self.release_range())
-            low[:, -1] = first + (last - first) * low[:, -1]
             width[:, -1] *= last - first
-        return _Boxes(event, low, width, self.predict_corners(event, low, width))
+        # Each vertex once, though it is a corner of many boxes.
+        vertices = _grid(list(edges))
+        at = np.repeat(events, len(vertices))
+        rows = self.predict(at, self._placed(at, np.tile(vertices, (len(events), 1)), step))
+        rows = rows.reshape(len(events), *map(len, edges), -1)
+        sizes = [len(e) - 1 for e in edges]
+        predictions = np.empty((len(event), 2**n_axes, rows.shape[-1]))
+        for number, side in enumerate(_sides(n_axes)):
+            window = tuple(slice(k, k + size) for k, size in zip(side, sizes, strict=True))
+            predictions[:, number] = rows[(slice(None), *window)].reshape(len(event), -1)
+        return _Boxes(event, low, width, predictions)
+
+    def _placed(self, event: IntArray, points: FloatArray, step: FloatArray) -> FloatArray:
+        """Points of the grid, at the place of each one's event."""
+        placed = points.copy()
+        placed[:, : self.n_strengths] += stagger(event, step)
+        if points.shape[1] > self.n_strengths:
+            first, last = (ends[event] for ends in self.release_range())
+            placed[:, -1] = first + (last - first) * points[:, -1]
+        return placed
 
     def split(self, boxes: _Boxes, axis: IntArray) -> _Boxes:
         """Halve each box along its axis; only the corners in between are new."""
@@ -309,6 +319,11 @@ def stagger(events: IntArray, step: FloatArray) -> FloatArray:
     shifts = golden[np.arange(len(step)) % len(golden)]
     result: FloatArray = step * np.mod((events[:, None] + 1.0) * shifts, 1.0)
     return result
+
+
+def _grid(axes: list[FloatArray]) -> FloatArray:
+    """All combinations of values on each axis, (n, n_axes), the last axis fastest."""
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
 
 
 def _sides(n_axes: int) -> IntArray:

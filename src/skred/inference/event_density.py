@@ -20,6 +20,8 @@ EVENT_DENSITY_CACHE_KEY = int(sha256(Path(__file__).read_bytes()).hexdigest()[:1
 _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 _SQRT_HALF = math.sqrt(0.5)
 _LEAST = 1e-300
+_TINY, _SMALL = 1e-30, 1e-200
+"""Densities below the first are taken by their logarithm; products below the second are put away."""
 _COMMON_STEPS, _COMMON_STEP = 28, 0.5
 _NEGLIGIBLE = -60.0
 
@@ -42,23 +44,6 @@ def _log_stop(stop, reached, not_reached, place_sd):  # type: ignore[no-untyped-
     else:
         probability = 0.5 * (math.erfc(-below) - math.erfc(-above))
     return math.log(max(probability, _LEAST))
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _log_reading(residual, sd, scale, share, degrees):  # type: ignore[no-untyped-def]
-    """Log density of one reading's residual."""
-    wide = sd * scale
-    square = (residual / wide) ** 2
-    if degrees > 0.0:
-        constant = math.lgamma(0.5 * (degrees + 1.0)) - math.lgamma(0.5 * degrees)
-        constant -= 0.5 * math.log(degrees * math.pi) + math.log(wide)
-        return constant - 0.5 * (degrees + 1.0) * math.log1p(square / degrees)
-    if share == 0.0:
-        return -0.5 * square - math.log(wide) - _LOG_SQRT_2PI
-    usual = math.log(1.0 - share) - 0.5 * square
-    outlying = math.log(share / OUTLIER_FACTOR) - 0.5 * square / (OUTLIER_FACTOR * OUTLIER_FACTOR)
-    either = max(usual, outlying) + math.log1p(math.exp(-abs(usual - outlying)))
-    return either - math.log(wide) - _LOG_SQRT_2PI
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -97,16 +82,111 @@ def _nearest(event, sensor, low, high, shift, readings):  # type: ignore[no-unty
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
+def _log_student(event, low, high, readings, errors, case):  # type: ignore[no-untyped-def]
+    """Log likelihood of the observed readings under Student's t, in one case of the mixture."""
+    total, degrees, scale = 0.0, errors.degrees, errors.scales[case]
+    constant = math.lgamma(0.5 * (degrees + 1.0)) - math.lgamma(0.5 * degrees)
+    constant -= 0.5 * math.log(degrees * math.pi)
+    for j in range(readings.values.shape[1]):
+        if readings.observed[event, j]:
+            residual, sd = _nearest(event, j, low[j], high[j], 0.0, readings)
+            wide = sd * scale
+            total += constant - math.log(wide)
+            total -= 0.5 * (degrees + 1.0) * math.log1p((residual / wide) ** 2 / degrees)
+    return total
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _multiplied(product, total, usual, outlying, square, share):  # type: ignore[no-untyped-def]
+    """A product of densities with one more: as a product, and a sum of logarithms where it is tiny.
+
+    `usual` and `outlying` are the exponentials of minus half the square, and of that over an outlier's width.
+    """
+    density = (1.0 - share) * usual + share / OUTLIER_FACTOR * outlying
+    if density > _TINY:
+        product *= density
+    elif share > 0.0:
+        total += math.log(share / OUTLIER_FACTOR) - 0.5 * square / (OUTLIER_FACTOR * OUTLIER_FACTOR)
+    else:
+        total -= 0.5 * square
+    if product < _SMALL:
+        return 1.0, total + math.log(product)
+    return product, total
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _log_two_cases(event, low, high, readings, errors, a, b):  # type: ignore[no-untyped-def]
+    """Log likelihood of the observed readings in two cases of the mixture, of the same scale or not.
+
+    One logarithm for many readings, and exponentials that the cases share: this is what most of the time of a
+    calibration goes into.
+    """
+    scale_a, scale_b, share_a, share_b = (
+        errors.scales[a],
+        errors.scales[b],
+        errors.shares[a],
+        errors.shares[b],
+    )
+    product_a, product_b, product_sd = 1.0, 1.0, 1.0
+    total_a, total_b, total_sd, n = 0.0, 0.0, 0.0, 0
+    for j in range(readings.values.shape[1]):
+        if not readings.observed[event, j]:
+            continue
+        residual, sd = _nearest(event, j, low[j], high[j], 0.0, readings)
+        n += 1
+        product_sd *= sd
+        if not _SMALL < product_sd < 1.0 / _SMALL:
+            total_sd, product_sd = total_sd + math.log(product_sd), 1.0
+        square = (residual / (sd * scale_a)) ** 2
+        usual = math.exp(-0.5 * square)
+        outlying = math.exp(-0.5 * square / (OUTLIER_FACTOR * OUTLIER_FACTOR))
+        product_a, total_a = _multiplied(product_a, total_a, usual, outlying, square, share_a)
+        if scale_b != scale_a:
+            square = (residual / (sd * scale_b)) ** 2
+            usual = math.exp(-0.5 * square)
+            outlying = math.exp(-0.5 * square / (OUTLIER_FACTOR * OUTLIER_FACTOR))
+        product_b, total_b = _multiplied(product_b, total_b, usual, outlying, square, share_b)
+    common = total_sd + math.log(product_sd) + n * _LOG_SQRT_2PI
+    log_a = total_a + math.log(product_a) - n * math.log(scale_a) - common
+    log_b = total_b + math.log(product_b) - n * math.log(scale_b) - common
+    return log_a, log_b
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _normal_sums(event, low, high, readings):  # type: ignore[no-untyped-def]
+    """Of the observed readings: squares in standard deviations, minus the log constants, and how many."""
+    squares, constants, n = 0.0, 0.0, 0
+    for j in range(readings.values.shape[1]):
+        if readings.observed[event, j]:
+            residual, sd = _nearest(event, j, low[j], high[j], 0.0, readings)
+            squares += (residual / sd) ** 2
+            constants += math.log(sd) + _LOG_SQRT_2PI
+            n += 1
+    return squares, constants, n
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
 def _log_independent(event, low, high, readings, errors):  # type: ignore[no-untyped-def]
     """Log likelihood of the observed readings, independent within each case of the mixture."""
-    n_sensors = readings.values.shape[1]
-    most, total = -np.inf, 0.0
-    for case in range(errors.weights.size):
-        term = math.log(errors.weights[case])
-        for j in range(n_sensors):
-            if readings.observed[event, j]:
-                residual, sd = _nearest(event, j, low[j], high[j], 0.0, readings)
-                term += _log_reading(residual, sd, errors.scales[case], errors.shares[case], errors.degrees)
+    n_cases, outliers = errors.weights.size, False
+    for case in range(n_cases):
+        outliers |= errors.shares[case] > 0.0
+    squares, constants, n = 0.0, 0.0, 0
+    if not outliers and errors.degrees == 0.0:
+        squares, constants, n = _normal_sums(event, low, high, readings)
+    most, total, second = -np.inf, 0.0, 0.0
+    for case in range(n_cases):
+        if errors.degrees > 0.0:
+            term = _log_student(event, low, high, readings, errors, case)
+        elif not outliers:
+            scale = errors.scales[case]
+            term = -0.5 * squares / (scale * scale) - n * math.log(scale) - constants
+        elif case % 2 == 0:
+            other = min(case + 1, n_cases - 1)
+            term, second = _log_two_cases(event, low, high, readings, errors, case, other)
+        else:
+            term = second
+        term += math.log(errors.weights[case])
         if term > most:
             total = total * math.exp(most - term) + 1.0
             most = term
@@ -147,7 +227,8 @@ def _bound_correlated(event, low, high, readings, common):  # type: ignore[no-un
             if readings.observed[event, j]:
                 own = 1.0 - common if readings.is_velocity[j] else 1.0
                 residual, sd = _nearest(event, j, low[j], high[j], math.sqrt(common) * c, readings)
-                term += _log_reading(residual, sd, math.sqrt(own), 0.0, 0.0)
+                wide = sd * math.sqrt(own)
+                term -= 0.5 * (residual / wide) ** 2 + math.log(wide) + _LOG_SQRT_2PI
         most = max(most, term)
     return most
 

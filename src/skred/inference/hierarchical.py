@@ -29,7 +29,7 @@ from skred.inference.population import (
     spread_parameters,
 )
 from skred.inference.problem import Problem
-from skred.inference.rough_population import rough_population
+from skred.inference.rough_population import RoughPopulation, rough_population
 from skred.inference.surface import Surfaces, build_surfaces
 from skred.physics.geometry import sensor_table
 from skred.physics.kernel import simulate
@@ -48,6 +48,8 @@ _MEDIAN_LOG_MEAN, _MEDIAN_LOG_SD = -0.64, 1.1
 """Mean and standard deviation of the log of a half-normal variable of scale 1."""
 _COARSE_CELL = 0.25
 _CHECKED_EVENTS, _CHECKED_DRAWS = 24, 40
+_LEAST_CHECKED, _CHECKED_RUNS, _FINER_COSTS = 6, 3_000_000, 6.0
+"""Events checked at least, runs of the kernel a check may take, and how many more it takes than usual."""
 _SHARP_RUNOUT_M = 4.0
 INTEGRATION_LIMIT = 0.2
 """Largest error of the log likelihood over 22 events, in nats."""
@@ -68,6 +70,7 @@ class HierarchicalProblem(Problem):
     place_sd_m: float = PLACE_SD_M
     # Not init: a problem made from this one by `replace` must not keep what belongs to other recordings.
     _surfaces: dict[tuple[str, ...], Surfaces] = field(init=False, default_factory=dict, repr=False)
+    _rough: dict[tuple[str, ...], RoughPopulation] = field(init=False, default_factory=dict, repr=False)
     _errors: dict[tuple[str, ...], FloatArray] = field(init=False, default_factory=dict, repr=False)
 
     likelihood = "hierarchical"
@@ -213,8 +216,11 @@ class HierarchicalProblem(Problem):
         box = np.column_stack([scale - _BELOW_SCALE - wider, scale + _ABOVE_SCALE + wider])
         n = len(mechanisms)
         resolution = replace(resolution, narrow=resolution.narrow * self._sharpness)
-        coarse = build_surfaces(self.fronts(mechanisms), box, COARSE, np.full(n, _COARSE_CELL))
-        rough = rough_population(coarse, scale + _MEDIAN_LOG_MEAN, np.full(n, _MEDIAN_LOG_SD))
+        key = _key(mechanisms)
+        if key not in self._rough:
+            coarse = build_surfaces(self.fronts(mechanisms), box, COARSE, np.full(n, _COARSE_CELL))
+            self._rough[key] = rough_population(coarse, scale + _MEDIAN_LOG_MEAN, np.full(n, _MEDIAN_LOG_SD))
+        rough = self._rough[key]
         return build_surfaces(fronts, box, resolution, rough.cell / fineness, rough.envelope(fineness))
 
     @cached_property
@@ -228,11 +234,13 @@ class HierarchicalProblem(Problem):
     def integration_errors(self, law: Law, samples: Mapping[str, Any], seed: int = 0) -> FloatArray:
         """Differences of event log densities to a much finer integration, (n, n_checked_events).
 
-        Of at most 24 events, drawn at random from larger campaigns; positive where the usual is larger.
+        Of at most 24 events drawn at random, fewer where they take long; positive where the usual is larger.
         """
         n_events = self.campaign.n_events
+        runs_each = _FINER_COSTS * self.surfaces(law.mechanisms).n_runs / n_events
+        n_checked = int(np.clip(_CHECKED_RUNS / runs_each, _LEAST_CHECKED, _CHECKED_EVENTS))
         rng = np.random.default_rng([seed, 5])
-        chosen = np.sort(rng.permutation(n_events)[:_CHECKED_EVENTS])
+        chosen = np.sort(rng.permutation(n_events)[:n_checked])
         fronts = self.fronts(law.mechanisms)
         readings, releases = fronts.readings, fronts.releases
         fronts = fronts._replace(

@@ -155,8 +155,13 @@ def _patches(
     n_runs: int,
 ) -> Surfaces:
     """Gather nodes by event and cell, into weights and moments."""
-    keys = np.column_stack([event, np.floor((points[:, :-1] - origin[event]) / cell).astype(np.int64)])
-    found, group = np.unique(keys, axis=0, return_inverse=True)
+    cells = np.floor((points[:, :-1] - origin[event]) / cell).astype(np.int64).T
+    lowest = cells.min(axis=1, keepdims=True)
+    sizes = np.append(event.max() + 1, (cells - lowest).max(axis=1) + 1)
+    # One number instead of a row: sorting rows takes ten times as long.
+    keys = np.ravel_multi_index(np.vstack([event, cells - lowest]), sizes)
+    found, group = np.unique(keys, return_inverse=True)
+    event_found = np.unravel_index(found, sizes)[0]
     most = np.full(len(found), -np.inf)
     np.maximum.at(most, group, log_weights)
     weight = np.exp(log_weights - most[group])
@@ -169,7 +174,7 @@ def _patches(
         for j in range(i + 1):
             moment = np.bincount(group, weight * deviation[:, i] * deviation[:, j]) / total
             covariance[:, i, j] = covariance[:, j, i] = moment
-    first = np.append(np.searchsorted(found[:, 0], events), len(found))
+    first = np.append(np.searchsorted(event_found, events), len(found))
     return Surfaces(first, most + np.log(total), mean, covariance, n_runs)
 
 
