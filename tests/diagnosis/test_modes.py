@@ -15,6 +15,7 @@ from skred.diagnosis.extension import Extension, extended
 from skred.diagnosis.modes import Population, Rows, event_modes, log_joint, look_around, take_rows
 from skred.diagnosis.replicas import replicas
 from skred.inference.error_model import ERROR_MODELS
+from skred.physics.mechanisms import mechanisms
 
 NONE = np.zeros(0)
 BASES = {"sparse": sparse_base, "dense": dense_base}
@@ -183,3 +184,20 @@ def test_replicas_under_other_errors(model: str) -> None:
         share = float(errors.weights @ errors.shares)
         expected = float(errors.weights @ errors.scales**2) * (1.0 + 35.0 * share)
         assert z.var() == pytest.approx(expected, rel=0.2)
+
+
+def test_a_front_at_the_edge_of_stopping_has_no_slope_without_end() -> None:
+    """Friction that falls with speed: found as a matrix that could not be inverted."""
+    base = ryggfonn_base("pcm")
+    weakening = mechanisms()["velocity_weakening"]
+    assert weakening.added is not None
+    steepest = []
+    for shape in weakening.added.shapes(base.setting):
+        extension = extended(base.problem, base.law, (weakening.added.direction(base.setting, shape),))
+        friction = np.linspace(-1.5, -1.0, 4001)
+        points = np.column_stack([friction, np.full((len(friction), 2), [-6.9, 0.0])])
+        rows = base.rows.take(np.full(len(friction), 7))
+        around = look_around(extension, rows, points, np.array([0.7]))
+        steepest.append(float(np.sqrt(np.einsum("rii->ri", around.information).max())))
+        np.linalg.inv(around.information + np.eye(3))
+    assert 1e3 < max(steepest) < 1e5

@@ -20,7 +20,7 @@ from skred.diagnosis.curves import Base, Curve
 from skred.diagnosis.event_nodes import Budget
 from skred.diagnosis.extension import Extension
 from skred.diagnosis.modes import Population, Rows, take_rows
-from skred.diagnosis.tables import BUDGETS, Located, Tables, build_tables, exact_nodes, locate
+from skred.diagnosis.tables import BUDGETS, Located, Tables, build_tables, exact_nodes, finer, locate
 from skred.diagnosis.tabulated_op import tabulated_log_densities
 from skred.inference.event_density import integrated_log_density
 from skred.inference.hierarchical import INTEGRATION_LIMIT, HierarchicalProblem
@@ -42,7 +42,7 @@ _EXACT = Budget(1024, 512, 1.5, 1.8)
 _EXACT_RUNS = 16 * 22
 """Events times draws up to which there are so many nodes; where there are fewer, more."""
 _EXACT_EVENTS, _EXACT_DRAWS = 24, 16
-_ROUGH_DRAWS, _ROUGH_RUNS, _ENOUGH = 4, 4 * 22, 0.6
+_ROUGH_DRAWS, _ROUGH_RUNS, _ENOUGH = 8, 8 * 22, 0.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -296,7 +296,11 @@ def augmented_problem(base: Base, curves: Sequence[Curve]) -> AugmentedProblem:
     for budget in BUDGETS:
         problem = _with_tables(base, added, build_tables(base, extension, located, budget))
         if _rough_error(problem, located) < _ENOUGH * INTEGRATION_LIMIT:
-            break
+            return problem
+    if len(added) == 1:
+        # More nodes do not help where a likelihood bends with the strength, between the tables' strengths.
+        located = finer(base, extension, located)
+        problem = _with_tables(base, added, build_tables(base, extension, located, BUDGETS[-1]))
     return problem
 
 

@@ -163,11 +163,23 @@ def diagnose(
     effort: Effort,
     tell: Tell = lambda line: None,
 ) -> Diagnosis:
-    """Diagnose a base law on a campaign."""
+    """Diagnose a base law on a campaign; where the numerics break down that is an answer, and told."""
     clock = Clock(tell)
     reason = too_little(problem)
     if reason:
         return Diagnosis(problem, law, cannot=reason)
+    try:
+        return _steps(problem, law, settings, effort, clock)
+    except np.linalg.LinAlgError as error:
+        clock.end()
+        why = f"the numerics broke down in {list(clock.seconds)[-1]!r}: {error}"
+        return Diagnosis(problem, law, why, seconds=clock.seconds)
+
+
+def _steps(
+    problem: HierarchicalProblem, law: Law, settings: SamplerSettings, effort: Effort, clock: Clock
+) -> Diagnosis:
+    """All steps of a diagnosis."""
     clock.stage("base", f"{law.id}: calibrating the base law")
     calibration = calibrate(problem, law, settings)
     if not calibration.gate.passed:

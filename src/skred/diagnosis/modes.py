@@ -17,6 +17,8 @@ IntArray = NDArray[np.int64]
 _LARGEST_STEP = 1.0
 _STARTING_DAMPING = 1e-3
 _SETTLED = 1e-3
+_STEEPEST = 1e4
+"""Largest change of a reading, in standard deviations, per unit of an event's log strength."""
 
 
 class Rows(NamedTuple):
@@ -107,6 +109,10 @@ def look_around(extension: Extension, rows: Rows, points: FloatArray, strengths:
     predictions, by_points, by_strengths = extension.tangents(rows.event, points, strengths)
     at = np.arange(len(points))
     slope, curvature = reading_slopes(at, predictions, rows.readings, rows.errors)
+    # Where friction falls with speed a front can be at the very edge of stopping: a slope without end.
+    steepest = np.sqrt(curvature) * np.abs(by_points).max(axis=2)
+    limited = 1.0 / np.maximum(steepest / _STEEPEST, 1.0)
+    by_points, by_strengths = by_points * limited[:, :, None], by_strengths * limited[:, :, None]
     return Modes(points, points, predictions, by_points, by_strengths, slope, curvature)
 
 

@@ -14,7 +14,7 @@ from scipy.interpolate import RegularGridInterpolator
 from skred.diagnosis.curves import Base, Curve, Fit, _repeated, refit
 from skred.diagnosis.event_nodes import Budget, event_nodes
 from skred.diagnosis.extension import Extension
-from skred.diagnosis.modes import Population, Rows, event_modes
+from skred.diagnosis.modes import Population, Rows, event_modes, log_joint
 from skred.inference.surface import Nodes
 from skred.physics.mechanisms.spec import Added
 
@@ -170,7 +170,19 @@ def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located
         grid = new if refined else _grid(mean, factor, low, high, support, _LOOKING[n_axes])
     else:
         fits, _ = _look(base, extension, grid, scale, start)
-    return Located(grid, _without_failures(fits, best), mean, factor)
+    return Located(grid, _without_failures(fits, fits[best]), mean, factor)
+
+
+def finer(base: Base, extension: Extension, located: Located) -> Located:
+    """The same with half the steps between strengths."""
+    old = located.grid
+    grid = Grid(old.origin, 0.5 * old.steps, 2 * old.size - 1)
+    near = [located.fits[k] for k in old.nearest(grid.points)]
+    given = np.column_stack([np.tile(base.strengths, (len(near), 1)), grid.points])
+    start = (base.population, base.fit.points)
+    fits = refit(extension, base.rows, given, start, base.log_scale, n_rounds=1, fits=near)
+    kept = [_without_failures([one], before) for one, before in zip(fits, near, strict=True)]
+    return located._replace(grid=grid, fits=[one for (one,) in kept])
 
 
 class Support(NamedTuple):
@@ -271,10 +283,10 @@ def _posterior(
     return mean, factor, np.maximum(low, -_FARTHEST), np.minimum(high, _FARTHEST)
 
 
-def _without_failures(fits: Sequence[Fit], best: int) -> list[Fit]:
-    """Fits, those that came to nothing replaced by the best."""
+def _without_failures(fits: Sequence[Fit], instead: Fit) -> list[Fit]:
+    """Fits, those that came to nothing replaced by another."""
     return [
-        fit if np.isfinite(fit.found.psi).all() and np.isfinite(fit.found.covariance).all() else fits[best]
+        fit if np.isfinite(fit.found.psi).all() and np.isfinite(fit.found.covariance).all() else instead
         for fit in fits
     ]
 
@@ -300,7 +312,7 @@ def build_tables(base: Base, extension: Extension, located: Located, budget: Bud
     population = Population(
         np.concatenate([one.mean for one in found]), np.concatenate([one.covariance for one in found])
     )
-    start = np.concatenate([fit.points for fit in fits])
+    start = _highest(extension, rows, np.stack([fit.points for fit in fits]), given, population)
     modes = event_modes(extension, rows, start, given, population, n_steps=8)
     # Populations of the posterior differ in mean and in spread.
     covariances = np.stack([fit.found.covariance for fit in fits])
@@ -314,6 +326,31 @@ def build_tables(base: Base, extension: Extension, located: Located, budget: Bud
     release = remembering.asked[0][:, n].copy()
     points = modes.points.reshape(n_tables, n_events, n + 1)
     return Tables(grid, nodes, release, points, mean, factor, budget)
+
+
+def _highest(
+    extension: Extension, rows: Rows, points: FloatArray, strengths: FloatArray, population: Population
+) -> FloatArray:
+    """The highest of the modes found from each table's own points and from its neighbours', as rows.
+
+    Avalanches that stop at a place or pass it have two modes, and a table that is in the lower one of an
+    event would stand out between its neighbours.
+    """
+    best = event_modes(extension, rows, _flat(points), strengths, population, n_steps=8).points
+    height = log_joint(extension, rows, best, strengths, population)
+    found = best.reshape(points.shape)
+    for side in (1, -1):
+        start = _flat(np.roll(found, side, axis=0))
+        tried = event_modes(extension, rows, start, strengths, population, n_steps=8).points
+        new = log_joint(extension, rows, tried, strengths, population)
+        best = np.where((new > height)[:, None], tried, best)
+        height = np.maximum(new, height)
+    return best
+
+
+def _flat(points: FloatArray) -> FloatArray:
+    """Points of all tables, (n_tables, n_events, n), as rows."""
+    return points.reshape(-1, points.shape[-1])
 
 
 def exact_nodes(

@@ -66,7 +66,10 @@ def recur_with_speed(first, ground, table, keep, gain, per_source, u_c, limits, 
             excess = carried + speed_part - u1 * u1
             by_mean = linear - weakening * relative * relative / u_c
             by_end = (2.0 * u1 + u0 - 1.5 * mean) * per_total
-            u1 -= excess / (by_mean * by_end - 2.0 * u1)
+            left = 2.0 * u1 - by_mean * by_end
+            if not left > u1:  # close to where there are two solutions, or none
+                break
+            u1 += excess / left
             # Newton's error is squared in each step: after this one it is below rounding.
             if abs(excess) <= _NEAR * v0:
                 v1, solved = u1 * u1, True
