@@ -14,8 +14,8 @@ Written by `python benchmarks/ryggfonn_diagnoses.py` from `benchmarks/results/ry
 is the tool's own. 22 avalanches on the natural terrain, the catching dam (15 m high, crown at s = 1940 m,
 upstream foot at 1910 m) withheld. Log Bayes factors are against nothing, in nats, shapes and strengths
 integrated over, under the error models that were raced; probabilities use the prior odds of the campaign
-format. Left-out gains compare the augmented law under the error model it leads in with the base law under the
-default one: where both were raced, part of a gain can be the error model's.
+format. Left-out gains compare the augmented law with the base law under one error model, the one that the
+winner leads in.
 """
 
 
@@ -40,7 +40,7 @@ def _base(title: str, one: Found) -> str:
     return f"""## {title}
 
 Verdict `{one["verdict"]}`{_named(one)}; omnibus p = {_number(one["evidence"]["p_value"])}, error models
-raced: {", ".join(one.get("error_models", []))}.
+raced: {", ".join(one.get("error_models", []))}{_under(one)}.
 
 > {one["statement"]}
 
@@ -50,6 +50,10 @@ raced: {", ".join(one.get("error_models", []))}.
 
 ![Where: the missing retardation along the track](figures/ryggfonn-{name}-where.png)
 """
+
+
+def _under(one: Found) -> str:
+    return f"; before and after under {one['error_model']} errors" if one.get("error_model") else ""
 
 
 def _row(row: Found, probability: float) -> str:

@@ -1,0 +1,161 @@
+"""The published record: concealed trials that were sealed, diagnosed, revealed; and docs/proof.md.
+
+``python benchmarks/proof_page.py --add DIR`` takes a revealed proof folder into the record
+(``results/proof/<seed>/``: ledger, opened truths with their salts, answers without their predictors);
+without ``--add`` it only writes the page anew. The page scores all batches together.
+
+A batch is one ledger. Batches are added as time allows, each with a seed of its own; none is left out.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated, Any
+
+import cyclopts
+
+from skred.prove.ledger import ledger_sha256
+from skred.prove.scorecard import scorecard
+from skred.work.output import write_json, write_text
+
+ROOT = Path(__file__).resolve().parent.parent
+RECORD = ROOT / "benchmarks" / "results" / "proof"
+FIGURES = ROOT / "docs" / "figures"
+Found = Mapping[str, Any]
+_HEAD = """# The record of concealed trials
+
+Written by `python benchmarks/proof_page.py` from `benchmarks/results/proof/`. Each batch was sealed before its
+first diagnosis (`skred prove seal`: salted SHA-256 of truth, campaign, settings and source), diagnosed by
+processes that were given the campaign alone (`skred prove run`), then opened and verified (`skred prove
+reveal`). A crash or a time-out is a wrong answer; every trial of every batch is counted. Scores are defined in
+`src/skred/prove/scores*.py`.
+"""
+
+
+def add(folder: Path) -> None:
+    """Take a revealed proof folder into the record."""
+    ledger = json.loads((folder / "ledger.json").read_text(encoding="utf-8"))
+    target = RECORD / str(ledger["seed"])
+    names = [entry["trial"] for entry in ledger["trials"]]
+    write_json(target / "ledger.json", ledger)
+    sealed = {name: json.loads((folder / "sealed" / f"{name}.json").read_text("utf-8")) for name in names}
+    answers: dict[str, dict[str, Any]] = {}
+    for method in sorted((folder / "answers").iterdir()):
+        answers[method.name] = {name: _answer(folder, method.name, name) for name in names}
+    write_json(target / "sealed.json", sealed)
+    write_json(target / "answers.json", answers)
+
+
+def _answer(folder: Path, method: str, name: str) -> dict[str, Any]:
+    """An answer without its predictors, its realised gain with it."""
+    answer = json.loads((folder / "answers" / method / f"{name}.json").read_text(encoding="utf-8"))
+    answer.pop("predictors", None)
+    gain = folder / "gains" / method / f"{name}.json"
+    if gain.exists():
+        found = json.loads(gain.read_text(encoding="utf-8"))["gain"]
+        answer["gain"] = {**(answer.get("gain") or {}), **found}
+    return answer
+
+
+def gathered(batches: Sequence[Path]) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
+    """Trials with their truths, and answers by method, of all batches, named by seed and trial."""
+    trials, answers = [], dict[str, dict[str, Any]]()
+    for batch in batches:
+        sealed = json.loads((batch / "sealed.json").read_text(encoding="utf-8"))
+        trials += [{"trial": f"{batch.name}/{name}", "truth": one["truth"]} for name, one in sealed.items()]
+        given = json.loads((batch / "answers.json").read_text(encoding="utf-8"))
+        for method, by_trial in given.items():
+            mine = answers.setdefault(method, {})
+            mine.update({f"{batch.name}/{name}": answer for name, answer in by_trial.items()})
+    return trials, answers
+
+
+def page(batches: Sequence[Path], document: Found, figures: Sequence[str]) -> str:
+    """The whole page."""
+    parts = [_HEAD, "## Batches\n", _batches(batches), "## Bars\n", _bars(document)]
+    parts += [f"![{name.replace('_', ' ')}](figures/proof-{name}.png)\n" for name in figures]
+    parts += ["## What it got wrong\n", _wrong(batches)]
+    return "\n".join(parts)
+
+
+def _batches(batches: Sequence[Path]) -> str:
+    rows = [
+        "| seed | trials | sealed (UTC) | SHA-256 of the ledger | source |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for batch in batches:
+        ledger = json.loads((batch / "ledger.json").read_text(encoding="utf-8"))
+        rows.append(
+            f"| {ledger['seed']} | {ledger['n']} ({ledger['kind']}) | {ledger['created_utc']} |"
+            f" `{ledger_sha256(ledger)}` | `{ledger['source_sha256'][:12]}` |"
+        )
+    return "\n".join(rows) + "\n"
+
+
+def _bars(document: Found) -> str:
+    rows = ["| goal | what | bar | measured (95 %) | trials | |", "| --- | --- | --- | --- | --- | --- |"]
+    for one in document["bars"]:
+        limit = [f"at least {one['at_least']:g}"] if one["at_least"] is not None else []
+        limit += [f"at most {one['at_most']:g}"] if one["at_most"] is not None else []
+        between = f" ({one['low']:.3g} to {one['high']:.3g})" if one["low"] is not None else ""
+        measured = "-" if one["measured"] is None else f"{one['measured']:.3g}{between}"
+        cells = (one["goal"], one["what"], ", ".join(limit), measured, one["n"], one["status"])
+        rows.append(f"| {' | '.join(map(str, cells))} |")
+    return "\n".join(rows) + "\n"
+
+
+def _wrong(batches: Sequence[Path]) -> str:
+    """Every trial in which something was alarmed, named or missed wrongly."""
+    rows = [
+        "| trial | what was hidden | signal-to-noise | verdict | named | P(nothing) |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    trials, answers = gathered(batches)
+    for one in trials:
+        answer, truth = answers["skred"][one["trial"]], one["truth"]
+        ids = {hidden["id"] for hidden in truth["mechanisms"]}
+        named = [answer["mechanism"], *answer["indistinguishable"]] if answer.get("mechanism") else []
+        alarm = answer["verdict"] in ("missing_physics", "instrument", "unexplained")
+        unlisted = truth["hidden"] == "unlisted"
+        right = (set(named) & ids or (unlisted and answer["verdict"] == "unexplained")) if ids else not alarm
+        if not right:
+            hidden = " + ".join(sorted(ids)) or truth["nasty"] or "nothing"
+            nothing = answer.get("probability", {}).get("nothing")
+            rows.append(
+                f"| {one['trial']} {truth['kind']} | {hidden}{' (unlisted)' if unlisted else ''} |"
+                f" {truth['snr']:.1f} | {answer['verdict']} | {', '.join(named)} |"
+                f" {'-' if nothing is None else f'{nothing:.2f}'} |"
+            )
+    return "\n".join(rows) + "\n"
+
+
+app = cyclopts.App(help=__doc__)
+
+
+@app.default
+def main(
+    *,
+    new: Annotated[Path | None, cyclopts.Parameter(name="--add", help="Revealed proof folder.")] = None,
+) -> None:
+    """Write the page, after taking in another batch if one is given."""
+    from skred.report.scorecard_figures import save_scorecard_figures
+
+    if new is not None:
+        add(new)
+    batches = sorted((one for one in RECORD.iterdir() if one.is_dir()), key=lambda one: int(one.name))
+    trials, answers = gathered(batches)
+    document = scorecard({"n": len(trials)}, trials, answers)
+    write_json(RECORD / "scorecard.json", document)
+    with TemporaryDirectory() as folder:
+        figures = save_scorecard_figures(document, Path(folder))
+        for name, file in figures.items():
+            shutil.copy(file, FIGURES / f"proof-{name}.png")
+    write_text(ROOT / "docs" / "proof.md", page(batches, document, list(figures)))
+
+
+if __name__ == "__main__":
+    app()
