@@ -28,11 +28,11 @@ FIGURES = ROOT / "docs" / "figures"
 Found = Mapping[str, Any]
 _HEAD = """# The record of concealed trials
 
-Written by `python benchmarks/proof_page.py` from `benchmarks/results/proof/`. Each batch was sealed before its
-first diagnosis (`skred prove seal`: salted SHA-256 of truth, campaign, settings and source), diagnosed by
+Written by `python benchmarks/proof_page.py` from `benchmarks/results/proof/`. Each batch was sealed before
+its first diagnosis (`skred prove seal`: salted SHA-256 of truth, campaign, settings and source), diagnosed by
 processes that were given the campaign alone (`skred prove run`), then opened and verified (`skred prove
-reveal`). A crash or a time-out is a wrong answer; every trial of every batch is counted. Scores are defined in
-`src/skred/prove/scores*.py`.
+reveal`). A crash or a time-out is a wrong answer; every trial of every batch is counted. Scores are defined
+in `src/skred/prove/scores*.py`.
 """
 
 
