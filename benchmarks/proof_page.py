@@ -41,6 +41,7 @@ def add(folder: Path) -> None:
     ledger = json.loads((folder / "ledger.json").read_text(encoding="utf-8"))
     target = RECORD / str(ledger["seed"])
     names = [entry["trial"] for entry in ledger["trials"]]
+    target.mkdir(parents=True, exist_ok=True)
     write_json(target / "ledger.json", ledger)
     sealed = {name: json.loads((folder / "sealed" / f"{name}.json").read_text("utf-8")) for name in names}
     answers: dict[str, dict[str, Any]] = {}
@@ -61,10 +62,15 @@ def _answer(folder: Path, method: str, name: str) -> dict[str, Any]:
     return answer
 
 
+def _is_open(batch: Path) -> bool:
+    """Whether a batch has been revealed; until then its folder holds the ledger alone."""
+    return (batch / "sealed.json").exists()
+
+
 def gathered(batches: Sequence[Path]) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
     """Trials with their truths, and answers by method, of all batches, named by seed and trial."""
     trials, answers = [], dict[str, dict[str, Any]]()
-    for batch in batches:
+    for batch in filter(_is_open, batches):
         sealed = json.loads((batch / "sealed.json").read_text(encoding="utf-8"))
         trials += [{"trial": f"{batch.name}/{name}", "truth": one["truth"]} for name, one in sealed.items()]
         given = json.loads((batch / "answers.json").read_text(encoding="utf-8"))
@@ -84,14 +90,15 @@ def page(batches: Sequence[Path], document: Found, figures: Sequence[str]) -> st
 
 def _batches(batches: Sequence[Path]) -> str:
     rows = [
-        "| seed | trials | sealed (UTC) | SHA-256 of the ledger | source |",
-        "| --- | --- | --- | --- | --- |",
+        "| seed | trials | sealed (UTC) | SHA-256 of the ledger | source | |",
+        "| --- | --- | --- | --- | --- | --- |",
     ]
     for batch in batches:
         ledger = json.loads((batch / "ledger.json").read_text(encoding="utf-8"))
         rows.append(
             f"| {ledger['seed']} | {ledger['n']} ({ledger['kind']}) | {ledger['created_utc']} |"
             f" `{ledger_sha256(ledger)}` | `{ledger['source_sha256'][:12]}` |"
+            f" {'opened' if _is_open(batch) else 'not opened yet'} |"
         )
     return "\n".join(rows) + "\n"
 
