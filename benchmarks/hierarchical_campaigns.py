@@ -29,9 +29,9 @@ import skred.inference
 import skred.physics
 from skred.campaign import Event, Sensor, Status, find_campaign, read_campaign
 from skred.inference.error_model import Errors, EventReadings
-from skred.inference.event_density import OUTLIER_FACTOR
 from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
 from skred.inference.population import correlation_parameters, population_of, spread_parameters
+from skred.inference.reading_density import OUTLIER_FACTOR
 from skred.physics.kernel import simulate
 from skred.physics.law import Law
 
@@ -44,7 +44,7 @@ TYPICAL = {"pcm": (0.287, 0.00226), "coulomb": (0.531,), "constant": (4.66,), "v
 TYPICAL_SPREAD = 0.13
 _DECISIVE = (
     "bisection", "error_model", "event_density", "event_draws", "hierarchical", "integrated_op",
-    "joint_metropolis", "population", "rough_population", "sampling", "surface",
+    "joint_metropolis", "population", "reading_density", "rough_population", "sampling", "surface",
 )  # fmt: skip
 
 

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.inference.event_density import log_likelihoods
 from skred.inference.hierarchical import HierarchicalProblem
+from skred.inference.reading_density import log_likelihoods
 from skred.physics.kernel import simulate
 from skred.physics.law import Law
 

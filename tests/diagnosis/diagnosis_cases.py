@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from skred.campaign import Campaign, find_campaign, read_campaign
+from skred.campaign.parts import of_events
 from skred.diagnosis.curves import Base, fit_base
 from skred.diagnosis.extension import extended
 from skred.diagnosis.mixed import fit_population, mean_prior, starting_population
@@ -28,18 +29,7 @@ def trial(seed: int, kind: Kind, hidden: str, base: str, snr: float | None = Non
 
 
 def first_events(campaign: Campaign, n: int) -> Campaign:
-    return with_events(campaign, list(range(n)))
-
-
-def with_events(campaign: Campaign, chosen: list[int]) -> Campaign:
-    """Some events of a campaign, in this order."""
-    return replace(
-        campaign,
-        events=tuple(campaign.events[k] for k in chosen),
-        values=campaign.values[chosen],
-        status=campaign.status[chosen],
-        stated_sd=campaign.stated_sd[chosen],
-    )
+    return of_events(campaign, range(n))
 
 
 def with_sensors(campaign: Campaign, chosen: list[int]) -> Campaign:

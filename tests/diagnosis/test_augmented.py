@@ -15,14 +15,16 @@ from scipy.stats import halfnorm, lognorm, norm
 
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.diagnosis.augmented import AugmentedProblem, augmented_problem
-from skred.diagnosis.curves import Base, Curve, curve, curve_near, fit_base
+from skred.diagnosis.curves import Base, Curve, curve, curve_near, fit_base, repeated
 from skred.diagnosis.event_nodes import ROUGH
 from skred.diagnosis.extension import extended
 from skred.diagnosis.mixed import fit_population, mean_prior, starting_population
-from skred.diagnosis.modes import campaign_rows
+from skred.diagnosis.modes import Population, campaign_rows, log_joint
+from skred.diagnosis.tables import finer, highest, locate
 from skred.diagnosis.tabulated_op import TabulatedLogDensity, tabulated_log_density
-from skred.inference.event_density import integrated_log_density, log_likelihoods
+from skred.inference.event_density import integrated_log_density
 from skred.inference.hierarchical import hierarchical_problem
+from skred.inference.reading_density import log_likelihoods
 from skred.inference.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 from skred.inference.sampling import SamplerSettings
 from skred.laws import load_law
@@ -224,3 +226,38 @@ def test_what_cannot_be_is_refused(base: Base, drag: Curve, problem: AugmentedPr
         inputs = [pt.as_tensor_variable(value) for value in problem.tables.arrays.values()]
         density = TabulatedLogDensity()(np.zeros((3, 1)), np.ones((1, 1)), strengths, *inputs)
         pt.grad(density.sum(), strengths)
+
+
+def test_finer_tables_hold_the_old_ones(base: Base, drag: Curve) -> None:
+    """Half the steps, the same range; fits at old strengths stay what they were but for the sums' noise."""
+    extension = extended(base.problem, base.law, (drag.direction,))
+    old = locate(base, extension, [drag])
+    new = finer(base, extension, old)
+    assert_allclose(new.grid.points[::2], old.grid.points, rtol=1e-12)
+    assert len(new.grid.points) == 2 * len(old.grid.points) - 1
+    before = [fit.found.log_evidence for fit in old.fits]
+    after = [fit.found.log_evidence for fit in new.fits]
+    assert_allclose(after[::2], before, atol=0.05)
+    between = 0.5 * (np.array(before[1:]) + before[:-1])
+    assert_allclose(after[1::2], between, atol=0.5)
+
+
+def test_a_table_in_the_lower_mode_is_lifted_by_its_neighbours(base: Base, drag: Curve) -> None:
+    """Points that start far off at one table end where the neighbours' lead, or higher."""
+    extension = extended(base.problem, base.law, (drag.direction,))
+    located = locate(base, extension, [drag])
+    points = np.stack([fit.points for fit in located.fits])
+    n_tables, n_events, n = points.shape
+    rows = repeated(base.rows, n_tables)
+    given = located.grid.points.repeat(n_events, axis=0)
+    ones = [fit.found.population(n - 1) for fit in located.fits]
+    population = Population(
+        np.concatenate([one.mean for one in ones]), np.concatenate([one.covariance for one in ones])
+    )
+    spoiled = points.copy()
+    spoiled[3, :, 0] -= 1.5  # friction a fifth: all run to the end of the track
+    right = log_joint(extension, rows, highest(extension, rows, points, given, population), given, population)
+    found = log_joint(
+        extension, rows, highest(extension, rows, spoiled, given, population), given, population
+    )
+    assert_allclose(found, right, atol=1e-3)

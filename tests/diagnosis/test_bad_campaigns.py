@@ -88,6 +88,15 @@ def test_a_gate_that_fails_gives_no_name() -> None:
     assert_refused(verdict(found), "the gate of the base law's calibration failed")
 
 
+def test_numerics_that_break_down_give_no_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(*_: object) -> Any:
+        raise np.linalg.LinAlgError("Matrix is not positive definite")
+
+    monkeypatch.setattr("skred.diagnosis.diagnose.calibrate", fails)
+    document = diagnosed(small())
+    assert_refused(document, "the numerics broke down in 'base': Matrix is not positive definite")
+
+
 def test_all_runouts_censored() -> None:
     campaign = small()
     status, values = np.array(campaign.status), np.array(campaign.values)

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_cases import base_of, first_events, screen_of, trial, with_events, with_sensors
+from diagnosis_cases import base_of, first_events, screen_of, trial, with_sensors
 
+from skred.campaign.parts import of_events
 from skred.diagnosis.curves import Base
 from skred.diagnosis.extension import extended
 from skred.diagnosis.identify import LIMIT_Z, Told, extra_sensors, mean_power, told
@@ -81,7 +82,7 @@ def test_detection_limit_by_simulation(base: Base, table: dict[str, Told], name:
 def test_more_events_tell_more(base: Base, table: dict[str, Told]) -> None:
     """Every event four times: limits halve, but for the population mean's prior."""
     campaign = base.problem.campaign
-    four = with_events(campaign, list(range(campaign.n_events)) * 4)
+    four = of_events(campaign, list(range(campaign.n_events)) * 4)
     events = tuple(replace(event, id=f"{event.id} {k}") for k, event in enumerate(four.events))
     problem = replace(base.problem, campaign=replace(four, events=events))
     screen = Screen(problem, base.law, replace(base.setting, n_events=4 * campaign.n_events))

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from skred.diagnosis.slopes import reading_slopes
 from skred.inference.error_model import ERROR_MODELS, EventReadings
-from skred.inference.event_density import log_likelihoods
+from skred.inference.reading_density import log_likelihoods
 
 MODELS = ["normal", "robust", "student", "scaled"]
 INF = np.inf

@@ -32,8 +32,8 @@ from skred.diagnosis.unseen import (
     unseen,
 )
 from skred.errors import InputError
-from skred.inference.event_density import log_likelihoods
 from skred.inference.hierarchical import hierarchical_problem
+from skred.inference.reading_density import log_likelihoods
 from skred.inference.sampling import SamplerSettings
 from skred.laws import load_law
 from skred.physics.mechanisms import mechanisms

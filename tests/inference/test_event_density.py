@@ -20,15 +20,12 @@ from scipy.stats import t as student_t
 
 from skred.inference.error_model import ERROR_MODELS, EventReadings
 from skred.inference.event_density import (
-    assess,
     draw_nodes,
     integrated_log_density,
     integrated_log_density_pullback,
-    log_likelihood,
-    log_likelihood_bound,
-    log_likelihoods,
 )
 from skred.inference.integrated_op import IntegratedLogDensity, IntegratedLogDensityPullback
+from skred.inference.reading_density import assess, log_likelihood, log_likelihood_bound, log_likelihoods
 
 # The readings given a front, written down again.
 

@@ -14,8 +14,9 @@ from numpy.testing import assert_allclose
 from scipy.stats import norm
 
 from skred.campaign import Campaign, Event, Sensor, Status, find_campaign, read_campaign
-from skred.inference.event_density import integrated_log_density, log_likelihoods
+from skred.inference.event_density import integrated_log_density
 from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
+from skred.inference.reading_density import log_likelihoods
 from skred.inference.surface import Surfaces
 from skred.laws import load_law
 from skred.physics.kernel import simulate

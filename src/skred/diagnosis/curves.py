@@ -119,7 +119,7 @@ def refit(
     state = list(fits) if fits is not None else [Fit(_unfitted(start[0]), start[1])] * n_groups
     active = list(range(n_groups))
     for number in range(_MOST_ROUNDS):
-        many = _repeated(rows, len(active))
+        many = repeated(rows, len(active))
         given = np.repeat(strengths[active], n_events, axis=0)
         parts = [state[k].found.population(n) for k in active]
         population = Population(*(np.concatenate([part[a] for part in parts]) for a in range(2)))
@@ -158,7 +158,7 @@ def _moved(before: FloatArray, after: FloatArray, n: int) -> bool:
     return bool(mean.max() > _FAR_MEAN or spread.max() > _FAR_SPREAD)
 
 
-def _repeated(rows: Rows, n_groups: int) -> Rows:
+def repeated(rows: Rows, n_groups: int) -> Rows:
     """The same rows for each of several groups."""
     n = len(rows.event)
     group_rows = np.tile(np.arange(n), n_groups)

@@ -218,7 +218,7 @@ def _steps(
 
 
 def reference_of(calibration: Calibration, step: Step) -> tuple[Calibration, str]:
-    """The base law calibrated under a step's error model, and why it cannot be trusted if it cannot."""
+    """The base law calibrated under a step's error model, or as it is and why, if that cannot be trusted."""
     problem, own = step.calibration.problem, calibration.problem
     assert isinstance(problem, AugmentedProblem) and isinstance(own, HierarchicalProblem)
     if problem.error_model.id == own.error_model.id:
@@ -227,7 +227,10 @@ def reference_of(calibration: Calibration, step: Step) -> tuple[Calibration, str
     problems = "; ".join(again.gate.problems)
     if again.gate.passed:
         return again, ""
-    return again, f"the gate of {calibration.law.id} under {problem.error_model.id} errors failed: {problems}"
+    return (
+        calibration,
+        f"the gate of {calibration.law.id} under {problem.error_model.id} errors failed: {problems}",
+    )
 
 
 def population_draws(calibration: Calibration, n: int, seed: int) -> tuple[FloatArray, FloatArray]:

@@ -19,7 +19,7 @@ from scipy.stats import qmc
 
 from skred.diagnosis.extension import Extension
 from skred.diagnosis.modes import Modes, Population, Rows
-from skred.inference.event_density import log_likelihoods
+from skred.inference.reading_density import log_likelihoods
 from skred.inference.surface import Nodes
 
 FloatArray = NDArray[np.float64]

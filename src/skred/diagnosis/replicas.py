@@ -9,8 +9,8 @@ from skred.campaign import Status
 from skred.diagnosis.extension import Extension
 from skred.diagnosis.modes import Rows
 from skred.inference.error_model import Errors, EventReadings
-from skred.inference.event_density import OUTLIER_FACTOR
 from skred.inference.hierarchical import HierarchicalProblem
+from skred.inference.reading_density import OUTLIER_FACTOR
 from skred.physics.inputs import VELOCITY_TO_STOP
 
 FloatArray = NDArray[np.float64]

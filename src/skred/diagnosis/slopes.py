@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from skred.inference.event_density import OUTLIER_FACTOR
+from skred.inference.reading_density import OUTLIER_FACTOR
 
 _SQRT_2 = math.sqrt(2.0)
 _SQRT_2PI = math.sqrt(2.0 * math.pi)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
-from skred.diagnosis.curves import Base, Curve, Fit, _repeated, refit
+from skred.diagnosis.curves import Base, Curve, Fit, refit, repeated
 from skred.diagnosis.event_nodes import Budget, event_nodes
 from skred.diagnosis.extension import Extension
 from skred.diagnosis.modes import Population, Rows, event_modes, log_joint
@@ -306,13 +306,13 @@ def build_tables(base: Base, extension: Extension, located: Located, budget: Bud
     """Nodes of all events at all strengths of a grid, around populations as wide as what is known of them."""
     grid, fits, mean, factor = located
     n, n_tables, n_events = len(base.law.mechanisms), len(fits), len(base.rows.event)
-    rows = _repeated(base.rows, n_tables)
+    rows = repeated(base.rows, n_tables)
     given = np.column_stack([np.tile(base.strengths, (n_tables, 1)), grid.points]).repeat(n_events, axis=0)
     found = [fit.found.population(n) for fit in fits]
     population = Population(
         np.concatenate([one.mean for one in found]), np.concatenate([one.covariance for one in found])
     )
-    start = _highest(extension, rows, np.stack([fit.points for fit in fits]), given, population)
+    start = highest(extension, rows, np.stack([fit.points for fit in fits]), given, population)
     modes = event_modes(extension, rows, start, given, population, n_steps=8)
     # Populations of the posterior differ in mean and in spread.
     covariances = np.stack([fit.found.covariance for fit in fits])
@@ -328,7 +328,7 @@ def build_tables(base: Base, extension: Extension, located: Located, budget: Bud
     return Tables(grid, nodes, release, points, mean, factor, budget)
 
 
-def _highest(
+def highest(
     extension: Extension, rows: Rows, points: FloatArray, strengths: FloatArray, population: Population
 ) -> FloatArray:
     """The highest of the modes found from each table's own points and from its neighbours', as rows.
@@ -379,6 +379,6 @@ def exact_nodes(
         As in `event_nodes`.
     """
     n_groups, n_rows = len(strengths), len(rows.event)
-    many, given = _repeated(rows, n_groups), strengths.repeat(n_rows, axis=0)
+    many, given = repeated(rows, n_groups), strengths.repeat(n_rows, axis=0)
     modes = event_modes(extension, many, start.reshape(n_groups * n_rows, -1), given, population)
     return event_nodes(extension, many, given, population, modes, budget, reference, shifts)

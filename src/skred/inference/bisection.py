@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from skred.inference.error_model import Errors, EventReadings
-from skred.inference.event_density import assess, log_likelihoods
+from skred.inference.reading_density import assess, log_likelihoods
 from skred.physics.inputs import Contributions, Path
 from skred.physics.kernel import simulate
 

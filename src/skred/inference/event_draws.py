@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from skred.inference.error_model import ErrorModel
-from skred.inference.event_density import OUTLIER_FACTOR, draw_nodes
+from skred.inference.event_density import draw_nodes
 from skred.inference.hierarchical import HierarchicalProblem
 from skred.inference.population import population_of
+from skred.inference.reading_density import OUTLIER_FACTOR
 from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
