@@ -224,6 +224,18 @@ def test_releases_that_begin_off_the_track(release: float) -> None:
     assert np.abs(differences(problem, "coulomb", AROUND["coulomb"], 2000, 60)).max() < TOLERANCE
 
 
+@pytest.mark.parametrize("release, release_sd, runout", [(60.0, 30.0, 200.0), (300.0, 60.0, 700.0)])
+def test_a_release_beside_a_bench(release: float, release_sd: float, runout: float) -> None:
+    """A short runout: released a little higher, the same snow does not start at all.
+
+    All of its likelihood lies along that jump, which no halving resolves.
+    """
+    campaign = pick(FOUR[:1], release_s_m=release, release_sd_m=release_sd)
+    problem = hierarchical_problem(replace(campaign, values=np.where(campaign.values > 0.0, runout, np.nan)))
+    assert np.abs(differences(problem, "coulomb", ([-0.4], [0.1]), 2000, 400)).max() < TOLERANCE
+    assert problem.surfaces(load_law("coulomb").mechanisms).n_runs < 500_000
+
+
 PLAUSIBLE = Population([math.log(0.31), math.log(0.0035)], [0.22, 1.1], -0.1)
 """Within the posterior of all 22 avalanches."""
 

@@ -22,6 +22,9 @@ _GAUSS = 0.5 / math.sqrt(3.0)
 """Distance of the two Gauss-Legendre nodes from the middle of a box, in its widths."""
 RELEASE_REACH = 4.0
 """How many standard deviations from its mean a release is looked for."""
+RELEASE_NARROW = 8.0
+"""A narrow width on the axis of the release, over one on an axis of the strengths: as a standard deviation
+of the release, the unit of its axis, is to a usual spread of a strength."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +40,9 @@ class Resolution:
     share : float
         Share of an event's integral below which a narrow box is not halved any more.
     narrow : float
-        Width at which a box counts as narrow: its bound is then no longer believed, because a
-        front that just passes a counter-slope makes a jump, across which the bound promises all.
+        Width in logarithms of strengths at which a box counts as narrow: its bound is then no longer
+        believed, because a front that just passes a counter-slope makes a jump, across which the bound
+        promises all.
     """
 
     change: float = 1.75
@@ -241,7 +245,7 @@ class Bisection:
                 change, bound, top, mean,
             )  # fmt: skip
             np.maximum.at(best, boxes.event, top)
-            narrow = boxes.width[:, : self.n_strengths].min(axis=1) <= resolution.narrow
+            narrow = (boxes.width <= self.narrowest(n_axes)).any(axis=1)
             bound = np.where(narrow, top, bound)
             log_volume = np.log(boxes.width).sum(axis=1)
             log_mass = settled.copy()
@@ -266,6 +270,12 @@ class Bisection:
     def widest(self, n_axes: int) -> FloatArray:
         """Largest width of a box on each axis."""
         return self.cell if n_axes == self.n_strengths else np.append(self.cell, 1.0)
+
+    def narrowest(self, n_axes: int) -> FloatArray:
+        """Width on each axis at which a box counts as narrow."""
+        narrow = np.full(n_axes, self.resolution.narrow)
+        narrow[self.n_strengths :] *= RELEASE_NARROW
+        return narrow
 
     def nodes(self, events: IntArray, edges: Sequence[FloatArray]) -> tuple[IntArray, FloatArray, FloatArray]:
         """Quadrature nodes of some events, from a grid of boxes with these edges on each axis.
