@@ -88,7 +88,7 @@ def diagnose_case(case: Case, replicas: int) -> dict[str, Any]:
 def _best_factor(race: Any, name: str, factor: float) -> float:
     """Log Bayes factor of a mechanism's best shape if its prior were wider or narrower."""
     entrant = race.leading(name).entrants[name]
-    return float(entrant.best.log_bayes_factor(factor * entrant.mechanism.added.scale))
+    return float(entrant.best.log_bayes_factor_at(factor * entrant.mechanism.added.scale))
 
 
 app = cyclopts.App(help=__doc__)

@@ -6,6 +6,7 @@ A command is a function decorated with ``@app.command`` that returns its exit co
 
 import os
 import sys
+from dataclasses import replace
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from cyclopts import App, CycloptsError
 
 from skred.cli_inputs import campaign_of, hierarchical_of, laws_of, pooled_or_reason, problem_of
 from skred.cli_options import (
+    DIAGNOSIS_SAMPLING,
     MAX_MECHANISMS,
     SAMPLING,
     BaseModel,
@@ -247,7 +249,7 @@ def diagnose(
 
     replicas = QUICK_REPLICAS if quick else Effort.replicas
     effort = Effort(replicas, max_mechanisms or MAX_MECHANISMS[quick], exact_loo)
-    settings = Sampling(seed=seed).settings("hierarchical")
+    settings = replace(DIAGNOSIS_SAMPLING, seed=seed).settings("hierarchical")
     document = diagnose_to(
         problem, law, settings, effort, folder, output.tell, lock=lock or 0, folds=outer_folds or 0
     )

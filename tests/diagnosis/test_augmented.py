@@ -156,7 +156,7 @@ def test_posterior_is_that_of_a_dense_grid(problem: AugmentedProblem, calibratio
 
 
 def test_draws_agree_with_the_race(drag: Curve, calibration: Any) -> None:
-    mean, sd = drag.moments()
+    mean, sd = drag.moments
     draws = calibration.tree["posterior"]["turbulent_drag"].values
     assert abs(draws.mean() - mean) < 0.35 * sd  # three events: Laplace's formula is rough
     assert 0.7 < draws.std() / sd < 1.4

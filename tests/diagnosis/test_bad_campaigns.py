@@ -92,7 +92,7 @@ def test_numerics_that_break_down_give_no_name(monkeypatch: pytest.MonkeyPatch) 
     def fails(*_: object) -> Any:
         raise np.linalg.LinAlgError("Matrix is not positive definite")
 
-    monkeypatch.setattr("skred.diagnosis.diagnose.calibrate", fails)
+    monkeypatch.setattr("skred.diagnosis.diagnose.calibrate_surely", fails)
     document = diagnosed(small())
     assert_refused(document, "the numerics broke down in 'base': Matrix is not positive definite")
 

@@ -30,16 +30,16 @@ def test_second_look_against_many_nodes_on_a_dense_grid(base: Base, name: str) -
     reach = job.mechanism.added.scale * np.linspace(0.0, 3.5, 24)
     grid = np.concatenate([-reach[:0:-1], reach]) if job.mechanism.added.either_sign else reach
     exact = curve_at(base, job.mechanism, job.shape, grid, FINE)
-    assert found.log_bayes_factor() == pytest.approx(exact.log_bayes_factor(), abs=0.4)
-    mean, sd = exact.moments()
-    assert abs(found.moments()[0] - mean) < 0.25 * sd
+    assert found.log_bayes_factor == pytest.approx(exact.log_bayes_factor, abs=0.4)
+    mean, sd = exact.moments
+    assert abs(found.moments[0] - mean) < 0.25 * sd
 
 
 def test_rough_look_finds_what_is_missing(base: Base) -> None:
     assert first_look(base) is ROUGH
     for job in candidates(base.setting):
         if job.mechanism.id in ("turbulent_drag", "viscous_drag"):
-            assert curve(base, job.mechanism, job.shape, ROUGH).log_bayes_factor() > 5.0
+            assert curve(base, job.mechanism, job.shape, ROUGH).log_bayes_factor > 5.0
 
 
 def test_fronts_are_looked_at_where_readings_are_far_off() -> None:
@@ -50,7 +50,7 @@ def test_fronts_are_looked_at_where_readings_are_far_off() -> None:
     assert drag.added is not None
     found = [curve(base, drag, shape, USUAL) for shape in drag.added.shapes(base.setting)]
     rough = [curve(base, drag, shape, ROUGH) for shape in drag.added.shapes(base.setting)]
-    heights = [max(one.log_bayes_factor() for one in curves) for curves in (found, rough)]
+    heights = [max(one.log_bayes_factor for one in curves) for curves in (found, rough)]
     assert heights[0] > 30.0 > heights[1] + 10.0
 
 
@@ -77,7 +77,7 @@ def test_finer_curves_share_the_weight_of_their_place() -> None:
     curves = [made("segment_drag", 100.0 * k, 1.0) for k in range(3)]
     (entrant,) = _entrants(curves, {1: [made("segment_drag", 100.0, 1.0)] * 4}).values()
     assert len(entrant.curves) == 6 and np.exp(entrant.log_weights).sum() == pytest.approx(1.0)
-    assert entrant.log_bayes_factor == pytest.approx(curves[0].log_bayes_factor())
+    assert entrant.log_bayes_factor == pytest.approx(curves[0].log_bayes_factor)
 
 
 def test_other_error_models_start_from_any() -> None:

@@ -172,5 +172,5 @@ def test_profile_is_found_from_a_listed_mechanism_where_nothing_is_too_far() -> 
     listed = curve(base, drag, Shape(1600.0, 1700.0), USUAL)
     kind = next(kind for kind in KINDS if kind.column is Column.QUADRATIC and kind.length_m < 100.0)
     from_nothing, from_listed = fit_profile(base, kind), fit_profile(base, kind, listed)
-    assert listed.log_bayes_factor() > 20.0
+    assert listed.log_bayes_factor > 20.0
     assert from_listed.log_bayes_factor > max(from_nothing.log_bayes_factor, 0.0) + 10.0

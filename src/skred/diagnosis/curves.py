@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -220,12 +221,18 @@ class Curve:
             log_prior = log_prior + math.log(2.0)
         return strengths, spline(strengths) + log_prior
 
-    def log_bayes_factor(self, scale: float | None = None) -> float:
-        """Against strength 0, in nats; with the prior of another scale if one is given."""
+    @cached_property
+    def log_bayes_factor(self) -> float:
+        """Against strength 0, in nats."""
+        return self.log_bayes_factor_at(None)
+
+    def log_bayes_factor_at(self, scale: float | None) -> float:
+        """Against strength 0, in nats, with the prior of another scale."""
         strengths, log_density = self.fine(scale)
         most = float(log_density.max())
         return most + math.log(float(np.trapezoid(np.exp(log_density - most), strengths)))
 
+    @cached_property
     def moments(self) -> tuple[float, float]:
         """Posterior mean and standard deviation of the strength, if the mechanism is there."""
         strengths, log_density = self.fine()
@@ -275,9 +282,9 @@ def curve_near(base: Base, mechanism: Mechanism, shape: Shape, near: Curve, firs
     least = 0.03 * _scale(mechanism)
     for number in range(_PASSES):
         budget = first if number == 0 and first.linear else USUAL
-        before = near.moments()
+        before = near.moments
         near = curve_at(base, mechanism, shape, _strengths_near(near), budget, near)
-        after = near.moments()
+        after = near.moments
         sd = max(before[1], least), max(after[1], least)
         if budget is USUAL and abs(after[0] - before[0]) < sd[0] and 0.5 < sd[1] / sd[0] < 2.0:
             break
@@ -293,7 +300,7 @@ def _strengths_near(near: Curve) -> FloatArray:
     """Strengths around the mean of a curve, without 0."""
     added = near.mechanism.added
     assert added is not None
-    mean, sd = near.moments()
+    mean, sd = near.moments
     sd = max(sd, 0.03 * added.scale)
     strengths = mean + sd * np.array(_NEAR)
     if abs(mean) > 2.0 * abs(_NEAR[0]) * sd:  # nothing between 0 and there otherwise

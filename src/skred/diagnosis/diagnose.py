@@ -26,7 +26,7 @@ from skred.inference.hierarchical import HierarchicalProblem
 from skred.inference.population import population_of
 from skred.inference.sampling import SamplerSettings
 from skred.physics.law import Law
-from skred.work.calibrate import Calibration, calibrate
+from skred.work.calibrate import Calibration, calibrate_surely
 
 FloatArray = NDArray[np.float64]
 Tell = Callable[[str], None]
@@ -181,7 +181,7 @@ def _steps(
 ) -> Diagnosis:
     """All steps of a diagnosis."""
     clock.stage("base", f"{law.id}: calibrating the base law")
-    calibration = calibrate(problem, law, settings)
+    calibration = calibrate_surely(problem, law, settings)
     if not calibration.gate.passed:
         clock.end()
         why = "the gate of the base law's calibration failed: " + "; ".join(calibration.gate.problems)
@@ -223,7 +223,7 @@ def reference_of(calibration: Calibration, step: Step) -> tuple[Calibration, str
     assert isinstance(problem, AugmentedProblem) and isinstance(own, HierarchicalProblem)
     if problem.error_model.id == own.error_model.id:
         return calibration, ""
-    again = calibrate(problem.base.problem, calibration.law, calibration.settings)
+    again = calibrate_surely(problem.base.problem, calibration.law, calibration.settings)
     problems = "; ".join(again.gate.problems)
     if again.gate.passed:
         return again, ""
@@ -270,7 +270,7 @@ def let_in(
         entrants = tuple(heat.entrants[name] for name in names)
         chosen.append(entrants[0].best)
         problem = augmented_problem(_plain(heat.base), chosen)
-        calibration = calibrate(problem, base.law, settings)
+        calibration = calibrate_surely(problem, base.law, settings)
         if not calibration.gate.passed:
             problems = "; ".join(calibration.gate.problems)
             cannot = f"the gate of {base.law.id} + {names[0]} failed: {problems}"

@@ -69,7 +69,7 @@ class Entrant:
     @property
     def log_factors(self) -> FloatArray:
         """Log Bayes factor of each shape, its prior weight included."""
-        return self.log_weights + np.array([one.log_bayes_factor() for one in self.curves])
+        return self.log_weights + np.array([one.log_bayes_factor for one in self.curves])
 
     @property
     def log_bayes_factor(self) -> float:
@@ -86,11 +86,11 @@ class Entrant:
     @property
     def best(self) -> Curve:
         """The curve of the highest Bayes factor."""
-        return self.curves[int(np.argmax([one.log_bayes_factor() for one in self.curves]))]
+        return self.curves[int(np.argmax([one.log_bayes_factor for one in self.curves]))]
 
     def strength(self) -> tuple[float, float]:
         """Posterior mean and standard deviation of the strength over all shapes."""
-        moments = np.array([one.moments() for one in self.curves])
+        moments = np.array([one.moments for one in self.curves])
         weights = self.shape_weights
         mean = float(weights @ moments[:, 0])
         return mean, math.sqrt(float(weights @ (moments[:, 1] ** 2 + (moments[:, 0] - mean) ** 2)))
@@ -314,7 +314,7 @@ def _looked_at_again(
 
 def _leading(curves: Sequence[Curve], finer: Mapping[int, list[Curve]]) -> list[int]:
     """The places of each mechanism that lead it, as far as is known."""
-    own = [one.log_bayes_factor() for one in curves]
+    own = [one.log_bayes_factor for one in curves]
     height = np.array([_mean_log_factor(finer[k]) if k in finer else own[k] for k in range(len(curves))])
     leading: list[int] = []
     for name in dict.fromkeys(one.mechanism.id for one in curves):
@@ -325,7 +325,7 @@ def _leading(curves: Sequence[Curve], finer: Mapping[int, list[Curve]]) -> list[
 
 
 def _mean_log_factor(curves: Sequence[Curve]) -> float:
-    return float(np.logaddexp.reduce([one.log_bayes_factor() for one in curves])) - math.log(len(curves))
+    return float(np.logaddexp.reduce([one.log_bayes_factor for one in curves])) - math.log(len(curves))
 
 
 def _split(base: Base, curve: Curve) -> tuple[Shape, ...]:

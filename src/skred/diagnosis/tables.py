@@ -149,7 +149,7 @@ def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located
     scale = np.array([p.scale for p in priors])
     lowest = np.array([-_MOST_SCALES * p.scale if p.either_sign else 0.0 for p in priors])
     support = Support(lowest, _MOST_SCALES * scale)
-    mean, sd = (np.array(values) for values in zip(*(curve.moments() for curve in curves), strict=True))
+    mean, sd = (np.array(values) for values in zip(*(curve.moments for curve in curves), strict=True))
     factor = np.diag(np.clip(sd, 0.01 * scale, scale))
     reach = np.full(n_axes, _STARTING_REACH)
     start = (base.population, base.fit.points)

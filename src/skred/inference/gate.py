@@ -41,6 +41,11 @@ class Gate:
         """Whether the result may be used."""
         return not self.problems
 
+    @property
+    def chains_too_short(self) -> bool:
+        """Whether more draws could help."""
+        return not (self.r_hat_max <= R_HAT_LIMIT and min(self.ess_bulk_min, self.ess_tail_min) >= ESS_LIMIT)
+
     def with_problems(self, more: Sequence[str]) -> Gate:
         """The same gate with further reasons to fail."""
         return replace(self, problems=(*self.problems, *more))

@@ -219,7 +219,8 @@ class JointMetropolis(pm.Metropolis):
         return function.vm.jit_fn, function.input_storage[1:]
 
     def _data_values(self) -> tuple[Any, ...]:
-        return tuple(np.array(container.storage[0], order="C") for container in self._data)
+        # No copies, or tables of many nodes would be copied for each draw of the tuning.
+        return tuple(np.require(container.storage[0], requirements=("C", "W")) for container in self._data)
 
     def reset_tuning(self) -> None:
         """Forget what was learnt."""

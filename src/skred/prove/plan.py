@@ -105,14 +105,14 @@ def _hidden(plan: Plan, seed: int) -> str:
 
 def diagnosis_settings(quick: bool) -> dict[str, Any]:
     """How ``skred diagnose`` diagnoses for a user who sets nothing, or only ``--quick``."""
-    from skred.cli_options import MAX_MECHANISMS, SAMPLING
+    from skred.cli_options import DIAGNOSIS_SAMPLING, MAX_MECHANISMS
     from skred.diagnosis.diagnose import QUICK_REPLICAS, Effort
     from skred.inference.error_model import DEFAULT_ERRORS
     from skred.physics.terrain import SMOOTHING_M
 
     effort = Effort(QUICK_REPLICAS if quick else Effort.replicas, MAX_MECHANISMS[quick])
     return {
-        "sampler": SAMPLING.settings("hierarchical").as_dict(),
+        "sampler": DIAGNOSIS_SAMPLING.settings("hierarchical").as_dict(),
         "effort": asdict(effort),
         "errors": DEFAULT_ERRORS,
         "smoothing_m": SMOOTHING_M,

@@ -181,7 +181,7 @@ def places_figure(found: Diagnosis, race: Race, number: int) -> Figure:
 
 def _at_places(axes: Axes, entrant: Entrant, sensors: dict[str, Any]) -> None:
     colour = colour_of(entrant.mechanism.id)
-    factors = np.array([one.log_bayes_factor() for one in entrant.curves])
+    factors = np.array([one.log_bayes_factor for one in entrant.curves])
     top = max(float(factors.max()), 0.0)
     floor = min(top, max(float(factors.min()), -3.0, top - _DEPTH)) - 1.0
     for one, factor in zip(entrant.curves, np.maximum(factors, floor), strict=True):

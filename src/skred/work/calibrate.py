@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,9 @@ from skred.inference.results import assemble, save
 from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior
 from skred.physics.law import Law, Parameter
 from skred.work.output import write_json
+
+MORE = 4
+"""How many times the draws a second attempt makes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +73,15 @@ def calibrate(
     gate = gate.with_problems(problem.numerical_problems(law, posterior["posterior"].to_dataset()))
     tree = assemble(problem, law, posterior, prior, gate, settings)
     return Calibration(law, problem, settings, model, step, tree, gate)
+
+
+def calibrate_surely(problem: Problem, law: Law, settings: SamplerSettings) -> Calibration:
+    """As `calibrate`, and once more with `MORE` times the draws where the chains were too short."""
+    found = calibrate(problem, law, settings)
+    if not found.gate.chains_too_short:
+        return found
+    more = replace(settings, draws=MORE * settings.draws, tune=MORE * settings.tune)
+    return calibrate(problem, law, more)
 
 
 def write_calibration(calibration: Calibration, folder: Path) -> None:
