@@ -270,6 +270,6 @@ def test_a_table_in_the_lower_mode_is_lifted_by_its_neighbours(
             highest(extension, rows, spoiled, given, population),
         )
     )
-    assert np.all(low[3] < height[3] - 5.0)
-    assert_allclose(lifted[3], height[3], atol=2.0)
+    assert np.all(low[3] < height[3] - 20.0)
+    assert np.all(lifted[3] > height[3] - 10.0)  # a neighbour's points, one step of the strength away
     assert np.all(lifted >= low)

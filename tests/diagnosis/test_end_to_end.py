@@ -140,7 +140,7 @@ def test_before_and_after_stand_under_one_error_model(biased: Diagnosis, name: s
     assert (found is calibration) == (name == "robust")
     assert verdict(replace(biased, steps=(step,)))["error_model"] == name
     if name != "robust":
-        few = replace(calibration, settings=replace(calibration.settings, draws=40, tune=40))
+        few = replace(calibration, settings=replace(calibration.settings, draws=10, tune=10))
         found, cannot = reference_of(few, step)
         assert found is few and f"under {name} errors failed" in cannot
 

@@ -28,7 +28,7 @@ NONE = np.zeros(0)
 def nodes_of(base: Base, budget: Budget) -> Nodes:
     extension, population = extended(base.problem, base.law), base.population
     modes = event_modes(extension, base.rows, base.fit.points, NONE, population)
-    return event_nodes(extension, base.rows, NONE, population, modes, budget)
+    return event_nodes(extension, base.rows, NONE, population, modes, budget).nodes
 
 
 @pytest.mark.parametrize("law_id", ["constant", "coulomb"])

@@ -23,7 +23,7 @@ from skred.diagnosis.modes import Population, Rows, take_rows
 from skred.diagnosis.tables import BUDGETS, Located, Tables, build_tables, exact_nodes, finer, locate
 from skred.diagnosis.tabulated_op import tabulated_log_densities
 from skred.inference.event_density import integrated_log_density
-from skred.inference.hierarchical import INTEGRATION_LIMIT, HierarchicalProblem
+from skred.inference.hierarchical import HierarchicalProblem
 from skred.inference.population import population_of, population_variables
 from skred.inference.surface import Surfaces
 from skred.physics.kernel import front_speeds
@@ -38,11 +38,11 @@ AUGMENTED_LIMIT = 1.0
 A claim of a mechanism rests on several nats; where fronts stop on a stretch that is added, an event's
 likelihood bends sharply with the strength, and more nodes do not help.
 """
-_EXACT = Budget(1024, 512, 1.5, 1.8)
+_EXACT = Budget(512, 256, 1024, 1.5, 1.8)
 _EXACT_RUNS = 16 * 22
 """Events times draws up to which there are so many nodes; where there are fewer, more."""
 _EXACT_EVENTS, _EXACT_DRAWS = 24, 16
-_ROUGH_DRAWS, _ROUGH_RUNS, _ENOUGH = 8, 8 * 22, 0.6
+_ROUGH_DRAWS, _ROUGH_RUNS, _ENOUGH = 8, 8 * 22, 0.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,7 +233,7 @@ class AugmentedProblem(HierarchicalProblem):
         start = self.tables.modes[self.tables.grid.nearest(added)][:, chosen]
         given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
         more = 2 ** int(np.clip(np.log2(runs / (len(added) * len(chosen))), 0, 3))
-        budget = _EXACT._replace(around_mode=more * 1024, over_population=more * 512)
+        budget = _EXACT.times(more)
         nodes = exact_nodes(self.extension, rows, given, population, start, budget, base.population)
         errors = self._tabulated(means, factors, added)[:, chosen]
         for k in range(len(means)):
@@ -295,7 +295,7 @@ def augmented_problem(base: Base, curves: Sequence[Curve]) -> AugmentedProblem:
     located = locate(base, extension, curves)
     for budget in BUDGETS:
         problem = _with_tables(base, added, build_tables(base, extension, located, budget))
-        if _rough_error(problem, located) < _ENOUGH * INTEGRATION_LIMIT:
+        if _rough_error(problem, located) < _ENOUGH * AUGMENTED_LIMIT:
             return problem
     if len(added) == 1:
         # More nodes do not help where a likelihood bends with the strength, between the tables' strengths.

@@ -127,7 +127,7 @@ def refit(
         points = np.concatenate([state[k].points for k in active])
         modes = event_modes(extension, many, points, given, population, n_steps=6)
         spent = budget if number > 0 or first_budget is None else first_budget
-        nodes = event_nodes(extension, many, given, population, modes, spent, start[0])
+        nodes = event_nodes(extension, many, given, population, modes, spent, start[0]).nodes
         moved = []
         for k, part, own in zip(
             active,

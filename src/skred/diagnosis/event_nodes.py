@@ -1,18 +1,19 @@
 """Importance nodes: each event's likelihood over its own strengths, where a population makes them likely.
 
-A mixture of two proposals, most nodes around the event's own mode, some over the whole population, weighs
-each node by the mixture's density; so a second mode (reached, not reached) that the first proposal misses
-is still counted. The same quasi-random numbers serve every strength, which makes differences between
-strengths smoother than the integrals themselves.
+A mixture of proposals, many nodes around the event's own mode, some over the whole population, and many
+where those have found the weight to be, weighs each node by the mixture's density; so a second mode
+(reached, not reached) that the first proposal misses is still counted. The same quasi-random numbers serve
+every strength, which makes differences between strengths smoother than the integrals themselves.
 """
 
 from __future__ import annotations
 
 import math
-from functools import cache, partial
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
@@ -31,20 +32,110 @@ class Budget(NamedTuple):
 
     Attributes
     ----------
+    around_mode, over_population : int
+        Powers of 2, as those below.
+    adapted : int
+        Put where the others have found the weight to be: around modes that nobody looked for, along the
+        edges that stops make.
     linear : bool
         Take readings at the nodes from the tangents at the mode instead of from fronts: quick, and wrong
         where a front stops near a sensor.
     """
 
-    around_mode: int = 64
+    around_mode: int = 32
     over_population: int = 32
+    adapted: int = 32
     wider: float = 1.35
     population_wider: float = 1.6
     linear: bool = False
 
+    def times(self, more: int) -> Budget:
+        """So many times the nodes."""
+        return self._replace(
+            around_mode=more * self.around_mode,
+            over_population=more * self.over_population,
+            adapted=more * self.adapted,
+        )
 
-USUAL, FIRST, FINE = Budget(), Budget(32, 16), Budget(512, 256, 1.5, 1.8)
-ROUGH = Budget(32, 16, linear=True)
+
+USUAL, FIRST, FINE = Budget(), Budget(32, 16, 0), Budget(256, 128, 512, 1.5, 1.8)
+ROUGH = Budget(32, 16, 0, linear=True)
+_CENTRES = 16
+"""Places that adapted nodes are put around, of each event."""
+_SHRUNK = 3.0
+"""As how many effective nodes the linear model counts for the width around those places."""
+_ADAPTED_WIDER = 1.3
+
+
+class Spread(NamedTuple):
+    """Nodes of all rows, as many each.
+
+    Attributes
+    ----------
+    points : (n_rows, n_nodes, n_base + 1) array
+        The release's deviation last.
+    log_weights : (n_rows, n_nodes) array
+    """
+
+    points: FloatArray
+    log_weights: FloatArray
+
+    @property
+    def nodes(self) -> Nodes:
+        """As the compiled sums over a population read them."""
+        n_rows, n_nodes, n = self.points.shape
+        points = np.ascontiguousarray(self.points[:, :, : n - 1].reshape(-1, n - 1).T)
+        return Nodes(n_nodes * np.arange(n_rows + 1), points, self.log_weights.ravel())
+
+
+class _Part(NamedTuple):
+    """A share of the nodes: mixtures of normal densities of one width each, one for each row.
+
+    Attributes
+    ----------
+    size : int
+        Nodes of a row.
+    centres : (n_rows, n_centres, n_axes) array
+    factor : (n_rows, n_axes, n_axes) array
+    """
+
+    size: int
+    centres: FloatArray
+    factor: FloatArray
+
+    def points(self, numbers: FloatArray) -> FloatArray:
+        """Nodes from normal numbers, both (n_rows, size, n_axes)."""
+        # Around each centre a run of the quasi-random sequence: every sixteenth number would fill a sliver.
+        at = np.arange(self.size) * self.centres.shape[1] // self.size
+        points: FloatArray = self.centres[:, at] + numbers @ self.factor.transpose(0, 2, 1)
+        return points
+
+    def log_density(self, points: FloatArray) -> FloatArray:
+        """At points of the rows, (n_rows, k, n_axes) to (n_rows, k)."""
+        whiten = np.linalg.inv(self.factor)
+        log_scale = np.log(np.einsum("rii->ri", whiten)).sum(axis=1) - points.shape[2] * _LOG_SQRT_2PI
+        white = points @ whiten.transpose(0, 2, 1), self.centres @ whiten.transpose(0, 2, 1)
+        result: FloatArray = _log_mixture(*white) + log_scale[:, None]
+        return result
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _log_mixture(points, centres):  # type: ignore[no-untyped-def]
+    """Log of the mean of unit normal densities around centres, but for their constant, row by row."""
+    n_rows, n_points, n_axes = points.shape
+    n_centres = centres.shape[1]
+    result, squares = np.empty((n_rows, n_points)), np.empty(n_centres)
+    for row in range(n_rows):
+        for k in range(n_points):
+            for centre in range(n_centres):
+                squares[centre] = 0.0
+                for axis in range(n_axes):
+                    squares[centre] += (points[row, k, axis] - centres[row, centre, axis]) ** 2
+            least, total = squares.min(), 0.0
+            for centre in range(n_centres):
+                total += math.exp(0.5 * (least - squares[centre]))
+            result[row, k] = math.log(total / n_centres) - 0.5 * least
+    return result
 
 
 @cache
@@ -70,8 +161,11 @@ def event_nodes(
     budget: Budget = USUAL,
     reference: Population | None = None,
     shifts: FloatArray | None = None,
-) -> Nodes:
-    """Nodes of all rows, as the compiled sums over a population read them.
+) -> Spread:
+    """Nodes of all rows, as many for each.
+
+    All are weighted by the mixture of all that was proposed, what was found by adaptation included (adaptive
+    multiple importance sampling: Cornuet and others, 2012, doi 10.1111/j.1467-9469.2011.00756.x).
 
     Parameters
     ----------
@@ -80,7 +174,7 @@ def event_nodes(
     population : Population
         Roughly where the events' strengths are.
     modes : Modes
-        Around which most nodes are put.
+        Around which many nodes are put.
     reference : Population, optional
         Of one group: another population that the nodes must cover, half of those over the population are
         put there. Without it a population that has become too narrow would never see what it misses.
@@ -88,45 +182,84 @@ def event_nodes(
         By which each row's quasi-random numbers are moved round along each axis, 0 to 1. For means over
         rows, not differences: what is left of the integration errors then averages out.
     """
-    n_rows, n = len(rows.event), population.mean.shape[1]
-    uncertain = extension.problem.releases.sd[rows.event] > 0.0
-    axes = n + 1 if uncertain.any() else n
+    n = population.mean.shape[1]
+    axes = n + 1 if (extension.problem.releases.sd[rows.event] > 0.0).any() else n
     cover = np.linalg.inv(modes.information + population.precision[rows.group])[:, :axes, :axes]
-    around = budget.wider * np.linalg.cholesky(0.5 * (cover + cover.transpose(0, 2, 1)))
+    cover = 0.5 * (cover + cover.transpose(0, 2, 1))
+    parts = [
+        _Part(budget.around_mode, modes.points[:, None, :axes], budget.wider * np.linalg.cholesky(cover))
+    ]
     both = [population] if reference is None else [population, reference]
-    sizes = [budget.around_mode, *[budget.over_population // len(both)] * len(both)]
-    centres, factors = [modes.points[:, :axes]], [around]
     for one in both:
         centre, over = _over(one, rows, axes, budget.population_wider)
-        centres.append(centre)
-        factors.append(over)
-    numbers = partial(_normal_numbers, extension.problem.campaign.n_events)
-    points = np.concatenate(
-        [
-            centre[:, None, :]
-            + np.einsum("rij,rkj->rki", factor, _rotated(numbers(size, axes, k)[rows.event], shifts))
-            for k, (centre, factor, size) in enumerate(zip(centres, factors, sizes, strict=True))
-        ],
-        axis=1,
-    )
-    log_proposal = np.full(points.shape[:2], -np.inf)
-    for centre, factor, size in zip(centres, factors, sizes, strict=True):
-        part = math.log(size / points.shape[1]) + _log_normal(points, centre, factor)
-        log_proposal = np.logaddexp(log_proposal, part)
-    n_nodes = points.shape[1]
-    flat = np.zeros((n_rows * n_nodes, n + 1))
+        parts.append(_Part(budget.over_population // len(both), centre[:, None, :], over))
+
+    def spread(part: _Part, seed: int) -> tuple[FloatArray, FloatArray]:
+        """Nodes of a part, and the log likelihoods there, the release's prior included."""
+        numbers = _normal_numbers(extension.problem.campaign.n_events, part.size, axes, seed)[rows.event]
+        points = part.points(_rotated(numbers, shifts))
+        return points, _log_likelihoods(extension, rows, strengths, modes, points, budget.linear)
+
+    found = [spread(part, seed) for seed, part in enumerate(parts)]
+    points, log_l = (np.concatenate([one[k] for one in found], axis=1) for k in range(2))
+    log_weights = log_l - _log_proposal(parts, points)
+    if budget.adapted:
+        centre, over = _over(population, rows, n, 1.0)
+        log_prior = _Part(0, centre[:, None, :], over).log_density(points[:, :, :n])
+        parts.append(_adapted(points, log_weights + log_prior, cover, budget.adapted))
+        more, log_more = spread(parts[-1], len(parts))
+        points, log_l = np.concatenate([points, more], axis=1), np.concatenate([log_l, log_more], axis=1)
+        log_weights = log_l - _log_proposal(parts, points)
+    n_rows, n_nodes = log_weights.shape
+    full = np.zeros((n_rows, n_nodes, n + 1))
+    full[:, :, :axes] = points
+    return Spread(full, log_weights - math.log(n_nodes))
+
+
+def _log_likelihoods(
+    extension: Extension, rows: Rows, strengths: FloatArray, modes: Modes, points: FloatArray, linear: bool
+) -> FloatArray:
+    """At nodes, (n_rows, k, n_axes) to (n_rows, k); with the prior of a release that is an axis."""
+    n_rows, size, axes = points.shape
+    n = extension.n_base
+    flat = np.zeros((n_rows * size, n + 1))
     flat[:, :axes] = points.reshape(-1, axes)
-    which = np.repeat(np.arange(n_rows), n_nodes)
-    if budget.linear:
-        predictions = _linear_predictions(modes, flat, which)
+    which = np.repeat(np.arange(n_rows), size)
+    if linear:
+        predictions = _linear_predictions(modes, flat.reshape(n_rows, size, n + 1))
     else:
         given = np.broadcast_to(strengths, (n_rows, len(extension.directions)))
         predictions = extension.predict(rows.event[which], flat, given[which])
-    log_weights = log_likelihoods(which, predictions, rows.readings, rows.errors)
+    log_l: FloatArray = log_likelihoods(which, predictions, rows.readings, rows.errors)
     if axes > n:
-        log_weights = log_weights - 0.5 * flat[:, n] ** 2 - _LOG_SQRT_2PI
-    log_weights = log_weights - log_proposal.ravel() - math.log(n_nodes)
-    return Nodes(n_nodes * np.arange(n_rows + 1), np.ascontiguousarray(flat[:, :n].T), log_weights)
+        log_l = log_l - 0.5 * flat[:, n] ** 2 - _LOG_SQRT_2PI
+    return log_l.reshape(n_rows, size)
+
+
+def _log_proposal(parts: list[_Part], points: FloatArray) -> FloatArray:
+    """Log density of the mixture of all parts, by their sizes."""
+    total = sum(part.size for part in parts)
+    terms = [math.log(part.size / total) + part.log_density(points) for part in parts]
+    return np.asarray(np.logaddexp.reduce(terms, axis=0))
+
+
+def _adapted(points: FloatArray, log_posterior: FloatArray, cover: FloatArray, size: int) -> _Part:
+    """Where weighted nodes say that each row's posterior is: normal densities around some of them."""
+    weights = np.exp(log_posterior - log_posterior.max(axis=1, keepdims=True))
+    weights /= weights.sum(axis=1, keepdims=True)
+    effective = 1.0 / np.sum(weights**2, axis=1)
+    deviation = points - np.sum(weights[:, :, None] * points, axis=1)[:, None, :]
+    covariance = np.einsum("rk,rki,rkj->rij", weights, deviation, deviation, optimize=True)
+    shrink = (_SHRUNK / (_SHRUNK + effective))[:, None, None]
+    covariance = shrink * cover + (1.0 - shrink) * covariance
+    # Systematic resampling, and the usual bandwidth of a kernel density of so many.
+    steps = (np.arange(_CENTRES) + 0.5) / _CENTRES
+    chosen = (np.cumsum(weights, axis=1)[:, None, :] < steps[:, None]).sum(axis=2)
+    centres = np.take_along_axis(points, np.minimum(chosen, points.shape[1] - 1)[:, :, None], axis=1)
+    n_axes = points.shape[2]
+    count = np.minimum(effective, _CENTRES)
+    bandwidth = _ADAPTED_WIDER * (4.0 / ((n_axes + 2) * count)) ** (1.0 / (n_axes + 4))
+    return _Part(size, centres, bandwidth[:, None, None] * np.linalg.cholesky(covariance))
 
 
 def _rotated(numbers: FloatArray, shifts: FloatArray | None) -> FloatArray:
@@ -138,11 +271,11 @@ def _rotated(numbers: FloatArray, shifts: FloatArray | None) -> FloatArray:
     return rotated
 
 
-def _linear_predictions(modes: Modes, points: FloatArray, which: NDArray[np.int64]) -> FloatArray:
-    """Readings along the tangents at each row's mode; a speed below zero is none."""
-    change = np.einsum("pij,pj->pi", modes.by_points[which], points - modes.tangents_at[which])
-    result: FloatArray = np.maximum(modes.predictions[which] + change, 0.0)
-    return result
+def _linear_predictions(modes: Modes, points: FloatArray) -> FloatArray:
+    """Readings at nodes along the tangents at each row's mode; a speed below zero is none."""
+    change = (points - modes.tangents_at[:, None, :]) @ modes.by_points.transpose(0, 2, 1)
+    result: FloatArray = np.maximum(modes.predictions[:, None, :] + change, 0.0)
+    return result.reshape(-1, result.shape[2])
 
 
 def _over(population: Population, rows: Rows, axes: int, wider: float) -> tuple[FloatArray, FloatArray]:
@@ -155,13 +288,3 @@ def _over(population: Population, rows: Rows, axes: int, wider: float) -> tuple[
     if axes > n:
         factor[:, n, n] = 1.0
     return centre, factor
-
-
-def _log_normal(points: FloatArray, mean: FloatArray, factor: FloatArray) -> FloatArray:
-    """Log density of normal distributions, one a row: (n_rows, k, n_axes) points to (n_rows, k)."""
-    white = np.einsum("rij,rkj->rki", np.linalg.inv(factor), points - mean[:, None, :])
-    log_determinant = np.log(np.einsum("rii->ri", factor)).sum(axis=1)
-    result: FloatArray = (
-        -0.5 * np.sum(white**2, axis=2) - log_determinant[:, None] - points.shape[2] * _LOG_SQRT_2PI
-    )
-    return result

@@ -282,7 +282,7 @@ def _finely(base: Base, extension: Extension, strengths: FloatArray, fit: Fit) -
     fits = refit(extension, base.rows, strengths[None, :], start, base.log_scale, FINE, n_rounds=2)
     population = fits[0].found.population(len(base.law.mechanisms))
     modes = event_modes(extension, base.rows, fits[0].points, strengths, population)
-    nodes = event_nodes(extension, base.rows, strengths, population, modes, FINE, base.population)
+    nodes = event_nodes(extension, base.rows, strengths, population, modes, FINE, base.population).nodes
     found = evidence(nodes, base.log_scale, fits[0].found.psi)
     sampled, _ = importance_evidence(nodes, base.log_scale, found, _DRAWS, seed=0)
     return found.log_evidence, sampled

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +20,8 @@ from skred.physics.mechanisms.spec import Added
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-BUDGETS = Budget(256, 128, 1.5, 1.8), Budget(512, 256, 1.5, 1.8), Budget(1024, 512, 1.5, 1.8)
+_LEAST = Budget(64, 64, 128, 1.5, 1.8)
+BUDGETS = _LEAST, _LEAST.times(2), _LEAST.times(4)
 """Of the tables: each where the one before is not good enough."""
 _LOOKING, _FINAL = {1: 11, 2: 6}, {1: 13, 2: 8}
 """Strengths along each axis while the posterior is looked for, and of the tables, by the number of axes."""
@@ -291,17 +292,6 @@ def _without_failures(fits: Sequence[Fit], instead: Fit) -> list[Fit]:
     ]
 
 
-@dataclass(frozen=True, eq=False)
-class _Remembering(Extension):
-    """An extension that keeps the points it was last asked about."""
-
-    asked: list[FloatArray] = field(default_factory=list)
-
-    def predict(self, events: IntArray, points: FloatArray, strengths: FloatArray) -> FloatArray:
-        self.asked[:] = [points]
-        return super().predict(events, points, strengths)
-
-
 def build_tables(base: Base, extension: Extension, located: Located, budget: Budget) -> Tables:
     """Nodes of all events at all strengths of a grid, around populations as wide as what is known of them."""
     grid, fits, mean, factor = located
@@ -319,13 +309,11 @@ def build_tables(base: Base, extension: Extension, located: Located, budget: Bud
     wider = np.exp(np.minimum(np.sqrt(np.einsum("tii->ti", covariances)[:, n : 2 * n]), 0.7))
     wide = population.covariance * wider[:, :, None] * wider[:, None, :]
     wide = wide + np.clip(covariances[:, :n, :n], -1.0, 1.0)
-    remembering = _Remembering(extension.problem, extension.law, extension.directions)
-    nodes = event_nodes(
-        remembering, rows, given, Population(population.mean, wide), modes, budget, base.population
+    spread = event_nodes(
+        extension, rows, given, Population(population.mean, wide), modes, budget, base.population
     )
-    release = remembering.asked[0][:, n].copy()
     points = modes.points.reshape(n_tables, n_events, n + 1)
-    return Tables(grid, nodes, release, points, mean, factor, budget)
+    return Tables(grid, spread.nodes, spread.points[:, :, n].ravel(), points, mean, factor, budget)
 
 
 def highest(
@@ -381,4 +369,4 @@ def exact_nodes(
     n_groups, n_rows = len(strengths), len(rows.event)
     many, given = repeated(rows, n_groups), strengths.repeat(n_rows, axis=0)
     modes = event_modes(extension, many, start.reshape(n_groups * n_rows, -1), given, population)
-    return event_nodes(extension, many, given, population, modes, budget, reference, shifts)
+    return event_nodes(extension, many, given, population, modes, budget, reference, shifts).nodes

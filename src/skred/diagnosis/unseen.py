@@ -36,7 +36,7 @@ from skred.work.calibrate import Calibration
 
 FloatArray = NDArray[np.float64]
 N_DRAWS = 200
-_NODES = Budget(64, 32, 1.5, 1.8)
+_NODES = Budget(64, 32, 64, 1.5, 1.8)
 """Nodes of an event for each draw; their errors average out over the draws."""
 _AT_ONCE = 20
 """Draws whose nodes are held in memory together."""

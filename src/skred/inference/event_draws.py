@@ -17,6 +17,8 @@ from skred.inference.reading_density import OUTLIER_FACTOR
 from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
+_FARTHEST = 230.0
+"""Largest logarithm of a strength, either way: its powers are numbers too."""
 
 
 class Avalanches(NamedTuple):
@@ -60,7 +62,8 @@ def new_avalanches(
     wide = np.maximum(sd, 1e-9)  # cut off where the track ends, as in the likelihood
     low, high = ndtr(-mean / wide), ndtr((length - mean) / wide)
     deviation = ndtri(low + (high - low) * rng.random((len(means), n_events)))
-    return Avalanches(np.exp(logs), _on_track(problem, deviation))
+    # Where spreads are absurdly wide a strength can be beyond any number.
+    return Avalanches(np.exp(np.clip(logs, -_FARTHEST, _FARTHEST)), _on_track(problem, deviation))
 
 
 def _on_track(problem: HierarchicalProblem, deviation: FloatArray) -> FloatArray:
