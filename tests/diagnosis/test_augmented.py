@@ -238,7 +238,7 @@ def test_finer_tables_hold_the_old_ones(base: Base, drag: Curve) -> None:
     assert len(new.grid.points) == 2 * len(old.grid.points) - 1
     before = [fit.found.log_evidence for fit in old.fits]
     after = [fit.found.log_evidence for fit in new.fits]
-    assert_allclose(after[::2], before, atol=0.05)
+    assert_allclose(after[::2], before, atol=0.1)
     between = 0.5 * (np.array(before[1:]) + before[:-1])
     assert_allclose(after[1::2], between, atol=0.5)
 

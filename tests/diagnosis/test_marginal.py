@@ -52,7 +52,7 @@ def test_nodes_agree_with_surfaces(law_id: str) -> None:
         "constant",
         "coulomb",
         pytest.param(
-            "pcm", marks=pytest.mark.xfail(strict=True, reason="1.6 nats too low: modes are missed")
+            "pcm", marks=pytest.mark.xfail(strict=True, reason="1.3 nats too low: modes are missed")
         ),
     ],
 )

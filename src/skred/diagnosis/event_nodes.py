@@ -42,9 +42,9 @@ class Budget(NamedTuple):
         where a front stops near a sensor.
     """
 
-    around_mode: int = 32
-    over_population: int = 32
-    adapted: int = 32
+    around_mode: int = 16
+    over_population: int = 64
+    adapted: int = 64
     wider: float = 1.35
     population_wider: float = 1.6
     linear: bool = False
