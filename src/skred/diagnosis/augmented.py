@@ -254,6 +254,9 @@ class AugmentedProblem(HierarchicalProblem):
         speeds: FloatArray = front_speeds(rows, releases, self.path, extension.contributions)
         return speeds
 
+    def finer(self) -> None:
+        """None: tables are as fine as helps."""
+
     def surfaces(self, mechanisms: Sequence[Mechanism]) -> Surfaces:
         """Not there: surfaces would be those of the base law alone.
 

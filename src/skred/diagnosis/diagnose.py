@@ -182,6 +182,7 @@ def _steps(
     """All steps of a diagnosis."""
     clock.stage("base", f"{law.id}: calibrating the base law")
     calibration = calibrate_surely(problem, law, settings)
+    problem = _problem_of(calibration)
     if not calibration.gate.passed:
         clock.end()
         why = "the gate of the base law's calibration failed: " + "; ".join(calibration.gate.problems)
@@ -217,10 +218,17 @@ def _steps(
     )  # fmt: skip
 
 
+def _problem_of(calibration: Calibration) -> HierarchicalProblem:
+    """What a base law was calibrated on: perhaps finer than was asked for."""
+    problem = calibration.problem
+    assert isinstance(problem, HierarchicalProblem)
+    return problem
+
+
 def reference_of(calibration: Calibration, step: Step) -> tuple[Calibration, str]:
     """The base law calibrated under a step's error model, or as it is and why, if that cannot be trusted."""
-    problem, own = step.calibration.problem, calibration.problem
-    assert isinstance(problem, AugmentedProblem) and isinstance(own, HierarchicalProblem)
+    problem, own = step.calibration.problem, _problem_of(calibration)
+    assert isinstance(problem, AugmentedProblem)
     if problem.error_model.id == own.error_model.id:
         return calibration, ""
     again = calibrate_surely(problem.base.problem, calibration.law, calibration.settings)

@@ -64,10 +64,13 @@ class HierarchicalProblem(Problem):
     error_model : ErrorModel
     place_sd_m : float
         How well it is known where a front stopped relative to a sensor.
+    fineness : int
+        1 as usual; 2 for events resolved finer, over a wider envelope, at several times the cost.
     """
 
     error_model: ErrorModel = ERROR_MODELS[DEFAULT_ERRORS]
     place_sd_m: float = PLACE_SD_M
+    fineness: int = 1
     # Not init: a problem made from this one by `replace` must not keep what belongs to other recordings.
     _surfaces: dict[tuple[str, ...], Surfaces] = field(init=False, default_factory=dict, repr=False)
     _rough: dict[tuple[str, ...], RoughPopulation] = field(init=False, default_factory=dict, repr=False)
@@ -204,13 +207,18 @@ class HierarchicalProblem(Problem):
         """Surfaces of all events under a law, made once: coarsely, then finely where it matters."""
         key = _key(mechanisms)
         if key not in self._surfaces:
-            self._surfaces[key] = self._resolve(mechanisms, self.fronts(mechanisms), Resolution(), 1.0)
+            self._surfaces[key] = self._resolve(mechanisms, self.fronts(mechanisms), self.fineness)
         return self._surfaces[key]
 
-    def _resolve(
-        self, mechanisms: Sequence[Mechanism], fronts: Fronts, resolution: Resolution, fineness: float
-    ) -> Surfaces:
+    def finer(self) -> HierarchicalProblem | None:
+        """The same with events resolved finer; None where they are already."""
+        return replace(self, fineness=2) if self.fineness == 1 else None
+
+    def _resolve(self, mechanisms: Sequence[Mechanism], fronts: Fronts, fineness: int) -> Surfaces:
         """Surfaces with patches `fineness` times smaller, and box and envelope wider, than usual (1)."""
+        resolution = Resolution()
+        for _ in range(fineness - 1):
+            resolution = resolution.finer()
         scale = np.log([mechanism.strength.prior_scale for mechanism in mechanisms])
         wider = _WIDER_CHECK * (fineness - 1.0)
         box = np.column_stack([scale - _BELOW_SCALE - wider, scale + _ABOVE_SCALE + wider])
@@ -252,7 +260,7 @@ class HierarchicalProblem(Problem):
             ),
             releases=releases._replace(mean=releases.mean[chosen], sd=releases.sd[chosen]),
         )
-        finer = self._resolve(law.mechanisms, fronts, Resolution().finer(), 2.0)
+        finer = self._resolve(law.mechanisms, fronts, self.fineness + 1)
         exact = self._log_likelihood(finer, law, samples)
         difference: FloatArray = self.log_likelihood(law, samples)[:, chosen] - exact
         return difference

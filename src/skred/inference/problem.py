@@ -74,6 +74,10 @@ class Problem(ABC):
         """What is wrong with the numerics of the likelihood, and what to do."""
         return ()
 
+    def finer(self) -> Problem | None:
+        """The same problem with finer numerics; None where there are none."""
+        return None
+
     @abstractmethod
     def constants(self) -> dict[str, Any]:
         """Variables of the group constant_data that are this likelihood's own, and attributes."""

@@ -76,12 +76,19 @@ def calibrate(
 
 
 def calibrate_surely(problem: Problem, law: Law, settings: SamplerSettings) -> Calibration:
-    """As `calibrate`, and once more with `MORE` times the draws where the chains were too short."""
+    """As `calibrate`, and once more where the gate failed.
+
+    With `MORE` times the draws if the chains were too short, else with events resolved finer if they can be:
+    the calibration's problem is then another than was given.
+    """
     found = calibrate(problem, law, settings)
-    if not found.gate.chains_too_short:
+    if found.gate.passed:
         return found
-    more = replace(settings, draws=MORE * settings.draws, tune=MORE * settings.tune)
-    return calibrate(problem, law, more)
+    if found.gate.chains_too_short:
+        more = replace(settings, draws=MORE * settings.draws, tune=MORE * settings.tune)
+        return calibrate(problem, law, more)
+    finer = problem.finer()
+    return found if finer is None else calibrate(finer, law, settings)
 
 
 def write_calibration(calibration: Calibration, folder: Path) -> None:
