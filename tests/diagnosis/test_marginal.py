@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from diagnosis_cases import dense_base, ryggfonn_base, sparse_base
 from numpy.testing import assert_allclose
 
+import skred.diagnosis.event_nodes as event_nodes_module
 from skred.diagnosis.curves import Base
 from skred.diagnosis.event_nodes import FINE, USUAL, Budget, event_nodes
 from skred.diagnosis.extension import extended
@@ -63,6 +66,30 @@ def test_few_nodes_agree_with_surfaces(law_id: str) -> None:
     exact = evidence(base.problem.surfaces(base.law.mechanisms).nodes, base.log_scale, start)
     usual = evidence(nodes_of(base, USUAL), base.log_scale, start)
     assert usual.log_evidence == pytest.approx(exact.log_evidence, abs=0.3)
+
+
+def _shifted(numbers: Any, by: int, n_events: int, n: int, n_axes: int, seed: int) -> Any:
+    return numbers(n_events, n, n_axes, seed + by)
+
+
+def test_adapted_nodes_scatter_less(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With fewer nodes; eight sets of numbers. Avalanches that stop at the dam or pass it have two modes."""
+    base = ryggfonn_base("pcm")
+    numbers = event_nodes_module._normal_numbers
+
+    def evidences(budget: Budget) -> list[float]:
+        found = []
+        for seed in range(8):
+            monkeypatch.setattr(
+                event_nodes_module,
+                "_normal_numbers",
+                lambda *a, seed=seed: numbers(*a[:3], a[3] + 100 * seed),
+            )
+            found.append(evidence(nodes_of(base, budget), base.log_scale, base.fit.found.psi).log_evidence)
+        return found
+
+    plain, adapted = evidences(Budget(128, 64, 0)), evidences(Budget(16, 64, 64))
+    assert np.std(adapted) < 0.35 * np.std(plain)
 
 
 @pytest.mark.parametrize("which", ["constant", "coulomb", "sparse", "dense"])

@@ -9,7 +9,7 @@ import pytest
 from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
 
 from skred.diagnosis.curves import Base, Curve, curve, curve_at, curve_near, first_look
-from skred.diagnosis.event_nodes import FINE, ROUGH, USUAL
+from skred.diagnosis.event_nodes import FINE, FRONTS, ROUGH
 from skred.diagnosis.race import _entrants, _leading, with_errors
 from skred.diagnosis.screen import candidates
 from skred.physics.mechanisms import mechanisms
@@ -45,10 +45,10 @@ def test_rough_look_finds_what_is_missing(base: Base) -> None:
 def test_fronts_are_looked_at_where_readings_are_far_off() -> None:
     """At Ryggfonn without drag a third of the readings are outliers: tangents miss what ends that."""
     base = ryggfonn_base("coulomb")
-    assert first_look(base) is USUAL
+    assert first_look(base) is FRONTS
     drag = mechanisms()["velocity_weakening"]
     assert drag.added is not None
-    found = [curve(base, drag, shape, USUAL) for shape in drag.added.shapes(base.setting)]
+    found = [curve(base, drag, shape, FRONTS) for shape in drag.added.shapes(base.setting)]
     rough = [curve(base, drag, shape, ROUGH) for shape in drag.added.shapes(base.setting)]
     heights = [max(one.log_bayes_factor for one in curves) for curves in (found, rough)]
     assert heights[0] > 30.0 > heights[1] + 10.0

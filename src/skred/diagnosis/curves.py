@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import Akima1DInterpolator
 
-from skred.diagnosis.event_nodes import FIRST, ROUGH, USUAL, Budget, event_nodes
+from skred.diagnosis.event_nodes import FIRST, FRONTS, ROUGH, USUAL, Budget, event_nodes
 from skred.diagnosis.extension import Extension, extended, setting_of
 from skred.diagnosis.marginal import Evidence, coordinates, evidence, prior_log_scale
 from skred.diagnosis.mixed import mean_prior
@@ -254,7 +254,7 @@ def first_look(base: Base) -> Budget:
     stated = np.hypot(readings.relative_sd * predictions, readings.absolute_sd)
     sd = np.where(readings.stated_sd > 0.0, readings.stated_sd, stated)
     far = np.abs(readings.values - predictions) > _FAR_OFF * sd
-    return USUAL if far[readings.observed].mean() > _FAR_SHARE else ROUGH
+    return FRONTS if far[readings.observed].mean() > _FAR_SHARE else ROUGH
 
 
 def curve(base: Base, mechanism: Mechanism, shape: Shape, budget: Budget) -> Curve:

@@ -59,7 +59,8 @@ class Budget(NamedTuple):
 
 
 USUAL, FIRST, FINE = Budget(), Budget(32, 16, 0), Budget(256, 128, 512, 1.5, 1.8)
-ROUGH = Budget(32, 16, 0, linear=True)
+ROUGH, FRONTS = Budget(32, 16, 0, linear=True), Budget(16, 32, 32)
+"""For a first look: along tangents, and with fronts where those mislead."""
 _CENTRES = 16
 """Places that adapted nodes are put around, of each event."""
 _SHRUNK = 3.0
