@@ -22,25 +22,23 @@ import cyclopts
 from skred.prove.scorecard import DIAGNOSIS, scorecard
 from skred.work.output import write_json
 
-SAMPLES = {"draws": 1000, "tune": 1000, "chains": 4}
+
+def _settings(replicas: int) -> dict[str, Any]:
+    """A user's, but for the number of clean campaigns simulated."""
+    from skred.prove.plan import diagnosis_settings
+
+    settings = diagnosis_settings(quick=False)
+    return settings | {"effort": {**settings["effort"], "replicas": replicas}}
 
 
 def diagnose_one(trial: Path, out: Path, replicas: int) -> dict[str, Any]:
     """Verdict of one trial, from its campaign folder and its base law only."""
-    from skred.campaign import read_campaign
-    from skred.diagnosis.diagnose import Effort, diagnose
-    from skred.diagnosis.verdict import verdict
-    from skred.inference.hierarchical import hierarchical_problem
-    from skred.inference.sampling import SamplerSettings
-    from skred.laws import load_law
+    from skred.prove.task import diagnose_campaign
 
     started, cpu = time.monotonic(), time.process_time()
     request = json.loads((trial / "request.json").read_text(encoding="utf-8"))
     try:
-        problem = hierarchical_problem(read_campaign(trial / "campaign"))
-        settings = SamplerSettings("metropolis", **SAMPLES, seed=0)
-        law = load_law(request["base_model"])
-        document = verdict(diagnose(problem, law, settings, Effort(replicas=replicas)))
+        document = diagnose_campaign(trial / "campaign", request["base_model"], _settings(replicas))
     except Exception as error:  # a crash is an answer, and a wrong one
         document = {"verdict": "crash", "error": repr(error), "traceback": traceback.format_exc()}
     document |= {"wall_seconds": time.monotonic() - started, "cpu_seconds": time.process_time() - cpu}
@@ -94,7 +92,7 @@ def main(
             measured = f"{bar['measured']:.2f}, n = {bar['n']}"
             print(f"{bar['goal']}: {bar['what']}: {measured}: {bar['status']}")
     if out is not None:
-        write_json(out, found | {"settings": {"samples": SAMPLES, "replicas": replicas}})
+        write_json(out, found | {"settings": _settings(replicas)})
 
 
 if __name__ == "__main__":

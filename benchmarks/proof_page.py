@@ -19,9 +19,10 @@ from typing import Annotated, Any
 import cyclopts
 
 from skred.prove.ledger import ledger_sha256
-from skred.prove.scorecard import scorecard
+from skred.prove.scorecard import DIAGNOSIS, scorecard
 from skred.work.output import write_json, write_text
 
+FAILED = ("crash", "timeout")
 ROOT = Path(__file__).resolve().parent.parent
 RECORD = ROOT / "benchmarks" / "results" / "proof"
 FIGURES = ROOT / "docs" / "figures"
@@ -84,8 +85,33 @@ def page(batches: Sequence[Path], document: Found, figures: Sequence[str]) -> st
     """The whole page."""
     parts = [_HEAD, "## Batches\n", _batches(batches), "## Bars\n", _bars(document)]
     parts += [f"![{name.replace('_', ' ')}](figures/proof-{name}.png)\n" for name in figures]
-    parts += ["## What it got wrong\n", _wrong(batches)]
+    parts += ["## Open and masked\n", _masked(document)]
+    parts += ["## What it got wrong\n", _wrong(batches), *map(_notes, batches)]
     return "\n".join(parts)
+
+
+def _masked(document: Found) -> str:
+    """Found, of trials of which the base law shows on average something, and of those where it hides it."""
+    head = ["| signal-to-noise | open: found | masked: found |", "| --- | --- | --- |"]
+    scores = document["methods"][DIAGNOSIS]
+    both = [scores[which]["all"]["detection"]["by_snr"] for which in ("open", "masked")]
+    rows = [
+        f"| {row['snr_from']:g} to {row['snr_to']:g} | {_share(row)} | {_share(other)} |"
+        for row, other in zip(*both, strict=True)
+    ]
+    return "\n".join([*head, *rows]) + "\n"
+
+
+def _share(found: Found) -> str:
+    if not found["n"]:
+        return "-"
+    return f"{found['hits']} of {found['n']} ({found['low']:.2f} to {found['high']:.2f})"
+
+
+def _notes(batch: Path) -> str:
+    """What is to be said about a batch, written by hand after it was opened."""
+    file = batch / "notes.md"
+    return f"## About batch {batch.name}\n\n{file.read_text(encoding='utf-8')}" if file.exists() else ""
 
 
 def _batches(batches: Sequence[Path]) -> str:
@@ -129,7 +155,7 @@ def _wrong(batches: Sequence[Path]) -> str:
         alarm = answer["verdict"] in ("missing_physics", "instrument", "unexplained")
         unlisted = truth["hidden"] == "unlisted"
         right = (set(named) & ids or (unlisted and answer["verdict"] == "unexplained")) if ids else not alarm
-        if not right:
+        if not right or answer["verdict"] in FAILED:
             hidden = " + ".join(sorted(ids)) or truth["nasty"] or "nothing"
             nothing = answer.get("probability", {}).get("nothing")
             rows.append(

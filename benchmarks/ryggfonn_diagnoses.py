@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any, NamedTuple
@@ -21,6 +22,7 @@ from skred.work.output import write_json, write_text
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "benchmarks" / "results" / "ryggfonn"
 FIGURES = ROOT / "docs" / "figures"
+MOVED = ("LC", "CD")
 PRIOR_FACTORS = (0.5, 1.0, 2.0)
 SHOWN = ("where", "probabilities", "places")
 
@@ -34,6 +36,8 @@ class Case(NamedTuple):
     smoothing_m: float = 10.0
     errors: str = "robust"
     spans: bool = False
+    sensors_m: tuple[float, float] = (0.0, 0.0)
+    """How far downstream of where they are taken to be the sensors LC and CD are put."""
 
 
 CASES = (
@@ -44,6 +48,10 @@ CASES = (
     Case("pcm-smoothing-20", "pcm", smoothing_m=20.0),
     Case("pcm-student", "pcm", errors="student"),
     Case("pcm-spans", "pcm", spans=True),
+    # Their places were inferred, to within 40 and 20 m (data README).
+    Case("pcm-sensors-up", "pcm", sensors_m=(-40.0, -20.0)),
+    Case("pcm-sensors-down", "pcm", sensors_m=(40.0, 20.0)),
+    Case("pcm-sensors-closer", "pcm", sensors_m=(40.0, -20.0)),
     Case("pcm-with-dam", "pcm", campaign="ryggfonn-with-dam"),
 )
 
@@ -53,22 +61,30 @@ def campaign_of(case: Case) -> Any:
     from skred.campaign import find_campaign, read_campaign
     from skred.campaign.ryggfonn import build
 
-    if not case.spans:
-        return read_campaign(find_campaign(case.campaign))
-    return build(find_campaign("ryggfonn") / "raw", spans=True)
+    if case.spans:
+        return build(find_campaign("ryggfonn") / "raw", spans=True)
+    campaign = read_campaign(find_campaign(case.campaign))
+    shifts = dict(zip(MOVED, case.sensors_m, strict=True))
+    sensors = [
+        replace(one, s_from_m=one.s_from_m + by, s_to_m=one.s_to_m + by)
+        if (by := shifts.get(one.id)) and one.s_from_m is not None and one.s_to_m is not None
+        else one
+        for one in campaign.sensors
+    ]
+    return replace(campaign, sensors=tuple(sensors))
 
 
 def diagnose_case(case: Case, replicas: int) -> dict[str, Any]:
     """Diagnose one case; its verdict, and the evidence of each mechanism under other scales of its prior."""
+    from skred.cli_options import DIAGNOSIS_SAMPLING
     from skred.diagnosis.diagnose import Effort, diagnose
     from skred.diagnosis.verdict import verdict
     from skred.inference.hierarchical import hierarchical_problem
-    from skred.inference.sampling import SamplerSettings
     from skred.laws import load_law
     from skred.report.diagnosis import save_diagnosis_figures
 
     problem = hierarchical_problem(campaign_of(case), error_model=case.errors, smoothing_m=case.smoothing_m)
-    settings = SamplerSettings("metropolis", 1000, 1000, 4, 0)
+    settings = DIAGNOSIS_SAMPLING.settings("hierarchical")
     found = diagnose(problem, load_law(case.base_model), settings, Effort(replicas=replicas), print)
     document = verdict(found) | {"case": case._asdict()}
     if found.race is not None:

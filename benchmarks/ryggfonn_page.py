@@ -183,7 +183,8 @@ def _robust(found: Mapping[str, Found]) -> str:
     return f"""## What it depends on
 
 Base M2 under other choices: smoothing of the terrain (10 m elsewhere), Student errors, sensors taken as the
-spans they are, the surveyed terrain with the dam in it.
+spans they are, the surveyed terrain with the dam in it, and the sensors LC and CD both further up (by 40 and
+20 m), both further down, and closer to each other, as far as their places are uncertain.
 
 | case | verdict | omnibus p | leading candidates, log Bayes factor |
 | --- | --- | --- | --- |
