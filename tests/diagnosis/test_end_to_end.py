@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from diagnosis_cases import first_events, trial, with_sensors
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from skred.campaign import Campaign, Status
 from skred.diagnosis.diagnose import Diagnosis, Effort, diagnose, reference_of
 from skred.diagnosis.held_out import HeldOut, errors, paired
+from skred.diagnosis.predictive import Predicted
 from skred.diagnosis.verdict import verdict
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical import hierarchical_problem
@@ -119,7 +120,10 @@ def test_predictions_are_of_the_readings(clean: Diagnosis) -> None:
     found, problem = clean.before, clean.problem
     assert found is not None
     seen = problem.observed
-    assert np.isfinite(found.predicted[seen]).all() and np.isnan(found.predicted[~seen]).all()
+    for values in found.predicted:
+        assert np.isfinite(values[seen]).all() and np.isnan(values[~seen]).all()
+    inside = (problem.values >= found.predicted.low) & (problem.values <= found.predicted.high)
+    assert_array_equal(inside[seen], found.covered[seen] == 1.0)
     assert np.isnan(found.covered[~seen]).all() and 0.6 < found.covered[seen].mean() <= 1.0
     assert found.elpd == pytest.approx(found.pointwise.sum())
 
@@ -146,7 +150,8 @@ def test_before_and_after_stand_under_one_error_model(biased: Diagnosis, name: s
 
 
 def held(pointwise: list[float], predicted: Any = None, covered: Any = None) -> HeldOut:
-    return HeldOut(np.array(pointwise), np.zeros(len(pointwise)), (), (), predicted, covered)
+    every = Predicted(predicted, predicted, predicted)
+    return HeldOut(np.array(pointwise), np.zeros(len(pointwise)), (), (), every, covered)
 
 
 def test_paired_by_hand() -> None:

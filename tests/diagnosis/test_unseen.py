@@ -112,7 +112,7 @@ def test_what_was_missing_predicts_unseen_avalanches_better(
     assert realised_gain(document | {"after": None}, biased(), fresh) is None
     held = unseen(predictor_of(augmented), fresh)
     seen = np.asarray(fresh.status) == Status.OBSERVED
-    assert_array_equal(np.isfinite(held.predicted), seen)
+    assert_array_equal(np.isfinite(held.predicted.mean), seen)
     assert 0.7 < held.covered[seen].mean() <= 1.0
 
 
@@ -171,8 +171,10 @@ def test_predictions_hold_what_they_should() -> None:
     assert_allclose(found.mean[:, GATE], FACTOR * plain.mean[:, GATE], rtol=1e-9)
     others = np.arange(few.n_sensors) != GATE
     assert_array_equal(found.mean[:, others], plain.mean[:, others])
-    inside = found.holds(0.5 * (found.low + found.high))
-    assert inside.all() and not found.holds(found.high + 1e-6).any()
+    seen = np.ones(found.low.shape, dtype=bool)
+    assert_array_equal(found.covered(0.5 * (found.low + found.high), seen), 1.0)
+    assert_array_equal(found.covered(found.high + 1e-6, seen), 0.0)
+    assert np.isnan(found.covered(found.mean, ~seen)).all()
 
 
 def test_a_predictor_comes_back_as_it_was(augmented: Calibration) -> None:

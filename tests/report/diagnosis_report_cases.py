@@ -17,6 +17,7 @@ from skred.diagnosis.identify import Identifiability, Told
 from skred.diagnosis.locate import Location
 from skred.diagnosis.odds import prior_odds
 from skred.diagnosis.omnibus import Omnibus
+from skred.diagnosis.predictive import Predicted
 from skred.diagnosis.race import Entrant, Heat, Race
 from skred.inference.gate import Gate
 from skred.inference.hierarchical import HierarchicalProblem
@@ -100,7 +101,14 @@ def held(problem: HierarchicalProblem, better: float) -> HeldOut:
     predicted = np.where(problem.observed, problem.values + noise, np.nan)
     covered = np.where(problem.observed, 1.0, np.nan)
     pointwise = rng.normal(-12.0, 2.0, n) + better
-    return HeldOut(pointwise, np.full(n, 0.4), problem.campaign.event_ids[:2], (), predicted, covered)
+    return HeldOut(
+        pointwise,
+        np.full(n, 0.4),
+        problem.campaign.event_ids[:2],
+        (),
+        Predicted(predicted, predicted - 8.0, predicted + 8.0),
+        covered,
+    )
 
 
 def calibration(problem: HierarchicalProblem, added: tuple = (), gate: Gate = GATE) -> SimpleNamespace:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from skred.diagnosis.extension import Extension
-from skred.diagnosis.predictive import predict_event
+from skred.diagnosis.predictive import Predicted, predict_event
 from skred.inference.leave_one_out import exact_leave_one_out
 from skred.inference.population import population_of
 
@@ -36,8 +36,8 @@ class HeldOut:
         Events that it was not trusted for, refitted without.
     not_converged : tuple of str
         Those of them whose refit did not converge.
-    predicted : (n_events, n_sensors) array
-        Mean prediction of each reading, m/s or m.
+    predicted : Predicted
+        Of each reading, (n_events, n_sensors); NaN where there is none.
     covered : (n_events, n_sensors) array
         1 where the central 90 % of the predictions hold the reading, NaN where there is none.
     """
@@ -46,7 +46,7 @@ class HeldOut:
     pareto_k: FloatArray
     refitted: tuple[str, ...]
     not_converged: tuple[str, ...]
-    predicted: FloatArray
+    predicted: Predicted
     covered: FloatArray
 
     @property
@@ -97,8 +97,8 @@ def _smoothed(densities: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _predictions(
     calibration: Any, extension: Extension, added: FloatArray, weights: FloatArray, seed: int
-) -> tuple[FloatArray, FloatArray]:
-    """Mean prediction of each event's readings by the others, and whether 90 % intervals hold them."""
+) -> tuple[Predicted, FloatArray]:
+    """Predictions of each event's readings by the others, and whether 90 % intervals hold them."""
     problem, law = calibration.problem, calibration.law
     posterior = calibration.tree["posterior"].to_dataset()
     names = [parameter.name for parameter in problem.parameters(law)]
@@ -106,22 +106,19 @@ def _predictions(
     means, factors = population_of(law, samples)
     rng = np.random.default_rng([seed, 31])
     n_events, readings = problem.campaign.n_events, problem.readings
-    predicted = np.full((n_events, problem.campaign.n_sensors), np.nan)
-    covered = np.full_like(predicted, np.nan)
+    parts = []
     for event in range(n_events):
         drawn = rng.choice(len(weights), size=_DRAWS, p=weights[:, event])
         drawn = np.repeat(drawn, _FRONTS)
-        found = predict_event(extension, event, means[drawn], factors[drawn], added[drawn], rng)
-        seen = readings.observed[event]
-        predicted[event, seen] = found.mean[seen]
-        covered[event, seen] = found.holds(readings.values[event])[seen]
-    return predicted, covered
+        parts.append(predict_event(extension, event, means[drawn], factors[drawn], added[drawn], rng))
+    found = Predicted(*(np.array(values) for values in zip(*parts, strict=True)))
+    return found.where(readings.observed), found.covered(readings.values, readings.observed)
 
 
 def errors(found: HeldOut, problem: Any) -> dict[str, float | None]:
     """Root mean square error of speeds [m/s] and runouts [m], and coverage of the 90 % intervals."""
     velocity = problem.readings.is_velocity
-    difference = np.where(problem.observed, found.predicted - problem.values, np.nan)
+    difference = np.where(problem.observed, found.predicted.mean - problem.values, np.nan)
 
     def rms(columns: NDArray[np.bool_]) -> float | None:
         chosen = difference[:, columns]

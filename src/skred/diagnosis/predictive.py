@@ -27,9 +27,13 @@ class Predicted(NamedTuple):
     low: FloatArray
     high: FloatArray
 
-    def holds(self, values: FloatArray) -> NDArray[np.bool_]:
-        """Whether the central 90 % of the predictions hold some values."""
-        return np.asarray((values >= self.low) & (values <= self.high))
+    def where(self, seen: NDArray[np.bool_]) -> Predicted:
+        """The same, NaN where nothing was seen."""
+        return Predicted(*(np.where(seen, values, np.nan) for values in self))
+
+    def covered(self, values: FloatArray, seen: NDArray[np.bool_]) -> FloatArray:
+        """1 where the central 90 % of the predictions hold the reading, else 0, NaN where none was seen."""
+        return np.where(seen, (values >= self.low) & (values <= self.high), np.nan)
 
 
 def predict_event(

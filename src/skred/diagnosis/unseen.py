@@ -182,10 +182,9 @@ def unseen(predictor: Predictor, campaign: Campaign, seed: int = 0) -> HeldOut:
     """Scores and predictions of a campaign's events, as of events left out; nothing was reweighted."""
     problem, found = problem_of(predictor, campaign), predictions(predictor, campaign, seed)
     seen = problem.observed
-    predicted = np.where(seen, found.mean, np.nan)
-    covered = np.where(seen, found.holds(problem.readings.values), np.nan)
+    covered = found.covered(problem.readings.values, seen)
     scores = log_scores(predictor, campaign, seed)
-    return HeldOut(scores, np.zeros(len(scores)), (), (), predicted, covered)
+    return HeldOut(scores, np.zeros(len(scores)), (), (), found.where(seen), covered)
 
 
 def problem_of(predictor: Predictor, campaign: Campaign) -> HierarchicalProblem:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.diagnosis.predictive import Predicted
 from skred.report.diagnosis_words import AFTER, BEFORE
 from skred.report.labels import figure_text, unit_text
 from skred.report.style import GREY, legend_below, new_figure, styled
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from skred.diagnosis.diagnose import Diagnosis
+    from skred.diagnosis.held_out import HeldOut
 
 FloatArray = NDArray[np.float64]
 _MOST_NAMED = 60
@@ -36,33 +38,41 @@ def left_out_figure(found: Diagnosis) -> Figure:
     for axes, (quantity, columns, unit, zero) in zip(panels, shown, strict=True):
         seen = problem.observed[:, columns]
         recorded = problem.values[:, columns][seen] - zero
-        first = before.predicted[:, columns][seen] - zero
-        second = None if after is None else after.predicted[:, columns][seen] - zero
+        first = _of(before, columns, seen, zero)
+        second = None if after is None else _of(after, columns, seen, zero)
         _pairs(axes, recorded, first, second)
         of = " from the reference" if quantity == "runout" and problem.campaign.reference_s_m else ""
         of = of or (" s" if quantity == "runout" else "")
         axes.set_xlabel(f"recorded {quantity}{of} [{unit}]")
         axes.set_ylabel(f"predicted from the other avalanches [{unit}]")
-    legend_below(figure, panels, columns=3)
+    legend_below(figure, panels, columns=2)
     return figure
 
 
-def _pairs(axes: Axes, recorded: FloatArray, before: FloatArray, after: FloatArray | None) -> None:
-    ends = [recorded.min(), recorded.max(), np.nanmin(before), np.nanmax(before)]
-    if after is not None:
-        axes.vlines(recorded, before, after, color="#c4c4c4", linewidth=0.6, zorder=1)
-        ends += [np.nanmin(after), np.nanmax(after)]
+def _of(held: HeldOut, columns: NDArray[np.bool_], seen: NDArray[np.bool_], zero: float) -> Predicted:
+    """Predictions of the readings of some sensors, as rows."""
+    return Predicted(*(values[:, columns][seen] - zero for values in held.predicted))
+
+
+def _pairs(axes: Axes, recorded: FloatArray, before: Predicted, after: Predicted | None) -> None:
+    last = before if after is None else after
+    ends = [recorded.min(), recorded.max(), np.nanmin(before.mean), np.nanmax(before.mean)]
+    ends += [np.nanmin(last.low), np.nanmax(last.high)]
+    axes.vlines(
+        recorded, last.low, last.high, color="#c9d6e3", linewidth=1.6, zorder=1,
+        label="90 % of what was to be expected" + ("" if after is None else ", with it"),
+    )  # fmt: skip
     margin = 0.04 * (max(ends) - min(ends)) or 1.0
     low, high = float(min(ends) - margin), float(max(ends) + margin)
     axes.plot([low, high], [low, high], color=GREY, linewidth=0.9, linestyle="--", label="perfect")
     size = 4.5 if len(recorded) < 150 else 3.0
     axes.plot(
-        recorded, before, linestyle="none", marker="o", markersize=size, markerfacecolor="none",
+        recorded, before.mean, linestyle="none", marker="o", markersize=size, markerfacecolor="none",
         color=BEFORE, label="base law", zorder=2,
     )  # fmt: skip
     if after is not None:
         axes.plot(
-            recorded, after, linestyle="none", marker="o", markersize=size, color=AFTER, alpha=0.85,
+            recorded, after.mean, linestyle="none", marker="o", markersize=size, color=AFTER, alpha=0.85,
             markeredgewidth=0.0, label="with what was missing", zorder=3,
         )  # fmt: skip
     axes.set_xlim(low, high)
