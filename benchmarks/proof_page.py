@@ -124,9 +124,15 @@ def _batches(batches: Sequence[Path]) -> str:
         rows.append(
             f"| {ledger['seed']} | {ledger['n']} ({ledger['kind']}) | {ledger['created_utc']} |"
             f" `{ledger_sha256(ledger)}` | `{ledger['source_sha256'][:12]}` |"
-            f" {'opened' if _is_open(batch) else 'not opened yet'} |"
+            f" {_state(batch)} |"
         )
     return "\n".join(rows) + "\n"
+
+
+def _state(batch: Path) -> str:
+    if _is_open(batch):
+        return "opened"
+    return "given up unopened, see below" if (batch / "notes.md").exists() else "not opened yet"
 
 
 def _bars(document: Found) -> str:

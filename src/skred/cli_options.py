@@ -136,5 +136,5 @@ class Sampling:
 
 SAMPLING = Sampling()
 """How a command samples unless told otherwise."""
-DIAGNOSIS_SAMPLING = Sampling(draws=800, tune=600)
+DIAGNOSIS_SAMPLING = Sampling(draws=600, tune=1000)
 """How a diagnosis samples: enough to pass the gate nearly always; with more where it did not."""

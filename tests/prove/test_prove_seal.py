@@ -61,7 +61,7 @@ def test_settings_are_those_of_a_user() -> None:
 
     settings, quick = diagnosis_settings(False), diagnosis_settings(True)
     assert Effort(**settings["effort"]) == Effort()
-    sampler = {"sampler": "metropolis", "draws": 800, "tune": 600, "chains": 4, "seed": 0}
+    sampler = {"sampler": "metropolis", "draws": 600, "tune": 1000, "chains": 4, "seed": 0}
     assert settings["sampler"] == sampler == quick["sampler"]
     assert quick["effort"]["replicas"] == QUICK_REPLICAS
 

@@ -42,7 +42,7 @@ _EXACT = Budget(512, 256, 1024, 1.5, 1.8)
 _EXACT_RUNS = 16 * 22
 """Events times draws up to which there are so many nodes; where there are fewer, more."""
 _EXACT_EVENTS, _EXACT_DRAWS = 24, 16
-_ROUGH_DRAWS, _ROUGH_RUNS, _ENOUGH = 8, 8 * 22, 0.4
+_ROUGH_DRAWS, _ROUGH_RUNS, _ENOUGH = 8, 8 * 22, 0.2
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,8 +20,8 @@ from skred.physics.mechanisms.spec import Added
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-_LEAST = Budget(64, 64, 128, 1.5, 1.8)
-BUDGETS = _LEAST, _LEAST.times(2), _LEAST.times(4)
+_LEAST = Budget(128, 128, 256, 1.5, 1.8)
+BUDGETS = _LEAST, _LEAST.times(2)
 """Of the tables: each where the one before is not good enough."""
 _LOOKING, _FINAL = {1: 11, 2: 6}, {1: 13, 2: 8}
 """Strengths along each axis while the posterior is looked for, and of the tables, by the number of axes."""
