@@ -263,4 +263,4 @@ def test_what_a_diagnosis_is_asked(folder: Path, diagnosed: Diagnosed) -> None:
     assert problem.campaign.name == "ryggfonn-with-dam" and problem.likelihood == "hierarchical"
     assert problem.terrain.smoothing_m == 20.0 and problem.error_model.id == "student"
     assert one["law"].id == "constant"
-    assert (settings.sampler, settings.seed, settings.draws, settings.tune) == ("metropolis", 7, 1000, 1000)
+    assert (settings.sampler, settings.seed, settings.draws, settings.tune) == ("metropolis", 7, 600, 1000)

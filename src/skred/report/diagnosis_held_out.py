@@ -60,7 +60,7 @@ def _pairs(axes: Axes, recorded: FloatArray, before: Predicted, after: Predicted
     ends += [np.nanmin(last.low), np.nanmax(last.high)]
     axes.vlines(
         recorded, last.low, last.high, color="#c9d6e3", linewidth=1.6, zorder=1,
-        label="90 % of what was to be expected" + ("" if after is None else ", with it"),
+        label="90 % interval" + ("" if after is None else ", with what was missing"),
     )  # fmt: skip
     margin = 0.04 * (max(ends) - min(ends)) or 1.0
     low, high = float(min(ends) - margin), float(max(ends) + margin)
@@ -75,9 +75,9 @@ def _pairs(axes: Axes, recorded: FloatArray, before: Predicted, after: Predicted
             recorded, after.mean, linestyle="none", marker="o", markersize=size, color=AFTER, alpha=0.85,
             markeredgewidth=0.0, label="with what was missing", zorder=3,
         )  # fmt: skip
-    axes.set_xlim(low, high)
+    beside = 0.06 * float(np.ptp(recorded)) or margin
+    axes.set_xlim(recorded.min() - beside, recorded.max() + beside)
     axes.set_ylim(low, high)
-    axes.set_aspect("equal", adjustable="box")
 
 
 @styled
