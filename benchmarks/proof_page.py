@@ -188,7 +188,6 @@ def main(
     batches = sorted((one for one in RECORD.iterdir() if one.is_dir()), key=lambda one: int(one.name))
     trials, answers = gathered(batches)
     document = scorecard({"n": len(trials)}, trials, answers)
-    write_json(RECORD / "scorecard.json", document)
     with TemporaryDirectory() as folder:
         figures = save_scorecard_figures(document, Path(folder))
         for name, file in figures.items():
