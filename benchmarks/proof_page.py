@@ -4,7 +4,8 @@
 (``results/proof/<seed>/``: ledger, opened truths with their salts, answers without their predictors);
 without ``--add`` it only writes the page anew. The page scores all batches together.
 
-A batch is one ledger. Batches are added as time allows, each with a seed of its own; none is left out.
+A batch is one ledger. Batches are added as time allows, each with a seed of its own. One that is given up
+keeps its ledger, and its ``notes.md`` says why.
 """
 
 from __future__ import annotations
@@ -32,7 +33,8 @@ _HEAD = """# The record of concealed trials
 Written by `python benchmarks/proof_page.py` from `benchmarks/results/proof/`. Each batch was sealed before
 its first diagnosis (`skred prove seal`: salted SHA-256 of truth, campaign, settings and source), diagnosed by
 processes that were given the campaign alone (`skred prove run`), then opened and verified (`skred prove
-reveal`). A crash or a time-out is a wrong answer; every trial of every batch is counted. Scores are defined
+reveal`). A crash or a time-out is a wrong answer; every trial of every opened batch is counted, and a
+batch that was given up is listed with its reason. Scores are defined
 in `src/skred/prove/scores*.py`.
 """
 
