@@ -25,6 +25,11 @@ def strengths(mu: Any, xi_h: Any) -> tuple[Any, Any]:
     return mu, GRAVITY / xi_h
 
 
+def inverse(mu: Any, drag: Any) -> tuple[Any, Any]:
+    """Parameters of strengths."""
+    return mu, GRAVITY / drag
+
+
 def build(problem: Any) -> Any:
     """PyMC model of a campaign; with `--likelihood hierarchical` priors are of the events' medians."""
     import numpy as np
@@ -46,6 +51,7 @@ LAW = Law(
     build=build,
     reference="Voellmy (1955); Salm (1993), Annals of Glaciology 18, 221-226",
     strengths=strengths,
+    inverse=inverse,
     derived=(Parameter("xi", "xi", "m s-2"),),
     relation="D = g / (xi h)",
 )

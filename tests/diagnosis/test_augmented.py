@@ -155,6 +155,26 @@ def test_posterior_is_that_of_a_dense_grid(problem: AugmentedProblem, calibratio
         assert abs(draws.std() / sd - 1.0) < 0.12, name
 
 
+def test_chains_start_around_the_posterior(problem: AugmentedProblem, calibration: Any) -> None:
+    """As likely as what the chains then draw, nearly, though wider; the prior's draws are far from it."""
+    law = problem.base.law
+    prior = {name: np.asarray(v).ravel() for name, v in calibration.tree["prior"].to_dataset().items()}
+    names = [parameter.name for parameter in problem.parameters(law)]
+    starts = problem.to_start_from(law, {name: prior[name] for name in names}, seed=0)
+    assert set(starts) == set(names) and {len(v) for v in starts.values()} == {len(prior[names[0]])}
+    posterior = calibration.tree["posterior"].to_dataset()
+    low, high = problem.range
+    for name in names:
+        drawn, kept = np.asarray(starts[name]), posterior[name].values
+        assert abs(np.median(drawn) - np.median(kept)) < kept.std()
+        assert 0.8 < drawn.std() / kept.std() < 3.0
+    added = problem.added_rows(starts)
+    assert np.all((added > low) & (added < high))
+    height = problem.log_likelihood(law, {name: posterior[name].values for name in names}).sum(axis=1)
+    assert np.median(problem.log_likelihood(law, starts).sum(axis=1)) > np.median(height) - 15.0
+    assert np.median(problem.log_likelihood(law, prior).sum(axis=1)) < np.median(height) - 25.0
+
+
 def test_draws_agree_with_the_race(drag: Curve, calibration: Any) -> None:
     mean, sd = drag.moments
     draws = calibration.tree["posterior"]["turbulent_drag"].values
@@ -195,7 +215,7 @@ def test_two_mechanisms(base: Base, drag: Curve) -> None:
     expected = integrated_log_density(means, factor, first, *tables.nodes[1:])
     assert_allclose(tabulated_log_density(means, factor, strengths, *arrays), expected, rtol=1e-10)
     rng = np.random.default_rng(1)
-    added = tables.mean + rng.uniform(-1.0, 1.0, (4, 2)) @ tables.factor.T
+    added = tables.mean + rng.uniform(-1.0, 1.0, (4, 2)) @ tables.located.factor.T
     added[:, 0] = np.maximum(added[:, 0], both.range[0][0])
     population = (np.full((4, 1), np.log(0.3)), np.full((4, 1, 1), 0.25))
     assert np.abs(both.errors_at(*population, added, np.arange(n_events))).max() < 0.1

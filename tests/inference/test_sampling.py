@@ -113,7 +113,7 @@ def test_each_chain_starts_from_the_likeliest_of_its_own(problem: Any, calibrati
 
     names = LAW.parameter_names
     prior = sample_prior(calibration.model, LAW, 0, draws=40)
-    starts = _starts(LAW, problem, prior, 4)
+    starts = _starts(LAW, problem, prior, SamplerSettings(chains=4))
     assert len({start[names[0]] for start in starts}) == 4
     every = prior[names[0]].values.ravel()
     for chain, start in enumerate(starts):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.metadata import entry_points
 from typing import Any
 
@@ -102,3 +103,12 @@ def test_equations(law_id: str, equation: str) -> None:
 def test_voellmys_drag_is_g_over_xi_h() -> None:
     law = load_law("voellmy")
     assert_allclose(law.strength_rows({"dry_friction": [0.2], "xi_h": [2000.0]}), [[0.2, GRAVITY / 2000.0]])
+
+
+def test_an_inverse_that_is_none_is_refused() -> None:
+    law = load_law("voellmy")
+    with pytest.raises(ValueError, match="inverse"):
+        replace(law, inverse=lambda mu, drag: (mu, drag))
+    found = law.parameter_rows(np.array([[0.2, 0.005], [0.3, 0.01]]))
+    assert_allclose(found["dry_friction"], [0.2, 0.3])
+    assert_allclose(found["xi_h"], [GRAVITY / 0.005, GRAVITY / 0.01])

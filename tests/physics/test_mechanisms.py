@@ -24,6 +24,7 @@ from skred.physics.law import Law
 from skred.physics.mechanisms import Mechanism, mechanisms
 from skred.physics.mechanisms.coulomb_friction import WITHOUT_CURVATURE
 from skred.physics.mechanisms.spec import Added, Direction, Group, Setting, Shape
+from skred.physics.mechanisms.stretches import equation_of, is_opposed
 from skred.physics.terrain import Terrain
 
 ALL = mechanisms()
@@ -83,13 +84,21 @@ def concave() -> Terrain:
 @pytest.fixture(scope="module")
 def settings(problem: HierarchicalProblem, concave: Terrain) -> list[Setting]:
     """Ryggfonn, and recordings along the whole of a track, up to both its ends."""
-    own = setting_of(problem, load_law("pcm"))
-    whole = replace(own, terrain=concave, recorded_m=(0.0, concave.length_m))
+    edges = problem.terrain.edge_s_m
+    own = setting_of(problem, load_law("pcm"), np.where(edges < 2000.0, 25.0 - 0.005 * edges, 0.0))
+    fronts = typical_fronts(concave)
+    whole = replace(own, terrain=concave, recorded_m=(0.0, concave.length_m), front_speed=fronts)
     return [own, whole]
 
 
+def typical_fronts(terrain: Terrain) -> np.ndarray:
+    """Speed of one front under constant retardation, from the top."""
+    law = contributions_of([ALL["constant_retardation"]], terrain)
+    return front_speeds(np.array([[0.5]]), np.zeros(1), path_of(terrain), law)[0]
+
+
 def test_a_mechanism_is_found_by_its_file() -> None:
-    assert set(ALL) == {file.stem for file in FOLDER.glob("*.py")} - {"__init__", "spec"}
+    assert set(ALL) == {file.stem for file in FOLDER.glob("*.py")} - {"__init__", "spec", "stretches"}
 
 
 def test_all_of_the_format_are_there() -> None:
@@ -172,23 +181,51 @@ def test_a_positive_strength_retards_when_added(mechanism: Mechanism, settings: 
     """Never a faster front than without it, as fast above it, slower below: on a concave track."""
     setting, added = settings[1], added_to(mechanism)
     edge = setting.terrain.edge_s_m
-    for shape in some(added.shapes(setting)):
+    plain = [shape for shape in added.shapes(setting) if not is_opposed(shape)]
+    for shape in some(plain):
         direction = added.direction(setting, shape)
-        contributions = make_contributions(
-            np.array([Column.CONSTANT, *direction.columns], dtype=np.int64),
-            np.vstack([np.ones((1, setting.terrain.n_cells)), direction.profiles]),
-            direction.weakening_speed or 8.0,
-        )
         sizes = added.scale * np.array([0.0, 0.25, 0.5])
-        strengths = np.column_stack([np.full(3, 0.5), *[sizes] * len(direction.columns)])
-        speeds = front_speeds(strengths, np.zeros(3), path_of(setting.terrain), contributions)
-        without, with_it, with_more = speeds
+        without, with_it, with_more = with_added(setting, direction, np.full(3, 0.5), sizes)
         assert without[-1] > 0
         assert np.all(with_it <= without * (1 + 1e-12)) and np.all(with_more <= with_it * (1 + 1e-12))
         above = 0.0 if shape.s_from_m is None else shape.s_from_m
         below = 15.0 if shape.s_to_m is None else shape.s_to_m
         np.testing.assert_array_equal(with_it[edge <= above], without[edge <= above])
         assert np.all(with_it[edge >= below] < without[edge >= below])
+
+
+def with_added(setting: Setting, direction: Direction, b: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Front speeds under constant retardation b [m s-2] with something added."""
+    contributions = make_contributions(
+        np.array([Column.CONSTANT, *direction.columns], dtype=np.int64),
+        np.vstack([np.ones((1, setting.terrain.n_cells)), direction.profiles]),
+        direction.weakening_speed or 8.0,
+    )
+    strengths = np.column_stack([b, *[sizes] * len(direction.columns)])
+    return front_speeds(strengths, np.zeros(len(b)), path_of(setting.terrain), contributions)
+
+
+@pytest.mark.parametrize("name", ["segment_drag", "entrainment"])
+def test_what_is_opposed_does_not_show_in_a_typical_front(name: str, settings: list[Setting]) -> None:
+    """Below the stretch a typical front is as fast as without it; others come closer to it."""
+    setting, added = settings[1], added_to(ALL[name])
+    opposed = [shape for shape in added.shapes(setting) if is_opposed(shape)]
+    assert opposed
+    for shape in some(opposed, 6):
+        direction = added.direction(setting, shape)
+        assert "U_0" in equation_of(ALL[name], shape)
+        b = np.array([0.5, 0.0, 1.0])
+        without = with_added(setting, direction, b, np.zeros(3))
+        with_it = with_added(setting, direction, b, np.full(3, added.scale))
+        below = setting.terrain.edge_s_m >= (shape.s_to_m or 0.0)
+        change = np.log(with_it[:, below] / without[:, below])[:, 0]
+        assert abs(change[0]) < 0.02 and change[1] < -5 * abs(change[0]) and change[2] > 5 * abs(change[0])
+
+
+def test_where_no_front_comes_nothing_is_opposed(settings: list[Setting]) -> None:
+    setting = replace(settings[0], front_speed=np.zeros_like(settings[0].front_speed))
+    shapes = added_to(ALL["segment_drag"]).shapes(setting)
+    assert shapes and not any(is_opposed(shape) for shape in shapes)
 
 
 @pytest.mark.parametrize("mechanism", ALL.values(), ids=ALL)
@@ -231,7 +268,7 @@ def test_parts_of_a_shape_are_near_it(settings: list[Setting]) -> None:
             for part in added.split(settings[0], shape):
                 assert shape.s_from_m is not None and shape.s_to_m is not None
                 assert part.s_from_m is not None and part.s_to_m is not None
-                assert part != shape and part.constants == shape.constants
+                assert part != shape and dict(part.constants).keys() == dict(shape.constants).keys()
                 assert part.s_from_m < shape.s_to_m and part.s_to_m > shape.s_from_m
 
 

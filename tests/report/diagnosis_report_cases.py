@@ -90,7 +90,7 @@ def location() -> Location:
     mean = 0.8 * np.exp(-(((s_m - 1800.0) / 80.0) ** 2))
     work = np.array([[1650.0, 1810.0, 61.3, 12.1], [1810.0, 1910.0, 12.2, 14.0]])
     return Location(
-        s_m, mean, mean - 0.3, mean + 0.3, np.linspace(1, 0, 60), 140.0, (1750.0, 1850.0), work, 9.0
+        s_m, mean, mean - 0.3, mean + 0.3, np.linspace(1, 0, 60), 140.0, False, (1750.0, 1850.0), work, 9.0
     )
 
 

@@ -19,16 +19,18 @@ from numpy.typing import NDArray
 from skred.diagnosis.curves import Base, Curve
 from skred.diagnosis.event_nodes import Budget
 from skred.diagnosis.extension import Extension
+from skred.diagnosis.marginal import population_at
 from skred.diagnosis.modes import Population, Rows, take_rows
 from skred.diagnosis.tables import BUDGETS, Located, Tables, build_tables, exact_nodes, finer, locate
 from skred.diagnosis.tabulated_op import tabulated_log_densities
 from skred.inference.event_density import integrated_log_density
 from skred.inference.hierarchical import HierarchicalProblem
-from skred.inference.population import population_of, population_variables
+from skred.inference.population import population_of, population_samples, population_variables
 from skred.inference.surface import Surfaces
 from skred.physics.kernel import front_speeds
 from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Direction, Mechanism, Shape
+from skred.physics.mechanisms.stretches import equation_of
 
 FloatArray = NDArray[np.float64]
 MOST_ADDED = 2
@@ -42,6 +44,8 @@ _EXACT = Budget(512, 256, 1024, 1.5, 1.8)
 _EXACT_RUNS = 16 * 22
 """Events times draws up to which there are so many nodes; where there are fewer, more."""
 _EXACT_EVENTS, _EXACT_DRAWS = 24, 16
+_START_WIDER, _INSIDE = 1.5, 0.02
+"""How much wider than the posterior chains start, and how far inside the range, as a share of it."""
 _ROUGH_DRAWS, _ROUGH_RUNS, _ENOUGH = 8, 8 * 22, 0.2
 
 
@@ -165,6 +169,22 @@ class AugmentedProblem(HierarchicalProblem):
         """Added strengths of many parameter vectors: arrays by name to (n, n_added)."""
         return np.column_stack([np.asarray(samples[one.name], dtype=float).ravel() for one in self.added])
 
+    def to_start_from(self, law: Law, prior: dict[str, FloatArray], seed: int) -> dict[str, FloatArray]:
+        """Parameter vectors from around the posterior, wider.
+
+        From the prior, where spreads are of any size, a chain can get to an end of a strength's range, learn
+        steps as small as it needs there, and stay.
+        """
+        rng, n = np.random.default_rng([seed, 6]), len(next(iter(prior.values())))
+        located, (low, high) = self.tables.located, self.range
+        margin = _INSIDE * (high - low)
+        reach = _START_WIDER * rng.standard_normal((n, len(self.added))) @ located.factor.T
+        added = np.clip(located.mean + reach, low + margin, high - margin)
+        psi = located.populations_near(added, rng, _START_WIDER)
+        own = law.parameter_rows(np.exp(psi[:, : len(law.mechanisms)]))
+        rest = population_samples(law, psi[:, len(law.mechanisms) :])
+        return {**own, **rest, **{one.name: added[:, k] for k, one in enumerate(self.added)}}
+
     def predictive(
         self, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
     ) -> dict[str, xr.Dataset]:
@@ -183,7 +203,7 @@ class AugmentedProblem(HierarchicalProblem):
             "id": one.mechanism.id,
             "title": one.mechanism.title,
             "parameter": one.name,
-            "equation": one.mechanism.equation,
+            "equation": equation_of(one.mechanism, shape),
             "s_from_m": shape.s_from_m,
             "s_to_m": shape.s_to_m,
             "covariate": shape.covariate,
@@ -339,16 +359,11 @@ def _named(curves: Sequence[Curve]) -> tuple[AddedStrength, ...]:
 def _rough_error(problem: AugmentedProblem, located: Located) -> float:
     """Error of 22 events [nats], at populations as the fits have them."""
     rng = np.random.default_rng(17)
-    grid, n = located.grid, len(problem.base.law.mechanisms)
-    added = located.mean + rng.uniform(-2.0, 2.0, (_ROUGH_DRAWS, len(grid.size))) @ located.factor.T
-    added = np.clip(added, *problem.range)
-    populations = []
-    for table in grid.nearest(added):
-        found = located.fits[table].found
-        psi = rng.multivariate_normal(found.psi, found.covariance)
-        populations.append(found._replace(psi=psi).population(n))
-    means = np.concatenate([one.mean for one in populations])
-    factors = np.linalg.cholesky(np.concatenate([one.covariance for one in populations]))
+    reach = rng.uniform(-2.0, 2.0, (_ROUGH_DRAWS, len(located.mean))) @ located.factor.T
+    added = np.clip(located.mean + reach, *problem.range)
+    psi = located.populations_near(added, rng)
+    means, covariances = population_at(psi, len(problem.base.law.mechanisms))
+    factors = np.linalg.cholesky(covariances)
     chosen = np.sort(rng.permutation(problem.campaign.n_events)[:_EXACT_EVENTS])
     return float(
         22.0 * np.abs(problem.errors_at(means, factors, added, chosen, _ROUGH_RUNS).mean(axis=1)).max()

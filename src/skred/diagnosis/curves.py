@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import Akima1DInterpolator
 
 from skred.diagnosis.event_nodes import FIRST, FRONTS, ROUGH, USUAL, Budget, event_nodes
-from skred.diagnosis.extension import Extension, extended, setting_of
+from skred.diagnosis.extension import Extension, extended, setting_of, typical_speed
 from skred.diagnosis.marginal import Evidence, coordinates, evidence, prior_log_scale
 from skred.diagnosis.mixed import mean_prior
 from skred.diagnosis.modes import Population, Rows, campaign_rows, event_modes, log_joint, take_rows
@@ -353,7 +353,7 @@ def fit_base(
     With nothing in, the population is that of the law's likelihood surfaces, in which no mode is missed.
     """
     extension = extended(problem, law, directions)
-    setting, rows = setting_of(problem, law), campaign_rows(extension)
+    rows = campaign_rows(extension)
     if points is None:
         points = np.zeros((len(rows.event), len(law.mechanisms) + 1))
         points[:, :-1] = population.mean[0]
@@ -368,6 +368,7 @@ def fit_base(
         tried = [event_modes(extension, rows, start, given, exact, n_steps=20).points for start in starts]
         heights = [log_joint(extension, rows, one, given, exact) for one in tried]
         fit = Fit(found, np.where((heights[1] > heights[0])[:, None], tried[1], tried[0]))
+    setting = setting_of(problem, law, typical_speed(extension.speeds(fit.points, given)))
     return Base(problem, law, setting, rows, fit, directions, given)
 
 

@@ -13,7 +13,7 @@ from skred.diagnosis.covariates import standard_of
 from skred.inference.hierarchical import HierarchicalProblem
 from skred.physics.geometry import WEAKENING_SPEED_M_S
 from skred.physics.inputs import Contributions, make_contributions
-from skred.physics.kernel import simulate, simulate_with_jacobian
+from skred.physics.kernel import front_speeds, simulate, simulate_with_jacobian
 from skred.physics.law import Law
 from skred.physics.mechanisms.spec import Direction, Setting
 
@@ -21,8 +21,14 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
-def setting_of(problem: HierarchicalProblem, law: Law) -> Setting:
-    """What mechanisms added to a law on a campaign can refer to."""
+def setting_of(problem: HierarchicalProblem, law: Law, front_speed: FloatArray | None = None) -> Setting:
+    """What mechanisms added to a law on a campaign can refer to.
+
+    Parameters
+    ----------
+    front_speed : (n_cells + 1,) array, optional
+        Typical speed of the fitted fronts [m/s]; left at 0 nothing is looked for that refers to it.
+    """
     campaign = problem.campaign
     names = sorted({name for event in campaign.events for name in event.covariates})
     standards = {name: standard_of(campaign.events, name) for name in names}
@@ -39,6 +45,7 @@ def setting_of(problem: HierarchicalProblem, law: Law) -> Setting:
         velocities=tuple(not sensor.is_runout for sensor in campaign.sensors),
         covariates=covariates,
         n_events=campaign.n_events,
+        front_speed=np.zeros(problem.terrain.n_cells + 1) if front_speed is None else front_speed,
     )
 
 
@@ -138,6 +145,13 @@ class Extension:
         readings: FloatArray = simulate(rows, releases, path, self.contributions, sensors)
         return readings * factors
 
+    def speeds(self, points: FloatArray, strengths: FloatArray) -> FloatArray:
+        """Front speed of each event at the cells' edges [m/s], (n_events, n_cells + 1), at one point each."""
+        given = np.broadcast_to(strengths, (len(points), len(self.directions)))
+        rows, releases, _ = self._inputs(np.arange(len(points)), points, given)
+        found: FloatArray = front_speeds(rows, releases, self.problem.path, self.contributions)
+        return found
+
     def tangents(
         self, events: IntArray, points: FloatArray, strengths: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -170,6 +184,13 @@ class Extension:
             if direction.log_readings is not None:
                 by_strengths[:, :-1, k] += readings[:, :-1] * direction.log_readings
         return readings, by_points, by_strengths
+
+
+def typical_speed(speeds: FloatArray) -> FloatArray:
+    """Root of the mean square over the fronts that come by, 0 where none does, (n_edges,)."""
+    fronts = np.maximum((speeds > 0.0).sum(axis=0), 1)
+    typical: FloatArray = np.sqrt((speeds**2).sum(axis=0) / fronts)
+    return typical
 
 
 def extended(problem: HierarchicalProblem, law: Law, directions: Sequence[Direction] = ()) -> Extension:

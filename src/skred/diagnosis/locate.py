@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.diagnosis.extension import extended
 from skred.diagnosis.race import Heat
-from skred.diagnosis.unlisted import Profile, hats
+from skred.diagnosis.unlisted import Kind, Profile, hats
 from skred.physics.columns import Column
 
 FloatArray = NDArray[np.float64]
@@ -25,8 +26,11 @@ class Location:
     ----------
     s_m : (n,) array
     mean, low, high : (n,) arrays, m s-2
-        Retardation missing from the base law, at the typical speed where it goes with U^2; the band holds the
-        whole profile with probability 0.9.
+        Retardation missing from the base law, at the typical speed where it goes with U^2, and where it is
+        nil there at a speed that is higher by the fronts' spread; the band holds the whole profile with
+        probability 0.9.
+    opposed : bool
+        Whether it is nil at the typical speed.
     covered : (n,) array
         Share of the events that came by.
     resolution_m : float
@@ -44,6 +48,7 @@ class Location:
     high: FloatArray
     covered: FloatArray
     resolution_m: float
+    opposed: bool
     stretch_m: tuple[float, float]
     work: FloatArray
     log_bayes_factor: float
@@ -55,18 +60,10 @@ def locate(heat: Heat) -> Location:
     base = heat.base
     terrain = base.setting.terrain
     edge = np.asarray(terrain.edge_s_m)
-    releases = base.problem.releases.mean
-    strengths = np.exp(base.fit.points[:, : len(base.law.mechanisms)])
-    speeds = np.array(
-        [
-            base.problem.speeds(base.law.mechanisms, row[None, :], release)[0]
-            for row, release in zip(strengths, releases, strict=True)
-        ]
-    )
+    speeds = extended(base.problem, base.law, base.directions).speeds(base.fit.points, base.strengths)
     squares = 0.5 * (speeds[:, 1:] ** 2 + speeds[:, :-1] ** 2)
     here = squares > 0.0
-    typical = squares.sum(axis=0) / np.maximum(here.sum(axis=0), 1)
-    factor = typical if profile.kind.column is Column.QUADRATIC else np.ones_like(typical)
+    factor = _per_unit(profile.kind, squares, here)
     basis = hats(terrain, profile.knots_m) * factor
     inside = np.flatnonzero(hats(terrain, profile.knots_m).sum(axis=0) > 0.0)
     mean, sd, band = _band(profile, basis[:, inside])
@@ -79,10 +76,23 @@ def locate(heat: Heat) -> Location:
         high=mean + band * sd,
         covered=here.mean(axis=0)[inside],
         resolution_m=_resolution(profile),
+        opposed=profile.kind.opposed,
         stretch_m=_stretch(profile),
         work=work,
         log_bayes_factor=profile.log_bayes_factor,
     )
+
+
+def _per_unit(kind: Kind, squares: FloatArray, here: NDArray[np.bool_]) -> FloatArray:
+    """Retardation [m s-2] in each cell for one unit of a profile, (n_cells,)."""
+    fronts = np.maximum(here.sum(axis=0), 1)
+    typical: FloatArray = squares.sum(axis=0) / fronts
+    if kind.column is not Column.QUADRATIC:
+        return np.ones_like(typical)
+    if not kind.opposed:
+        return typical
+    spread: FloatArray = np.sqrt(np.sum((squares - typical) ** 2 * here, axis=0) / fronts)
+    return spread
 
 
 def _band(profile: Profile, basis: FloatArray) -> tuple[FloatArray, FloatArray, float]:

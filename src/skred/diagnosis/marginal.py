@@ -149,8 +149,13 @@ class Evidence(NamedTuple):
 
     def population(self, n: int) -> Population:
         """The most probable population."""
-        factor = _factor(self.psi, n)
-        return Population(self.psi[None, :n].copy(), (factor @ factor.T)[None])
+        return population_at(self.psi[None], n)
+
+
+def population_at(psi: FloatArray, n: int) -> Population:
+    """Populations of `n` strengths at coordinates of this module, (n_groups, n_coordinates)."""
+    factors = np.array([_factor(one, n) for one in psi])
+    return Population(psi[:, :n].copy(), np.einsum("gij,gkj->gik", factors, factors))
 
 
 def coordinates(population: Population, group: int = 0) -> FloatArray:

@@ -26,7 +26,7 @@ from skred.diagnosis.marginal import evidence, importance_evidence
 from skred.diagnosis.modes import campaign_rows, event_modes
 from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, probabilities
 from skred.diagnosis.screen import candidates
-from skred.diagnosis.unlisted import KINDS, Kind, Profile, fit_profile, log_evidence_of
+from skred.diagnosis.unlisted import KINDS, Kind, Profile, alike, fit_profile, log_evidence_of
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Mechanism, Shape
@@ -250,11 +250,11 @@ def _heat(error_model: str, base: Base, tell: Tell) -> Heat:
 def _profile(base: Base, kind: Kind, entrants: dict[str, Entrant]) -> Profile:
     """The unlisted force of one kind: from no force, and from the best listed one that enters alike."""
     found = fit_profile(base, kind)
-    alike = [one for one in entrants.values() if kind.column in one.best.direction.columns]
-    if alike:
-        best = max(alike, key=lambda one: one.log_bayes_factor)
+    near = [one for entrant in entrants.values() for one in entrant.curves if alike(kind, one)]
+    if near:
+        best = max(near, key=lambda one: one.log_bayes_factor)
         if best.log_bayes_factor > found.log_bayes_factor:
-            other = fit_profile(base, kind, best.best)
+            other = fit_profile(base, kind, best)
             found = max(found, other, key=lambda one: one.log_bayes_factor)
     return found
 

@@ -19,7 +19,7 @@ from skred.diagnosis.extension import Extension
 from skred.diagnosis.mixed import MeanPrior, Scores, efficient_scores, mean_prior, without
 from skred.diagnosis.modes import Modes, Population, Rows, look_around
 from skred.diagnosis.odds import prior_odds
-from skred.diagnosis.unlisted import KINDS, Kind, hats, knots
+from skred.diagnosis.unlisted import KINDS, Kind, entering, hats, knots
 from skred.inference.hierarchical import HierarchicalProblem
 from skred.physics.columns import Column
 from skred.physics.law import Law
@@ -86,15 +86,15 @@ class Screen:
         return knots(self.setting)
 
     @cached_property
-    def columns(self) -> tuple[Column, ...]:
+    def ways(self) -> tuple[tuple[Column, bool], ...]:
         """How the unlisted force goes with speed."""
-        return tuple(dict.fromkeys(kind.column for kind in KINDS))
+        return tuple(dict.fromkeys(kind.enters for kind in KINDS))
 
     @cached_property
     def _parts(self) -> list[Extension]:
         """Extensions whose directions follow each other: candidates, profiles; then candidates with U."""
         basis = hats(self.setting.terrain, self.knots_m)
-        profiles = [Direction((column,), row[None, :]) for column in self.columns for row in basis]
+        profiles = [entering(self.setting, way, row) for way in self.ways for row in basis]
         plain = [c.direction for c in self.candidates if not c.with_speed]
         parts = [[*plain, *profiles]]
         by_scale: dict[float | None, list[Direction]] = {}
@@ -164,7 +164,7 @@ class Screen:
         n = len(self.knots_m)
         factors = []
         for kind in KINDS:
-            start = first + n * self.columns.index(kind.column)
+            start = first + n * self.ways.index(kind.enters)
             part = slice(start, start + n)
             factors.append(
                 _of_profile(scores.score[:, part], scores.information[:, part, part], self._cover(kind))

@@ -8,6 +8,7 @@ from skred.diagnosis.diagnose import Diagnosis
 from skred.diagnosis.odds import NOTHING, UNLISTED
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.stretches import U_1, U_2
 
 
 def statement(found: Diagnosis, document: dict[str, Any]) -> str:
@@ -56,6 +57,13 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         f"Its {strength['parameter'].replace('_', ' ')} is {strength['mean']:.3g} +- {strength['sd']:.2g}"
         f"{_unit(strength['unit'])}.",
     ]
+    constants = document["mechanisms"][0]["constants"]
+    if U_1 in constants:
+        sentences.append(
+            "On the same stretch a relief equals it at the typical speed"
+            f" ({constants[U_1]:.0f} to {constants[U_2]:.0f} m/s), so that it shows in fronts that are faster"
+            " or slower than most, not on average."
+        )
     if document["covariate"]:
         sentences.append("Associated with, not necessarily caused by.")
     if ties:

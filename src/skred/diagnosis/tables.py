@@ -100,40 +100,6 @@ class Grid(NamedTuple):
         return np.stack(tables, axis=1), np.stack(weights, axis=1)
 
 
-@dataclass(frozen=True, eq=False)
-class Tables:
-    """Nodes at each strength of a grid.
-
-    Attributes
-    ----------
-    grid : Grid
-    nodes : Nodes
-        Of all events at the first strengths, then at the next, ...
-    release : (n_nodes,) array
-        The release's deviation at each node, in standard deviations.
-    modes : (n_tables, n_events, n_base + 1) array
-        Most probable points of the events.
-    mean : (n_added,) array
-        Posterior mean of the strengths by the race's formula.
-    factor : (n_added, n_added) array
-        Lower Cholesky factor of their posterior covariance, by the same.
-    budget : Budget
-    """
-
-    grid: Grid
-    nodes: Nodes
-    release: FloatArray
-    modes: FloatArray
-    mean: FloatArray
-    factor: FloatArray
-    budget: Budget
-
-    @property
-    def arrays(self) -> dict[str, Any]:
-        """What the compiled interpolation reads, by name."""
-        return {**self.grid._asdict(), **self.nodes._asdict()}
-
-
 class Located(NamedTuple):
     """Fits on a grid that covers the posterior of the added strengths, with their mean and its factor."""
 
@@ -141,6 +107,56 @@ class Located(NamedTuple):
     fits: list[Fit]
     mean: FloatArray
     factor: FloatArray
+
+    def populations_near(self, added: FloatArray, rng: np.random.Generator, wider: float = 1.0) -> FloatArray:
+        """A draw of the population's coordinates at each of some added strengths, by the race's formula.
+
+        Parameters
+        ----------
+        added : (n, n_added) array
+        wider : float
+            What its standard deviations are multiplied by.
+        """
+        found = [self.fits[table].found for table in self.grid.nearest(added)]
+        return np.array([rng.multivariate_normal(one.psi, wider**2 * one.covariance) for one in found])
+
+
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """Nodes at each strength of a grid.
+
+    Attributes
+    ----------
+    located : Located
+    nodes : Nodes
+        Of all events at the first strengths, then at the next, ...
+    release : (n_nodes,) array
+        The release's deviation at each node, in standard deviations.
+    modes : (n_tables, n_events, n_base + 1) array
+        Most probable points of the events.
+    budget : Budget
+    """
+
+    located: Located
+    nodes: Nodes
+    release: FloatArray
+    modes: FloatArray
+    budget: Budget
+
+    @property
+    def grid(self) -> Grid:
+        """The strengths that there are nodes at."""
+        return self.located.grid
+
+    @property
+    def mean(self) -> FloatArray:
+        """Posterior mean of the strengths by the race's formula, (n_added,)."""
+        return self.located.mean
+
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """What the compiled interpolation reads, by name."""
+        return {**self.grid._asdict(), **self.nodes._asdict()}
 
 
 def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located:
@@ -294,7 +310,7 @@ def _without_failures(fits: Sequence[Fit], instead: Fit) -> list[Fit]:
 
 def build_tables(base: Base, extension: Extension, located: Located, budget: Budget) -> Tables:
     """Nodes of all events at all strengths of a grid, around populations as wide as what is known of them."""
-    grid, fits, mean, factor = located
+    grid, fits = located.grid, located.fits
     n, n_tables, n_events = len(base.law.mechanisms), len(fits), len(base.rows.event)
     rows = repeated(base.rows, n_tables)
     given = np.column_stack([np.tile(base.strengths, (n_tables, 1)), grid.points]).repeat(n_events, axis=0)
@@ -313,7 +329,7 @@ def build_tables(base: Base, extension: Extension, located: Located, budget: Bud
         extension, rows, given, Population(population.mean, wide), modes, budget, base.population
     )
     points = modes.points.reshape(n_tables, n_events, n + 1)
-    return Tables(grid, spread.nodes, spread.points[:, :, n].ravel(), points, mean, factor, budget)
+    return Tables(located, spread.nodes, spread.points[:, :, n].ravel(), points, budget)
 
 
 def highest(

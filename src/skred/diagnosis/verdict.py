@@ -13,6 +13,7 @@ from skred.diagnosis.identify import Told
 from skred.diagnosis.next_sensor import next_sensor
 from skred.diagnosis.race import Entrant, Race
 from skred.diagnosis.statement import statement
+from skred.physics.mechanisms.stretches import equation_of
 
 _NO_LIMIT = 20.0
 """Strengths so many prior scales large are no limit: these recordings say nothing of the mechanism."""
@@ -35,7 +36,7 @@ def verdict(found: Diagnosis) -> dict[str, Any]:
         "strength": _strength(found.steps[0], 0) if found.steps else None,
         "covariate": entrant.best.shape.covariate if entrant is not None else None,
         "sensor": entrant.best.shape.sensor if entrant is not None else None,
-        "equation": entrant.mechanism.equation if entrant is not None else None,
+        "equation": equation_of(entrant.mechanism, entrant.best.shape) if entrant is not None else None,
         "evidence": _evidence(found),
         "held_out": _held_out(found),
         "detection_limits": _detection_limits(found),
@@ -78,7 +79,7 @@ def _mechanism(step: Step, number: int) -> dict[str, Any]:
         "id": entrant.mechanism.id,
         "strength": _strength(step, number),
         "location": None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]},
-        "equation": entrant.mechanism.equation,
+        "equation": equation_of(entrant.mechanism, shape),
         "covariate": shape.covariate,
         "sensor": shape.sensor,
         "constants": dict(shape.constants),

@@ -91,6 +91,15 @@ def population_of(law: Law, samples: Mapping[str, Any]) -> tuple[FloatArray, Flo
     return means, factors
 
 
+def population_samples(law: Law, coordinates: FloatArray) -> dict[str, FloatArray]:
+    """Spreads and correlations by name from logarithms and inverse hyperbolic tangents, (n, n_population)."""
+    spreads, correlations = spread_parameters(law.mechanisms), correlation_parameters(law.mechanisms)
+    values = np.column_stack(
+        [np.exp(coordinates[:, : len(spreads)]), np.tanh(coordinates[:, len(spreads) :])]
+    )
+    return {p.name: values[:, k] for k, p in enumerate((*spreads, *correlations))}
+
+
 def population_variables(mechanisms: Sequence[Mechanism]) -> Any:
     """Spreads and correlations as random variables of the current PyMC model; the factor, symbolic."""
     import pymc as pm

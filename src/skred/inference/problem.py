@@ -78,6 +78,10 @@ class Problem(ABC):
         """The same problem with finer numerics; None where there are none."""
         return None
 
+    def to_start_from(self, law: Law, prior: dict[str, FloatArray], seed: int) -> dict[str, FloatArray]:
+        """Parameter vectors, among which chains find their starts: draws of the prior, as they are."""
+        return prior
+
     @abstractmethod
     def constants(self) -> dict[str, Any]:
         """Variables of the group constant_data that are this likelihood's own, and attributes."""

@@ -86,7 +86,7 @@ def sample_posterior(
             chains=settings.chains,
             cores=1,  # a chain takes less time than starting a process
             step=step or JointMetropolis(model=model),
-            initvals=_starts(law, problem, prior, settings.chains),
+            initvals=_starts(law, problem, prior, settings),
             random_seed=settings.seed,
             progressbar=progress,
             compute_convergence_checks=False,
@@ -97,14 +97,16 @@ def sample_posterior(
     return tree
 
 
-def _starts(law: Law, problem: Problem, prior: xr.Dataset, chains: int) -> list[dict[str, Any]]:
+def _starts(law: Law, problem: Problem, prior: xr.Dataset, settings: SamplerSettings) -> list[dict[str, Any]]:
     """One starting point for each chain."""
     samples = {str(name): variable.values.ravel() for name, variable in prior.data_vars.items()}
+    chains = settings.chains
     n = min(_STARTS_PER_CHAIN, prior.sizes["chain"] * prior.sizes["draw"] // chains)
     first = {name: values[: n * chains] for name, values in samples.items()}
+    first = problem.to_start_from(law, first, settings.seed)
     log_density = problem.log_likelihood(law, first).sum(axis=1).reshape(chains, n)
     best = np.nan_to_num(log_density, nan=-np.inf).argmax(axis=1) + n * np.arange(chains)
-    return [{name: samples[name][i] for name in samples} for i in best]
+    return [{name: first[name][i] for name in first} for i in best]
 
 
 @contextmanager

@@ -57,6 +57,8 @@ class Law:
         Where the law comes from.
     strengths : callable
         Parameters, in order, to the strengths of the mechanisms, in order.
+    inverse : callable
+        Strengths, in order, to parameters, in order.
     derived : tuple of Parameter
         Quantities that its model computes from the parameters, for display.
     relation : str
@@ -70,8 +72,15 @@ class Law:
     build: Callable[[Any], Any]
     reference: str
     strengths: Callable[..., tuple[Any, ...]] = _as_they_are
+    inverse: Callable[..., tuple[Any, ...]] = _as_they_are
     derived: tuple[Parameter, ...] = ()
     relation: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse an inverse that is none."""
+        some = np.linspace(0.3, 0.7, len(self.parameters))
+        if not np.allclose(self.inverse(*self.strengths(*some)), some):
+            raise ValueError(f"{self.id}: inverse does not give back the parameters of strengths")
 
     @property
     def equation(self) -> str:
@@ -89,3 +98,7 @@ class Law:
         """Strengths of many parameter vectors: arrays by name to (n, n_mechanisms)."""
         columns = [np.asarray(samples[name], dtype=float).ravel() for name in self.parameter_names]
         return np.column_stack(self.strengths(*columns))
+
+    def parameter_rows(self, strengths: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
+        """Parameters by name, n values each, of many strengths of the mechanisms, (n, n_mechanisms)."""
+        return dict(zip(self.parameter_names, self.inverse(*strengths.T), strict=True))

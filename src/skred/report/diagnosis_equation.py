@@ -7,6 +7,7 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from skred.physics.mechanisms.spec import Group
+from skred.physics.mechanisms.stretches import U_1, U_2, equation_of, is_opposed
 from skred.report.draws import chains_of, interval
 from skred.report.labels import name_text, population_role, symbol_text, unit_text
 from skred.report.numbers import decimals_for, rounded
@@ -42,11 +43,11 @@ def equations(found: Diagnosis) -> dict[str, Any]:
     """The base law's equation, with each new term, and what is read instead for an instrument's fault."""
     terms, readings = [], []
     for step in found.steps:
-        mechanism = step.entrants[0].mechanism
+        mechanism, shape = step.entrants[0].mechanism, step.entrants[0].best.shape
         if mechanism.group is Group.INSTRUMENT:
             readings.append(formula(mechanism.equation.partition(": ")[2] or mechanism.equation))
         else:
-            terms.append(formula("- " + mechanism.equation.removeprefix("-")))
+            terms.append(formula("- " + equation_of(mechanism, shape).removeprefix("-")))
     right, relation = _right(found.law)
     return {
         "head": formula(_HEAD),
@@ -118,6 +119,10 @@ def _added_rows(found: Diagnosis, step: Step, number: int) -> list[dict[str, Any
         else:
             ends = f"where the stretch begins and ends, here {shape.s_from_m:.0f} and {shape.s_to_m:.0f}"
             rows.append(_row("s_1, s_2", "m", ends, new=True))
+    if is_opposed(shape):
+        first, last = (dict(shape.constants)[name] for name in (U_1, U_2))
+        what = f"speed at which a relief on the stretch equals it, here {first:g} at s_1 to {last:g} at s_2"
+        return [*rows, _row("U_0", "m s-1", what, new=True)]
     for named, value in shape.constants:
         symbol, _, unit = named.partition(" [")
         rows.append(_row(_short(symbol), unit.rstrip("]") or "1", f"{symbol}, here {value:g}", new=True))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.odds import NOTHING, UNLISTED
+from skred.physics.mechanisms.stretches import is_opposed
 from skred.report.diagnosis_words import (
     AFTER,
     MISMATCH,
@@ -146,7 +147,10 @@ def _shape_text(curve: Curve) -> str:
     shape, parts = curve.shape, []
     if shape.s_from_m is not None and shape.s_to_m is not None:
         parts.append(f"s = {shape.s_from_m:.0f} to {shape.s_to_m:.0f} m")
-    parts += [f"{symbol_text(symbol)} = {value:g}" for symbol, value in shape.constants]
+    if is_opposed(shape):
+        parts.append("with a relief equal to it at the typical speed")
+    else:
+        parts += [f"{symbol_text(symbol)} = {value:g}" for symbol, value in shape.constants]
     parts += [f"sensor {shape.sensor}"] if shape.sensor else []
     parts += [f"covariate {shape.covariate}"] if shape.covariate else []
     return "its most probable shape: " + ", ".join(parts) if parts else "along the whole track"

@@ -89,7 +89,9 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
             priors=rows.prior_rows(found),
             settings=rows.settings_rows(document),
             profile_priors=[
-                f"{kind.amplitude:g} {unit_text(kind.unit)} over {kind.length_m:.0f} m" for kind in KINDS
+                f"{kind.amplitude:g} {unit_text(kind.unit)} over {kind.length_m:.0f} m"
+                + (", nil at the typical speed" if kind.opposed else "")
+                for kind in KINDS
             ],
             limits={
                 "p": LIMIT, "e": E_LIMIT, "k": K_LIMIT, "r_hat": R_HAT_LIMIT, "ess": ESS_LIMIT,

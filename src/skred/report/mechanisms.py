@@ -9,6 +9,7 @@ import numpy as np
 
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group, Mechanism, Setting
+from skred.physics.mechanisms.stretches import is_opposed
 from skred.physics.terrain import Terrain
 from skred.report.tables import plain_table, plain_text
 
@@ -95,8 +96,11 @@ def looked_for(mechanism: Mechanism) -> str:
         where = "the whole track"
     else:
         where = "all avalanches alike"
-    names = dict.fromkeys(name for shape in shapes for name, _ in shape.constants)
-    values = {name: sorted({dict(shape.constants)[name] for shape in shapes}) for name in names}
+    if any(is_opposed(shape) for shape in shapes):
+        where += "; the longer ones also with a relief that equals it at the typical speed"
+    plain = [shape for shape in shapes if not is_opposed(shape)]
+    names = dict.fromkeys(name for shape in plain for name, _ in shape.constants)
+    values = {name: sorted({dict(shape.constants)[name] for shape in plain}) for name in names}
     return "; ".join([where, *(f"{name} of {_either(found)}" for name, found in values.items())])
 
 
@@ -117,6 +121,7 @@ def _example() -> Setting:
         velocities=(True, True),
         covariates={"covariate": np.array([-1.0, 1.0])},
         n_events=2,
+        front_speed=20.0 * np.ones(_N_CELLS + 1),
     )
 
 

@@ -12,8 +12,8 @@ from skred.physics.mechanisms.spec import (
     Setting,
     Shape,
     Strength,
-    on_a_stretch,
 )
+from skred.physics.mechanisms.stretches import on_a_stretch
 
 HALF_WIDTH_M = 25.0
 """Length of the climb and of the descent [m]."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
@@ -70,6 +70,9 @@ class Setting:
     covariates : mapping
         Numeric covariates of the events by name, standardised, (n_events,) each; constant ones left out.
     n_events : int
+    front_speed : (n_cells + 1,) array
+        Typical speed of the base law's fronts at the cells' edges [m/s]: the root of the mean square over the
+        events that come there, 0 where none does.
     """
 
     terrain: Terrain
@@ -79,6 +82,13 @@ class Setting:
     velocities: tuple[bool, ...]
     covariates: Mapping[str, FloatArray]
     n_events: int
+    front_speed: FloatArray
+
+    @property
+    def front_square(self) -> FloatArray:
+        """Typical U^2 in each cell [m2/s2], (n_cells,)."""
+        squares: FloatArray = 0.5 * (self.front_speed[1:] ** 2 + self.front_speed[:-1] ** 2)
+        return squares
 
 
 @dataclass(frozen=True)
@@ -233,14 +243,6 @@ def everywhere(terrain: Terrain) -> FloatArray:
     return np.ones(terrain.n_cells)
 
 
-def on_a_stretch(terrain: Terrain, s_from_m: float, s_to_m: float) -> FloatArray:
-    """Share of each cell that lies on a stretch, (n_cells,)."""
-    edge = terrain.edge_s_m
-    overlap = np.minimum(edge[1:], s_to_m) - np.maximum(edge[:-1], s_from_m)
-    share: FloatArray = np.clip(overlap / np.diff(edge), 0.0, 1.0)
-    return share
-
-
 def one_shape(setting: Setting) -> tuple[Shape, ...]:
     """Shapes of a mechanism that acts alike along the whole track."""
     return (Shape(),)
@@ -253,50 +255,6 @@ def along_the_track(column: Column, profile: Profile) -> Callable[[Setting, Shap
         return Direction((column,), profile(setting.terrain)[None, :])
 
     return direction
-
-
-def along_a_stretch(column: Column) -> Callable[[Setting, Shape], Direction]:
-    """Direction of a mechanism that enters one column on the shape's stretch."""
-
-    def direction(setting: Setting, shape: Shape) -> Direction:
-        assert shape.s_from_m is not None and shape.s_to_m is not None
-        return Direction((column,), on_a_stretch(setting.terrain, shape.s_from_m, shape.s_to_m)[None, :])
-
-    return direction
-
-
-STRETCHES_M = (75.0, 200.0, 500.0)
-"""Lengths of the stretches that are looked at [m]."""
-_STEP_IN_LENGTHS = 0.4
-
-
-def stretches(setting: Setting) -> tuple[Shape, ...]:
-    """Stretches of several lengths, overlapping, over the recorded part of the track."""
-    first, last = setting.recorded_m
-    shapes = []
-    for length in STRETCHES_M:
-        if length > 1.2 * (last - first):
-            continue
-        n = max(int(np.ceil(max(last - first - length, 0.0) / (_STEP_IN_LENGTHS * length))), 1)
-        for start in np.linspace(first, max(last - length, first), n + 1):
-            shapes.append(Shape(float(start), float(min(start + length, setting.terrain.length_m))))
-    return tuple(shapes)
-
-
-def split_stretch(setting: Setting, shape: Shape) -> tuple[Shape, ...]:
-    """The stretch moved by a fifth of its length, shortened, lengthened."""
-    assert shape.s_from_m is not None and shape.s_to_m is not None
-    length = shape.s_to_m - shape.s_from_m
-    changes = ((-0.2, -0.2), (0.2, 0.2), (0.15, -0.15), (-0.25, 0.25), (-0.4, 0.0), (0.0, 0.4))
-    end = setting.terrain.length_m
-    return tuple(
-        replace(
-            shape,
-            s_from_m=max(shape.s_from_m + first * length, 0.0),
-            s_to_m=min(shape.s_to_m + last * length, end),
-        )
-        for first, last in changes
-    )
 
 
 def lacking(*ids: str) -> Callable[[tuple[str, ...]], bool]:

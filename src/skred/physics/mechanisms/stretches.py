@@ -1,0 +1,117 @@
+"""Mechanisms that act on a stretch of the track: where they are looked for, how they enter, what opposes.
+
+A drag on a stretch may be opposed there: a smoother or steeper bed, or whatever else gives fronts of the
+typical speed back what it takes. On average nothing shows then, and a base law that is right at every sensor
+is still wrong for each front that is faster or slower than most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.physics.columns import Column
+from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
+from skred.physics.terrain import Terrain
+
+FloatArray = NDArray[np.float64]
+STRETCHES_M = (75.0, 200.0, 500.0)
+"""Lengths of the stretches that are looked at [m]."""
+_STEP_IN_LENGTHS = 0.4
+U_1, U_2 = "U_1 [m s-1]", "U_2 [m s-1]"
+"""Front speeds at both ends of a stretch at which a relief on it equals the drag."""
+_OPPOSED_FROM_M = 150.0
+_LEAST_SPEED = 1.0
+
+
+def on_a_stretch(terrain: Terrain, s_from_m: float, s_to_m: float) -> FloatArray:
+    """Share of each cell that lies on a stretch, (n_cells,)."""
+    edge = terrain.edge_s_m
+    overlap = np.minimum(edge[1:], s_to_m) - np.maximum(edge[:-1], s_from_m)
+    share: FloatArray = np.clip(overlap / np.diff(edge), 0.0, 1.0)
+    return share
+
+
+def ends_of(shape: Shape) -> tuple[float, float]:
+    """Where the stretch of a local mechanism begins and ends [m]."""
+    assert shape.s_from_m is not None and shape.s_to_m is not None
+    return shape.s_from_m, shape.s_to_m
+
+
+def along_a_stretch(column: Column) -> Callable[[Setting, Shape], Direction]:
+    """Direction of a mechanism that enters one column on the shape's stretch, and of what opposes it."""
+
+    def direction(setting: Setting, shape: Shape) -> Direction:
+        share = on_a_stretch(setting.terrain, *ends_of(shape))
+        if not is_opposed(shape):
+            return Direction((column,), share[None, :])
+        return Direction((column, Column.CONSTANT), np.array([share, -share * _relief(setting, shape)]))
+
+    return direction
+
+
+def is_opposed(shape: Shape) -> bool:
+    """Whether a relief on the stretch equals the mechanism at the typical speed."""
+    return U_1 in dict(shape.constants)
+
+
+def equation_of(mechanism: Mechanism, shape: Shape) -> str:
+    """A mechanism's term in the equation of motion, with what opposes it."""
+    return mechanism.equation.replace("U^2", "(U^2 - U_0^2)", 1) if is_opposed(shape) else mechanism.equation
+
+
+def _relief(setting: Setting, shape: Shape) -> FloatArray:
+    """U^2 at which the relief equals the drag, in each cell: linear between the stretch's ends."""
+    first, last = ends_of(shape)
+    constants = dict(shape.constants)
+    edge = setting.terrain.edge_s_m
+    middle = 0.5 * (edge[1:] + edge[:-1])
+    squares = np.array([constants[U_1], constants[U_2]]) ** 2
+    return np.interp(middle, [first, last], squares)
+
+
+def stretches(setting: Setting) -> tuple[Shape, ...]:
+    """Stretches of several lengths, overlapping, over the recorded part of the track."""
+    first, last = setting.recorded_m
+    shapes = []
+    for length in STRETCHES_M:
+        if length > 1.2 * (last - first):
+            continue
+        n = max(int(np.ceil(max(last - first - length, 0.0) / (_STEP_IN_LENGTHS * length))), 1)
+        for start in np.linspace(first, max(last - length, first), n + 1):
+            shapes.append(Shape(float(start), float(min(start + length, setting.terrain.length_m))))
+    return tuple(shapes)
+
+
+def stretches_of_drag(setting: Setting) -> tuple[Shape, ...]:
+    """The stretches, and the longer ones once more with a relief that opposes the drag."""
+    plain = stretches(setting)
+    wide = [one for one in plain if ends_of(one)[1] - ends_of(one)[0] > _OPPOSED_FROM_M]
+    opposed = [_opposed(setting, one) for one in wide]
+    return (*plain, *(one for one in opposed if one is not None))
+
+
+def _opposed(setting: Setting, shape: Shape) -> Shape | None:
+    """The stretch with a relief that equals the drag at the typical speed; None where no front comes."""
+    speeds = np.interp(ends_of(shape), setting.terrain.edge_s_m, setting.front_speed)
+    if speeds.min() < _LEAST_SPEED:
+        return None
+    constants = tuple((name, round(float(u), 1)) for name, u in zip((U_1, U_2), speeds, strict=True))
+    return replace(shape, constants=constants)
+
+
+def split_stretch(setting: Setting, shape: Shape) -> tuple[Shape, ...]:
+    """The stretch moved by a fifth of its length, shortened, lengthened; opposed if it was."""
+    first, last = ends_of(shape)
+    length, end = last - first, setting.terrain.length_m
+    changes = ((-0.2, -0.2), (0.2, 0.2), (0.15, -0.15), (-0.25, 0.25), (-0.4, 0.0), (0.0, 0.4))
+    moved = [
+        Shape(max(first + before * length, 0.0), min(last + after * length, end)) for before, after in changes
+    ]
+    if not is_opposed(shape):
+        return tuple(moved)
+    opposed = [_opposed(setting, one) for one in moved]
+    return tuple(one for one in opposed if one is not None)
