@@ -80,6 +80,18 @@ def test_finer_curves_share_the_weight_of_their_place() -> None:
     assert entrant.log_bayes_factor == pytest.approx(curves[0].log_bayes_factor)
 
 
+def test_not_knowing_the_place_widens_a_strength() -> None:
+    """The variance of a mixture: within shapes, and between their means."""
+    flat, steep = made("segment_drag", 0.0, 1.0), made("segment_drag", 100.0, 1.0)
+    slope = 4.0 * np.arange(len(steep.strengths))
+    steep = replace(steep, log_evidence=1.0 + slope - slope.max())
+    (entrant,) = _entrants([flat, steep], {}).values()
+    weights, between = entrant.shape_weights, entrant.strength_between_shapes()
+    within = weights @ np.array([one.moments[1] ** 2 for one in entrant.curves])
+    assert between > 0.0 and entrant.strength()[1] ** 2 == pytest.approx(within + between**2)
+    assert _entrants([flat], {})["segment_drag"].strength_between_shapes() == 0.0
+
+
 def test_other_error_models_start_from_any() -> None:
     """The evidence of an error model does not depend on the one that it was reached from."""
     base = sparse_base()

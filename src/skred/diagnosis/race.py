@@ -95,6 +95,12 @@ class Entrant:
         mean = float(weights @ moments[:, 0])
         return mean, math.sqrt(float(weights @ (moments[:, 1] ** 2 + (moments[:, 0] - mean) ** 2)))
 
+    def strength_between_shapes(self) -> float:
+        """Standard deviation of the strength's mean over the shapes: what not knowing the place adds."""
+        means = np.array([one.moments[0] for one in self.curves])
+        weights = self.shape_weights
+        return math.sqrt(float(weights @ (means - weights @ means) ** 2))
+
     def stretch(self) -> tuple[float, float] | None:
         """Where it acts: weighted medians of both ends [m], None where it is not local."""
         if self.best.shape.place_m is None:

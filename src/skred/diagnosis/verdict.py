@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from skred.diagnosis.decide import alarmed
-from skred.diagnosis.diagnose import Diagnosis, Step
+from skred.diagnosis.diagnose import Diagnosis, strength_of
 from skred.diagnosis.held_out import errors, paired
 from skred.diagnosis.identify import Told
 from skred.diagnosis.next_sensor import next_sensor
@@ -29,11 +29,11 @@ def verdict(found: Diagnosis) -> dict[str, Any]:
         "base_model": found.law.id,
         "verdict": found.decision.verdict,
         "mechanism": names[0] if names else None,
-        "mechanisms": [_mechanism(step, number) for number, step in enumerate(found.steps)],
+        "mechanisms": [_mechanism(found, number) for number in range(len(found.steps))],
         "probability": found.race.probability if found.race is not None else {},
         "indistinguishable": list(names[1:]),
         "location": _location(found, entrant),
-        "strength": _strength(found.steps[0], 0) if found.steps else None,
+        "strength": _strength(found, 0) if found.steps else None,
         "covariate": entrant.best.shape.covariate if entrant is not None else None,
         "sensor": entrant.best.shape.sensor if entrant is not None else None,
         "equation": equation_of(entrant.mechanism, entrant.best.shape) if entrant is not None else None,
@@ -57,27 +57,22 @@ def _location(found: Diagnosis, entrant: Entrant | None) -> dict[str, float] | N
     return None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]}
 
 
-def _strength(step: Step, number: int) -> dict[str, Any]:
-    """Posterior of an added strength in the augmented law: shrunk by its prior."""
-    problem: Any = step.calibration.problem
+def _strength(found: Diagnosis, number: int) -> dict[str, Any]:
+    problem: Any = found.steps[-1].calibration.problem
     added = problem.added[number]
-    draws = np.asarray(step.calibration.tree["posterior"].to_dataset()[added.name].values)
-    return {
-        "parameter": added.name,
-        "unit": added.mechanism.strength.unit,
-        "mean": float(draws.mean()),
-        "sd": float(draws.std(ddof=1)),
-    }
+    mean, sd = strength_of(found.steps, number)
+    return {"parameter": added.name, "unit": added.mechanism.strength.unit, "mean": mean, "sd": sd}
 
 
-def _mechanism(step: Step, number: int) -> dict[str, Any]:
+def _mechanism(found: Diagnosis, number: int) -> dict[str, Any]:
     """One mechanism let in, its strength as the last calibration has it."""
+    step = found.steps[number]
     entrant = step.entrants[0]
     stretch = entrant.stretch()
     shape = entrant.best.shape
     return {
         "id": entrant.mechanism.id,
-        "strength": _strength(step, number),
+        "strength": _strength(found, number),
         "location": None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]},
         "equation": equation_of(entrant.mechanism, shape),
         "covariate": shape.covariate,

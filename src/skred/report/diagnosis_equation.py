@@ -92,7 +92,9 @@ def _row(symbol: str, unit: str, meaning: str, reference: str = "", doi: str = "
 def _added_rows(found: Diagnosis, step: Step, number: int) -> list[dict[str, Any]]:
     entrant = step.entrants[0]
     mechanism, shape = entrant.mechanism, entrant.best.shape
-    mean, sd = _posterior(found, number)
+    from skred.diagnosis.diagnose import strength_of
+
+    mean, sd = strength_of(found.steps, number)
     decimals = decimals_for(sd)
     about = f"{name_text(mechanism.strength.name)}: {mechanism.title}"
     meaning = f"{about}; here {rounded(mean, decimals)} ± {rounded(sd, decimals)}"
@@ -133,13 +135,6 @@ def _added_rows(found: Diagnosis, step: Step, number: int) -> list[dict[str, Any
 
 def _short(symbol: str) -> str:
     return {"loss": "l"}.get(symbol, symbol)
-
-
-def _posterior(found: Diagnosis, number: int) -> tuple[float, float]:
-    calibration = found.steps[-1].calibration
-    problem: Any = calibration.problem
-    values = chains_of(calibration.tree, problem.added[number].name)
-    return float(values.mean()), float(values.std(ddof=1))
 
 
 def parameter_rows(found: Diagnosis) -> list[dict[str, str]]:
