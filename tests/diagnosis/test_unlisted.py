@@ -163,6 +163,10 @@ def test_evidence_of_all_kinds_is_their_mean(base: Base) -> None:
     some = [replace(profile, log_bayes_factor=value) for value in (2.0, -1.0, 0.5, 900.0)]
     assert log_evidence_of(some) == pytest.approx(900.0 - np.log(4.0))
     assert log_evidence_of(some[:3]) == pytest.approx(np.log(np.exp([2.0, -1.0, 0.5]).mean()))
+    assert sum(kind.share for kind in KINDS) == pytest.approx(1.0)
+    one_of_each = [replace(profile, kind=kind) for kind, profile in zip(KINDS[3:5], some, strict=False)]
+    shares = np.array([kind.share for kind in KINDS[3:5]])
+    assert log_evidence_of(one_of_each) == pytest.approx(np.log(shares @ np.exp([2.0, -1.0]) / shares.sum()))
 
 
 def test_profile_is_found_from_a_listed_mechanism_where_nothing_is_too_far() -> None:

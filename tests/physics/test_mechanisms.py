@@ -205,9 +205,9 @@ def with_added(setting: Setting, direction: Direction, b: np.ndarray, sizes: np.
     return front_speeds(strengths, np.zeros(len(b)), path_of(setting.terrain), contributions)
 
 
-@pytest.mark.parametrize("name", ["segment_drag", "entrainment"])
+@pytest.mark.parametrize("name", ["segment_drag", "entrainment", "segment_friction"])
 def test_what_is_opposed_does_not_show_in_a_typical_front(name: str, settings: list[Setting]) -> None:
-    """Below the stretch a typical front is as fast as without it; others come closer to it."""
+    """Below the stretch a typical front is as fast as without it; drag brings others closer."""
     setting, added = settings[1], added_to(ALL[name])
     opposed = [shape for shape in added.shapes(setting) if is_opposed(shape)]
     assert opposed
@@ -219,7 +219,9 @@ def test_what_is_opposed_does_not_show_in_a_typical_front(name: str, settings: l
         with_it = with_added(setting, direction, b, np.full(3, added.scale))
         below = setting.terrain.edge_s_m >= (shape.s_to_m or 0.0)
         change = np.log(with_it[:, below] / without[:, below])[:, 0]
-        assert abs(change[0]) < 0.02 and change[1] < -5 * abs(change[0]) and change[2] > 5 * abs(change[0])
+        sign = 1.0 if name == "segment_friction" else -1.0
+        faster, slower = sign * change[1], -sign * change[2]
+        assert abs(change[0]) < 0.02 and faster > 5 * abs(change[0]) and slower > 5 * abs(change[0])
 
 
 def test_where_no_front_comes_nothing_is_opposed(settings: list[Setting]) -> None:

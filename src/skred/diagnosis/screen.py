@@ -166,10 +166,9 @@ class Screen:
         for kind in KINDS:
             start = first + n * self.ways.index(kind.enters)
             part = slice(start, start + n)
-            factors.append(
-                _of_profile(scores.score[:, part], scores.information[:, part, part], self._cover(kind))
-            )
-        result: FloatArray = np.logaddexp.reduce(np.array(factors), axis=0) - math.log(len(KINDS))
+            found = _of_profile(scores.score[:, part], scores.information[:, part, part], self._cover(kind))
+            factors.append(found + math.log(kind.share))
+        result: FloatArray = np.logaddexp.reduce(np.array(factors), axis=0)
         return result
 
     def _cover(self, kind: Kind) -> FloatArray:

@@ -60,7 +60,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     constants = document["mechanisms"][0]["constants"]
     if U_1 in constants:
         sentences.append(
-            "On the same stretch a relief equals it at the typical speed"
+            "On the same stretch something opposes it that equals it at the typical speed"
             f" ({constants[U_1]:.0f} to {constants[U_2]:.0f} m/s), so that it shows in fronts that are faster"
             " or slower than most, not on average."
         )

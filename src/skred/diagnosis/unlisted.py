@@ -11,7 +11,7 @@ share first (orthogonal model error: Sargsyan, Huan and Najm, 2019, doi
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,6 +44,8 @@ class Kind:
         Standard deviation of the profile.
     length_m : float
         Correlation length.
+    share : float
+        Prior probability among the kinds.
     """
 
     column: Column
@@ -51,6 +53,7 @@ class Kind:
     unit: str
     amplitude: float
     length_m: float
+    share: float
 
     @property
     def enters(self) -> tuple[Column, bool]:
@@ -58,13 +61,15 @@ class Kind:
         return self.column, self.opposed
 
 
+OPPOSED_SHARE = 0.1
+"""Prior probability that it is nil at the typical speed: two unlisted things that happen to be equal."""
 KINDS = tuple(
-    Kind(column, opposed, unit, amplitude, length)
-    for column, opposed, unit, amplitude in (
-        (Column.CONSTANT, False, "m s-2", 0.8),
-        (Column.QUADRATIC, False, "m-1", 1.5e-3),
+    Kind(column, opposed, unit, amplitude, length, share / 2.0)
+    for column, opposed, unit, amplitude, share in (
+        (Column.CONSTANT, False, "m s-2", 0.8, 0.5 * (1.0 - OPPOSED_SHARE)),
+        (Column.QUADRATIC, False, "m-1", 1.5e-3, 0.5 * (1.0 - OPPOSED_SHARE)),
         # U^2 varies by a third or so between fronts: the same work, then, as without opposition.
-        (Column.QUADRATIC, True, "m-1", 4.5e-3),
+        (Column.QUADRATIC, True, "m-1", 4.5e-3, OPPOSED_SHARE),
     )
     for length in (80.0, 250.0)
 )
@@ -221,8 +226,8 @@ def _scores(
     return found.score[0, n_before:], found.information[0, n_before:, n_before:]
 
 
-def log_evidence_of(profiles: list[Profile]) -> float:
-    """Log Bayes factor of the unlisted force: the kinds with equal weights."""
-    factors = np.array([profile.log_bayes_factor for profile in profiles])
-    most = float(factors.max())
-    return most + math.log(float(np.exp(factors - most).mean()))
+def log_evidence_of(profiles: Sequence[Profile]) -> float:
+    """Log Bayes factor of the unlisted force over its kinds."""
+    factors = [profile.log_bayes_factor for profile in profiles]
+    shares = np.array([profile.kind.share for profile in profiles])
+    return float(np.logaddexp.reduce(np.array(factors) + np.log(shares / shares.sum())))

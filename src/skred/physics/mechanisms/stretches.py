@@ -1,8 +1,8 @@
 """Mechanisms that act on a stretch of the track: where they are looked for, how they enter, what opposes.
 
-A drag on a stretch may be opposed there: a smoother or steeper bed, or whatever else gives fronts of the
-typical speed back what it takes. On average nothing shows then, and a base law that is right at every sensor
-is still wrong for each front that is faster or slower than most.
+What acts on a stretch may be opposed there: a smoother bed beside more drag, less drag beside a rougher bed,
+or whatever else gives fronts of the typical speed back what it takes. On average nothing shows then, and a
+base law that is right at every sensor is still wrong for each front that is faster or slower than most.
 """
 
 from __future__ import annotations
@@ -22,9 +22,10 @@ STRETCHES_M = (75.0, 200.0, 500.0)
 """Lengths of the stretches that are looked at [m]."""
 _STEP_IN_LENGTHS = 0.4
 U_1, U_2 = "U_1 [m s-1]", "U_2 [m s-1]"
-"""Front speeds at both ends of a stretch at which a relief on it equals the drag."""
+"""Front speeds at both ends of a stretch at which what opposes a mechanism equals it."""
 _OPPOSED_FROM_M = 150.0
-_LEAST_SPEED = 1.0
+_LEAST_SPEED = 5.0
+"""Front speed [m/s] below which nothing is opposed: fronts are about to stop there."""
 
 
 def on_a_stretch(terrain: Terrain, s_from_m: float, s_to_m: float) -> FloatArray:
@@ -48,23 +49,31 @@ def along_a_stretch(column: Column) -> Callable[[Setting, Shape], Direction]:
         share = on_a_stretch(setting.terrain, *ends_of(shape))
         if not is_opposed(shape):
             return Direction((column,), share[None, :])
-        return Direction((column, Column.CONSTANT), np.array([share, -share * _relief(setting, shape)]))
+        square = _typical_square(setting, shape)
+        if column is Column.QUADRATIC:
+            return Direction((column, Column.CONSTANT), np.array([share, -share * square]))
+        return Direction((column, Column.QUADRATIC), np.array([share, -share / square]))
 
     return direction
 
 
 def is_opposed(shape: Shape) -> bool:
-    """Whether a relief on the stretch equals the mechanism at the typical speed."""
+    """Whether something on the stretch equals the mechanism at the typical speed, the other way."""
     return U_1 in dict(shape.constants)
 
 
 def equation_of(mechanism: Mechanism, shape: Shape) -> str:
     """A mechanism's term in the equation of motion, with what opposes it."""
-    return mechanism.equation.replace("U^2", "(U^2 - U_0^2)", 1) if is_opposed(shape) else mechanism.equation
+    if not is_opposed(shape):
+        return mechanism.equation
+    if "U^2" in mechanism.equation:
+        return mechanism.equation.replace("U^2", "(U^2 - U_0^2)", 1)
+    symbol = mechanism.strength.symbol
+    return mechanism.equation.replace(symbol, f"{symbol} (1 - U^2 / U_0^2)", 1)
 
 
-def _relief(setting: Setting, shape: Shape) -> FloatArray:
-    """U^2 at which the relief equals the drag, in each cell: linear between the stretch's ends."""
+def _typical_square(setting: Setting, shape: Shape) -> FloatArray:
+    """U^2 at which what opposes the mechanism equals it, in each cell: linear between the stretch's ends."""
     first, last = ends_of(shape)
     constants = dict(shape.constants)
     edge = setting.terrain.edge_s_m
@@ -74,7 +83,10 @@ def _relief(setting: Setting, shape: Shape) -> FloatArray:
 
 
 def stretches(setting: Setting) -> tuple[Shape, ...]:
-    """Stretches of several lengths, overlapping, over the recorded part of the track."""
+    """Stretches of several lengths, overlapping, over the recorded part of the track.
+
+    The longer ones once more, opposed: what is opposed on a short one does too little.
+    """
     first, last = setting.recorded_m
     shapes = []
     for length in STRETCHES_M:
@@ -83,19 +95,13 @@ def stretches(setting: Setting) -> tuple[Shape, ...]:
         n = max(int(np.ceil(max(last - first - length, 0.0) / (_STEP_IN_LENGTHS * length))), 1)
         for start in np.linspace(first, max(last - length, first), n + 1):
             shapes.append(Shape(float(start), float(min(start + length, setting.terrain.length_m))))
-    return tuple(shapes)
-
-
-def stretches_of_drag(setting: Setting) -> tuple[Shape, ...]:
-    """The stretches, and the longer ones once more with a relief that opposes the drag."""
-    plain = stretches(setting)
-    wide = [one for one in plain if ends_of(one)[1] - ends_of(one)[0] > _OPPOSED_FROM_M]
+    wide = [one for one in shapes if ends_of(one)[1] - ends_of(one)[0] > _OPPOSED_FROM_M]
     opposed = [_opposed(setting, one) for one in wide]
-    return (*plain, *(one for one in opposed if one is not None))
+    return (*shapes, *(one for one in opposed if one is not None))
 
 
 def _opposed(setting: Setting, shape: Shape) -> Shape | None:
-    """The stretch with a relief that equals the drag at the typical speed; None where no front comes."""
+    """The stretch, opposed by what equals the mechanism at the typical speed; None where fronts stop."""
     speeds = np.interp(ends_of(shape), setting.terrain.edge_s_m, setting.front_speed)
     if speeds.min() < _LEAST_SPEED:
         return None
