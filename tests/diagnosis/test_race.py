@@ -10,7 +10,7 @@ from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
 
 from skred.diagnosis.curves import Base, Curve, curve, curve_at, curve_near, first_look
 from skred.diagnosis.event_nodes import FINE, FRONTS, ROUGH
-from skred.diagnosis.race import _entrants, _leading, with_errors
+from skred.diagnosis.race import _entrants, _leading, _that_count, with_errors
 from skred.diagnosis.screen import candidates
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Direction, Shape
@@ -71,6 +71,15 @@ def test_those_that_lead_after_a_second_look_are_looked_at_too() -> None:
     assert _leading(curves, finer) == [1, 2]
     # Far behind the best is not looked at.
     assert _leading(curves, {1: [made("segment_drag", 100.0, 20.0)]}) == [1]
+
+
+def test_what_is_far_behind_is_not_looked_at_again() -> None:
+    heights = {"segment_drag": [30.0, 19.0, 21.0], "obstacle": [12.0, 9.0], "sensor_bias": [14.0, 3.0]}
+    curves = [made(name, 100.0 * k, one) for name, row in heights.items() for k, one in enumerate(row)]
+    assert _that_count(dict(enumerate(curves))) == [0, 2, 3, 5]
+    # A second look at what is hopeless against the best of all would change nothing that is said.
+    assert _leading(curves, {}) == [0, 3, 5]
+    assert _leading([made("segment_drag", 300.0, 45.0), *curves], {}) == [0]
 
 
 def test_finer_curves_share_the_weight_of_their_place() -> None:

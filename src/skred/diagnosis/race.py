@@ -40,6 +40,8 @@ _CHECKED, _DRAWS = 5, 500
 """Leading mechanisms whose best curve is looked at with many more nodes."""
 _WITHIN, _AT_MOST, _TURNS = 3.0, 2, 3
 """Places of a mechanism that are looked at again: within so many nats of its best, so many, so many times."""
+_FAR_BEHIND, _HOPELESS = 10.0, 20.0
+"""Nats behind its mechanism's best, or behind the best of all, at which a place is not looked at any more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,12 +129,15 @@ class Heat:
     base : Base
     entrants : mapping of str to Entrant
     profiles : list of Profile
+    first_look : list of Curve
+        A rough one for each candidate.
     """
 
     error_model: str
     base: Base
     entrants: dict[str, Entrant]
     profiles: list[Profile]
+    first_look: list[Curve]
 
     @property
     def log_factors(self) -> dict[str, float]:
@@ -210,13 +215,13 @@ def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
     chosen = [DEFAULT_ERRORS]
     if height[preferred] > height[DEFAULT_ERRORS] + _PREFERRED_BY:
         chosen.append(preferred)
-    heats = []
+    heats: list[Heat] = []
     for number, name in enumerate(chosen):
 
         def told(done: int, of: int, number: int = number) -> None:
             tell(done + number * of, of * len(chosen))
 
-        heats.append(_heat(name, bases[name], told))
+        heats.append(_heat(name, bases[name], told, heats[0] if heats else None))
     # The evidence of an error model without a heat counts for nothing and everything alike.
     raced = [entrant.mechanism for entrant in heats[0].entrants.values()]
     return Race(tuple(heats), prior_odds(raced), {name: heights[name] for name in chosen})
@@ -234,13 +239,11 @@ def with_errors(base: Base, error_model: str) -> Base:
     return replace(base, problem=problem, rows=rows, fit=fit)
 
 
-def _heat(error_model: str, base: Base, tell: Tell) -> Heat:
-    todo, budget = candidates(base.setting, ties=False), first_look(base)
+def _heat(error_model: str, base: Base, tell: Tell, before: Heat | None) -> Heat:
+    """The race under one error model; `before` under another one."""
+    budget = first_look(base)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        curves = []
-        for one in pool.map(lambda job: curve(base, job.mechanism, job.shape, budget), todo):
-            curves.append(one)
-            tell(len(curves), len(todo))
+        curves = _first_looks(base, budget, pool, tell, () if before is None else before.first_look)
         entrants = _looked_at_again(base, curves, budget, pool)
         profiles = list(pool.map(lambda kind: _profile(base, kind, entrants), KINDS))
     for name, (correction, disagreement) in _corrections(base, entrants).items():
@@ -250,7 +253,37 @@ def _heat(error_model: str, base: Base, tell: Tell) -> Heat:
         if other is not None and mechanism.added is not None and mechanism.added.joins(base.setting.base):
             same = tuple(replace(one, mechanism=mechanism) for one in other.curves)
             entrants[mechanism.id] = replace(other, mechanism=mechanism, curves=same)
-    return Heat(error_model, base, entrants, profiles)
+    return Heat(error_model, base, entrants, profiles, curves)
+
+
+def _first_looks(
+    base: Base, budget: Budget, pool: ThreadPoolExecutor, tell: Tell, before: Sequence[Curve]
+) -> list[Curve]:
+    """A rough curve for each candidate; those `before`, by another error model, where they cannot count."""
+    todo, curves, looked = candidates(base.setting, ties=False), dict(enumerate(before)), set[int]()
+
+    def look(number: int) -> Curve:
+        return curve(base, todo[number].mechanism, todo[number].shape, budget)
+
+    while jobs := sorted(set(_that_count(curves) if curves else range(len(todo))) - looked):
+        looked |= set(jobs)
+        for done, (number, one) in enumerate(zip(jobs, pool.map(look, jobs), strict=True), start=1):
+            curves[number] = one
+            tell(len(todo) - len(jobs) + done, len(todo))
+    return [curves[number] for number in range(len(todo))]
+
+
+def _that_count(curves: Mapping[int, Curve]) -> list[int]:
+    """Numbers of the curves that are not far behind."""
+    best: dict[str, float] = {}
+    for one in curves.values():
+        best[one.mechanism.id] = max(one.log_bayes_factor, best.get(one.mechanism.id, -math.inf))
+    most = max(best.values())
+    return [
+        number
+        for number, one in curves.items()
+        if one.log_bayes_factor > max(best[one.mechanism.id] - _FAR_BEHIND, most - _HOPELESS)
+    ]
 
 
 def _profile(base: Base, kind: Kind, entrants: dict[str, Entrant]) -> Profile:
@@ -326,7 +359,8 @@ def _leading(curves: Sequence[Curve], finer: Mapping[int, list[Curve]]) -> list[
     for name in dict.fromkeys(one.mechanism.id for one in curves):
         members = np.array([k for k, one in enumerate(curves) if one.mechanism.id == name])
         best = members[np.argsort(-height[members])][:_AT_MOST]
-        leading += [int(k) for k in best if height[k] > height[members].max() - _WITHIN]
+        least = max(height[members].max() - _WITHIN, height.max() - _HOPELESS)
+        leading += [int(k) for k in best if height[k] > least]
     return leading
 
 
