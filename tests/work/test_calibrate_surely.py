@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pytest
 
 from skred.campaign import find_campaign, read_campaign
 from skred.campaign.parts import of_events
@@ -35,15 +35,14 @@ def test_short_chains_are_made_longer() -> None:
     assert found.problem is given
 
 
-def test_a_rough_integration_is_made_finer(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_rough_integration_is_made_finer() -> None:
     """The limit lies between the errors of both."""
     given, settings = problem(), SamplerSettings(draws=600, tune=400, seed=1)
     samples = {"retardation": np.array([4.0, 5.0]), "retardation_spread": np.array([0.15, 0.3])}
     finer: Any = given.finer()
     rough, fine = (np.abs(one.integration_errors(LAW, samples)).max() for one in (given, finer))
     assert fine < 0.5 * rough
-    monkeypatch.setattr(HierarchicalProblem, "integration_limit", 1e-7)
-    found = calibrate_surely(given, LAW, settings)
+    found = calibrate_surely(replace(given, integration_limit=1e-7), LAW, settings)
     assert isinstance(found.problem, HierarchicalProblem) and found.problem.fineness == 2
     assert found.problem.finer() is None
     assert "integration" in found.gate.problems[0]

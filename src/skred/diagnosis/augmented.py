@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -34,8 +34,8 @@ from skred.physics.mechanisms.stretches import equation_of
 
 FloatArray = NDArray[np.float64]
 MOST_ADDED = 2
-AUGMENTED_LIMIT = 1.0
-"""Largest error of the log likelihood over 22 events, in nats, at the worst of some draws.
+CLAIM_LIMIT = 1.0
+"""Largest error of the log likelihood over 22 events in a diagnosis, in nats, at the worst of some draws.
 
 A claim of a mechanism rests on several nats; where fronts stop on a stretch that is added, an event's
 likelihood bends sharply with the strength, and more nodes do not help.
@@ -92,7 +92,7 @@ class AugmentedProblem(HierarchicalProblem):
     tables : Tables
     """
 
-    integration_limit: ClassVar[float] = AUGMENTED_LIMIT
+    integration_limit: float = CLAIM_LIMIT
     base: Base
     added: tuple[AddedStrength, ...]
     tables: Tables = field(repr=False)
@@ -318,7 +318,7 @@ def augmented_problem(base: Base, curves: Sequence[Curve]) -> AugmentedProblem:
     located = locate(base, extension, curves)
     for budget in BUDGETS:
         problem = _with_tables(base, added, build_tables(base, extension, located, budget))
-        if _rough_error(problem, located) < _ENOUGH * AUGMENTED_LIMIT:
+        if _rough_error(problem, located) < _ENOUGH * CLAIM_LIMIT:
             return problem
     if len(added) == 1:
         # More nodes do not help where a likelihood bends with the strength, between the tables' strengths.

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.augmented import AugmentedProblem, augmented_problem
+from skred.diagnosis.augmented import CLAIM_LIMIT, AugmentedProblem, augmented_problem
 from skred.diagnosis.curves import Base, Curve, fit_base
 from skred.diagnosis.decide import Decision, alarmed, decide
 from skred.diagnosis.extension import Extension, extended
@@ -195,6 +195,7 @@ def _steps(
 ) -> Diagnosis:
     """All steps of a diagnosis."""
     clock.stage("base", f"{law.id}: calibrating the base law")
+    problem = replace(problem, integration_limit=CLAIM_LIMIT)
     calibration = calibrate_surely(problem, law, settings)
     problem = _problem_of(calibration)
     if not calibration.gate.passed:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -66,18 +66,20 @@ class HierarchicalProblem(Problem):
         How well it is known where a front stopped relative to a sensor.
     fineness : int
         1 as usual; 2 for events resolved finer, over a wider envelope, at several times the cost.
+    integration_limit : float
+        Largest error of the log likelihood over 22 events that is let pass, in nats.
     """
 
     error_model: ErrorModel = ERROR_MODELS[DEFAULT_ERRORS]
     place_sd_m: float = PLACE_SD_M
     fineness: int = 1
+    integration_limit: float = INTEGRATION_LIMIT
     # Not init: a problem made from this one by `replace` must not keep what belongs to other recordings.
     _surfaces: dict[tuple[str, ...], Surfaces] = field(init=False, default_factory=dict, repr=False)
     _rough: dict[tuple[str, ...], RoughPopulation] = field(init=False, default_factory=dict, repr=False)
     _errors: dict[tuple[str, ...], FloatArray] = field(init=False, default_factory=dict, repr=False)
 
     likelihood = "hierarchical"
-    integration_limit: ClassVar[float] = INTEGRATION_LIMIT
 
     def parameters(self, law: Law) -> tuple[Parameter, ...]:
         """The law's own parameters, here medians over events, then spreads and correlations."""
