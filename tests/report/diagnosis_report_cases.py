@@ -69,7 +69,7 @@ def race_of(problem: HierarchicalProblem, tops: dict[str, float], n_heats: int =
     }
     profile = SimpleNamespace(log_bayes_factor=tops.get("unlisted", -1.0))
     heats = tuple(
-        Heat(name, SimpleNamespace(), entrants, [profile]) for name in ("robust", "student")[:n_heats]
+        Heat(name, SimpleNamespace(), entrants, [profile], []) for name in ("robust", "student")[:n_heats]
     )
     odds = prior_odds(entrant.mechanism for entrant in entrants.values())
     return Race(heats, odds, {"robust": -100.0, "student": -103.0})

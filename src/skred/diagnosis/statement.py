@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from skred.diagnosis.decide import NOTHING_AT_MOST
 from skred.diagnosis.diagnose import Diagnosis
 from skred.diagnosis.odds import NOTHING, UNLISTED
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
@@ -122,11 +123,26 @@ def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     ]
 
 
+def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
+    """What the race would say alone, where it says something and the check does not."""
+    assert found.check is not None
+    probability = document["probability"]
+    if probability[NOTHING] >= NOTHING_AT_MOST:
+        return ""
+    first = max((name for name in probability if name != NOTHING), key=lambda name: probability[name])
+    what = "a force not in the list" if first == UNLISTED else _title(first)
+    return (
+        f"Of what could be missing, {what} would be the most probable ({_share(probability[first])}); but of"
+        f" clean campaigns like this one {100.0 * found.check.p_value:.0f} % show as much; none is claimed."
+    )
+
+
 def _nothing(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     assert found.check is not None and found.table is not None
     return [
         f"The recordings give no reason to add anything (p = {found.check.p_value:.2g}; probability of"
         f" nothing {_share(document['probability'][NOTHING])}).",
+        _hint(found, document),
         f"A relevant strength of what is listed would have been found in {100.0 * found.table.power:.0f} % of"
         " cases on average; the table of detection limits says from where on each would have been seen.",
     ]
@@ -140,6 +156,7 @@ def _cannot(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         f"No alarm (p = {found.check.p_value:.2g}), but these recordings cannot tell: a relevant strength of"
         f" what is listed would have been found in only {100.0 * found.table.power:.0f} % of cases on"
         " average, so silence means little.",
+        _hint(found, document),
     ]
     sensor = document["next_sensor"]
     if sensor is not None:

@@ -1,0 +1,25 @@
+"""Where the race leans to something and the check does not fire, the statement says both."""
+
+from __future__ import annotations
+
+import pytest
+from diagnosis_report_cases import diagnosis
+
+from skred.diagnosis.statement import statement
+
+
+def document(probability: dict[str, float]) -> dict:
+    return {"probability": probability, "next_sensor": None}
+
+
+@pytest.mark.parametrize("kind", ["nothing", "silent"])
+def test_a_lean_that_the_check_does_not_bear_out_is_told_and_not_claimed(kind: str) -> None:
+    found = diagnosis(kind)
+    assert found.check is not None
+    leaning = statement(found, document({"nothing": 0.2, "obstacle": 0.5, "unlisted": 0.3}))
+    assert "an obstacle: a dam, a wall, a step would be the most probable (50 %)" in leaning
+    assert f"{100.0 * found.check.p_value:.0f} % show as much; none is claimed" in leaning
+    other = statement(found, document({"nothing": 0.2, "obstacle": 0.3, "unlisted": 0.5}))
+    assert "a force not in the list would be" in other
+    plain = statement(found, document({"nothing": 0.6, "obstacle": 0.3, "unlisted": 0.1}))
+    assert "would be the most probable" not in plain
