@@ -19,6 +19,7 @@ from skred.diagnosis.odds import prior_odds
 from skred.diagnosis.omnibus import Omnibus
 from skred.diagnosis.predictive import Predicted
 from skred.diagnosis.race import Entrant, Heat, Race
+from skred.diagnosis.unlisted import KINDS
 from skred.inference.gate import Gate
 from skred.inference.hierarchical import HierarchicalProblem
 from skred.laws import load_law
@@ -67,7 +68,7 @@ def race_of(problem: HierarchicalProblem, tops: dict[str, float], n_heats: int =
         and mechanism.added.joins(setting.base)
         and mechanism.added.shapes(setting)
     }
-    profile = SimpleNamespace(log_bayes_factor=tops.get("unlisted", -1.0))
+    profile = SimpleNamespace(log_bayes_factor=tops.get("unlisted", -1.0), kind=KINDS[0])
     heats = tuple(
         Heat(name, SimpleNamespace(), entrants, [profile], []) for name in ("robust", "student")[:n_heats]
     )
