@@ -55,6 +55,11 @@ class Effort:
 
 
 QUICK_REPLICAS = 100
+RACE_AGAIN = 0.2
+"""P-value of the augmented law's check below which a second mechanism is looked for.
+
+The check sees little of a second one beside the first. Where it does not fire the race has to be sure alone.
+"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,11 +306,11 @@ def let_in(
         clock.stage("check again", "is anything wrong with the augmented law")
         check, next_base = _check_again(heat.base, calibration, problem, chosen, settings, effort)
         steps.append(Step(entrants, raced, calibration, check))
-        if not check.fired or number + 1 == effort.max_mechanisms:
+        if check.p_value > RACE_AGAIN or number + 1 == effort.max_mechanisms:
             break
-        clock.stage("second race", "something is left: every candidate refitted again")
+        clock.stage("second race", "something may be left: every candidate refitted again")
         raced = race(next_base)
-        second = decide(raced.probability, True, True)
+        second = decide(raced.probability, check.fired, True)
         if not second.names:
             break
         names = second.names
