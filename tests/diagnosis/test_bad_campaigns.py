@@ -57,7 +57,7 @@ def outcome(base: Base) -> tuple[str, tuple[str, ...]]:
     assert np.isfinite(list(raced.log_factors.values())).all()
     place = locate(raced.leading(UNLISTED))
     assert np.isfinite(place.mean).all() and np.isfinite(place.work).all()
-    found = decide(raced.probability, False, False)
+    found = decide(raced.probability, 0.5, False)
     return found.verdict, found.names
 
 

@@ -70,25 +70,25 @@ def shares(nothing: float, unlisted: float, **named: float) -> dict[str, float]:
 def test_silence() -> None:
     quiet = shares(0.7, 0.05, obstacle=0.2, sensor_bias=0.05)
     for can_tell, expected in ((True, "nothing_missing"), (False, "cannot_tell")):
-        found = decide(quiet, fired=False, can_tell=can_tell)
+        found = decide(quiet, p_value=0.3, can_tell=can_tell)
         assert (found.verdict, found.names) == (expected, ())
     # Not fired: a race at three to one is no alarm.
     loud = shares(0.25, 0.05, obstacle=0.65, sensor_bias=0.05)
-    assert decide(loud, fired=False, can_tell=True).verdict == "nothing_missing"
+    assert decide(loud, p_value=0.3, can_tell=True).verdict == "nothing_missing"
 
 
 def test_one_name() -> None:
-    found = decide(shares(0.02, 0.02, obstacle=0.9, segment_drag=0.05, sensor_bias=0.01), True, True)
+    found = decide(shares(0.02, 0.02, obstacle=0.9, segment_drag=0.05, sensor_bias=0.01), 0.005, True)
     assert (found.verdict, found.names) == ("missing_physics", ("obstacle",))
     # What cannot be told in general may still show.
-    assert decide(shares(0.02, 0.02, obstacle=0.96), True, False).names == ("obstacle",)
+    assert decide(shares(0.02, 0.02, obstacle=0.96), 0.005, False).names == ("obstacle",)
 
 
 def test_ties_by_the_share_of_the_group() -> None:
     """0.9 of the group, not of everything: 0.50 + 0.13 of 0.70 is exactly that."""
     found = decide(
         shares(0.2, 0.05, obstacle=0.13, segment_drag=0.5, segment_friction=0.07, sensor_bias=0.05),
-        True,
+        0.005,
         True,
     )
     assert (found.verdict, found.names) == ("missing_physics", ("segment_drag", "obstacle"))
@@ -100,32 +100,39 @@ def test_ties_by_the_share_of_the_group() -> None:
 def test_groups_before_names() -> None:
     """`unlisted` is the most probable single id, yet six mechanisms together are more probable."""
     many = dict.fromkeys(PHYSICS[:6], 0.1)
-    found = decide(shares(0.05, 0.3, sensor_bias=0.05, **many), True, True)
+    found = decide(shares(0.05, 0.3, sensor_bias=0.05, **many), 0.005, True)
     assert found.verdict == "missing_physics" and set(found.names) == set(many)
 
 
 def test_unlisted_wins_over_single_mechanisms() -> None:
     few = dict.fromkeys(PHYSICS[:6], 0.05)
-    found = decide(shares(0.05, 0.6, sensor_bias=0.05, **few), True, True)
+    found = decide(shares(0.05, 0.6, sensor_bias=0.05, **few), 0.005, True)
     assert (found.verdict, found.names) == ("unexplained", ())
 
 
 def test_instruments() -> None:
-    found = decide(shares(0.05, 0.05, obstacle=0.25, sensor_bias=0.6, release_offset=0.05), True, True)
+    found = decide(shares(0.05, 0.05, obstacle=0.25, sensor_bias=0.6, release_offset=0.05), 0.005, True)
     assert (found.verdict, found.names) == ("instrument", ("sensor_bias",))
-    found = decide(shares(0.05, 0.05, obstacle=0.3, sensor_bias=0.35, release_offset=0.25), True, True)
+    found = decide(shares(0.05, 0.05, obstacle=0.3, sensor_bias=0.35, release_offset=0.25), 0.005, True)
     assert (found.verdict, found.names) == ("instrument", ("sensor_bias", "release_offset"))
 
 
 def test_no_instrument_in_the_race() -> None:
-    assert decide(shares(0.1, 0.2, obstacle=0.7), True, True).names == ("obstacle",)
-    assert decide(shares(0.1, 0.9), True, True).verdict == "unexplained"
+    assert decide(shares(0.1, 0.2, obstacle=0.7), 0.005, True).names == ("obstacle",)
+    assert decide(shares(0.1, 0.9), 0.005, True).verdict == "unexplained"
 
 
 def test_the_race_alone_and_the_check_alone() -> None:
-    """A race that leaves nothing less than 1 % is an alarm; a check that fires against it is none."""
+    """A race that leaves nothing less than 1 % is an alarm; a check that fires against it is none.
+
+    And both together, where each is nearly there.
+    """
+    nearly = shares(0.09, 0.01, obstacle=0.9)
+    assert decide(nearly, p_value=0.05, can_tell=True).names == ("obstacle",)
+    assert decide(nearly, p_value=0.06, can_tell=True).verdict == "nothing_missing"
+    assert decide(shares(0.11, 0.0, obstacle=0.89), 0.05, True).verdict == "nothing_missing"
     sure = shares(0.009, 0.001, obstacle=0.99)
-    assert decide(sure, fired=False, can_tell=True).names == ("obstacle",)
-    assert decide(shares(0.011, 0.0, obstacle=0.989), False, True).verdict == "nothing_missing"
-    assert decide(shares(0.51, 0.0, obstacle=0.49), True, True).verdict == "nothing_missing"
-    assert decide(shares(0.49, 0.0, obstacle=0.51), True, True).names == ("obstacle",)
+    assert decide(sure, p_value=0.3, can_tell=True).names == ("obstacle",)
+    assert decide(shares(0.011, 0.0, obstacle=0.989), 0.3, True).verdict == "nothing_missing"
+    assert decide(shares(0.51, 0.0, obstacle=0.49), 0.005, True).verdict == "nothing_missing"
+    assert decide(shares(0.49, 0.0, obstacle=0.51), 0.005, True).names == ("obstacle",)

@@ -6,15 +6,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from skred.diagnosis.odds import NOTHING, UNLISTED
+from skred.diagnosis.omnibus import LIMIT
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group
 
 HELD = 0.9
 """Share of its group that a tie set holds."""
-NOTHING_AT_MOST = 0.5
-E_LIMIT = 0.01
-"""Probability of nothing below which the race alone raises the alarm: under a clean campaign the odds exceed
-1 / E_LIMIT in a share of at most E_LIMIT (Markov's inequality for a Bayes factor)."""
+NOTHING_AT_MOST, E_LIMIT = 0.5, 0.01
+DOUBTFUL = 0.05
+ALARMS = ((LIMIT, NOTHING_AT_MOST), (DOUBTFUL, 2.0 * DOUBTFUL), (1.0, E_LIMIT))
+"""The alarm is raised where, for any of these, the check's p-value is at most the first and the probability
+of nothing below the second: the check alone, unless the race denies it; both, where each is all but sure; the
+race alone. Under a clean campaign odds exceed 1 / E_LIMIT in a share of at most E_LIMIT (Markov's inequality
+for a Bayes factor)."""
 
 
 @dataclass(frozen=True)
@@ -33,25 +37,24 @@ class Decision:
     names: tuple[str, ...]
 
 
-def alarmed(probability: Mapping[str, float], fired: bool) -> bool:
-    """Whether something is wrong: the calibrated limit is passed and the race agrees, or the race is sure."""
-    nothing = probability[NOTHING]
-    return (fired and nothing < NOTHING_AT_MOST) or nothing < E_LIMIT
+def alarmed(probability: Mapping[str, float], p_value: float) -> bool:
+    """Whether something is wrong, by the check and the race together."""
+    return any(p_value <= most and probability[NOTHING] < below for most, below in ALARMS)
 
 
-def decide(probability: Mapping[str, float], fired: bool, can_tell: bool) -> Decision:
+def decide(probability: Mapping[str, float], p_value: float, can_tell: bool) -> Decision:
     """Verdict from probabilities.
 
     Parameters
     ----------
     probability : mapping
         Of each id.
-    fired : bool
-        Whether the omnibus check's limit is passed.
+    p_value : float
+        Of the omnibus check.
     can_tell : bool
         Whether relevant strengths would mostly have been found.
     """
-    if not alarmed(probability, fired):
+    if not alarmed(probability, p_value):
         return Decision("nothing_missing" if can_tell else "cannot_tell", ())
     groups: dict[str, dict[str, float]] = {UNLISTED: {UNLISTED: probability[UNLISTED]}}
     for name, share in probability.items():

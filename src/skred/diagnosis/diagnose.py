@@ -217,8 +217,8 @@ def _steps(
     check = omnibus(screen, base.rows, start, draws, settings.seed, effort.replicas)
     clock.stage("race", "what is missing: every candidate refitted")
     raced = race(base)
-    decision = decide(raced.probability, check.fired, table.can_tell)
-    location = locate(raced.leading(UNLISTED)) if alarmed(raced.probability, check.fired) else None
+    decision = decide(raced.probability, check.p_value, table.can_tell)
+    location = locate(raced.leading(UNLISTED)) if alarmed(raced.probability, check.p_value) else None
     steps, reference, cannot = tuple[Step, ...](), calibration, ""
     if decision.names:
         clock.stage("augment", f"{law.id} + {decision.names[0]}: calibrating the augmented law")
@@ -298,7 +298,8 @@ def let_in(
         entrants = tuple(heat.entrants[name] for name in names)
         chosen.append(entrants[0].best)
         problem = augmented_problem(_plain(heat.base), chosen)
-        calibration = calibrate_surely(problem, base.law, settings)
+        # Its chains start around the posterior: half the tuning does.
+        calibration = calibrate_surely(problem, base.law, replace(settings, tune=settings.tune // 2))
         if not calibration.gate.passed:
             problems = "; ".join(calibration.gate.problems)
             cannot = f"the gate of {base.law.id} + {names[0]} failed: {problems}"
@@ -310,7 +311,7 @@ def let_in(
             break
         clock.stage("second race", "something may be left: every candidate refitted again")
         raced = race(next_base)
-        second = decide(raced.probability, check.fired, True)
+        second = decide(raced.probability, check.p_value, True)
         if not second.names:
             break
         names = second.names

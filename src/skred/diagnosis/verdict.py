@@ -167,7 +167,7 @@ def _more(found: Diagnosis) -> dict[str, Any]:
     """Keys beyond the format's."""
     more: dict[str, Any] = {"reason": found.cannot or None, "seconds": found.seconds}
     if found.race is not None and found.check is not None:
-        more["alarm"] = alarmed(found.race.probability, found.check.fired)
+        more["alarm"] = alarmed(found.race.probability, found.check.p_value)
         more["log_bayes_factors"] = found.race.log_factors
         more["error_models"] = [heat.error_model for heat in found.race.heats]
         more["candidates"] = [_candidate(found.race, name) for name in found.race.heats[0].entrants]

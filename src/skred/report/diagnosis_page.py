@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skred.diagnosis.decide import E_LIMIT, decide
+from skred.diagnosis.decide import DOUBTFUL, E_LIMIT, decide
 from skred.diagnosis.held_out import K_LIMIT, paired
 from skred.diagnosis.omnibus import LIMIT
 from skred.diagnosis.unlisted import KINDS
@@ -94,8 +94,8 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
                 for kind in KINDS
             ],
             limits={
-                "p": LIMIT, "e": E_LIMIT, "k": K_LIMIT, "r_hat": R_HAT_LIMIT, "ess": ESS_LIMIT,
-                "practical": PRACTICAL_DIFFERENCE,
+                "p": LIMIT, "doubtful": DOUBTFUL, "e": E_LIMIT, "k": K_LIMIT, "r_hat": R_HAT_LIMIT,
+                "ess": ESS_LIMIT, "practical": PRACTICAL_DIFFERENCE,
             },
             too_few=_too_few(found),
             dropped=_dropped(found),
@@ -146,7 +146,7 @@ def _dropped(found: Diagnosis) -> tuple[str, ...]:
     """What the race would have named, had its own calibration passed the gate."""
     if found.race is None or found.check is None or found.table is None or found.steps:
         return ()
-    return decide(found.race.probability, found.check.fired, found.table.can_tell).names
+    return decide(found.race.probability, found.check.p_value, found.table.can_tell).names
 
 
 def _difference(found: Diagnosis) -> dict[str, Any] | None:
