@@ -121,7 +121,8 @@ def _retardation(axes: Axes, profile: Location) -> None:
     )  # fmt: skip
     axes.plot(profile.s_m, profile.mean, color=INK, linewidth=1.4, label="missing retardation, mean")
     axes.axhline(0.0, color=GREY, linewidth=0.8)
-    axes.set_ylabel(f"missing retardation\n[{unit_text('m s-2')}], positive brakes")
+    what = "missing retardation\nof a fast front" if profile.opposed else "missing retardation\n"
+    axes.set_ylabel(f"{what} [{unit_text('m s-2')}],\npositive brakes")
     axes.grid(axis="y")
     # The stretch that the profile can tell apart.
     low, high = axes.get_ylim()
