@@ -118,12 +118,24 @@ def _between(found: Mapping[str, Found]) -> str:
         said = (
             f"Under M2 the leading stretch, {_where(stretch['location'])}, takes"
             f" {stretch['strength']['mean']:.2g} ± {stretch['strength']['sd']:.1g} m/s² more than dry"
-            " friction and drag do.\n"
+            f" friction and drag do{_opposed(found['pcm'])}.\n"
         )
     return (
         "## Between LC and CD\n\nMissing specific work between sensors (positive: the law brakes too little),"
         f" with the unlisted force of the highest evidence. {said}\n"
         "| base | s [m] | missing work [J/kg] |\n| --- | --- | --- |\n" + rows
+    )
+
+
+def _opposed(one: Found) -> str:
+    """Of whom friction takes more, where something opposes it."""
+    constants = next((row["constants"] for row in one["mechanisms"] if row["id"] == "segment_friction"), {})
+    if "U_1 [m s-1]" not in constants:
+        return ""
+    first, last = constants["U_1 [m s-1]"], constants["U_2 [m s-1]"]
+    return (
+        f" where a front hardly moves, nothing more at the typical speed ({first:.0f} to {last:.0f} m/s) and less"
+        " above: slow fronts are braked there and fast ones are not"
     )
 
 
@@ -174,7 +186,8 @@ def _robust(found: Mapping[str, Found]) -> str:
             for row in listed
         )
         said = one["verdict"] + (f": {one['reason']}" if one.get("reason") else "")
-        rows.append(f"| {name} | {said} | {_number(one['evidence']['p_value'])} | {what} |")
+        share = _share(one["probability"].get("unlisted", 0.0))
+        rows.append(f"| {name} | {said} | {_number(one['evidence']['p_value'])} | {what} | {share} |")
     scales = found["pcm"].get("prior_scales", {})
     priors = "; ".join(
         f"`{name}` {values['0.5']:.1f} / {values['1.0']:.1f} / {values['2.0']:.1f}"
@@ -186,8 +199,8 @@ Base M2 under other choices: smoothing of the terrain (10 m elsewhere), Student 
 spans they are, the surveyed terrain with the dam in it, and the sensors LC and CD both further up (by 40 and
 20 m), both further down, and closer to each other, as far as their places are uncertain.
 
-| case | verdict | omnibus p | leading candidates, log Bayes factor |
-| --- | --- | --- | --- |
+| case | verdict | omnibus p | leading candidates, log Bayes factor | probability of an unlisted force |
+| --- | --- | --- | --- | --- |
 {chr(10).join(rows)}
 
 Priors half, once and twice as wide, log Bayes factor of the best shape: {priors}.
