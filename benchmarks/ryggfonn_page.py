@@ -134,8 +134,8 @@ def _opposed(one: Found) -> str:
         return ""
     first, last = constants["U_1 [m s-1]"], constants["U_2 [m s-1]"]
     return (
-        f" where a front hardly moves, nothing more at the typical speed ({first:.0f} to {last:.0f} m/s) and less"
-        " above: slow fronts are braked there and fast ones are not"
+        f" where a front hardly moves, nothing more at the typical speed ({first:.0f} to {last:.0f} m/s) and"
+        " less above: slow fronts are braked there and fast ones are not"
     )
 
 
