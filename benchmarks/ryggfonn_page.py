@@ -108,7 +108,8 @@ def _growing(found: Mapping[str, Found]) -> str:
 def _between(found: Mapping[str, Found]) -> str:
     """The missing work between the sensors, where the data's README tells of two groups of retardation."""
     rows = "".join(
-        f"| {name} | {row['s_from_m']:.0f}-{row['s_to_m']:.0f} | {row['mean']:.0f} ± {row['sd']:.0f} |\n"
+        f"| {name} | {row['s_from_m']:.0f}-{row['s_to_m']:.0f} | {found[name]['missing_work_of']} |"
+        f" {row['mean']:.0f} ± {row['sd']:.0f} |\n"
         for name in ("coulomb", "pcm", "constant")
         for row in found[name].get("missing_work", [])
     )
@@ -122,8 +123,9 @@ def _between(found: Mapping[str, Found]) -> str:
         )
     return (
         "## Between LC and CD\n\nMissing specific work between sensors (positive: the law brakes too little),"
-        f" with the unlisted force of the highest evidence. {said}\n"
-        "| base | s [m] | missing work [J/kg] |\n| --- | --- | --- |\n" + rows
+        " with the unlisted force of the highest evidence. A force that is nil at the typical speed does work"
+        f" only on other fronts; then it is that on one faster than most by the fronts' spread. {said}\n"
+        "| base | s [m] | work on a | missing work [J/kg] |\n| --- | --- | --- | --- |\n" + rows
     )
 
 

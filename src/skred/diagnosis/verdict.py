@@ -193,6 +193,7 @@ def _more(found: Diagnosis) -> dict[str, Any]:
         ]
         more["power"] = found.table.power
     if found.location is not None:
+        more["missing_work_of"] = "fast front" if found.location.opposed else "typical front"
         more["missing_work"] = [
             {"s_from_m": a, "s_to_m": b, "mean": mean, "sd": sd, "unit": "J kg-1"}
             for a, b, mean, sd in found.location.work.tolist()
