@@ -93,7 +93,13 @@ def _growing(found: Mapping[str, Found]) -> str:
     """Whether M1 is found to lack a drag that grows with speed."""
     factors = found["coulomb"]["log_bayes_factors"]
     drags = ("turbulent_drag", "viscous_drag", "segment_drag")
-    others = ("constant_retardation", "segment_friction", "velocity_weakening", "covariate_friction")
+    others = (
+        "obstacle",
+        "constant_retardation",
+        "segment_friction",
+        "velocity_weakening",
+        "covariate_friction",
+    )
     said = ", ".join(f"`{name}` {factors[name]:.1f}" for name in drags)
     against = ", ".join(f"`{name}` {factors[name]:.1f}" for name in others)
     best = max(factors, key=lambda name: factors[name])
@@ -119,25 +125,13 @@ def _between(found: Mapping[str, Found]) -> str:
         said = (
             f"Under M2 the leading stretch, {_where(stretch['location'])}, takes"
             f" {stretch['strength']['mean']:.2g} ± {stretch['strength']['sd']:.1g} m/s² more than dry"
-            f" friction and drag do{_opposed(found['pcm'])}.\n"
+            " friction and drag do.\n"
         )
     return (
         "## Between LC and CD\n\nMissing specific work between sensors (positive: the law brakes too little),"
         " with the unlisted force of the highest evidence. A force that is nil at the typical speed does work"
         f" only on other fronts; then it is that on one faster than most by the fronts' spread. {said}\n"
         "| base | s [m] | work on a | missing work [J/kg] |\n| --- | --- | --- | --- |\n" + rows
-    )
-
-
-def _opposed(one: Found) -> str:
-    """Of whom friction takes more, where something opposes it."""
-    constants = next((row["constants"] for row in one["mechanisms"] if row["id"] == "segment_friction"), {})
-    if "U_1 [m s-1]" not in constants:
-        return ""
-    first, last = constants["U_1 [m s-1]"], constants["U_2 [m s-1]"]
-    return (
-        f" where a front hardly moves, nothing more at the typical speed ({first:.0f} to {last:.0f} m/s) and"
-        " less above: slow fronts are braked there and fast ones are not"
     )
 
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
 
+from skred.diagnosis import race
 from skred.diagnosis.curves import Base, Curve, curve, curve_at, curve_near, first_look
 from skred.diagnosis.event_nodes import FINE, FRONTS, ROUGH
-from skred.diagnosis.race import _entrants, _leading, _that_count, with_errors
+from skred.diagnosis.race import _entrants, _first_looks, _leading, _that_count, with_errors
 from skred.diagnosis.screen import candidates
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Direction, Shape
@@ -76,10 +80,40 @@ def test_those_that_lead_after_a_second_look_are_looked_at_too() -> None:
 def test_what_is_far_behind_is_not_looked_at_again() -> None:
     heights = {"segment_drag": [30.0, 19.0, 21.0], "obstacle": [12.0, 9.0], "sensor_bias": [14.0, 3.0]}
     curves = [made(name, 100.0 * k, one) for name, row in heights.items() for k, one in enumerate(row)]
-    assert _that_count(dict(enumerate(curves))) == [0, 2, 3, 5]
+    assert _that_count(dict(enumerate(curves))) == [0, 2, 3, 4, 5]
     # A second look at what is hopeless against the best of all would change nothing that is said.
     assert _leading(curves, {}) == [0, 3, 5]
     assert _leading([made("segment_drag", 300.0, 45.0), *curves], {}) == [0]
+
+
+def test_under_another_error_model_each_mechanism_is_looked_at_until_the_rest_is_far_behind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A place that was far behind is looked at once the leading one falls; one that stays behind is not."""
+    before = [made("obstacle", 100.0 * k, one) for k, one in enumerate([30.0, 19.0, 5.0])]
+    now = [made("obstacle", 100.0 * k, one) for k, one in enumerate([12.0, 25.0, 40.0])]
+    looked: list[int] = []
+
+    def curve(base: Any, mechanism: Any, shape: Any, budget: Any) -> Curve:
+        looked.append(int(shape.s_from_m / 100.0))
+        return now[looked[-1]]
+
+    todo = [SimpleNamespace(mechanism=one.mechanism, shape=one.shape) for one in now]
+    monkeypatch.setattr(race, "curve", curve)
+    monkeypatch.setattr(race, "candidates", lambda setting, ties: todo)
+    with ThreadPoolExecutor(1) as pool:
+        told: list[tuple[int, int]] = []
+        base: Any = SimpleNamespace(setting=None)
+        found = _first_looks(base, ROUGH, pool, lambda *of: told.append(of), before)
+    assert looked == [0, 1] and found == [now[0], now[1], before[2]] and told[-1] == (3, 3)
+
+
+def test_strengths_of_other_sensors_are_other_strengths() -> None:
+    one, other = made("sensor_bias", 0.0, 1.0), made("sensor_bias", 100.0, 1.0)
+    slope = 4.0 * np.arange(len(other.strengths))
+    other = replace(other, log_evidence=0.9 + slope - slope.max(), shape=Shape(sensor="b"))
+    (entrant,) = _entrants([replace(one, shape=Shape(sensor="a")), other], {}).values()
+    assert entrant.strength_between_shapes() == 0.0
 
 
 def test_finer_curves_share_the_weight_of_their_place() -> None:
@@ -97,7 +131,9 @@ def test_not_knowing_the_place_widens_a_strength() -> None:
     (entrant,) = _entrants([flat, steep], {}).values()
     weights, between = entrant.shape_weights, entrant.strength_between_shapes()
     within = weights @ np.array([one.moments[1] ** 2 for one in entrant.curves])
-    assert between > 0.0 and entrant.strength()[1] ** 2 == pytest.approx(within + between**2)
+    mean = entrant.strength()[0]
+    about_best = entrant.strength()[1] ** 2 + (mean - entrant.best.moments[0]) ** 2
+    assert between > 0.0 and about_best == pytest.approx(within + between**2)
     assert _entrants([flat], {})["segment_drag"].strength_between_shapes() == 0.0
 
 

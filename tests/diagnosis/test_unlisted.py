@@ -14,7 +14,8 @@ from skred.campaign import Status, find_campaign, read_campaign
 from skred.diagnosis.curves import Base, curve
 from skred.diagnosis.event_nodes import USUAL
 from skred.diagnosis.extension import extended
-from skred.diagnosis.locate import _band, _resolution, _stretch, _work
+from skred.diagnosis.locate import _band, _resolution, _stretch, _work, locate
+from skred.diagnosis.race import Heat
 from skred.diagnosis.screen import _of_profile
 from skred.diagnosis.unlisted import KINDS, Profile, combined, fit_profile, hats, knots, log_evidence_of
 from skred.physics.columns import Column
@@ -145,6 +146,24 @@ def test_band_holds_the_whole_profile(base: Base) -> None:
     draws = np.random.default_rng(9).multivariate_normal(profile.mean, profile.covariance, 4000) @ basis
     held = np.all(np.abs(draws - mean) <= factor * sd, axis=1).mean()
     assert held == pytest.approx(0.9, abs=0.03)
+
+
+def test_the_most_probable_kind_is_shown_or_the_one_asked_for(base: Base) -> None:
+    """An opposed kind has the smaller share; what is missing of a fast front is then meant."""
+    plain = replace(made_profile(base, 1), log_bayes_factor=10.0)
+    opposed = replace(made_profile(base, 5), log_bayes_factor=11.0)
+    heat = Heat("robust", base, {}, [plain, opposed], [])
+    assert locate(heat).log_bayes_factor == 10.0 and not locate(heat).opposed
+    found = locate(heat, opposed=True)
+    assert found.log_bayes_factor == 11.0 and found.opposed
+    speeds = extended(base.problem, base.law).speeds(base.fit.points, base.strengths)
+    edge = base.setting.terrain.edge_s_m
+    squares = 0.5 * (speeds[:, 1:] ** 2 + speeds[:, :-1] ** 2)
+    middle = int(np.abs(0.5 * (edge[1:] + edge[:-1]) - found.s_m[len(found.s_m) // 2]).argmin())
+    here = squares[squares[:, middle] > 0.0, middle]
+    expected = np.interp(found.s_m[len(found.s_m) // 2], opposed.knots_m, opposed.mean) * here.std()
+    assert found.mean[len(found.s_m) // 2] == pytest.approx(expected, rel=1e-6)
+    assert here.mean() == pytest.approx(base.setting.front_square[middle], rel=0.1)
 
 
 def test_resolution(base: Base) -> None:

@@ -14,6 +14,7 @@ import pytest
 import skred.physics.mechanisms
 from skred.campaign import find_campaign, read_campaign
 from skred.diagnosis.extension import Extension, extended, setting_of
+from skred.diagnosis.unlisted import KINDS
 from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
 from skred.laws import law_ids, load_law
 from skred.physics.columns import Column
@@ -24,7 +25,7 @@ from skred.physics.law import Law
 from skred.physics.mechanisms import Mechanism, mechanisms
 from skred.physics.mechanisms.coulomb_friction import WITHOUT_CURVATURE
 from skred.physics.mechanisms.spec import Added, Direction, Group, Setting, Shape
-from skred.physics.mechanisms.stretches import equation_of, is_opposed
+from skred.physics.mechanisms.stretches import OPPOSED_SHARE, equation_of, is_opposed, shares
 from skred.physics.terrain import Terrain
 
 ALL = mechanisms()
@@ -205,7 +206,7 @@ def with_added(setting: Setting, direction: Direction, b: np.ndarray, sizes: np.
     return front_speeds(strengths, np.zeros(len(b)), path_of(setting.terrain), contributions)
 
 
-@pytest.mark.parametrize("name", ["segment_drag", "entrainment", "segment_friction"])
+@pytest.mark.parametrize("name", ["segment_drag", "entrainment"])
 def test_what_is_opposed_does_not_show_in_a_typical_front(name: str, settings: list[Setting]) -> None:
     """Below the stretch a typical front is as fast as without it; drag brings others closer."""
     setting, added = settings[1], added_to(ALL[name])
@@ -219,9 +220,21 @@ def test_what_is_opposed_does_not_show_in_a_typical_front(name: str, settings: l
         with_it = with_added(setting, direction, b, np.full(3, added.scale))
         below = setting.terrain.edge_s_m >= (shape.s_to_m or 0.0)
         change = np.log(with_it[:, below] / without[:, below])[:, 0]
-        sign = 1.0 if name == "segment_friction" else -1.0
-        faster, slower = sign * change[1], -sign * change[2]
+        faster, slower = -change[1], change[2]
         assert abs(change[0]) < 0.02 and faster > 5 * abs(change[0]) and slower > 5 * abs(change[0])
+
+
+def test_opposed_shapes_share_a_tenth(settings: list[Setting]) -> None:
+    """As the opposed kinds of the unlisted force do; without any, or with nothing else, all are alike."""
+    shapes = added_to(ALL["segment_drag"]).shapes(settings[1])
+    opposed = np.array([is_opposed(shape) for shape in shapes])
+    found = shares(shapes)
+    assert found.sum() == pytest.approx(1.0) and found[opposed].sum() == pytest.approx(OPPOSED_SHARE)
+    assert sum(kind.share for kind in KINDS if kind.opposed) == pytest.approx(OPPOSED_SHARE)
+    for some_of in (~opposed, opposed):
+        chosen = [shape for shape, one in zip(shapes, some_of, strict=True) if one]
+        np.testing.assert_allclose(shares(chosen), 1.0 / len(chosen))
+    assert not any(is_opposed(shape) for shape in added_to(ALL["segment_friction"]).shapes(settings[1]))
 
 
 def test_where_no_front_comes_nothing_is_opposed(settings: list[Setting]) -> None:

@@ -11,6 +11,7 @@ from hierarchical_cases import hierarchical_calibration, hierarchical_ryggfonn
 from skred.diagnosis.curves import Curve
 from skred.diagnosis.decide import Decision
 from skred.diagnosis.diagnose import Diagnosis, Step
+from skred.diagnosis.entrant import Entrant
 from skred.diagnosis.extension import setting_of
 from skred.diagnosis.held_out import HeldOut
 from skred.diagnosis.identify import Identifiability, Told
@@ -18,7 +19,7 @@ from skred.diagnosis.locate import Location
 from skred.diagnosis.odds import prior_odds
 from skred.diagnosis.omnibus import Omnibus
 from skred.diagnosis.predictive import Predicted
-from skred.diagnosis.race import Entrant, Heat, Race
+from skred.diagnosis.race import Heat, Race
 from skred.diagnosis.unlisted import KINDS
 from skred.inference.gate import Gate
 from skred.inference.hierarchical import HierarchicalProblem

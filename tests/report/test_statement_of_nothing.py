@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from diagnosis_report_cases import diagnosis
 
+from skred.diagnosis.diagnose import Left
 from skred.diagnosis.statement import statement
+from skred.diagnosis.verdict import verdict
 
 
 def document(probability: dict[str, float]) -> dict:
@@ -18,8 +22,24 @@ def test_a_lean_that_the_check_does_not_bear_out_is_told_and_not_claimed(kind: s
     assert found.check is not None
     leaning = statement(found, document({"nothing": 0.2, "obstacle": 0.5, "unlisted": 0.3}))
     assert "an obstacle: a dam, a wall, a step would be the most probable (50 %)" in leaning
-    assert f"{100.0 * found.check.p_value:.0f} % show as much; none is claimed" in leaning
+    assert (
+        f"{100.0 * found.check.p_value:.0f} % of clean campaigns look as odd, so none is claimed" in leaning
+    )
     other = statement(found, document({"nothing": 0.2, "obstacle": 0.3, "unlisted": 0.5}))
     assert "a force not in the list would be" in other
     plain = statement(found, document({"nothing": 0.6, "obstacle": 0.3, "unlisted": 0.1}))
     assert "would be the most probable" not in plain
+
+
+def test_what_a_last_race_leaned_to_is_told() -> None:
+    """Also that it was not let in, and why; and nothing where it leaned to nothing, or was not run."""
+    found = diagnosis("tie")
+    assert verdict(found)["left"] is None and "Another race" not in verdict(found)["statement"]
+    leaning = replace(found, left=Left(diagnosis("two").race, "the gate failed"))
+    document = verdict(leaning)
+    assert document["left"]["most_probable"] == "covariate_friction"
+    assert document["left"]["nothing"] == leaning.left.race.probability["nothing"]
+    assert "leans to friction that goes with a property" in document["statement"]
+    assert "it was not let in (the gate failed)" in document["statement"]
+    nothing = verdict(replace(found, left=Left(diagnosis("nothing").race)))
+    assert nothing["left"]["most_probable"] == "nothing" and "Another race" not in nothing["statement"]

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -12,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.augmented import CLAIM_LIMIT, AugmentedProblem, augmented_problem
+from skred.diagnosis.clock import Clock, Tell
 from skred.diagnosis.curves import Base, Curve, fit_base
 from skred.diagnosis.decide import Decision, alarmed, decide
+from skred.diagnosis.entrant import Entrant
 from skred.diagnosis.extension import Extension, extended
 from skred.diagnosis.held_out import HeldOut, held_out
 from skred.diagnosis.identify import Identifiability, identify
@@ -21,16 +22,16 @@ from skred.diagnosis.locate import Location, locate
 from skred.diagnosis.modes import Population
 from skred.diagnosis.odds import UNLISTED
 from skred.diagnosis.omnibus import Omnibus, omnibus
-from skred.diagnosis.race import Entrant, Race, race
+from skred.diagnosis.race import Race, race
 from skred.diagnosis.screen import Screen
 from skred.inference.hierarchical import HierarchicalProblem
 from skred.inference.population import population_of
 from skred.inference.sampling import SamplerSettings
 from skred.physics.law import Law
+from skred.physics.mechanisms.stretches import is_opposed
 from skred.work.calibrate import Calibration, calibrate_surely
 
 FloatArray = NDArray[np.float64]
-Tell = Callable[[str], None]
 LEAST_EVENTS = 6
 LEAST_SENSORS = 2
 
@@ -58,7 +59,7 @@ QUICK_REPLICAS = 100
 RACE_AGAIN = 0.2
 """P-value of the augmented law's check below which a second mechanism is looked for.
 
-The check sees little of a second one beside the first. Where it does not fire the race has to be sure alone.
+The check sees little of a second one beside the first; the alarm is raised by the same rule as for the first.
 """
 
 
@@ -82,6 +83,22 @@ class Step:
     race: Race
     calibration: Calibration
     check: Omnibus
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a last race, of the augmented law, found and did not let in.
+
+    Attributes
+    ----------
+    race : Race or None
+        None where no such race was run.
+    reason : str
+        Why what it would name was not let in, where it would name something.
+    """
+
+    race: Race | None = None
+    reason: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +125,7 @@ class Diagnosis:
         then differ by what was let in alone. The same as `calibration` where that error model is its own.
     before, after : HeldOut
         Predictions by the base law and, where something was let in, by the augmented one.
+    left : Left
     seconds : dict
         Of each stage.
     """
@@ -126,6 +144,7 @@ class Diagnosis:
     reference: Calibration | None = None
     before: HeldOut | None = None
     after: HeldOut | None = None
+    left: Left = Left()
     seconds: dict[str, float] = field(default_factory=dict)
 
 
@@ -140,27 +159,6 @@ def strength_of(steps: Sequence[Step], number: int) -> tuple[float, float]:
     name = problem.added[number].name
     draws = np.asarray(calibration.tree["posterior"].to_dataset()[name].values)
     return float(draws.mean()), math.hypot(float(draws.std(ddof=1)), entrant.strength_between_shapes())
-
-
-class Clock:
-    """Seconds of each stage, told as they begin."""
-
-    def __init__(self, tell: Tell) -> None:
-        self.tell, self.seconds = tell, dict[str, float]()
-        self._last, self._name = time.monotonic(), ""
-
-    def stage(self, name: str, line: str) -> None:
-        """Begin a stage."""
-        self.end()
-        self._name = name
-        self.tell(line)
-
-    def end(self) -> None:
-        """End the present stage."""
-        now = time.monotonic()
-        if self._name:
-            self.seconds[self._name] = self.seconds.get(self._name, 0.0) + now - self._last
-        self._last, self._name = now, ""
 
 
 def too_little(problem: HierarchicalProblem) -> str:
@@ -218,11 +216,11 @@ def _steps(
     clock.stage("race", "what is missing: every candidate refitted")
     raced = race(base)
     decision = decide(raced.probability, check.p_value, table.can_tell)
-    location = locate(raced.leading(UNLISTED)) if alarmed(raced.probability, check.p_value) else None
-    steps, reference, cannot = tuple[Step, ...](), calibration, ""
+    location = _location(raced, decision) if alarmed(raced.probability, check.p_value) else None
+    steps, reference, cannot, left = tuple[Step, ...](), calibration, "", Left()
     if decision.names:
         clock.stage("augment", f"{law.id} + {decision.names[0]}: calibrating the augmented law")
-        steps, cannot = let_in(base, raced, decision, settings, effort, clock)
+        steps, cannot, left = let_in(base, raced, decision, settings, effort, clock)
     if steps:
         reference, cannot = reference_of(calibration, steps[-1])
         steps = steps if not cannot else ()
@@ -234,8 +232,16 @@ def _steps(
     clock.end()
     return Diagnosis(
         problem, law, cannot, calibration, screen, table, check, raced, decision, location, steps,
-        reference, before, after, clock.seconds,
+        reference, before, after, left, clock.seconds,
     )  # fmt: skip
+
+
+def _location(raced: Race, decision: Decision) -> Location:
+    """Where: of what is named the profile that goes with speed as that does, else the most probable."""
+    heat = raced.leading(UNLISTED)
+    if not decision.names:
+        return locate(heat)
+    return locate(heat, is_opposed(raced.leading(decision.names[0]).entrants[decision.names[0]].best.shape))
 
 
 def _problem_of(calibration: Calibration) -> HierarchicalProblem:
@@ -285,13 +291,13 @@ def _nothing_added(calibration: Calibration) -> FloatArray:
 
 def let_in(
     base: Base, raced: Race, decision: Decision, settings: SamplerSettings, effort: Effort, clock: Clock
-) -> tuple[tuple[Step, ...], str]:
+) -> tuple[tuple[Step, ...], str, Left]:
     """Let the winner in, check again, and a second one only if it earns it given the first.
 
-    Returns no steps, and why, where the winner's own calibration fails its gate.
+    Returns no steps, and why, where the winner's own calibration fails its gate; and what is left.
     """
     steps: list[Step] = []
-    cannot = ""
+    cannot, left = "", Left()
     names, chosen = decision.names, list[Curve]()
     for number in range(effort.max_mechanisms):
         heat = raced.leading(names[0])
@@ -303,20 +309,23 @@ def let_in(
         if not calibration.gate.passed:
             problems = "; ".join(calibration.gate.problems)
             cannot = f"the gate of {base.law.id} + {names[0]} failed: {problems}"
+            left = replace(left, reason=cannot) if steps else left
             break
         clock.stage("check again", "is anything wrong with the augmented law")
         check, next_base = _check_again(heat.base, calibration, problem, chosen, settings, effort)
         steps.append(Step(entrants, raced, calibration, check))
+        left = Left()
         if check.p_value > RACE_AGAIN or number + 1 == effort.max_mechanisms:
             break
         clock.stage("second race", "something may be left: every candidate refitted again")
         raced = race(next_base)
+        left = Left(raced)
         second = decide(raced.probability, check.p_value, True)
         if not second.names:
             break
         names = second.names
         clock.stage("augment", f"calibrating with {names[0]} as well")
-    return tuple(steps), "" if steps else cannot
+    return tuple(steps), "" if steps else cannot, left
 
 
 def _plain(base: Base) -> Base:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,9 +55,10 @@ class Location:
     log_bayes_factor: float
 
 
-def locate(heat: Heat) -> Location:
-    """The profile of the highest evidence, as a retardation."""
-    profile = max(heat.profiles, key=lambda one: one.log_bayes_factor)
+def locate(heat: Heat, opposed: bool | None = None) -> Location:
+    """The most probable profile as a retardation; of those that are opposed, or are not, if that is given."""
+    alike = [one for one in heat.profiles if opposed in (None, one.kind.opposed)]
+    profile = max(alike, key=lambda one: one.log_bayes_factor + math.log(one.kind.share))
     base = heat.base
     terrain = base.setting.terrain
     edge = np.asarray(terrain.edge_s_m)

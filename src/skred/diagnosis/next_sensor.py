@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from skred.diagnosis.diagnose import Diagnosis
+from skred.diagnosis.entrant import Entrant
 from skred.diagnosis.extension import extended
 from skred.diagnosis.identify import with_sensors
-from skred.diagnosis.race import Entrant
 
 _PLACES = 16
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 import os
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.curves import Base, Curve, Fit, curve, curve_near, first_look, refit
+from skred.diagnosis.entrant import Entrant
 from skred.diagnosis.event_nodes import FINE, USUAL, Budget, event_nodes
 from skred.diagnosis.extension import Extension, extended
 from skred.diagnosis.marginal import evidence, importance_evidence
@@ -29,7 +29,8 @@ from skred.diagnosis.screen import candidates
 from skred.diagnosis.unlisted import KINDS, Kind, Profile, alike, fit_profile, log_evidence_of
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
 from skred.physics.mechanisms import mechanisms
-from skred.physics.mechanisms.spec import Mechanism, Shape
+from skred.physics.mechanisms.spec import Shape
+from skred.physics.mechanisms.stretches import shares
 
 FloatArray = NDArray[np.float64]
 Tell = Callable[[int, int], None]
@@ -41,82 +42,8 @@ _CHECKED, _DRAWS = 5, 500
 _WITHIN, _AT_MOST, _TURNS = 3.0, 2, 3
 """Places of a mechanism that are looked at again: within so many nats of its best, so many, so many times."""
 _FAR_BEHIND, _HOPELESS = 10.0, 20.0
-"""Nats behind its mechanism's best, or behind the best of all, at which a place is not looked at any more."""
-
-
-@dataclass(frozen=True, eq=False)
-class Entrant:
-    """One mechanism in the race, under one error model.
-
-    Attributes
-    ----------
-    mechanism : Mechanism
-    curves : tuple of Curve
-        One for each shape.
-    log_weights : (n_curves,) array
-        Prior weight of each shape; they sum to 1.
-    correction : float
-        What many more nodes, and importance sampling over the population, change at the top of the best
-        curve, in nats; 0 where not looked at.
-    disagreement : float or None
-        Importance sampling less Laplace's formula there, nothing's subtracted; None where not looked at.
-    """
-
-    mechanism: Mechanism
-    curves: tuple[Curve, ...]
-    log_weights: FloatArray
-    correction: float = 0.0
-    disagreement: float | None = None
-
-    @property
-    def log_factors(self) -> FloatArray:
-        """Log Bayes factor of each shape, its prior weight included."""
-        return self.log_weights + np.array([one.log_bayes_factor for one in self.curves])
-
-    @property
-    def log_bayes_factor(self) -> float:
-        """Against nothing, shapes and strength integrated over."""
-        return float(np.logaddexp.reduce(self.log_factors)) + self.correction
-
-    @property
-    def shape_weights(self) -> FloatArray:
-        """Posterior probability of each shape."""
-        factors = self.log_factors
-        weights: FloatArray = np.exp(factors - np.logaddexp.reduce(factors))
-        return weights
-
-    @property
-    def best(self) -> Curve:
-        """The curve of the highest Bayes factor."""
-        return self.curves[int(np.argmax([one.log_bayes_factor for one in self.curves]))]
-
-    def strength(self) -> tuple[float, float]:
-        """Posterior mean and standard deviation of the strength over all shapes."""
-        moments = np.array([one.moments for one in self.curves])
-        weights = self.shape_weights
-        mean = float(weights @ moments[:, 0])
-        return mean, math.sqrt(float(weights @ (moments[:, 1] ** 2 + (moments[:, 0] - mean) ** 2)))
-
-    def strength_between_shapes(self) -> float:
-        """Standard deviation of the strength's mean over the shapes: what not knowing the place adds."""
-        means = np.array([one.moments[0] for one in self.curves])
-        weights = self.shape_weights
-        return math.sqrt(float(weights @ (means - weights @ means) ** 2))
-
-    def stretch(self) -> tuple[float, float] | None:
-        """Where it acts: weighted medians of both ends [m], None where it is not local."""
-        if self.best.shape.place_m is None:
-            return None
-        first = np.array([one.shape.s_from_m for one in self.curves], dtype=float)
-        last = np.array([one.shape.s_to_m for one in self.curves], dtype=float)
-        weights = self.shape_weights
-        return _weighted_median(first, weights), _weighted_median(last, weights)
-
-
-def _weighted_median(values: FloatArray, weights: FloatArray) -> float:
-    order = np.argsort(values)
-    share = np.cumsum(weights[order])
-    return float(values[order][min(int(np.searchsorted(share, 0.5 * share[-1])), len(values) - 1)])
+"""Nats behind its mechanism's best at which a place is not looked at under another error model; nats behind
+the best of all at which it is not looked at again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +57,7 @@ class Heat:
     entrants : mapping of str to Entrant
     profiles : list of Profile
     first_look : list of Curve
-        A rough one for each candidate.
+        A rough one for each candidate; that under another error model where it cannot count.
     """
 
     error_model: str
@@ -274,15 +201,14 @@ def _first_looks(
 
 
 def _that_count(curves: Mapping[int, Curve]) -> list[int]:
-    """Numbers of the curves that are not far behind."""
+    """Numbers of the curves that are not far behind their mechanism's best."""
     best: dict[str, float] = {}
     for one in curves.values():
         best[one.mechanism.id] = max(one.log_bayes_factor, best.get(one.mechanism.id, -math.inf))
-    most = max(best.values())
     return [
         number
         for number, one in curves.items()
-        if one.log_bayes_factor > max(best[one.mechanism.id] - _FAR_BEHIND, most - _HOPELESS)
+        if one.log_bayes_factor > best[one.mechanism.id] - _FAR_BEHIND
     ]
 
 
@@ -378,12 +304,13 @@ def _split(base: Base, curve: Curve) -> tuple[Shape, ...]:
 def _entrants(curves: Sequence[Curve], finer: Mapping[int, list[Curve]]) -> dict[str, Entrant]:
     """Curves by mechanism; finer ones share the weight of the one that they stand in for."""
     gathered: dict[str, tuple[list[Curve], list[float]]] = {}
-    sizes = Counter(one.mechanism.id for one in curves)
-    for k, one in enumerate(curves):
-        members, weights = gathered.setdefault(one.mechanism.id, ([], []))
-        stand_ins = finer.get(k, [one])
-        members += stand_ins
-        weights += [-math.log(sizes[one.mechanism.id] * len(stand_ins))] * len(stand_ins)
+    for name in dict.fromkeys(one.mechanism.id for one in curves):
+        own = [k for k, one in enumerate(curves) if one.mechanism.id == name]
+        members, weights = gathered.setdefault(name, ([], []))
+        for k, share in zip(own, shares([curves[k].shape for k in own]), strict=True):
+            stand_ins = finer.get(k, [curves[k]])
+            members += stand_ins
+            weights += [math.log(share / len(stand_ins))] * len(stand_ins)
     return {
         name: Entrant(members[0].mechanism, tuple(members), np.array(weights))
         for name, (members, weights) in gathered.items()

@@ -25,6 +25,7 @@ from skred.physics.columns import Column
 from skred.physics.law import Law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
+from skred.physics.mechanisms.stretches import shares
 
 FloatArray = NDArray[np.float64]
 
@@ -181,12 +182,12 @@ class Screen:
         factors, unlisted = self.log_factors(scores), self.log_factor_of_unlisted(scores)
         odds = prior_odds({candidate.mechanism for candidate in self.candidates})
         ids = np.array([candidate.mechanism.id for candidate in self.candidates])
+        shapes = [candidate.shape for candidate in self.candidates]
         terms = [unlisted + math.log(odds["unlisted"])]
         for name in dict.fromkeys(ids):
-            chosen = factors[:, ids == name]
-            terms.append(
-                np.logaddexp.reduce(chosen, axis=1) - math.log(chosen.shape[1]) + math.log(odds[name])
-            )
+            own = np.flatnonzero(ids == name)
+            log_shares = np.log(shares([shapes[k] for k in own]))
+            terms.append(np.logaddexp.reduce(factors[:, own] + log_shares, axis=1) + math.log(odds[name]))
         result: FloatArray = np.logaddexp.reduce(np.array(terms), axis=0) - math.log(odds["nothing"])
         return result
 

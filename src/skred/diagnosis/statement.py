@@ -83,7 +83,21 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
             f"The augmented law still fails the check (p = {last.p_value:.2g}): something more, or another"
             " shape of the same, is left; do not take the name for the whole story."
         )
-    return sentences
+    return [*sentences, _left(document)]
+
+
+def _left(document: dict[str, Any]) -> str:
+    """What a last race leaned to."""
+    left = document["left"]
+    if left is None or left["most_probable"] == NOTHING:
+        return ""
+    name = left["most_probable"]
+    what = "a force not in the list" if name == UNLISTED else _title(name)
+    why = f" ({left['reason']})" if left["reason"] else ""
+    return (
+        f"Another race, of the augmented law, leans to {what} ({_share(left['probability'])}; nothing more:"
+        f" {_share(left['nothing'])}); it was not let in{why}."
+    )
 
 
 def _split(document: dict[str, Any]) -> str:
@@ -132,16 +146,16 @@ def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
     first = max((name for name in probability if name != NOTHING), key=lambda name: probability[name])
     what = "a force not in the list" if first == UNLISTED else _title(first)
     return (
-        f"Of what could be missing, {what} would be the most probable ({_share(probability[first])}); but of"
-        f" clean campaigns like this one {100.0 * found.check.p_value:.0f} % show as much; none is claimed."
+        f"Of what could be missing, {what} would be the most probable ({_share(probability[first])}); but to"
+        f" the check {100.0 * found.check.p_value:.0f} % of clean campaigns look as odd, so none is claimed."
     )
 
 
 def _nothing(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     assert found.check is not None and found.table is not None
     return [
-        f"The recordings give no reason to add anything (p = {found.check.p_value:.2g}; probability of"
-        f" nothing {_share(document['probability'][NOTHING])}).",
+        f"The recordings do not bear out that anything is missing (p = {found.check.p_value:.2g}; probability"
+        f" of nothing {_share(document['probability'][NOTHING])}).",
         _hint(found, document),
         f"A relevant strength of what is listed would have been found in {100.0 * found.table.power:.0f} % of"
         " cases on average; the table of detection limits says from where on each would have been seen.",

@@ -23,7 +23,7 @@ from skred.diagnosis.mixed import efficient_scores, mean_prior
 from skred.diagnosis.modes import Population, look_around
 from skred.physics.columns import Column
 from skred.physics.mechanisms.spec import Direction, Setting
-from skred.physics.mechanisms.stretches import is_opposed
+from skred.physics.mechanisms.stretches import OPPOSED_SHARE, is_opposed
 from skred.physics.terrain import Terrain
 
 FloatArray = NDArray[np.float64]
@@ -61,8 +61,6 @@ class Kind:
         return self.column, self.opposed
 
 
-OPPOSED_SHARE = 0.1
-"""Prior probability that it is nil at the typical speed: two unlisted things that happen to be equal."""
 KINDS = tuple(
     Kind(column, opposed, unit, amplitude, length, share / 2.0)
     for column, opposed, unit, amplitude, share in (

@@ -8,10 +8,12 @@ import numpy as np
 
 from skred.diagnosis.decide import alarmed
 from skred.diagnosis.diagnose import Diagnosis, strength_of
+from skred.diagnosis.entrant import Entrant
 from skred.diagnosis.held_out import errors, paired
 from skred.diagnosis.identify import Told
 from skred.diagnosis.next_sensor import next_sensor
-from skred.diagnosis.race import Entrant, Race
+from skred.diagnosis.odds import NOTHING
+from skred.diagnosis.race import Race
 from skred.diagnosis.statement import statement
 from skred.physics.mechanisms.stretches import equation_of
 
@@ -42,6 +44,7 @@ def verdict(found: Diagnosis) -> dict[str, Any]:
         "detection_limits": _detection_limits(found),
         "next_sensor": next_sensor(found),
         "diagnostics": _diagnostics(found),
+        "left": _left(found),
     }
     document["statement"] = statement(found, document)
     return document | _more(found)
@@ -160,6 +163,20 @@ def _candidate(race: Race, name: str) -> dict[str, Any]:
         "covariate": shape.covariate,
         "sensor": shape.sensor,
         "estimators_differ_by": entrant.disagreement,
+    }
+
+
+def _left(found: Diagnosis) -> dict[str, Any] | None:
+    """What a race of the augmented law leaned to and was not let in; None where there was no such race."""
+    if found.left.race is None:
+        return None
+    probability = found.left.race.probability
+    first = max(probability, key=lambda name: probability[name])
+    return {
+        "most_probable": first,
+        "probability": probability[first],
+        "nothing": probability[NOTHING],
+        "reason": found.left.reason or None,
     }
 
 

@@ -64,8 +64,9 @@ def sample_posterior(
 ) -> xr.DataTree:
     """Posterior and sample_stats of a law's model.
 
-    Chains of Metropolis and NUTS start from prior draws: each from the most likely of twenty of
-    its own, so that starts are overdispersed and yet not on the plateau where no front moves.
+    Chains of Metropolis and NUTS start each from the most likely of twenty draws of its own: of the prior, so
+    that starts are overdispersed and yet not on the plateau where no front moves, or of what the problem
+    knows already of the posterior (`Problem.to_start_from`).
     `step` is for Metropolis, if there is one compiled already.
     """
     with model, quiet_pymc():

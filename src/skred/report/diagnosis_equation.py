@@ -123,7 +123,7 @@ def _added_rows(found: Diagnosis, step: Step, number: int) -> list[dict[str, Any
             rows.append(_row("s_1, s_2", "m", ends, new=True))
     if is_opposed(shape):
         first, last = (dict(shape.constants)[name] for name in (U_1, U_2))
-        what = f"speed at which something opposes and equals it, here {first:g} at s_1 to {last:g} at s_2"
+        what = f"speed at which a relief on the stretch equals it, here {first:g} at s_1 to {last:g} at s_2"
         return [*rows, _row("U_0", "m s-1", what, new=True)]
     for named, value in shape.constants:
         symbol, _, unit = named.partition(" [")

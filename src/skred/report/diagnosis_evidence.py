@@ -148,7 +148,7 @@ def _shape_text(curve: Curve) -> str:
     if shape.s_from_m is not None and shape.s_to_m is not None:
         parts.append(f"s = {shape.s_from_m:.0f} to {shape.s_to_m:.0f} m")
     if is_opposed(shape):
-        parts.append("opposed by its equal at the typical speed")
+        parts.append("with a relief equal to it at the typical speed")
     else:
         parts += [f"{symbol_text(symbol)} = {value:g}" for symbol, value in shape.constants]
     parts += [f"sensor {shape.sensor}"] if shape.sensor else []

@@ -25,8 +25,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from skred.diagnosis.diagnose import Diagnosis
+    from skred.diagnosis.entrant import Entrant
     from skred.diagnosis.locate import Location
-    from skred.diagnosis.race import Entrant, Race
+    from skred.diagnosis.race import Race
     from skred.inference.hierarchical import HierarchicalProblem
     from skred.physics.mechanisms.spec import Shape
 

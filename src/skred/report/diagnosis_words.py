@@ -16,8 +16,9 @@ from skred.report.style import GREY
 
 if TYPE_CHECKING:
     from skred.diagnosis.diagnose import Diagnosis
+    from skred.diagnosis.entrant import Entrant
     from skred.diagnosis.locate import Location
-    from skred.diagnosis.race import Entrant, Race
+from skred.diagnosis.race import Race
 
 FloatArray = NDArray[np.float64]
 BEFORE, AFTER, MISMATCH = GREY, "#0072B2", "#D55E00"

@@ -2,7 +2,7 @@
 
 from skred.physics.columns import Column
 from skred.physics.mechanisms.spec import Added, Mechanism, Strength
-from skred.physics.mechanisms.stretches import along_a_stretch, split_stretch, stretches
+from skred.physics.mechanisms.stretches import along_a_stretch, split_stretch, stretches_of_drag
 
 MECHANISM = Mechanism(
     id="entrainment",
@@ -23,7 +23,7 @@ MECHANISM = Mechanism(
         scale=2e-3,
         reason="over 350 m the scale doubles the mass",
         direction=along_a_stretch(Column.QUADRATIC),
-        shapes=stretches,
+        shapes=stretches_of_drag,
         split=split_stretch,
     ),
     same_term_as="segment_drag",

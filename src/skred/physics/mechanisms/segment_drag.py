@@ -2,7 +2,7 @@
 
 from skred.physics.columns import Column
 from skred.physics.mechanisms.spec import Added, Mechanism, Strength
-from skred.physics.mechanisms.stretches import along_a_stretch, split_stretch, stretches
+from skred.physics.mechanisms.stretches import along_a_stretch, split_stretch, stretches_of_drag
 
 MECHANISM = Mechanism(
     id="segment_drag",
@@ -23,7 +23,7 @@ MECHANISM = Mechanism(
         scale=2.5e-3,
         reason="over 200 m the scale takes 63 % of U^2",
         direction=along_a_stretch(Column.QUADRATIC),
-        shapes=stretches,
+        shapes=stretches_of_drag,
         split=split_stretch,
     ),
 )

@@ -1,13 +1,14 @@
 """Mechanisms that act on a stretch of the track: where they are looked for, how they enter, what opposes.
 
-What acts on a stretch may be opposed there: a smoother bed beside more drag, less drag beside a rougher bed,
-or whatever else gives fronts of the typical speed back what it takes. On average nothing shows then, and a
-base law that is right at every sensor is still wrong for each front that is faster or slower than most.
+Drag on a stretch may be opposed there: by a smoother or steeper bed, or whatever else gives fronts of the
+typical speed back what it takes. On average nothing shows then, and a base law that is right at every sensor
+is still wrong for each front that is faster or slower than most. Friction is not looked for so: what would
+oppose it, a drag below nil, would push fast fronts without bound.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +23,9 @@ STRETCHES_M = (75.0, 200.0, 500.0)
 """Lengths of the stretches that are looked at [m]."""
 _STEP_IN_LENGTHS = 0.4
 U_1, U_2 = "U_1 [m s-1]", "U_2 [m s-1]"
-"""Front speeds at both ends of a stretch at which what opposes a mechanism equals it."""
+"""Front speeds at both ends of a stretch at which a relief on it equals the drag; U_0^2 is linear between."""
+OPPOSED_SHARE = 0.1
+"""Prior probability, among the shapes of a force, that it is opposed: two things that happen to be equal."""
 _OPPOSED_FROM_M = 150.0
 _LEAST_SPEED = 5.0
 """Front speed [m/s] below which nothing is opposed: fronts are about to stop there."""
@@ -49,31 +52,32 @@ def along_a_stretch(column: Column) -> Callable[[Setting, Shape], Direction]:
         share = on_a_stretch(setting.terrain, *ends_of(shape))
         if not is_opposed(shape):
             return Direction((column,), share[None, :])
-        square = _typical_square(setting, shape)
-        if column is Column.QUADRATIC:
-            return Direction((column, Column.CONSTANT), np.array([share, -share * square]))
-        return Direction((column, Column.QUADRATIC), np.array([share, -share / square]))
+        return Direction((column, Column.CONSTANT), np.array([share, -share * _relief(setting, shape)]))
 
     return direction
 
 
 def is_opposed(shape: Shape) -> bool:
-    """Whether something on the stretch equals the mechanism at the typical speed, the other way."""
+    """Whether a relief on the stretch equals the drag at the typical speed."""
     return U_1 in dict(shape.constants)
 
 
 def equation_of(mechanism: Mechanism, shape: Shape) -> str:
     """A mechanism's term in the equation of motion, with what opposes it."""
-    if not is_opposed(shape):
-        return mechanism.equation
-    if "U^2" in mechanism.equation:
-        return mechanism.equation.replace("U^2", "(U^2 - U_0^2)", 1)
-    symbol = mechanism.strength.symbol
-    return mechanism.equation.replace(symbol, f"{symbol} (1 - U^2 / U_0^2)", 1)
+    return mechanism.equation.replace("U^2", "(U^2 - U_0^2)", 1) if is_opposed(shape) else mechanism.equation
 
 
-def _typical_square(setting: Setting, shape: Shape) -> FloatArray:
-    """U^2 at which what opposes the mechanism equals it, in each cell: linear between the stretch's ends."""
+def shares(shapes: Sequence[Shape]) -> FloatArray:
+    """Prior probability of each of a mechanism's shapes: equal, but for those that are opposed."""
+    opposed = np.array([is_opposed(shape) for shape in shapes])
+    n_opposed = int(opposed.sum())
+    if n_opposed in (0, len(shapes)):
+        return np.full(len(shapes), 1.0 / len(shapes))
+    return np.where(opposed, OPPOSED_SHARE / n_opposed, (1.0 - OPPOSED_SHARE) / (len(shapes) - n_opposed))
+
+
+def _relief(setting: Setting, shape: Shape) -> FloatArray:
+    """U^2 at which the relief equals the drag, in each cell: linear between the stretch's ends."""
     first, last = ends_of(shape)
     constants = dict(shape.constants)
     edge = setting.terrain.edge_s_m
@@ -83,10 +87,7 @@ def _typical_square(setting: Setting, shape: Shape) -> FloatArray:
 
 
 def stretches(setting: Setting) -> tuple[Shape, ...]:
-    """Stretches of several lengths, overlapping, over the recorded part of the track.
-
-    The longer ones once more, opposed: what is opposed on a short one does too little.
-    """
+    """Stretches of several lengths, overlapping, over the recorded part of the track."""
     first, last = setting.recorded_m
     shapes = []
     for length in STRETCHES_M:
@@ -95,13 +96,19 @@ def stretches(setting: Setting) -> tuple[Shape, ...]:
         n = max(int(np.ceil(max(last - first - length, 0.0) / (_STEP_IN_LENGTHS * length))), 1)
         for start in np.linspace(first, max(last - length, first), n + 1):
             shapes.append(Shape(float(start), float(min(start + length, setting.terrain.length_m))))
-    wide = [one for one in shapes if ends_of(one)[1] - ends_of(one)[0] > _OPPOSED_FROM_M]
+    return tuple(shapes)
+
+
+def stretches_of_drag(setting: Setting) -> tuple[Shape, ...]:
+    """The stretches, and the longer ones once more, opposed: on a short one that does too little."""
+    plain = stretches(setting)
+    wide = [one for one in plain if ends_of(one)[1] - ends_of(one)[0] > _OPPOSED_FROM_M]
     opposed = [_opposed(setting, one) for one in wide]
-    return (*shapes, *(one for one in opposed if one is not None))
+    return (*plain, *(one for one in opposed if one is not None))
 
 
 def _opposed(setting: Setting, shape: Shape) -> Shape | None:
-    """The stretch, opposed by what equals the mechanism at the typical speed; None where fronts stop."""
+    """The stretch with a relief that equals the drag at the typical speed; None where fronts stop."""
     speeds = np.interp(ends_of(shape), setting.terrain.edge_s_m, setting.front_speed)
     if speeds.min() < _LEAST_SPEED:
         return None
