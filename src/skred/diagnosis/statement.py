@@ -6,6 +6,7 @@ from typing import Any
 
 from skred.diagnosis.decide import NOTHING_AT_MOST
 from skred.diagnosis.diagnose import Diagnosis
+from skred.diagnosis.locate import Location
 from skred.diagnosis.odds import NOTHING, UNLISTED
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.physics.mechanisms import mechanisms
@@ -133,8 +134,35 @@ def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         f"Something is missing{_where(document['location'])} that no listed mechanism accounts for"
         f" (p = {found.check.p_value:.2g}; probability of nothing"
         f" {_share(document['probability'][NOTHING])}).",
+        _unlisted_way(found.location),
+        _closest(found),
         "The force profile is the answer: see where it stands out and how much work it does.",
     ]
+
+
+def _unlisted_way(location: Location | None) -> str:
+    """Whom an unlisted force brakes where it stands out, if it is nil at the typical speed."""
+    if location is None or not location.opposed:
+        return ""
+    first, last = location.stretch_m
+    there = location.mean[(location.s_m >= first) & (location.s_m <= last)]
+    faster, slower = ("brakes", "relieves") if there.mean() > 0.0 else ("relieves", "brakes")
+    return (
+        f"On average there is nothing to see: it {slower} fronts that are slower there than the typical one,"
+        f" and {faster} faster ones."
+    )
+
+
+def _closest(found: Diagnosis) -> str:
+    """The listed candidate of the highest evidence, beside the unlisted force."""
+    assert found.race is not None
+    factors = found.race.log_factors
+    listed = {name: value for name, value in factors.items() if name not in (NOTHING, UNLISTED)}
+    name = max(listed, key=lambda one: listed[one])
+    return (
+        f"Of what is listed, {_title(name)} comes closest: log Bayes factor {listed[name]:.1f} against nothing,"
+        f" where a force not in the list has {factors[UNLISTED]:.1f}."
+    )
 
 
 def _hint(found: Diagnosis, document: dict[str, Any]) -> str:

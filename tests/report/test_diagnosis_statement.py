@@ -43,3 +43,15 @@ def test_what_a_last_race_leaned_to_is_told() -> None:
     assert "it was not let in (the gate failed)" in document["statement"]
     nothing = verdict(replace(found, left=Left(diagnosis("nothing").race)))
     assert nothing["left"]["most_probable"] == "nothing" and "Another race" not in nothing["statement"]
+
+
+@pytest.mark.parametrize(
+    ("sign", "said"), [(1.0, "relieves fronts that are slower"), (-1.0, "brakes fronts that")]
+)
+def test_whom_an_unlisted_force_brakes(sign: float, said: str) -> None:
+    found = diagnosis("unexplained")
+    assert found.location is not None
+    plain = verdict(found)["statement"]
+    assert "On average there is nothing" not in plain and "comes closest: log Bayes factor" in plain
+    location = replace(found.location, opposed=True, mean=sign * found.location.mean)
+    assert said in verdict(replace(found, location=location))["statement"]
