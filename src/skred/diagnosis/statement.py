@@ -160,8 +160,8 @@ def _closest(found: Diagnosis) -> str:
     listed = {name: value for name, value in factors.items() if name not in (NOTHING, UNLISTED)}
     name = max(listed, key=lambda one: listed[one])
     return (
-        f"Of what is listed, {_title(name)} comes closest: log Bayes factor {listed[name]:.1f} against nothing,"
-        f" where a force not in the list has {factors[UNLISTED]:.1f}."
+        f"Of what is listed, {_title(name)} comes closest: log Bayes factor {listed[name]:.1f} against"
+        f" nothing, where a force not in the list has {factors[UNLISTED]:.1f}."
     )
 
 
