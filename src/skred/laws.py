@@ -29,9 +29,14 @@ def load_law(law_id: str) -> Law:
     ------
     UnknownLawError
         If no installed pack provides it.
+    InputError
+        If the pack's law is not one: its inverse does not undo its strengths.
     """
     for entry in entry_points(group=GROUP):
         if entry.name == law_id:
-            law: Law = entry.load()
+            try:
+                law: Law = entry.load()
+            except ValueError as error:
+                raise InputError(f"the law {law_id!r} of {entry.value} cannot be used: {error}") from error
             return law
     raise UnknownLawError(f"no law named {law_id!r}; there are: {', '.join(law_ids())}")

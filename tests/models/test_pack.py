@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from importlib.metadata import entry_points
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from skred.errors import InputError
 from skred.inference.sampling import sample_prior
 from skred.laws import GROUP, UnknownLawError, law_ids, load_law
 from skred.physics.columns import GRAVITY
@@ -112,3 +114,13 @@ def test_an_inverse_that_is_none_is_refused() -> None:
     found = law.parameter_rows(np.array([[0.2, 0.005], [0.3, 0.01]]))
     assert_allclose(found["dry_friction"], [0.2, 0.3])
     assert_allclose(found["xi_h"], [GRAVITY / 0.005, GRAVITY / 0.01])
+
+
+def test_a_packs_law_that_is_none_is_an_input_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    def load() -> Any:
+        raise ValueError("mine: inverse does not give back the parameters of strengths")
+
+    entry = SimpleNamespace(name="mine", value="pack:LAW", load=load)
+    monkeypatch.setattr("skred.laws.entry_points", lambda group: [entry])
+    with pytest.raises(InputError, match="'mine' of pack:LAW cannot be used: mine: inverse"):
+        load_law("mine")
