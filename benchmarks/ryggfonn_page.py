@@ -123,14 +123,14 @@ def _between(found: Mapping[str, Found]) -> str:
     said = ""
     if stretch is not None:
         said = (
-            f"Under M2 the leading stretch, {_where(stretch['location'])}, takes"
+            f"Under M2 plain friction on a stretch would sit at {_where(stretch['location'])} and take"
             f" {stretch['strength']['mean']:.2g} ± {stretch['strength']['sd']:.1g} m/s² more than dry"
             " friction and drag do.\n"
         )
     return (
         "## Between LC and CD\n\nMissing specific work between sensors (positive: the law brakes too little),"
-        " with the unlisted force of the highest evidence. A force that is nil at the typical speed does work"
-        f" only on other fronts; then it is that on one faster than most by the fronts' spread. {said}\n"
+        " with the most probable unlisted force that goes with speed as what is named does. A force that is nil at"
+        f" the typical speed does work only on other fronts; then it is that on one faster than most by the fronts' spread. {said}\n"
         "| base | s [m] | work on a | missing work [J/kg] |\n| --- | --- | --- | --- |\n" + rows
     )
 
