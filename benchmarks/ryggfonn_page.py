@@ -130,8 +130,8 @@ def _between(found: Mapping[str, Found]) -> str:
     return (
         "## Between LC and CD\n\nMissing specific work between sensors (positive: the law brakes too little),"
         " with the most probable unlisted force that goes with speed as what is named does. A force that is"
-        " nil at the typical speed does work only on other fronts; then it is that on one faster than most by the"
-        f" fronts' spread. {said}\n"
+        " nil at the typical speed does work only on other fronts; then it is that on one faster than most by"
+        f" the fronts' spread. {said}\n"
         "| base | s [m] | work on a | missing work [J/kg] |\n| --- | --- | --- | --- |\n" + rows
     )
 
