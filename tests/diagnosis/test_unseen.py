@@ -36,8 +36,10 @@ from skred.inference.hierarchical import hierarchical_problem
 from skred.inference.reading_density import log_likelihoods
 from skred.inference.sampling import SamplerSettings
 from skred.laws import load_law
+from skred.physics.columns import Column
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Shape
+from skred.physics.mechanisms.stretches import U_1, U_2
 from skred.work.calibrate import Calibration, calibrate
 
 GATE, FACTOR = 2, 1.3
@@ -193,6 +195,25 @@ def document() -> dict[str, Any]:
     covariate = Term("covariate_friction", Shape(covariate="x"), Standard(1.0, 2.0))
     terms = (Term("segment_drag", shape), covariate)
     return as_dict(by_hand(2, *terms, strengths=[[1e-3, 0.1], [2e-3, 0.1]]))
+
+
+def test_an_opposed_drag_is_kept_and_read_back() -> None:
+    """What opposes it needs nothing but its constants; with one of them alone it is no shape."""
+    constants = ((U_1, 30.0), (U_2, 20.0))
+    opposed = by_hand(
+        2, Term("segment_drag", Shape(400.0, 600.0, constants=constants)), strengths=[[1e-3]] * 2
+    )
+    again = from_dict(json.loads(json.dumps(as_dict(opposed))))
+    assert again.terms == opposed.terms
+    few = of_events(biased(), [1, 2])
+    (direction,) = extension_of(again, few).directions
+    assert direction.columns == (Column.QUADRATIC, Column.CONSTANT)
+    inside = direction.profiles[0] > 0.0
+    ratio = -direction.profiles[1, inside] / direction.profiles[0, inside]
+    assert ratio.max() <= 30.0**2 and ratio.min() >= 20.0**2 and np.all(np.diff(ratio) < 0.0)
+    half = replace(opposed, terms=(Term("segment_drag", Shape(400.0, 600.0, constants=constants[:1])),))
+    with pytest.raises(InputError, match="a shape that it cannot have"):
+        log_scores(half, few)
 
 
 HOSTILE: dict[str, Any] = {

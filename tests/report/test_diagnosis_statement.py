@@ -10,6 +10,7 @@ from diagnosis_report_cases import diagnosis
 from skred.diagnosis.diagnose import Left
 from skred.diagnosis.statement import statement
 from skred.diagnosis.verdict import verdict
+from skred.physics.mechanisms.stretches import U_1, U_2
 
 
 def document(probability: dict[str, float]) -> dict:
@@ -55,3 +56,17 @@ def test_whom_an_unlisted_force_brakes(sign: float, said: str) -> None:
     assert "On average there is nothing" not in plain and "comes closest: log Bayes factor" in plain
     location = replace(found.location, opposed=True, mean=sign * found.location.mean)
     assert said in verdict(replace(found, location=location))["statement"]
+
+
+def test_a_relief_that_opposes_a_named_drag_is_told() -> None:
+    """In the statement and in the equation, with the speeds at which they are equal."""
+    found = diagnosis("tie")
+    assert "a relief equals it" not in verdict(found)["statement"]
+    entrant = found.steps[0].entrants[0]
+    curves = tuple(
+        replace(one, shape=replace(one.shape, constants=((U_1, 31.0), (U_2, 24.0)))) for one in entrant.curves
+    )
+    step = replace(found.steps[0], entrants=(replace(entrant, curves=curves), *found.steps[0].entrants[1:]))
+    document = verdict(replace(found, steps=(step,)))
+    assert "a relief equals it at the typical speed (31 to 24 m/s)" in document["statement"]
+    assert "(U^2 - U_0^2)" in document["equation"] and document["mechanisms"][0]["constants"][U_1] == 31.0

@@ -59,13 +59,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         f"Its {strength['parameter'].replace('_', ' ')} is {strength['mean']:.3g} +- {strength['sd']:.2g}"
         f"{_unit(strength['unit'])}.",
     ]
-    constants = document["mechanisms"][0]["constants"]
-    if U_1 in constants:
-        sentences.append(
-            "On the same stretch something opposes it that equals it at the typical speed"
-            f" ({constants[U_1]:.0f} to {constants[U_2]:.0f} m/s), so that it shows in fronts that are faster"
-            " or slower than most, not on average."
-        )
+    sentences.append(_opposed(document["mechanisms"][0]["constants"]))
     if document["covariate"]:
         sentences.append("Associated with, not necessarily caused by.")
     if ties:
@@ -77,6 +71,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         sentences.append(
             f"Given that, a second one earned its place: {_title(second['id'])}{_where(second['location'])}."
         )
+        sentences.append(_opposed(second["constants"]))
     sentences.append(_improvement(document))
     last = found.steps[-1].check
     if last.fired:
@@ -85,6 +80,17 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
             " shape of the same, is left; do not take the name for the whole story."
         )
     return [*sentences, _left(document)]
+
+
+def _opposed(constants: dict[str, float]) -> str:
+    """That a relief opposes a mechanism, where one does."""
+    if U_1 not in constants:
+        return ""
+    return (
+        "On the same stretch a relief equals it at the typical speed"
+        f" ({constants[U_1]:.0f} to {constants[U_2]:.0f} m/s), so that it shows in fronts that are faster or"
+        " slower than most, not on average."
+    )
 
 
 def _left(document: dict[str, Any]) -> str:

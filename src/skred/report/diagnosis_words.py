@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from skred.diagnosis.diagnose import Diagnosis
     from skred.diagnosis.entrant import Entrant
     from skred.diagnosis.locate import Location
-from skred.diagnosis.race import Race
+    from skred.diagnosis.race import Race
 
 FloatArray = NDArray[np.float64]
 BEFORE, AFTER, MISMATCH = GREY, "#0072B2", "#D55E00"
