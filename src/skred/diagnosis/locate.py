@@ -109,9 +109,7 @@ def _band(profile: Profile, basis: FloatArray) -> tuple[FloatArray, FloatArray, 
 def _resolution(profile: Profile) -> float:
     """Mean width of what one unit of force at a knot is smeared over: the prior's share is taken out."""
     at = profile.knots_m
-    distance = (at[:, None] - at[None, :]) / profile.kind.length_m
-    prior = profile.kind.amplitude**2 * (np.exp(-0.5 * distance**2) + 1e-6 * np.eye(len(at)))
-    kernel = np.eye(len(at)) - profile.covariance @ np.linalg.inv(prior)
+    kernel = np.eye(len(at)) - profile.covariance @ np.linalg.inv(profile.prior.cover(at))
     told = float(np.trace(kernel))
     return float((at[-1] - at[0]) / max(told, 1.0))
 

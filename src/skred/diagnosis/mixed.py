@@ -78,6 +78,13 @@ def _by_group(rows: Rows, values: FloatArray) -> FloatArray:
     return result
 
 
+def _products(rows: Rows, first: FloatArray, second: FloatArray) -> FloatArray:
+    """Products of two matrices (n_rows, k, n) over k, summed over each group's rows, (n_groups, n, n)."""
+    one, other = (part.reshape(rows.n_groups, -1, part.shape[2]) for part in (first, second))
+    result: FloatArray = one.transpose(0, 2, 1) @ other
+    return result
+
+
 def deviations(points: FloatArray, rows: Rows, population: Population) -> FloatArray:
     """Deviation of points from their population's mean, the release's last."""
     deviation = points.copy()
@@ -96,12 +103,10 @@ def efficient_scores(modes: Modes, rows: Rows, population: Population, prior: Me
     pull = modes.slope + modes.curvature * np.einsum("rij,rj->ri", modes.by_points, deviation)
     weighted = modes.curvature[:, :, None] * modes.by_strengths
     mixed = np.einsum("rij,rik->rjk", modes.by_points, weighted, optimize=True)
-    own = np.einsum("rij,rik->rjk", modes.by_strengths, weighted, optimize=True)
     at_points = np.einsum("rij,ri->rj", modes.by_points, pull)
     score = np.einsum("rij,ri->rj", modes.by_strengths, pull)
     shrunk = np.einsum("rij,rjk->rik", cover, mixed, optimize=True)
     score = score - np.einsum("rji,rj->ri", shrunk, at_points)
-    left = own - np.einsum("rji,rjk->rik", mixed, shrunk, optimize=True)
     of_mean = at_points - np.einsum("rij,rjk,rk->ri", information, cover, at_points, optimize=True)
     mean_info = information - np.einsum("rij,rjk,rkl->ril", information, cover, information, optimize=True)
     cross = mixed - np.einsum("rij,rjk->rik", information, shrunk, optimize=True)
@@ -110,7 +115,8 @@ def efficient_scores(modes: Modes, rows: Rows, population: Population, prior: Me
     crossed = _by_group(rows, cross[:, :n])
     solved = np.linalg.solve(mean_total, crossed)
     result = _by_group(rows, score) - np.einsum("gji,gj->gi", solved, mean_score)
-    efficient = _by_group(rows, left) - np.einsum("gji,gjk->gik", crossed, solved, optimize=True)
+    left = _products(rows, modes.by_strengths, weighted) - _products(rows, mixed, shrunk)
+    efficient = left - np.einsum("gji,gjk->gik", crossed, solved, optimize=True)
     raw = _by_group(rows, np.einsum("rij,rij->rj", modes.by_strengths, weighted))
     return Scores(result, efficient, raw)
 

@@ -214,14 +214,8 @@ def _that_count(curves: Mapping[int, Curve]) -> list[int]:
 
 def _profile(base: Base, kind: Kind, entrants: dict[str, Entrant]) -> Profile:
     """The unlisted force of one kind: from no force, and from the best listed one that enters alike."""
-    found = fit_profile(base, kind)
     near = [one for entrant in entrants.values() for one in entrant.curves if alike(kind, one)]
-    if near:
-        best = max(near, key=lambda one: one.log_bayes_factor)
-        if best.log_bayes_factor > found.log_bayes_factor:
-            other = fit_profile(base, kind, best)
-            found = max(found, other, key=lambda one: one.log_bayes_factor)
-    return found
+    return fit_profile(base, kind, max(near, key=lambda one: one.log_bayes_factor) if near else None)
 
 
 def _corrections(base: Base, entrants: dict[str, Entrant]) -> dict[str, tuple[float, float]]:

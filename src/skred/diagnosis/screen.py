@@ -19,7 +19,7 @@ from skred.diagnosis.extension import Extension
 from skred.diagnosis.mixed import MeanPrior, Scores, efficient_scores, mean_prior, without
 from skred.diagnosis.modes import Modes, Population, Rows, look_around
 from skred.diagnosis.odds import prior_odds
-from skred.diagnosis.unlisted import KINDS, Kind, entering, hats, knots
+from skred.diagnosis.unlisted import KINDS, entering, hats, knots, priors_of
 from skred.inference.hierarchical import HierarchicalProblem
 from skred.physics.columns import Column
 from skred.physics.law import Law
@@ -87,15 +87,10 @@ class Screen:
         return knots(self.setting)
 
     @cached_property
-    def ways(self) -> tuple[tuple[Column, bool], ...]:
-        """How the unlisted force goes with speed."""
-        return tuple(dict.fromkeys(kind.enters for kind in KINDS))
-
-    @cached_property
     def _parts(self) -> list[Extension]:
         """Extensions whose directions follow each other: candidates, profiles; then candidates with U."""
         basis = hats(self.setting.terrain, self.knots_m)
-        profiles = [entering(self.setting, way, row) for way in self.ways for row in basis]
+        profiles = [entering(self.setting, kind, row) for kind in KINDS for row in basis]
         plain = [c.direction for c in self.candidates if not c.with_speed]
         parts = [[*plain, *profiles]]
         by_scale: dict[float | None, list[Direction]] = {}
@@ -164,18 +159,14 @@ class Screen:
         first = sum(not candidate.with_speed for candidate in self.candidates)
         n = len(self.knots_m)
         factors = []
-        for kind in KINDS:
-            start = first + n * self.ways.index(kind.enters)
-            part = slice(start, start + n)
-            found = _of_profile(scores.score[:, part], scores.information[:, part, part], self._cover(kind))
-            factors.append(found + math.log(kind.share))
+        for number, kind in enumerate(KINDS):
+            part = slice(first + n * number, first + n * (number + 1))
+            score, information = scores.score[:, part], scores.information[:, part, part]
+            for prior, share in priors_of(kind, self.knots_m).items():
+                found = _of_profile(score, information, prior.cover(self.knots_m))
+                factors.append(found + share + math.log(kind.share))
         result: FloatArray = np.logaddexp.reduce(np.array(factors), axis=0)
         return result
-
-    def _cover(self, kind: Kind) -> FloatArray:
-        distance = (self.knots_m[:, None] - self.knots_m[None, :]) / kind.length_m
-        cover: FloatArray = kind.amplitude**2 * (np.exp(-0.5 * distance**2) + 1e-6 * np.eye(len(distance)))
-        return cover
 
     def statistic(self, scores: Scores) -> FloatArray:
         """Log odds that anything is missing against nothing, in the linear model, (n_groups,)."""

@@ -2,23 +2,24 @@
 
 A normal process for the missing retardation per unit mass, independent of speed, in proportion to U^2, or to
 the difference of U^2 from its typical value, which shows only in what is unusual about each front; of several
-correlation lengths; its amplitude is what listed mechanisms do. It is the way out of the
-list, and it says where: missing forces estimated inside the equation, not in the residuals (Hooker, 2009,
-doi 10.1111/j.1541-0420.2008.01172.x), with base strengths, events' deviations and releases having their
-share first (orthogonal model error: Sargsyan, Huan and Najm, 2019, doi
+correlation lengths, and amplitudes about what listed mechanisms do; everywhere, or about one place. It is the
+way out of the list, and it says where: missing forces estimated inside the equation, not in the residuals
+(Hooker, 2009, doi 10.1111/j.1541-0420.2008.01172.x), with base strengths, events' deviations and releases
+having their share first (orthogonal model error: Sargsyan, Huan and Najm, 2019, doi
 10.1615/Int.J.UncertaintyQuantification.2019027384).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.curves import Base, Curve, Fit, refit
-from skred.diagnosis.extension import Extension, extended
+from skred.diagnosis.extension import extended
 from skred.diagnosis.mixed import efficient_scores, mean_prior
 from skred.diagnosis.modes import Population, look_around
 from skred.physics.columns import Column
@@ -31,19 +32,17 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Kind:
-    """One prior of the profile.
+    """One way in which the profile goes with speed.
 
     Attributes
     ----------
     column : Column
-        CONSTANT or QUADRATIC: how it goes with speed.
+        CONSTANT or QUADRATIC.
     opposed : bool
         Whether it is nil at the typical speed.
     unit : str
     amplitude : float
-        Standard deviation of the profile.
-    length_m : float
-        Correlation length.
+        Typical standard deviation of the profile; `PRIORS` are relative to it.
     share : float
         Prior probability among the kinds.
     """
@@ -52,27 +51,51 @@ class Kind:
     opposed: bool
     unit: str
     amplitude: float
-    length_m: float
     share: float
 
-    @property
-    def enters(self) -> tuple[Column, bool]:
-        """How it goes with speed: kinds that go alike have the same directions."""
-        return self.column, self.opposed
+
+@dataclass(frozen=True)
+class Prior:
+    """How strong and how smooth the profile is, and where.
+
+    Attributes
+    ----------
+    amplitude : float
+        Its standard deviation.
+    length_m : float
+        Its correlation length [m].
+    centre_m : float or None
+        About which place it acts; None is everywhere.
+    """
+
+    amplitude: float
+    length_m: float
+    centre_m: float | None = None
+
+    def cover(self, at: FloatArray) -> FloatArray:
+        """Covariance of the profile at places (n,), (n, n)."""
+        distance = (at[:, None] - at[None, :]) / self.length_m
+        alike = np.exp(-0.5 * distance**2)
+        if self.centre_m is not None:
+            near = np.exp(-0.5 * ((at - self.centre_m) / NEAR_M) ** 2)
+            alike *= near[:, None] * near[None, :]
+        found: FloatArray = self.amplitude**2 * (alike + 1e-6 * np.eye(len(at)))
+        return found
 
 
-KINDS = tuple(
-    Kind(column, opposed, unit, amplitude, length, share / 2.0)
-    for column, opposed, unit, amplitude, share in (
-        (Column.CONSTANT, False, "m s-2", 0.8, 0.5 * (1.0 - OPPOSED_SHARE)),
-        (Column.QUADRATIC, False, "m-1", 1.5e-3, 0.5 * (1.0 - OPPOSED_SHARE)),
-        # U^2 varies by a third or so between fronts: the same work, then, as without opposition.
-        (Column.QUADRATIC, True, "m-1", 4.5e-3, OPPOSED_SHARE),
-    )
-    for length in (80.0, 250.0)
+KINDS = (
+    Kind(Column.CONSTANT, False, "m s-2", 0.8, 0.5 * (1.0 - OPPOSED_SHARE)),
+    Kind(Column.QUADRATIC, False, "m-1", 1.5e-3, 0.5 * (1.0 - OPPOSED_SHARE)),
+    # U^2 varies by a third or so between fronts: the same work, then, as without opposition.
+    Kind(Column.QUADRATIC, True, "m-1", 4.5e-3, OPPOSED_SHARE),
 )
-_MOST_KNOTS, _LEAST_STEP_M = 16, 30.0
-_ROUNDS = 6
+AMPLITUDES, LENGTHS_M = (1.0 / 3.0, 1.0, 3.0), (40.0, 120.0, 400.0)
+"""Amplitudes in typical ones, and correlation lengths, all of equal prior probability. With one amplitude, a
+profile pays for each of its freedoms what the amplitude is off by; a listed mechanism pays that once."""
+NEAR_M, _CENTRES_M = 120.0, 150.0
+"""Standard deviation of the window of a profile that is local, and the distance of the windows' centres."""
+_MOST_KNOTS, _LEAST_STEP_M = 32, 30.0
+_ROUNDS, _PRIORS_TRIED, _SURE = 6, 12, 1.0
 _SHARES = (1.0, 0.4, 0.15, 0.05)
 _SETTLED = 0.05
 
@@ -84,13 +107,15 @@ class Profile:
     Attributes
     ----------
     kind : Kind
+    prior : Prior
+        The most probable one, under which it is fitted.
     knots_m : (n,) array
         Between which it is linear; 0 outside.
     mean : (n,) array
         At the knots, in the kind's unit; positive retards.
     covariance : (n, n) array
     log_bayes_factor : float
-        Against no such force.
+        Against no such force, over all priors.
     gain : float
         Gain in log evidence at the mean itself, before the price of its freedom.
     fit : Fit
@@ -98,12 +123,26 @@ class Profile:
     """
 
     kind: Kind
+    prior: Prior
     knots_m: FloatArray
     mean: FloatArray
     covariance: FloatArray
     log_bayes_factor: float
     gain: float
     fit: Fit
+
+
+def priors_of(kind: Kind, at: FloatArray) -> dict[Prior, float]:
+    """All priors of a kind's profile with knots at places, and the log of each one's prior probability.
+
+    Everywhere or local with equal probability, as listed forces are; each equally shared.
+    """
+    n = max(round((at[-1] - at[0]) / _CENTRES_M), 1)
+    centres = at[0] + (np.arange(n) + 0.5) * (at[-1] - at[0]) / n
+    sizes = [(kind.amplitude * part, length) for part in AMPLITUDES for length in LENGTHS_M]
+    everywhere = [Prior(*size) for size in sizes]
+    local = [Prior(*size, float(centre)) for size in sizes if size[1] <= NEAR_M for centre in centres]
+    return {one: -math.log(2.0 * len(group)) for group in (everywhere, local) for one in group}
 
 
 def knots(setting: Setting) -> FloatArray:
@@ -123,15 +162,14 @@ def hats(terrain: Terrain, at: FloatArray) -> FloatArray:
 
 def combined(setting: Setting, kind: Kind, at: FloatArray, values: FloatArray) -> Direction:
     """The profile as one direction, of strength 1."""
-    return entering(setting, kind.enters, values @ hats(setting.terrain, at))
+    return entering(setting, kind, values @ hats(setting.terrain, at))
 
 
-def entering(setting: Setting, enters: tuple[Column, bool], profile: FloatArray) -> Direction:
+def entering(setting: Setting, kind: Kind, profile: FloatArray) -> Direction:
     """A profile over the cells, (n_cells,), in the equation of motion."""
-    column, opposed = enters
-    if not opposed:
-        return Direction((column,), profile[None, :])
-    return Direction((column, Column.CONSTANT), np.array([profile, -profile * setting.front_square]))
+    if not kind.opposed:
+        return Direction((kind.column,), profile[None, :])
+    return Direction((kind.column, Column.CONSTANT), np.array([profile, -profile * setting.front_square]))
 
 
 def alike(kind: Kind, curve: Curve) -> bool:
@@ -139,52 +177,142 @@ def alike(kind: Kind, curve: Curve) -> bool:
     return kind.column in curve.direction.columns and kind.opposed == is_opposed(curve.shape)
 
 
+@dataclass(frozen=True, eq=False)
+class _Peak:
+    """A profile's values, the fit with it in, and the likelihood's slope and curvature there."""
+
+    values: FloatArray
+    fit: Fit
+    score: FloatArray
+    information: FloatArray
+
+
 def fit_profile(base: Base, kind: Kind, near: Curve | None = None) -> Profile:
     """Fit the profile by Gauss-Newton steps around the events' modes; its evidence with nodes at the top.
+
+    Fitted under one prior, its evidence under all of them follows from the likelihood's slope and curvature
+    there; it is then fitted under the most probable one.
 
     Parameters
     ----------
     near : Curve, optional
-        A listed mechanism in the kind's column: where to begin, instead of at no force. Far from what was
+        A listed mechanism in the kind's column: where to begin, beside no force. Far from what was
         recorded, robust errors see outliers and no direction to go.
     """
     at = knots(base.setting)
-    basis = hats(base.setting.terrain, at)
-    directions = [entering(base.setting, kind.enters, row) for row in basis]
-    wide = extended(base.problem, base.law, [*base.directions, *directions])
-    n_before = len(base.directions)
-    distance = (at[:, None] - at[None, :]) / kind.length_m
-    prior = kind.amplitude**2 * (np.exp(-0.5 * distance**2) + 1e-6 * np.eye(len(at)))
-    precision = np.linalg.inv(prior)
-    values, population, points = np.zeros(len(at)), base.population, base.fit.points
-    information = np.zeros_like(prior)
     # Nothing like everything else, so that what is left of integration errors is the same there.
-    nothing = fit = _fit_at(base, kind, at, values, (population, points))
+    none = np.zeros(len(at))
+    nothing = _fit_at(base, kind, at, none, (base.population, base.fit.points))
+    starts = [_peak(base, kind, at, none, nothing)]
     if near is not None:
-        values, fit = _begin(base, kind, at, near)
-        population, points = fit.found.population(len(base.law.mechanisms)), fit.points
-    height = fit.found.log_evidence - 0.5 * float(values @ precision @ values)
-    score, information = _scores(base, wide, n_before, values, population, points)
+        starts.append(_peak(base, kind, at, *_begin(base, kind, at, near)))
+    height = nothing.found.log_evidence
+    seen = _Seen(height, at, priors_of(kind, at))
+    next_one: Prior | None = Prior(kind.amplitude, NEAR_M)
+    while next_one is not None and len(seen.peaks) < _PRIORS_TRIED:
+        cover = next_one.cover(at)
+        start = _highest([*starts, *seen.peaks.values()], cover)
+        seen.add(next_one, _climb(base, kind, at, start, cover))
+        next_one = seen.open
+    prior = max(seen.peaks, key=lambda one: seen.own[one])
+    peak = seen.peaks[prior]
+    cover = np.linalg.inv(peak.information + np.linalg.inv(prior.cover(at)))
+    gain = peak.fit.found.log_evidence - height
+    return Profile(kind, prior, at, peak.values, 0.5 * (cover + cover.T), seen.log_factor, gain, peak.fit)
+
+
+class _Seen:
+    """Peaks under some priors, and what they say of all of them.
+
+    Where fronts stop, slope and curvature at one peak are a poor guide to another far away. A prior that was
+    climbed under has its own factor; one about the same place as some that were, the least that they promise;
+    any other the most that any peak promises, so that it is climbed under while it could matter.
+    """
+
+    def __init__(self, height: float, at: FloatArray, priors: dict[Prior, float]) -> None:
+        self.height = height
+        self.shares = priors
+        self.covers = {prior: prior.cover(at) for prior in priors}
+        self.peaks: dict[Prior, _Peak] = {}
+        self.own: dict[Prior, float] = {}
+        self.near = dict.fromkeys(priors, math.inf)
+        self.far = dict.fromkeys(priors, -math.inf)
+
+    def add(self, climbed: Prior, peak: _Peak) -> None:
+        """A peak under a prior."""
+        self.peaks[climbed] = peak
+        for prior, cover in self.covers.items():
+            factor = _log_factor(peak, self.height, cover) + self.shares[prior]
+            self.far[prior] = max(self.far[prior], factor)
+            if prior.centre_m == climbed.centre_m:
+                self.near[prior] = min(self.near[prior], factor)
+            if prior == climbed:
+                self.own[prior] = factor
+
+    @property
+    def factors(self) -> dict[Prior, float]:
+        """Log Bayes factor and log prior probability of each prior, as far as is known."""
+        near = {prior: value for prior, value in self.near.items() if value < math.inf}
+        return self.far | near | self.own
+
+    @property
+    def open(self) -> Prior | None:
+        """The most probable prior not climbed under; None where all of those are improbable together."""
+        left = {prior: factor for prior, factor in self.factors.items() if prior not in self.own}
+        if not left or np.logaddexp.reduce(list(left.values())) < self.log_factor - _SURE:
+            return None
+        return max(left, key=lambda one: left[one])
+
+    @property
+    def log_factor(self) -> float:
+        """Log Bayes factor over all priors."""
+        return float(np.logaddexp.reduce(list(self.factors.values())))
+
+
+def _log_factor(peak: _Peak, height: float, cover: FloatArray) -> float:
+    """Log Bayes factor under a prior, from a peak under another; at least that of no force at all."""
+    precision = np.linalg.inv(cover)
+    step = np.linalg.solve(peak.information + precision, peak.score - precision @ peak.values)
+    values = peak.values + step
+    gain = peak.fit.found.log_evidence - height + peak.score @ step - 0.5 * step @ peak.information @ step
+    _, log_det = np.linalg.slogdet(np.eye(len(cover)) + cover @ peak.information)
+    return max(float(gain - _price(values, precision)), 0.0) - 0.5 * float(log_det)
+
+
+def _highest(peaks: Sequence[_Peak], cover: FloatArray) -> _Peak:
+    """The one with the highest posterior under a prior."""
+    precision = np.linalg.inv(cover)
+    return max(peaks, key=lambda one: one.fit.found.log_evidence - _price(one.values, precision))
+
+
+def _price(values: FloatArray, precision: FloatArray) -> float:
+    """What a prior takes off the log density of values."""
+    return 0.5 * float(values @ precision @ values)
+
+
+def _climb(base: Base, kind: Kind, at: FloatArray, peak: _Peak, cover: FloatArray) -> _Peak:
+    """To the top of the posterior under a prior."""
+    precision = np.linalg.inv(cover)
     for _ in range(_ROUNDS):
-        step = np.linalg.solve(information + precision, score - precision @ values)
+        step = np.linalg.solve(peak.information + precision, peak.score - precision @ peak.values)
+        height = peak.fit.found.log_evidence - _price(peak.values, precision)
         for share in _SHARES:
-            new = values + share * step
-            tried = _fit_at(base, kind, at, new, (population, points))
-            gained = tried.found.log_evidence - 0.5 * float(new @ precision @ new) - height
+            values = peak.values + share * step
+            fit = _fit_at(base, kind, at, values, _start(base, peak.fit))
+            gained = fit.found.log_evidence - _price(values, precision) - height
             if gained > 0.0:
                 break
         else:
             break
-        values, fit, height = new, tried, height + gained
-        population, points = fit.found.population(len(base.law.mechanisms)), fit.points
-        score, information = _scores(base, wide, n_before, values, population, points)
+        peak = _peak(base, kind, at, values, fit)
         if gained < _SETTLED:
             break
-    gain = fit.found.log_evidence - nothing.found.log_evidence
-    _, log_det = np.linalg.slogdet(np.eye(len(at)) + prior @ information)
-    cover = np.linalg.inv(information + precision)
-    factor = gain - 0.5 * float(values @ precision @ values) - 0.5 * float(log_det)
-    return Profile(kind, at, values, 0.5 * (cover + cover.T), max(factor, -0.5 * float(log_det)), gain, fit)
+    # Where fronts stop the likelihood has kinks: a slope that no step could use up promises nothing.
+    return replace(peak, score=precision @ peak.values)
+
+
+def _start(base: Base, fit: Fit) -> tuple[Population, FloatArray]:
+    return fit.found.population(len(base.law.mechanisms)), fit.points
 
 
 def _begin(base: Base, kind: Kind, at: FloatArray, near: Curve) -> tuple[FloatArray, Fit]:
@@ -194,9 +322,7 @@ def _begin(base: Base, kind: Kind, at: FloatArray, near: Curve) -> tuple[FloatAr
     profile = near.direction.profiles[near.direction.columns.index(kind.column)]
     cells = hats(base.setting.terrain, at) * np.diff(edge)
     values = near.strengths[top] * (cells @ profile) / np.maximum(cells.sum(axis=1), 1e-9)
-    fit = near.fits[top]
-    start = (fit.found.population(len(base.law.mechanisms)), fit.points)
-    return values, _fit_at(base, kind, at, values, start)
+    return values, _fit_at(base, kind, at, values, _start(base, near.fits[top]))
 
 
 def _fit_at(
@@ -209,19 +335,16 @@ def _fit_at(
     return refit(extension, base.rows, strengths, start, base.log_scale)[0]
 
 
-def _scores(
-    base: Base,
-    wide: Extension,
-    n_before: int,
-    values: FloatArray,
-    population: Population,
-    points: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Efficient score and information of the knots' values at what they are."""
-    strengths = np.concatenate([base.strengths, values])
-    around = look_around(wide, base.rows, points, strengths)
+def _peak(base: Base, kind: Kind, at: FloatArray, values: FloatArray, fit: Fit) -> _Peak:
+    """With efficient score and information of the knots' values at what they are."""
+    basis = hats(base.setting.terrain, at)
+    directions = [entering(base.setting, kind, row) for row in basis]
+    wide = extended(base.problem, base.law, [*base.directions, *directions])
+    population, points = _start(base, fit)
+    around = look_around(wide, base.rows, points, np.concatenate([base.strengths, values]))
     found = efficient_scores(around, base.rows, population, mean_prior(base.law))
-    return found.score[0, n_before:], found.information[0, n_before:, n_before:]
+    n_before = len(base.directions)
+    return _Peak(values, fit, found.score[0, n_before:], found.information[0, n_before:, n_before:])
 
 
 def log_evidence_of(profiles: Sequence[Profile]) -> float:

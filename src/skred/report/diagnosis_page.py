@@ -12,7 +12,7 @@ import numpy as np
 from skred.diagnosis.decide import DOUBTFUL, E_LIMIT, decide
 from skred.diagnosis.held_out import K_LIMIT, paired
 from skred.diagnosis.omnibus import LIMIT
-from skred.diagnosis.unlisted import KINDS
+from skred.diagnosis.unlisted import AMPLITUDES, KINDS, LENGTHS_M, NEAR_M
 from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.report import diagnosis_rows as rows
@@ -88,11 +88,14 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
             trust=rows.trust_rows(found),
             priors=rows.prior_rows(found),
             settings=rows.settings_rows(document),
-            profile_priors=[
-                f"{kind.amplitude:g} {unit_text(kind.unit)} over {kind.length_m:.0f} m"
+            profile_scales=[
+                f"{kind.amplitude:g} {unit_text(kind.unit)}"
                 + (", nil at the typical speed" if kind.opposed else "")
                 for kind in KINDS
             ],
+            profile_amplitudes=[f"{part:.2g}" for part in AMPLITUDES],
+            profile_lengths=[f"{length:.0f}" for length in LENGTHS_M],
+            profile_window=f"{2.0 * NEAR_M:.0f}",
             limits={
                 "p": LIMIT, "doubtful": DOUBTFUL, "e": E_LIMIT, "k": K_LIMIT, "r_hat": R_HAT_LIMIT,
                 "ess": ESS_LIMIT, "practical": PRACTICAL_DIFFERENCE,
