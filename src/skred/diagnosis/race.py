@@ -169,7 +169,7 @@ def with_errors(base: Base, error_model: str) -> Base:
 def _heat(error_model: str, base: Base, tell: Tell, before: Heat | None) -> Heat:
     """The race under one error model; `before` under another one."""
     budget = first_look(base)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(_threads()) as pool:
         curves = _first_looks(base, budget, pool, tell, () if before is None else before.first_look)
         entrants = _looked_at_again(base, curves, budget, pool)
         profiles = list(pool.map(lambda kind: _profile(base, kind, entrants), KINDS))
@@ -181,6 +181,12 @@ def _heat(error_model: str, base: Base, tell: Tell, before: Heat | None) -> Heat
             same = tuple(replace(one, mechanism=mechanism) for one in other.curves)
             entrants[mechanism.id] = replace(other, mechanism=mechanism, curves=same)
     return Heat(error_model, base, entrants, profiles, curves)
+
+
+def _threads() -> int:
+    """As many as OMP_NUM_THREADS allows, which `skred prove` sets for its trials; all cores without it."""
+    allowed = os.environ.get("OMP_NUM_THREADS", "")
+    return int(allowed) if allowed.isdecimal() and int(allowed) > 0 else os.cpu_count() or 1
 
 
 def _first_looks(
