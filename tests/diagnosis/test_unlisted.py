@@ -25,6 +25,7 @@ from skred.diagnosis.unlisted import (
     _fit_at,
     _log_factor,
     _peak,
+    as_profile,
     combined,
     fit_profile,
     hats,
@@ -217,7 +218,8 @@ def test_profile_is_found_from_a_listed_mechanism_where_nothing_is_too_far() -> 
     drag = mechanisms()["segment_drag"]
     listed = curve(base, drag, Shape(1600.0, 1700.0), USUAL)
     kind = next(kind for kind in KINDS if kind.column is Column.QUADRATIC and not kind.opposed)
-    from_nothing, from_listed = fit_profile(base, kind), fit_profile(base, kind, listed)
+    from_nothing = fit_profile(base, kind)
+    from_listed = fit_profile(base, kind, as_profile(base, kind, listed))
     assert listed.log_bayes_factor > 20.0
     assert from_listed.log_bayes_factor > max(from_nothing.log_bayes_factor, 0.0) + 10.0
 

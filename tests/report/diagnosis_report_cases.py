@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from hierarchical_cases import hierarchical_calibration, hierarchical_ryggfonn
 
-from skred.diagnosis.curves import Curve
+from skred.diagnosis.curves import Curve, Fit
 from skred.diagnosis.decide import Decision
 from skred.diagnosis.diagnose import Diagnosis, Step
 from skred.diagnosis.entrant import Entrant
@@ -19,8 +19,9 @@ from skred.diagnosis.locate import Location
 from skred.diagnosis.odds import prior_odds
 from skred.diagnosis.omnibus import Omnibus
 from skred.diagnosis.predictive import Predicted
+from skred.diagnosis.profile_law import ProfileLaw
 from skred.diagnosis.race import Heat, Race
-from skred.diagnosis.unlisted import KINDS
+from skred.diagnosis.unlisted import KINDS, Prior, Profile
 from skred.inference.gate import Gate
 from skred.inference.hierarchical import HierarchicalProblem
 from skred.laws import load_law
@@ -166,9 +167,18 @@ def diagnosis(kind: str, text: str = "") -> Diagnosis:
         problem, LAW, "", calibration(problem), SimpleNamespace(), table,
         Omnibus(30.0 if alarm else 0.3, clean), race, Decision(verdicts[kind], names),
         location() if alarm else None, steps,
-        before=held(problem, 0.0), after=held(problem, 1.1) if steps else None,
+        profile=profile_law(problem, clean) if kind == "unexplained" else None,
+        before=held(problem, 0.0), after=held(problem, 1.1) if alarm else None,
         seconds={"base": 12.3, "race": 45.6},
     )  # fmt: skip
+
+
+def profile_law(problem: HierarchicalProblem, clean: np.ndarray) -> ProfileLaw:
+    at = np.linspace(1580.0, 2200.0, 20)
+    mean = 0.5 * np.exp(-0.5 * ((at - 1800.0) / 60.0) ** 2)
+    prior = Prior(0.8, 120.0, 1800.0)
+    profile = Profile(KINDS[0], prior, at, mean, 0.01 * np.eye(20), 30.0, 42.0, Fit(None, np.empty(0)))
+    return ProfileLaw(profile, "robust", Omnibus(0.1, clean), held(problem, 0.0), held(problem, 1.1))
 
 
 def _steps(problem, race, names, clean, *, second):

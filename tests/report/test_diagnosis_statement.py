@@ -8,6 +8,7 @@ import pytest
 from diagnosis_report_cases import diagnosis
 
 from skred.diagnosis.diagnose import Left
+from skred.diagnosis.omnibus import Omnibus
 from skred.diagnosis.statement import statement
 from skred.diagnosis.verdict import verdict
 from skred.physics.mechanisms.stretches import U_1, U_2
@@ -70,3 +71,20 @@ def test_a_relief_that_opposes_a_named_drag_is_told() -> None:
     document = verdict(replace(found, steps=(step,)))
     assert "a relief equals it at the typical speed (31 to 24 m/s)" in document["statement"]
     assert "(U^2 - U_0^2)" in document["equation"] and document["mechanisms"][0]["constants"][U_1] == 31.0
+
+
+def test_the_force_profile_let_in_is_told() -> None:
+    """What avalanches left out gain by it, its equation and its numbers; nothing is named."""
+    found = diagnosis("unexplained")
+    document = verdict(found)
+    assert found.profile is not None
+    assert document["mechanism"] is None and document["equation"] is None and document["strength"] is None
+    assert document["evidence"]["elpd_diff"] == pytest.approx(1.1 * found.problem.campaign.n_events)
+    assert "For avalanches left out the log score changes by +24.2" in document["statement"]
+    profile = document["profile"]
+    assert profile["equation"] == "-f(s)" and profile["unit"] == "m s-2"
+    assert profile["s_m"] == found.profile.profile.knots_m.tolist() and max(profile["mean"]) > 0.45
+    assert document["p_value_augmented"] == found.profile.check.p_value
+    failed = replace(found.profile, check=Omnibus(30.0, found.profile.check.simulated))
+    assert "still fails the check" in verdict(replace(found, profile=failed))["statement"]
+    assert "still fails the check" not in document["statement"]

@@ -22,6 +22,7 @@ from skred.diagnosis.locate import Location, locate
 from skred.diagnosis.modes import Population
 from skred.diagnosis.odds import UNLISTED
 from skred.diagnosis.omnibus import Omnibus, omnibus
+from skred.diagnosis.profile_law import ProfileLaw, profile_law
 from skred.diagnosis.race import Race, race
 from skred.diagnosis.screen import Screen
 from skred.inference.hierarchical import HierarchicalProblem
@@ -123,8 +124,10 @@ class Diagnosis:
     reference : Calibration
         Of the base law under the error model of the last step, where something was let in: before and after
         then differ by what was let in alone. The same as `calibration` where that error model is its own.
+    profile : ProfileLaw
+        The force profile let in, where no listed mechanism accounts for what is missing.
     before, after : HeldOut
-        Predictions by the base law and, where something was let in, by the augmented one.
+        Predictions by the base law and, where something was let in, by the law with it.
     left : Left
     seconds : dict
         Of each stage.
@@ -142,6 +145,7 @@ class Diagnosis:
     location: Location | None = None
     steps: tuple[Step, ...] = ()
     reference: Calibration | None = None
+    profile: ProfileLaw | None = None
     before: HeldOut | None = None
     after: HeldOut | None = None
     left: Left = Left()
@@ -226,13 +230,17 @@ def _steps(
         steps = steps if not cannot else ()
     if cannot:
         decision = Decision("cannot_tell", ())
+    profile = None
+    if decision.verdict == "unexplained":
+        clock.stage("profile", "the force profile let in: checked again, fitted anew without each avalanche")
+        profile = profile_law(raced.leading(UNLISTED), effort.replicas, settings.seed)
     clock.stage("held out", "predicting avalanches left out")
-    before = _before(reference, settings.seed, effort)
-    after = _after(steps, settings.seed, effort) if steps else None
+    before = profile.before if profile is not None else _before(reference, settings.seed, effort)
+    after = profile.after if profile is not None else _after(steps, settings.seed, effort)
     clock.end()
     return Diagnosis(
         problem, law, cannot, calibration, screen, table, check, raced, decision, location, steps,
-        reference, before, after, left, clock.seconds,
+        reference, profile, before, after, left, clock.seconds,
     )  # fmt: skip
 
 
@@ -374,7 +382,9 @@ def _before(reference: Calibration, seed: int, effort: Effort) -> HeldOut:
     return held_out(reference, extension, _nothing_added(reference), seed, exact=effort.exact_loo)
 
 
-def _after(steps: tuple[Step, ...], seed: int, effort: Effort) -> HeldOut:
+def _after(steps: tuple[Step, ...], seed: int, effort: Effort) -> HeldOut | None:
+    if not steps:
+        return None
     calibration = steps[-1].calibration
     problem: Any = calibration.problem
     extension: Extension = problem.extension

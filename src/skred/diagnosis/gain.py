@@ -47,9 +47,9 @@ def predictors(diagnosis: Diagnosis) -> dict[str, Any] | None:
 
 
 def promised_gain(diagnosis: Diagnosis) -> float | None:
-    """Gain of the log score for each avalanche, as the ones left out have it; None if nothing was let in."""
+    """Gain of the log score for each avalanche, by those left out; None if no mechanism was let in."""
     before, after = diagnosis.before, diagnosis.after
-    if before is None or after is None:
+    if before is None or after is None or not diagnosis.steps:
         return None
     return float(np.mean(after.pointwise - before.pointwise))
 

@@ -90,8 +90,11 @@ def held_out(
 
 
 def _smoothed(densities: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Pareto-smoothed log weights of leaving each event out, (n_draws, n_events), and Pareto k."""
-    log_weights, k = array_stats.psislw(-densities.T, axis=-1)
+    """Pareto-smoothed log weights of leaving each event out, (n_draws, n_events), and Pareto k.
+
+    ArviZ takes log likelihoods and changes their sign itself.
+    """
+    log_weights, k = array_stats.psislw(densities.T, axis=-1)
     return np.asarray(log_weights, dtype=float).T, np.asarray(k, dtype=float)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,7 @@ from numpy.typing import NDArray
 
 from skred.diagnosis.extension import extended
 from skred.diagnosis.race import Heat
-from skred.diagnosis.unlisted import Kind, Profile, hats
+from skred.diagnosis.unlisted import Kind, Profile, hats, most_probable
 from skred.physics.columns import Column
 
 FloatArray = NDArray[np.float64]
@@ -58,7 +57,7 @@ class Location:
 def locate(heat: Heat, opposed: bool | None = None) -> Location:
     """The most probable profile as a retardation; of those that are opposed, or are not, if that is given."""
     alike = [one for one in heat.profiles if opposed in (None, one.kind.opposed)]
-    profile = max(alike, key=lambda one: one.log_bayes_factor + math.log(one.kind.share))
+    profile = most_probable(alike)
     base = heat.base
     terrain = base.setting.terrain
     edge = np.asarray(terrain.edge_s_m)

@@ -25,7 +25,7 @@ FloatArray = NDArray[np.float64]
 _LOG_MEDIAN, _LOG_SD, _SHAPE = math.log(SPREAD_MEDIAN), SPREAD_LOG_SD, LKJ_SHAPE
 _LOG_2PI = math.log(2.0 * math.pi)
 _STEP = 2e-3
-_DEGREES = 5.0
+_DEGREES, _RESAMPLED_FROM = 5.0, 8
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -204,7 +204,27 @@ def importance_evidence(
     nodes: Nodes, log_scale: FloatArray, found: Evidence, n_draws: int, seed: int
 ) -> tuple[float, float]:
     """Evidence by importance sampling around the Laplace approximation, and its standard error in nats."""
-    rng = np.random.default_rng([seed, 11])
+    _, log_w = _weighted(nodes, log_scale, found, n_draws, np.random.default_rng([seed, 11]))
+    most = float(log_w.max())
+    weights = np.exp(log_w - most)
+    mean = float(weights.mean())
+    error = float(weights.std() / math.sqrt(n_draws) / mean)
+    return most + math.log(mean) + _log_correlation_constant(len(log_scale)), error
+
+
+def importance_draws(
+    nodes: Nodes, log_scale: FloatArray, found: Evidence, n: int, rng: np.random.Generator
+) -> FloatArray:
+    """Draws of the population, (n, n_psi): the Laplace approximation's, many more, weighted and resampled."""
+    draws, log_w = _weighted(nodes, log_scale, found, _RESAMPLED_FROM * n, rng)
+    weights = np.exp(log_w - log_w.max())
+    return draws[rng.choice(len(draws), size=n, p=weights / weights.sum())]
+
+
+def _weighted(
+    nodes: Nodes, log_scale: FloatArray, found: Evidence, n_draws: int, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Draws around the Laplace approximation, from a wider and heavier-tailed density; log weights."""
     n = len(found.psi)
     factor = 1.15 * np.linalg.cholesky(found.covariance)
     normal = rng.standard_normal((n_draws, n))
@@ -215,12 +235,7 @@ def importance_evidence(
     log_t = float(gammaln(0.5 * (_DEGREES + n)) - gammaln(0.5 * _DEGREES))
     log_t -= 0.5 * n * math.log(_DEGREES * math.pi) + float(np.log(np.diag(factor)).sum())
     log_q = log_t - 0.5 * (_DEGREES + n) * np.log1p(np.sum(white**2, axis=1) / _DEGREES)
-    log_w = targets - log_q
-    most = float(log_w.max())
-    weights = np.exp(log_w - most)
-    mean = float(weights.mean())
-    error = float(weights.std() / math.sqrt(n_draws) / mean)
-    return most + math.log(mean) + _log_correlation_constant(len(log_scale)), error
+    return draws, np.nan_to_num(targets - log_q, nan=-np.inf)
 
 
 def prior_log_scale(prior: MeanPrior) -> FloatArray:

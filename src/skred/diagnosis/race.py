@@ -10,7 +10,6 @@ two threads that ask at once find half of it; NumPy's does not.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -26,7 +25,8 @@ from skred.diagnosis.marginal import evidence, importance_evidence
 from skred.diagnosis.modes import campaign_rows, event_modes
 from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, probabilities
 from skred.diagnosis.screen import candidates
-from skred.diagnosis.unlisted import KINDS, Kind, Profile, alike, fit_profile, log_evidence_of
+from skred.diagnosis.threads import threads
+from skred.diagnosis.unlisted import KINDS, Kind, Profile, alike, as_profile, fit_profile, log_evidence_of
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Shape
@@ -169,7 +169,7 @@ def with_errors(base: Base, error_model: str) -> Base:
 def _heat(error_model: str, base: Base, tell: Tell, before: Heat | None) -> Heat:
     """The race under one error model; `before` under another one."""
     budget = first_look(base)
-    with ThreadPoolExecutor(_threads()) as pool:
+    with ThreadPoolExecutor(threads()) as pool:
         curves = _first_looks(base, budget, pool, tell, () if before is None else before.first_look)
         entrants = _looked_at_again(base, curves, budget, pool)
         profiles = list(pool.map(lambda kind: _profile(base, kind, entrants), KINDS))
@@ -181,12 +181,6 @@ def _heat(error_model: str, base: Base, tell: Tell, before: Heat | None) -> Heat
             same = tuple(replace(one, mechanism=mechanism) for one in other.curves)
             entrants[mechanism.id] = replace(other, mechanism=mechanism, curves=same)
     return Heat(error_model, base, entrants, profiles, curves)
-
-
-def _threads() -> int:
-    """As many as OMP_NUM_THREADS allows, which `skred prove` sets for its trials; all cores without it."""
-    allowed = os.environ.get("OMP_NUM_THREADS", "")
-    return int(allowed) if allowed.isdecimal() and int(allowed) > 0 else os.cpu_count() or 1
 
 
 def _first_looks(
@@ -221,7 +215,9 @@ def _that_count(curves: Mapping[int, Curve]) -> list[int]:
 def _profile(base: Base, kind: Kind, entrants: dict[str, Entrant]) -> Profile:
     """The unlisted force of one kind: from no force, and from the best listed one that enters alike."""
     near = [one for entrant in entrants.values() for one in entrant.curves if alike(kind, one)]
-    return fit_profile(base, kind, max(near, key=lambda one: one.log_bayes_factor) if near else None)
+    if not near:
+        return fit_profile(base, kind)
+    return fit_profile(base, kind, as_profile(base, kind, max(near, key=lambda one: one.log_bayes_factor)))
 
 
 def _corrections(base: Base, entrants: dict[str, Entrant]) -> dict[str, tuple[float, float]]:

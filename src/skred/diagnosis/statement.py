@@ -8,6 +8,7 @@ from skred.diagnosis.decide import NOTHING_AT_MOST
 from skred.diagnosis.diagnose import Diagnosis
 from skred.diagnosis.locate import Location
 from skred.diagnosis.odds import NOTHING, UNLISTED
+from skred.diagnosis.omnibus import Omnibus
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.stretches import U_1, U_2
@@ -73,13 +74,18 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         )
         sentences.append(_opposed(second["constants"]))
     sentences.append(_improvement(document))
-    last = found.steps[-1].check
-    if last.fired:
-        sentences.append(
-            f"The augmented law still fails the check (p = {last.p_value:.2g}): something more, or another"
-            " shape of the same, is left; do not take the name for the whole story."
-        )
+    sentences.append(_still_fired(found.steps[-1].check))
     return [*sentences, _left(document)]
+
+
+def _still_fired(check: Omnibus) -> str:
+    """That the law fails the check also with what was let in, where it does."""
+    if not check.fired:
+        return ""
+    return (
+        f"The augmented law still fails the check (p = {check.p_value:.2g}): something more, or another"
+        " shape of the same, is left; do not take this for the whole story."
+    )
 
 
 def _opposed(constants: dict[str, float]) -> str:
@@ -143,6 +149,8 @@ def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         _unlisted_way(found.location),
         _closest(found),
         "The force profile is the answer: see where it stands out and how much work it does.",
+        _improvement(document),
+        _still_fired(found.profile.check) if found.profile is not None else "",
     ]
 
 

@@ -28,6 +28,7 @@ from skred.physics.mechanisms.stretches import OPPOSED_SHARE, is_opposed
 from skred.physics.terrain import Terrain
 
 FloatArray = NDArray[np.float64]
+Start = tuple[FloatArray, tuple[Population, FloatArray]]
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ class Kind:
         Typical standard deviation of the profile; `PRIORS` are relative to it.
     share : float
         Prior probability among the kinds.
+    equation : str
+        Its term, f the profile and U_0 the typical speed.
     """
 
     column: Column
@@ -52,6 +55,7 @@ class Kind:
     unit: str
     amplitude: float
     share: float
+    equation: str
 
 
 @dataclass(frozen=True)
@@ -84,10 +88,10 @@ class Prior:
 
 
 KINDS = (
-    Kind(Column.CONSTANT, False, "m s-2", 0.8, 0.5 * (1.0 - OPPOSED_SHARE)),
-    Kind(Column.QUADRATIC, False, "m-1", 1.5e-3, 0.5 * (1.0 - OPPOSED_SHARE)),
+    Kind(Column.CONSTANT, False, "m s-2", 0.8, 0.5 * (1.0 - OPPOSED_SHARE), "-f(s)"),
+    Kind(Column.QUADRATIC, False, "m-1", 1.5e-3, 0.5 * (1.0 - OPPOSED_SHARE), "-f(s) U^2"),
     # U^2 varies by a third or so between fronts: the same work, then, as without opposition.
-    Kind(Column.QUADRATIC, True, "m-1", 4.5e-3, OPPOSED_SHARE),
+    Kind(Column.QUADRATIC, True, "m-1", 4.5e-3, OPPOSED_SHARE, "-f(s) (U^2 - U_0^2)"),
 )
 AMPLITUDES, LENGTHS_M = (1.0 / 3.0, 1.0, 3.0), (40.0, 120.0, 400.0)
 """Amplitudes in typical ones, and correlation lengths, all of equal prior probability. With one amplitude, a
@@ -187,7 +191,7 @@ class _Peak:
     information: FloatArray
 
 
-def fit_profile(base: Base, kind: Kind, near: Curve | None = None) -> Profile:
+def fit_profile(base: Base, kind: Kind, near: Start | None = None, first: Prior | None = None) -> Profile:
     """Fit the profile by Gauss-Newton steps around the events' modes; its evidence with nodes at the top.
 
     Fitted under one prior, its evidence under all of them follows from the likelihood's slope and curvature
@@ -195,9 +199,11 @@ def fit_profile(base: Base, kind: Kind, near: Curve | None = None) -> Profile:
 
     Parameters
     ----------
-    near : Curve, optional
-        A listed mechanism in the kind's column: where to begin, beside no force. Far from what was
+    near : (values, (Population, points)), optional
+        A profile, population and events' points: where to begin, beside no force. Far from what was
         recorded, robust errors see outliers and no direction to go.
+    first : Prior, optional
+        Under which to climb first.
     """
     at = knots(base.setting)
     # Nothing like everything else, so that what is left of integration errors is the same there.
@@ -205,10 +211,10 @@ def fit_profile(base: Base, kind: Kind, near: Curve | None = None) -> Profile:
     nothing = _fit_at(base, kind, at, none, (base.population, base.fit.points))
     starts = [_peak(base, kind, at, none, nothing)]
     if near is not None:
-        starts.append(_peak(base, kind, at, *_begin(base, kind, at, near)))
+        starts.append(_peak(base, kind, at, near[0], _fit_at(base, kind, at, *near)))
     height = nothing.found.log_evidence
     seen = _Seen(height, at, priors_of(kind, at))
-    next_one: Prior | None = Prior(kind.amplitude, NEAR_M)
+    next_one: Prior | None = first or Prior(kind.amplitude, NEAR_M)
     while next_one is not None and len(seen.peaks) < _PRIORS_TRIED:
         cover = next_one.cover(at)
         start = _highest([*starts, *seen.peaks.values()], cover)
@@ -315,14 +321,14 @@ def _start(base: Base, fit: Fit) -> tuple[Population, FloatArray]:
     return fit.found.population(len(base.law.mechanisms)), fit.points
 
 
-def _begin(base: Base, kind: Kind, at: FloatArray, near: Curve) -> tuple[FloatArray, Fit]:
-    """A listed mechanism's own profile at its best strength, at the knots, and the fit with it in."""
-    top = int(np.argmax(near.log_evidence))
+def as_profile(base: Base, kind: Kind, near: Curve) -> Start:
+    """A listed mechanism that enters like a kind, at its best strength: values at the knots, and its fit."""
+    at, top = knots(base.setting), int(np.argmax(near.log_evidence))
     edge = np.asarray(base.setting.terrain.edge_s_m)
     profile = near.direction.profiles[near.direction.columns.index(kind.column)]
     cells = hats(base.setting.terrain, at) * np.diff(edge)
     values = near.strengths[top] * (cells @ profile) / np.maximum(cells.sum(axis=1), 1e-9)
-    return values, _fit_at(base, kind, at, values, _start(base, near.fits[top]))
+    return values, _start(base, near.fits[top])
 
 
 def _fit_at(
@@ -345,6 +351,11 @@ def _peak(base: Base, kind: Kind, at: FloatArray, values: FloatArray, fit: Fit) 
     found = efficient_scores(around, base.rows, population, mean_prior(base.law))
     n_before = len(base.directions)
     return _Peak(values, fit, found.score[0, n_before:], found.information[0, n_before:, n_before:])
+
+
+def most_probable(profiles: Sequence[Profile]) -> Profile:
+    """The profile of the most probable kind."""
+    return max(profiles, key=lambda one: one.log_bayes_factor + math.log(one.kind.share))
 
 
 def log_evidence_of(profiles: Sequence[Profile]) -> float:

@@ -152,7 +152,8 @@ def log_scores(predictor: Predictor, campaign: Campaign, seed: int = 0) -> Float
     """
     extension = extension_of(predictor, campaign)
     try:
-        densities = _densities(predictor, extension, seed)
+        draws = predictor.means, predictor.factors, predictor.strengths
+        densities = log_densities(extension, campaign_rows(extension), *draws, seed)
     except np.linalg.LinAlgError as error:
         raise InputError("the predictor's draws are no populations: it is damaged") from error
     scores: FloatArray = logsumexp(densities, axis=0) - np.log(len(densities))
@@ -228,10 +229,18 @@ def _direction(term: Term, problem: HierarchicalProblem, law: Law) -> Direction:
         raise InputError(f"the predictor's {term.mechanism} has a shape that it cannot have") from error
 
 
-def _densities(predictor: Predictor, extension: Extension, seed: int) -> FloatArray:
-    """Log density of each event for each draw, its own strengths integrated out, (n_draws, n_events)."""
-    rows = campaign_rows(extension)
-    means, factors, strengths = predictor.means, predictor.factors, predictor.strengths
+def log_densities(
+    extension: Extension, rows: Rows, means: FloatArray, factors: FloatArray, strengths: FloatArray, seed: int
+) -> FloatArray:
+    """Log density of each row's event for each draw, its own strengths integrated out, (n_draws, n_rows).
+
+    Parameters
+    ----------
+    means, factors : (n_draws, n_base) and (n_draws, n_base, n_base) arrays
+        Of populations.
+    strengths : (n_draws, n_directions) array
+        Of what is added.
+    """
     covariances = np.einsum("nij,nkj->nik", factors, factors)
     typical = Population(means.mean(axis=0)[None], covariances.mean(axis=0)[None])
     rng = np.random.default_rng([seed, 35])

@@ -13,6 +13,7 @@ from skred.diagnosis.held_out import errors, paired
 from skred.diagnosis.identify import Told
 from skred.diagnosis.next_sensor import next_sensor
 from skred.diagnosis.odds import NOTHING
+from skred.diagnosis.profile_law import ProfileLaw
 from skred.diagnosis.race import Race
 from skred.diagnosis.statement import statement
 from skred.physics.mechanisms.stretches import equation_of
@@ -180,6 +181,22 @@ def _left(found: Diagnosis) -> dict[str, Any] | None:
     }
 
 
+def _profile(law: ProfileLaw) -> dict[str, Any]:
+    """The force profile at its knots, its equation's f(s); linear between, nothing outside."""
+    profile = law.profile
+    return {
+        "equation": profile.kind.equation,
+        "unit": profile.kind.unit,
+        "s_m": profile.knots_m.tolist(),
+        "mean": profile.mean.tolist(),
+        "sd": np.sqrt(np.diag(profile.covariance)).tolist(),
+        "prior_sd": profile.prior.amplitude,
+        "correlation_length_m": profile.prior.length_m,
+        "centre_m": profile.prior.centre_m,
+        "log_bayes_factor": profile.log_bayes_factor,
+    }
+
+
 def _more(found: Diagnosis) -> dict[str, Any]:
     """Keys beyond the format's."""
     more: dict[str, Any] = {"reason": found.cannot or None, "seconds": found.seconds}
@@ -193,6 +210,10 @@ def _more(found: Diagnosis) -> dict[str, Any]:
         more["error_model"] = problem.error_model.id
         more["p_value_augmented"] = found.steps[-1].check.p_value
         more["refitted_events"] = list(found.after.refitted) if found.after is not None else []
+    if found.profile is not None:
+        more["error_model"] = found.profile.error_model
+        more["p_value_augmented"] = found.profile.check.p_value
+        more["profile"] = _profile(found.profile)
     if found.table is not None:
         more["identifiability"] = [
             {

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
     from skred.diagnosis.diagnose import Diagnosis, Step
+    from skred.diagnosis.unlisted import Profile
     from skred.physics.law import Law
     from skred.work.calibrate import Calibration
 
@@ -49,6 +50,8 @@ def equations(found: Diagnosis) -> dict[str, Any]:
         else:
             terms.append(formula("- " + equation_of(mechanism, shape).removeprefix("-")))
     right, relation = _right(found.law)
+    if found.profile is not None:
+        terms.append(formula("- " + found.profile.profile.kind.equation.removeprefix("-")))
     return {
         "head": formula(_HEAD),
         "base": formula(right),
@@ -74,6 +77,8 @@ def symbol_rows(found: Diagnosis) -> list[dict[str, Any]]:
         rows.append(_row(strength.symbol, strength.unit, meaning, mechanism.reference, mechanism.doi))
     for number, step in enumerate(found.steps):
         rows += _added_rows(found, step, number)
+    if found.profile is not None:
+        rows += _profile_rows(found.profile.profile)
     text = found.law.equation + "".join(step.entrants[0].mechanism.equation for step in found.steps)
     present = set(re.findall(r"[A-Za-z]+", text)) | {"s", "U"}
     return rows + [_row(*one) for one in _SIMPLE if one[0] in present]
@@ -130,6 +135,16 @@ def _added_rows(found: Diagnosis, step: Step, number: int) -> list[dict[str, Any
         rows.append(_row(_short(symbol), unit.rstrip("]") or "1", f"{symbol}, here {value:g}", new=True))
     if shape.covariate:
         rows.append(_row("x", "1", f"{shape.covariate}, standardised", new=True))
+    return rows
+
+
+def _profile_rows(profile: Profile) -> list[dict[str, Any]]:
+    """The force profile's symbols."""
+    first, last = profile.knots_m[0], profile.knots_m[-1]
+    what = f"the force profile: linear between {len(profile.knots_m)} knots from {first:.0f} to {last:.0f} m"
+    rows = [_row("f(s)", profile.kind.unit, what, new=True)]
+    if profile.kind.opposed:
+        rows.append(_row("U_0", "m s-1", "typical speed of the base law's fronts there", new=True))
     return rows
 
 

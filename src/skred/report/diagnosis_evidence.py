@@ -46,6 +46,8 @@ _LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 def check_figure(found: Diagnosis) -> Figure:
     """The check's statistic of clean campaigns, and of the recordings; again for the augmented laws."""
     checks = [(found.law.id, found.check), *((_with(found, k), s.check) for k, s in enumerate(found.steps))]
+    if found.profile is not None:
+        checks.append((f"{found.law.id} + the force profile", found.profile.check))
     shown = [(name, check) for name, check in checks if check is not None]
     title = "Is anything wrong? The recordings against clean campaigns simulated from the law"
     figure = new_figure(3.3, title)

@@ -54,7 +54,7 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
     """Render the report of a diagnosis, see `skred.report.diagnosis.render_diagnosis`."""
     campaign = found.problem.campaign
     sections = dict(_SECTIONS)
-    if not found.steps:
+    if not found.steps and found.profile is None:
         sections["equation"] = "The equation"
         sections["before-after"] = "How well avalanches left out are predicted"
     locked, folds = unseen.locked(document), unseen.outer_folds(document)
