@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from diagnosis_report_cases import diagnosis
 
 from skred.diagnosis.diagnose import Left
 from skred.diagnosis.omnibus import Omnibus
 from skred.diagnosis.statement import statement
+from skred.diagnosis.strength import FORM, strength_of
 from skred.diagnosis.verdict import verdict
 from skred.physics.mechanisms.stretches import U_1, U_2
+from skred.report.draws import chains_of
 
 
 def document(probability: dict[str, float]) -> dict:
@@ -88,3 +91,15 @@ def test_the_force_profile_let_in_is_told() -> None:
     failed = replace(found.profile, check=Omnibus(30.0, found.profile.check.simulated))
     assert "still fails the check" in verdict(replace(found, profile=failed))["statement"]
     assert "still fails the check" not in document["statement"]
+
+
+@pytest.mark.parametrize("kind", ["sensor", "tie"])
+def test_what_the_form_of_a_term_is_uncertain_by_is_in_the_strength(kind: str) -> None:
+    """Of physics, not of instruments: a factor is a factor."""
+    found = diagnosis(kind)
+    (step,) = found.steps
+    mean, sd = strength_of(found.steps, 0)
+    draws = chains_of(step.calibration.tree, step.calibration.problem.added[0].name)
+    shapes = step.entrants[0].strength_between_shapes()
+    form = 0.0 if kind == "sensor" else FORM * mean
+    assert sd == pytest.approx(float(np.sqrt(draws.std(ddof=1) ** 2 + shapes**2 + form**2)))

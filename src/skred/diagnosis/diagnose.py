@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -150,19 +148,6 @@ class Diagnosis:
     after: HeldOut | None = None
     left: Left = Left()
     seconds: dict[str, float] = field(default_factory=dict)
-
-
-def strength_of(steps: Sequence[Step], number: int) -> tuple[float, float]:
-    """Mean and standard deviation of an added strength, as the last calibration has it.
-
-    Shrunk by its prior. The calibration holds its shape fixed; what the shapes in the race differ by is in
-    the standard deviation too.
-    """
-    calibration, entrant = steps[-1].calibration, steps[number].entrants[0]
-    problem: Any = calibration.problem
-    name = problem.added[number].name
-    draws = np.asarray(calibration.tree["posterior"].to_dataset()[name].values)
-    return float(draws.mean()), math.hypot(float(draws.std(ddof=1)), entrant.strength_between_shapes())
 
 
 def too_little(problem: HierarchicalProblem) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from skred.diagnosis.decide import alarmed
-from skred.diagnosis.diagnose import Diagnosis, strength_of
+from skred.diagnosis.diagnose import Diagnosis
 from skred.diagnosis.entrant import Entrant
 from skred.diagnosis.held_out import errors, paired
 from skred.diagnosis.identify import Told
@@ -16,6 +16,7 @@ from skred.diagnosis.odds import NOTHING
 from skred.diagnosis.profile_law import ProfileLaw
 from skred.diagnosis.race import Race
 from skred.diagnosis.statement import statement
+from skred.diagnosis.strength import strength_of
 from skred.physics.mechanisms.stretches import equation_of
 
 _NO_LIMIT = 20.0

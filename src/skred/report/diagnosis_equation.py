@@ -97,7 +97,7 @@ def _row(symbol: str, unit: str, meaning: str, reference: str = "", doi: str = "
 def _added_rows(found: Diagnosis, step: Step, number: int) -> list[dict[str, Any]]:
     entrant = step.entrants[0]
     mechanism, shape = entrant.mechanism, entrant.best.shape
-    from skred.diagnosis.diagnose import strength_of
+    from skred.diagnosis.strength import strength_of
 
     mean, sd = strength_of(found.steps, number)
     decimals = decimals_for(sd)
