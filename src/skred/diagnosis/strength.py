@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 FORM = 0.3
 """Relative standard deviation of a physical strength for the form of its term: edges, exponents, supply that
-real forces have otherwise. Set on 28 opened trials, whose true forms differ on purpose: 90 % intervals held 16
-of the true strengths without it, 24 with it."""
+real forces have otherwise. Set on 28 opened trials, whose true forms differ on purpose: 90 % intervals held
+16 of the true strengths without it, 24 with it."""
 
 
 def strength_of(steps: Sequence[Step], number: int) -> tuple[float, float]:
