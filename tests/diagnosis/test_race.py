@@ -16,7 +16,7 @@ from skred.diagnosis import race
 from skred.diagnosis.curves import Base, Curve, curve, curve_at, curve_near, first_look
 from skred.diagnosis.event_nodes import FINE, FRONTS, ROUGH
 from skred.diagnosis.race import _entrants, _first_looks, _leading, _that_count, with_errors
-from skred.diagnosis.screen import candidates
+from skred.diagnosis.screen import Screen, candidates
 from skred.diagnosis.threads import threads
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Direction, Shape
@@ -96,12 +96,13 @@ def test_under_another_error_model_each_mechanism_is_looked_at_until_the_rest_is
     now = [made("obstacle", 100.0 * k, one) for k, one in enumerate([12.0, 25.0, 40.0])]
     looked: list[int] = []
 
-    def curve(base: Any, mechanism: Any, shape: Any, budget: Any) -> Curve:
+    def curve(base: Any, mechanism: Any, shape: Any, budget: Any, linear: Any) -> Curve:
         looked.append(int(shape.s_from_m / 100.0))
         return now[looked[-1]]
 
     todo = [SimpleNamespace(mechanism=one.mechanism, shape=one.shape) for one in now]
     monkeypatch.setattr(race, "curve", curve)
+    monkeypatch.setattr(race, "_linear_strengths", lambda base: {})
     monkeypatch.setattr(race, "candidates", lambda setting, ties: todo)
     with ThreadPoolExecutor(1) as pool:
         told: list[tuple[int, int]] = []
@@ -155,3 +156,36 @@ def test_other_error_models_start_from_any() -> None:
 def test_threads_are_as_many_as_allowed(monkeypatch: pytest.MonkeyPatch, said: str, n: int | None) -> None:
     monkeypatch.setenv("OMP_NUM_THREADS", said)
     assert threads() == (n or os.cpu_count())
+
+
+def test_a_first_look_sees_strengths_far_below_the_grid() -> None:
+    """Many recordings tell a drag of a tenth of its prior's scale; the grid begins at a fifth."""
+    base = base_of(trial(1031, "dense", "turbulent_drag", "constant", 9.5).campaign, "constant")
+    job = next(one for one in candidates(base.setting) if one.mechanism.id == "turbulent_drag")
+    screen = Screen(base.problem, base.law, base.setting)
+    found = screen.strengths_found(screen.scores(base.rows, base.fit.points, base.population))
+    linear = found[job.mechanism.id, job.shape]
+    assert job.mechanism.added is not None and 0.0 < linear < 0.2 * job.mechanism.added.scale
+    rough = curve(base, job.mechanism, job.shape, ROUGH, linear)
+    settled = curve_near(base, job.mechanism, job.shape, rough, ROUGH)
+    assert settled.log_bayes_factor > 20.0
+    assert rough.log_bayes_factor == pytest.approx(settled.log_bayes_factor, abs=5.0)
+    blind = curve(base, job.mechanism, job.shape, ROUGH)
+    assert blind.log_bayes_factor < settled.log_bayes_factor - 5.0
+    assert settled.moments[0] == pytest.approx(linear, abs=6.0 * settled.moments[1])
+
+
+def test_moments_of_a_curve_on_uneven_strengths(base: Base) -> None:
+    """A normal likelihood, narrow beside the grid, under a half-normal prior."""
+    drag = mechanisms()["turbulent_drag"]
+    assert drag.added is not None
+    scale, mean, sd = drag.added.scale, 0.1 * drag.added.scale, 0.01 * drag.added.scale
+    near = mean + sd * np.linspace(-4.0, 4.0, 9)
+    strengths = np.concatenate([[0.0], near, scale * np.array([0.2, 0.6, 1.2, 3.5])])
+    strengths.sort()
+    heights = 0.5 * ((mean / sd) ** 2 - ((strengths - mean) / sd) ** 2)
+    direction = drag.added.direction(base.setting, Shape())
+    one = Curve(drag, Shape(), direction, strengths, heights, (base.fit,) * len(strengths))
+    assert one.moments[0] == pytest.approx(mean, rel=0.01) and one.moments[1] == pytest.approx(sd, rel=0.05)
+    exact = 50.0 + np.log(2.0 * sd / scale) - 0.5 * 0.1**2
+    assert one.log_bayes_factor == pytest.approx(exact, abs=0.1)

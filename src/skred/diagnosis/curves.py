@@ -35,8 +35,10 @@ _PASSES = 4
 _ROUNDS, _MOST_ROUNDS = 2, 6
 _FAR_MEAN, _FAR_SPREAD = 0.7, 0.35
 """Change of a population after which nodes are made anew: of its mean in spreads, of a log spread."""
-_FINE = 401
-"""Points at which a curve is integrated."""
+_BETWEEN = 60
+"""Points at which a curve is integrated between each two strengths."""
+_OUTSIDE = 2.2
+"""A strength beyond the one that the linear model finds, relative to it, where no other is."""
 _DEEP = 40.0
 _FAR_OFF, _FAR_SHARE = 4.0, 0.02
 """Standard deviations beyond which a reading is far off, and the share of such readings that is many."""
@@ -212,7 +214,9 @@ class Curve:
         added = self.mechanism.added
         assert added is not None
         scale = added.scale if scale is None else scale
-        strengths = np.linspace(self.strengths[0], self.strengths[-1], _FINE)
+        # As many between each two that were computed: these lie close where the curve is narrow.
+        parts = np.linspace(self.strengths[:-1], self.strengths[1:], _BETWEEN, endpoint=False, axis=1)
+        strengths = np.append(parts.ravel(), self.strengths[-1])
         floor = self.log_evidence.max() - _DEEP
         heights = np.maximum(self.log_evidence, floor)
         spline = Akima1DInterpolator(self.strengths, heights, method="makima")
@@ -236,7 +240,10 @@ class Curve:
     def moments(self) -> tuple[float, float]:
         """Posterior mean and standard deviation of the strength, if the mechanism is there."""
         strengths, log_density = self.fine()
-        weights = np.exp(log_density - log_density.max())
+        width = np.diff(strengths)
+        weights = (
+            np.exp(log_density - log_density.max()) * 0.5 * (np.append(width, 0.0) + np.insert(width, 0, 0.0))
+        )
         weights /= weights.sum()
         mean = float(weights @ strengths)
         return mean, math.sqrt(max(float(weights @ (strengths - mean) ** 2), 0.0))
@@ -257,15 +264,27 @@ def first_look(base: Base) -> Budget:
     return FRONTS if far[readings.observed].mean() > _FAR_SHARE else ROUGH
 
 
-def curve(base: Base, mechanism: Mechanism, shape: Shape, budget: Budget) -> Curve:
+def curve(
+    base: Base, mechanism: Mechanism, shape: Shape, budget: Budget, linear: float | None = None
+) -> Curve:
     """Evidence along the strength of a mechanism, on a grid over its prior.
 
-    With the budget ``ROUGH`` quick enough for every place, and wrong by nats where fronts stop near sensors.
+    Many recordings tell strengths far below the prior's scale; the grid alone would then miss where the
+    evidence is. With the budget ``ROUGH`` quick enough for every place, and wrong by nats where fronts stop
+    near sensors.
+
+    Parameters
+    ----------
+    linear : float, optional
+        The most probable strength in the linear model around no such mechanism.
     """
     added = mechanism.added
     assert added is not None
     grid = added.scale * np.array(_GRID)
     strengths = np.concatenate([-grid[::-1], grid]) if added.either_sign else grid
+    if linear is not None and (added.either_sign or linear > 0.0):
+        more = [linear] if abs(linear) * _OUTSIDE > grid[0] else [linear, _OUTSIDE * linear]
+        strengths = np.append(strengths, more)
     return curve_at(base, mechanism, shape, strengths, budget)
 
 

@@ -24,7 +24,7 @@ from skred.diagnosis.extension import Extension, extended
 from skred.diagnosis.marginal import evidence, importance_evidence
 from skred.diagnosis.modes import campaign_rows, event_modes
 from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, probabilities
-from skred.diagnosis.screen import candidates
+from skred.diagnosis.screen import Screen, candidates
 from skred.diagnosis.threads import threads
 from skred.diagnosis.unlisted import KINDS, Kind, Profile, alike, as_profile, fit_profile, log_evidence_of
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
@@ -188,9 +188,11 @@ def _first_looks(
 ) -> list[Curve]:
     """A rough curve for each candidate; those `before`, by another error model, where they cannot count."""
     todo, curves, looked = candidates(base.setting, ties=False), dict(enumerate(before)), set[int]()
+    linear = _linear_strengths(base)
 
     def look(number: int) -> Curve:
-        return curve(base, todo[number].mechanism, todo[number].shape, budget)
+        mechanism, shape = todo[number].mechanism, todo[number].shape
+        return curve(base, mechanism, shape, budget, linear.get((mechanism.id, shape)))
 
     while jobs := sorted(set(_that_count(curves) if curves else range(len(todo))) - looked):
         looked |= set(jobs)
@@ -198,6 +200,12 @@ def _first_looks(
             curves[number] = one
             tell(len(todo) - len(jobs) + done, len(todo))
     return [curves[number] for number in range(len(todo))]
+
+
+def _linear_strengths(base: Base) -> dict[tuple[str, Shape], float]:
+    """Roughly how strong the candidates are that stand out."""
+    screen = Screen(base.problem, base.law, base.setting, base.directions, base.strengths)
+    return screen.strengths_found(screen.scores(base.rows, base.fit.points, base.population))
 
 
 def _that_count(curves: Mapping[int, Curve]) -> list[int]:
