@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skred.diagnosis.decide import DOUBTFUL, E_LIMIT, decide
+from skred.diagnosis.decide import ALARMS, E_LIMIT, decide
 from skred.diagnosis.held_out import K_LIMIT, paired
 from skred.diagnosis.omnibus import LIMIT
 from skred.diagnosis.unlisted import AMPLITUDES, KINDS, LENGTHS_M, NEAR_M
@@ -97,7 +97,7 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
             profile_lengths=[f"{length:.0f}" for length in LENGTHS_M],
             profile_window=f"{2.0 * NEAR_M:.0f}",
             limits={
-                "p": LIMIT, "doubtful": DOUBTFUL, "e": E_LIMIT, "k": K_LIMIT, "r_hat": R_HAT_LIMIT,
+                "p": LIMIT, "doubtful": ALARMS[1][0], "sure": ALARMS[1][1], "e": E_LIMIT, "k": K_LIMIT, "r_hat": R_HAT_LIMIT,
                 "ess": ESS_LIMIT, "practical": PRACTICAL_DIFFERENCE,
             },
             too_few=_too_few(found),
