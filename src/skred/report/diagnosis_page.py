@@ -97,8 +97,8 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
             profile_lengths=[f"{length:.0f}" for length in LENGTHS_M],
             profile_window=f"{2.0 * NEAR_M:.0f}",
             limits={
-                "p": LIMIT, "doubtful": ALARMS[1][0], "sure": ALARMS[1][1], "e": E_LIMIT, "k": K_LIMIT, "r_hat": R_HAT_LIMIT,
-                "ess": ESS_LIMIT, "practical": PRACTICAL_DIFFERENCE,
+                "p": LIMIT, "doubtful": ALARMS[1][0], "sure": ALARMS[1][1], "e": E_LIMIT, "k": K_LIMIT,
+                "r_hat": R_HAT_LIMIT, "ess": ESS_LIMIT, "practical": PRACTICAL_DIFFERENCE,
             },
             too_few=_too_few(found),
             dropped=_dropped(found),
