@@ -208,10 +208,11 @@ def _left(found: Mapping[str, Found]) -> str:
     lines = []
     for name in ("coulomb", "pcm", "constant"):
         one = found[name]
-        if not one["mechanisms"]:
+        if not one["mechanisms"] and not one.get("profile"):
             lines.append(f"- `{name}`: nothing was let in ({one['verdict']}).")
             continue
         names = " and ".join(row["id"] for row in one["mechanisms"])
+        names = names or "the force profile (fitted anew without each)"
         held = one["held_out"]
         runout = f"{held['rmse_runout_before']:.0f} to {held['rmse_runout_after']:.0f} m"
         lines.append(
