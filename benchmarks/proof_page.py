@@ -45,7 +45,8 @@ def add(folder: Path) -> None:
     target = RECORD / str(ledger["seed"])
     names = [entry["trial"] for entry in ledger["trials"]]
     target.mkdir(parents=True, exist_ok=True)
-    write_json(target / "ledger.json", ledger)
+    # As it was published, to the last byte.
+    shutil.copyfile(folder / "ledger.json", target / "ledger.json")
     sealed = {name: json.loads((folder / "sealed" / f"{name}.json").read_text("utf-8")) for name in names}
     answers: dict[str, dict[str, Any]] = {}
     for method in sorted((folder / "answers").iterdir()):
