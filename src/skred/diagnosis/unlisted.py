@@ -194,8 +194,8 @@ class _Peak:
 def fit_profile(base: Base, kind: Kind, near: Start | None = None, first: Prior | None = None) -> Profile:
     """Fit the profile by Gauss-Newton steps around the events' modes; its evidence with nodes at the top.
 
-    Fitted under one prior, its evidence under all of them follows from the likelihood's slope and curvature
-    there; it is then fitted under the most probable one.
+    Climbed to under one prior after the other, as long as those left could matter; the evidence under them
+    follows from the likelihood's slope and curvature at the tops. The most probable one is kept.
 
     Parameters
     ----------
