@@ -109,10 +109,9 @@ def _check(base: Base, profile: Profile, most: int, seed: int) -> Omnibus:
 def _left_out(base: Base, profile: Profile, event: int, seed: int) -> tuple[_Event, _Event]:
     """One avalanche as the others have it, without the profile and with it."""
     rest = _without(base, event)
-    rng = np.random.default_rng([seed, 53, event])
-    plain = extended(base.problem, base.law, base.directions)
+    rng = _rng(seed, event)
+    before = _before(base, rest, event, rng)
     own = np.tile(base.strengths, (_DRAWS, 1))
-    before = _event(base, plain, event, _draws(rest, plain, rest.fit, base.strengths, own, rng), rng)
     others = np.flatnonzero(base.rows.event != event)
     population = profile.fit.found.population(len(base.law.mechanisms))
     near = profile.mean, (population, profile.fit.points[others])
@@ -124,6 +123,23 @@ def _left_out(base: Base, profile: Profile, event: int, seed: int) -> tuple[_Eve
     middle = np.append(base.strengths, again.mean)
     draws = _draws(rest, wide, again.fit, middle, np.column_stack([own, values]), rng)
     return before, _event(base, wide, event, draws, rng)
+
+
+def base_left_out(base: Base, seed: int) -> HeldOut:
+    """Each avalanche as the base law has it, fitted to the others."""
+    events = range(len(base.rows.event))
+    return _held_out(base, [_before(base, _without(base, k), k, _rng(seed, k)) for k in events])
+
+
+def _rng(seed: int, event: int) -> np.random.Generator:
+    return np.random.default_rng([seed, 53, event])
+
+
+def _before(base: Base, rest: Base, event: int, rng: np.random.Generator) -> _Event:
+    """One avalanche as the base law has it that was fitted to the rest."""
+    plain = extended(base.problem, base.law, base.directions)
+    own = np.tile(base.strengths, (_DRAWS, 1))
+    return _event(base, plain, event, _draws(rest, plain, rest.fit, base.strengths, own, rng), rng)
 
 
 def _without(base: Base, event: int) -> Base:
