@@ -68,7 +68,7 @@ def strengths(pairs: Sequence[Pair]) -> dict[str, Any]:
     the true strength is itself that of a stand-in.
     """
     named = [pair for pair in pairs if pair.right_name]
-    compared = [(pair, one) for pair in named if (one := _comparable(pair)) is not None]
+    compared = [(pair, one) for pair in named if (one := comparable(pair)) is not None]
     ids = sorted({str(one["id"]) for _, one in compared})
     relative = [
         (pair.number("strength", "mean") or 0.0) / float(one["strength"])
@@ -86,7 +86,7 @@ def strengths(pairs: Sequence[Pair]) -> dict[str, Any]:
     }
 
 
-def _comparable(pair: Pair) -> Mapping[str, Any] | None:
+def comparable(pair: Pair) -> Mapping[str, Any] | None:
     """The named effect as the truth has it, if its strength and the stated one are the same quantity."""
     truth = next(one for one in pair.hidden_effects if one["id"] == pair.name)
     words = STRENGTHS.get(str(pair.name))
