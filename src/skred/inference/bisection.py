@@ -55,7 +55,7 @@ class Resolution:
         return Resolution(0.5 * self.change, self.depth + 8.0, 0.25 * self.share, 0.5 * self.narrow)
 
 
-COARSE = Resolution(change=4.0, depth=25.0, share=1e-2, narrow=2e-2)
+COARSE = Resolution(change=6.0, depth=14.0, share=1e-2, narrow=4e-2)
 """Enough to find out where the population is."""
 
 

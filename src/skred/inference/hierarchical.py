@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign
-from skred.inference.bisection import COARSE, Fronts, Releases, Resolution
+from skred.inference.bisection import COARSE, Envelope, Fronts, Releases, Resolution
 from skred.inference.error_model import (
     DEFAULT_ERRORS,
     ERROR_MODELS,
@@ -29,7 +29,7 @@ from skred.inference.population import (
     spread_parameters,
 )
 from skred.inference.problem import Problem
-from skred.inference.rough_population import RoughPopulation, rough_population
+from skred.inference.rough_population import RoughPopulation, envelope_around, rough_population
 from skred.inference.surface import Surfaces, build_surfaces
 from skred.physics.geometry import sensor_table
 from skred.physics.kernel import simulate
@@ -209,29 +209,36 @@ class HierarchicalProblem(Problem):
         """Surfaces of all events under a law, made once: coarsely, then finely where it matters."""
         key = _key(mechanisms)
         if key not in self._surfaces:
-            self._surfaces[key] = self._resolve(mechanisms, self.fronts(mechanisms), self.fineness)
+            envelope = self._found(mechanisms).envelope(self.fineness)
+            self._surfaces[key] = self._resolve(mechanisms, self.fronts(mechanisms), self.fineness, envelope)
         return self._surfaces[key]
 
     def finer(self) -> HierarchicalProblem | None:
         """The same with events resolved finer; None where they are already."""
         return replace(self, fineness=2) if self.fineness == 1 else None
 
-    def _resolve(self, mechanisms: Sequence[Mechanism], fronts: Fronts, fineness: int) -> Surfaces:
-        """Surfaces with patches `fineness` times smaller, and box and envelope wider, than usual (1)."""
+    def _resolve(
+        self, mechanisms: Sequence[Mechanism], fronts: Fronts, fineness: int, envelope: Envelope
+    ) -> Surfaces:
+        """Surfaces with patches `fineness` times smaller, and a box wider, than usual (1)."""
         resolution = Resolution()
         for _ in range(fineness - 1):
             resolution = resolution.finer()
-        scale = np.log([mechanism.strength.prior_scale for mechanism in mechanisms])
-        wider = _WIDER_CHECK * (fineness - 1.0)
-        box = np.column_stack([scale - _BELOW_SCALE - wider, scale + _ABOVE_SCALE + wider])
-        n = len(mechanisms)
         resolution = replace(resolution, narrow=resolution.narrow * self._sharpness)
+        box = _box(mechanisms, _WIDER_CHECK * (fineness - 1.0))
+        return build_surfaces(fronts, box, resolution, self._found(mechanisms).cell / fineness, envelope)
+
+    def _found(self, mechanisms: Sequence[Mechanism]) -> RoughPopulation:
+        """Where the population of a law is, roughly."""
         key = _key(mechanisms)
         if key not in self._rough:
-            coarse = build_surfaces(self.fronts(mechanisms), box, COARSE, np.full(n, _COARSE_CELL))
-            self._rough[key] = rough_population(coarse, scale + _MEDIAN_LOG_MEAN, np.full(n, _MEDIAN_LOG_SD))
-        rough = self._rough[key]
-        return build_surfaces(fronts, box, resolution, rough.cell / fineness, rough.envelope(fineness))
+            n = len(mechanisms)
+            mean, sd = _log_scales(mechanisms) + _MEDIAN_LOG_MEAN, np.full(n, _MEDIAN_LOG_SD)
+            coarse = build_surfaces(
+                self.fronts(mechanisms), _box(mechanisms), COARSE, np.full(n, _COARSE_CELL)
+            )
+            self._rough[key] = rough_population(coarse, mean, sd)
+        return self._rough[key]
 
     @cached_property
     def _sharpness(self) -> float:
@@ -245,7 +252,10 @@ class HierarchicalProblem(Problem):
         """Differences of event log densities to a much finer integration, (n, n_checked_events).
 
         Of at most 24 events drawn at random, fewer where they take long; positive where the usual is larger.
+        The finer one is needed at these populations only, and resolved around them: around all that a
+        chain might visit, as the usual one is, it takes several times as long.
         """
+        means, factors = population_of(law, samples)
         n_events = self.campaign.n_events
         runs_each = _FINER_COSTS * self.surfaces(law.mechanisms).n_runs / n_events
         n_checked = int(np.clip(_CHECKED_RUNS / runs_each, _LEAST_CHECKED, _CHECKED_EVENTS))
@@ -262,10 +272,22 @@ class HierarchicalProblem(Problem):
             ),
             releases=releases._replace(mean=releases.mean[chosen], sd=releases.sd[chosen]),
         )
-        finer = self._resolve(law.mechanisms, fronts, self.fineness + 1)
+        finer = self._resolve(law.mechanisms, fronts, self.fineness + 1, envelope_around(means, factors))
         exact = self._log_likelihood(finer, law, samples)
         difference: FloatArray = self.log_likelihood(law, samples)[:, chosen] - exact
         return difference
+
+
+def _log_scales(mechanisms: Sequence[Mechanism]) -> FloatArray:
+    """Logarithms of the scales of the strengths' priors."""
+    scales: FloatArray = np.log([mechanism.strength.prior_scale for mechanism in mechanisms])
+    return scales
+
+
+def _box(mechanisms: Sequence[Mechanism], wider: float = 0.0) -> FloatArray:
+    """Where the logarithm of each strength is looked for, (n_strengths, 2)."""
+    scale = _log_scales(mechanisms)
+    return np.column_stack([scale - _BELOW_SCALE - wider, scale + _ABOVE_SCALE + wider])
 
 
 def _key(mechanisms: Sequence[Mechanism]) -> tuple[str, ...]:

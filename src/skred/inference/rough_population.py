@@ -22,6 +22,8 @@ _STARTING_SPREAD = 0.3
 _PRIOR_EVENTS = 2.0
 _REACH = 2.5
 """How many posterior standard deviations away a population may be."""
+_AROUND = 2.0
+"""How much wider, in variance, than the mean over some populations an envelope of them is."""
 _CELL_IN_SPREADS, _LEAST_CELL, _LARGEST_CELL = 1.0, 0.02, 0.25
 
 
@@ -94,6 +96,23 @@ def rough_population(surfaces: Surfaces, prior_mean: FloatArray, prior_sd: Float
     mean_sd = 1.0 / np.sqrt(prior_sd**-2.0 + informed.sum(axis=0) / spread**2)
     log_spread_sd = 1.0 / np.sqrt(SPREAD_LOG_SD**-2.0 + 2.0 * np.sum(informed**2, axis=0))
     return RoughPopulation(mean, mean_sd, spread, log_spread_sd, correlation)
+
+
+def envelope_around(means: FloatArray, factors: FloatArray) -> Envelope:
+    """Envelope of some populations and no others.
+
+    Parameters
+    ----------
+    means : (n, n_strengths) array
+        Of the logarithms of the strengths.
+    factors : (n, n_strengths, n_strengths) array
+        Lower Cholesky factors of their covariances.
+    """
+    deviation = means - means.mean(axis=0)
+    between = deviation.T @ deviation / len(means)
+    within = np.einsum("nij,nkj->ik", factors, factors) / len(means)
+    whiten = np.linalg.inv(np.linalg.cholesky(_AROUND * (within + between)))
+    return Envelope(means.mean(axis=0), whiten)
 
 
 def _weights(
