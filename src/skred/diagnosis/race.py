@@ -42,8 +42,10 @@ _CHECKED, _DRAWS = 5, 500
 _WITHIN, _AT_MOST, _TURNS = 3.0, 2, 3
 """Places of a mechanism that are looked at again: within so many nats of its best, so many, so many times."""
 _FAR_BEHIND, _HOPELESS = 10.0, 20.0
-"""Nats behind its mechanism's best at which a place is not looked at under another error model; nats behind
-the best of all at which it is not looked at again."""
+"""Nats behind its mechanism's best at which a place is not looked at under another error model, and behind
+the best of all at which it is not split; nats behind the best of all at which it is not looked at again."""
+_SPLIT_FROM = 1.0
+"""Nats in favour of a place from which it is split: parts of a place without evidence have hardly any."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,25 +262,36 @@ def _finely(base: Base, extension: Extension, strengths: FloatArray, fit: Fit) -
 def _looked_at_again(
     base: Base, curves: Sequence[Curve], budget: Budget, pool: ThreadPoolExecutor
 ) -> dict[str, Entrant]:
-    """Entrants whose leading places are split and computed with fronts; rough curves for the others.
+    """Entrants whose leading places are computed with fronts and then split; rough curves for the others.
 
     Once a place is looked at it may fall behind others that then lead, and are looked at in their turn.
     """
     finer: dict[int, list[Curve]] = {}
+
+    def look(job: tuple[int, Shape]) -> Curve:
+        near = curves[job[0]]
+        return curve_near(base, near.mechanism, job[1], near, budget)
+
     for _ in range(_TURNS):
         todo = [k for k in _leading(curves, finer) if k not in finer]
         if not todo:
             break
-        jobs = [(k, shape) for k in todo for shape in _split(base, curves[k])]
-
-        def look(job: tuple[int, Shape]) -> Curve:
-            near = curves[job[0]]
-            return curve_near(base, near.mechanism, job[1], near, budget)
-
-        found = pool.map(look, jobs)
-        for (k, _), one in zip(jobs, found, strict=True):
-            finer.setdefault(k, []).append(one)
+        places = pool.map(look, [(k, curves[k].shape) for k in todo])
+        finer.update({k: [one] for k, one in zip(todo, places, strict=True)})
+        split = _worth_splitting(curves, finer, todo)
+        jobs = [(k, shape) for k in split for shape in _split(base, curves[k])]
+        for (k, _), one in zip(jobs, pool.map(look, jobs), strict=True):
+            finer[k].append(one)
     return _entrants(curves, finer)
+
+
+def _worth_splitting(
+    curves: Sequence[Curve], finer: Mapping[int, list[Curve]], todo: Sequence[int]
+) -> list[int]:
+    """Places that have some evidence, roughly or with fronts, not too far behind the best of all."""
+    best = max(one.log_bayes_factor for place in finer.values() for one in place)
+    height = {k: max(curves[k].log_bayes_factor, finer[k][0].log_bayes_factor) for k in todo}
+    return [k for k in todo if height[k] > max(_SPLIT_FROM, best - _FAR_BEHIND)]
 
 
 def _leading(curves: Sequence[Curve], finer: Mapping[int, list[Curve]]) -> list[int]:
@@ -299,10 +312,10 @@ def _mean_log_factor(curves: Sequence[Curve]) -> float:
 
 
 def _split(base: Base, curve: Curve) -> tuple[Shape, ...]:
-    """A curve's own shape and the finer ones that it stands for."""
+    """The finer shapes that a curve stands for beside its own."""
     added = curve.mechanism.added
     assert added is not None
-    return (curve.shape, *added.split(base.setting, curve.shape))
+    return tuple(added.split(base.setting, curve.shape))
 
 
 def _entrants(curves: Sequence[Curve], finer: Mapping[int, list[Curve]]) -> dict[str, Entrant]:
