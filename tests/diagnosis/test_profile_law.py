@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from typing import Any
 
@@ -11,10 +12,15 @@ from diagnosis_cases import base_of, first_events, trial, with_sensors
 from numpy.testing import assert_array_equal
 
 from skred.diagnosis.curves import Base
-from skred.diagnosis.diagnose import Effort, _before
+from skred.diagnosis.diagnose import Diagnosis, Effort, _before
+from skred.diagnosis.extension import extended, setting_of
+from skred.diagnosis.gain import predictors_of, promised_gain
+from skred.diagnosis.predictor_document import as_dict, from_dict
 from skred.diagnosis.profile_law import ProfileLaw, _left_out, profile_law
-from skred.diagnosis.race import Heat
-from skred.diagnosis.unlisted import KINDS, fit_profile
+from skred.diagnosis.race import Heat, Race
+from skred.diagnosis.unlisted import KINDS, combined, fit_profile, knots
+from skred.diagnosis.unseen import ProfileTerm, log_scores
+from skred.errors import InputError
 from skred.inference.sampling import SamplerSettings
 from skred.work.calibrate import calibrate
 
@@ -51,6 +57,69 @@ def test_a_force_that_is_there_predicts_avalanches_left_out(let_in: ProfileLaw) 
 def test_a_force_that_is_not_there_does_not() -> None:
     clean = law_of(thinned("nothing", None))
     assert (clean.after.pointwise - clean.before.pointwise).sum() < 1.0
+
+
+def diagnosed(hidden: Base, let_in: ProfileLaw) -> Diagnosis:
+    heat = Heat("robust", hidden, {}, [let_in.profile], [])
+    race = Race((heat,), {}, {"robust": 0.0})
+    return Diagnosis(
+        hidden.problem, hidden.law, race=race, profile=let_in, before=let_in.before, after=let_in.after
+    )
+
+
+def test_fresh_avalanches_are_scored_with_the_profile(hidden: Base, let_in: ProfileLaw) -> None:
+    """As plain data and back; what they gain is about what those left out promise."""
+    found = diagnosed(hidden, let_in)
+    document = json.loads(json.dumps([as_dict(one) for one in predictors_of(found) if one is not None]))
+    before, after = (from_dict(one) for one in document)
+    assert before.profile is None and after.profile is not None
+    fresh = trial(1003, "dense", "push_pull", "constant", 14.0).fresh
+    fresh = with_sensors(fresh, [*range(0, fresh.n_sensors - 1, 2), fresh.n_sensors - 1])
+    realised = (log_scores(after, fresh) - log_scores(before, fresh)).mean()
+    promised = promised_gain(found)
+    assert promised is not None and promised > 1.0
+    assert 0.4 * promised < realised < 2.0 * promised
+
+
+@pytest.mark.parametrize("kind", range(len(KINDS)))
+def test_a_predictor_s_profile_is_that_which_was_fitted(hidden: Base, kind: int) -> None:
+    """Readings with any values at the knots, also where the force refers to the typical speed."""
+    setting, own = hidden.setting, KINDS[kind]
+    at = knots(setting)
+    values = own.amplitude * np.sin(np.arange(len(at)))
+    fitted = extended(hidden.problem, hidden.law, [combined(setting, own, at, values)])
+    profile = replace(fit_profile(hidden, KINDS[0]), kind=own)
+    directions = ProfileTerm.of(profile, setting).directions(setting_of(hidden.problem, hidden.law))
+    told = extended(hidden.problem, hidden.law, directions)
+    events, points = hidden.rows.event, hidden.fit.points
+    expected = fitted.predict(events, points, np.array([1.0]))
+    np.testing.assert_allclose(told.predict(events, points, values), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("kind", "-f", "no force profile"),
+        ("knots_m", [10.0, 5.0], "knots_m: expected two or more increasing"),
+        ("knots_m", [1.0] * 1000, "at most"),
+        ("front_speed", [-1.0, 2.0], "none negative"),
+        ("front_speed", "fast", "expected a list"),
+    ],
+)
+def test_a_profile_that_cannot_be_is_refused(key: str, value: Any, words: str) -> None:
+    places, speeds = [10.0, 50.0], [0.0, 0.0]
+    term = {"kind": KINDS[0].equation, "knots_m": places, "edge_m": places, "front_speed": speeds}
+    document = {
+        "format": 1,
+        "law": "constant",
+        "error_model": "robust",
+        "place_sd_m": 8.0,
+        "smoothing_m": 10.0,
+    }
+    document |= {"means": [[0.5]], "factors": [[[0.1]]], "terms": [], "strengths": [[0.1, 0.2]]}
+    assert from_dict(document | {"profile": term}).profile is not None
+    with pytest.raises(InputError, match=words):
+        from_dict(document | {"profile": term | {key: value}})
 
 
 def test_an_avalanche_has_no_say_in_what_is_predicted_of_it(hidden: Base, let_in: ProfileLaw) -> None:

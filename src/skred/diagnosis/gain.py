@@ -12,8 +12,10 @@ import numpy as np
 
 from skred.campaign import Campaign
 from skred.diagnosis.diagnose import Diagnosis
+from skred.diagnosis.odds import UNLISTED
 from skred.diagnosis.predictor_document import as_dict, from_dict
-from skred.diagnosis.unseen import Predictor, log_scores, predictor_of
+from skred.diagnosis.profile_law import ProfileLaw
+from skred.diagnosis.unseen import Predictor, ProfileTerm, log_scores, predictor_of
 from skred.errors import InputError
 from skred.work.calibrate import Calibration
 
@@ -26,11 +28,27 @@ def predictors_of(diagnosis: Diagnosis) -> tuple[Predictor, Predictor | None]:
     ValueError
         If the diagnosis did not get as far as a calibration.
     """
+    if diagnosis.profile is not None:
+        return _with_profile(diagnosis, diagnosis.profile)
     before = calibration_before(diagnosis)
     if before is None:
         raise ValueError(f"nothing was calibrated: {diagnosis.cannot}")
     after = predictor_of(diagnosis.steps[-1].calibration) if diagnosis.steps else None
     return predictor_of(before), after
+
+
+def _with_profile(diagnosis: Diagnosis, law: ProfileLaw) -> tuple[Predictor, Predictor]:
+    """Without the force profile that was let in and with it, under one error model."""
+    problem = diagnosis.problem
+    base = diagnosis.race.leading(UNLISTED).base if diagnosis.race is not None else None
+    assert base is not None
+    term = ProfileTerm.of(law.profile, base.setting)
+    common = diagnosis.law.id, law.error_model, problem.place_sd_m, problem.terrain.smoothing_m
+    before, after = law.draws_before, law.draws_after
+    return (
+        Predictor(*common, before.means, before.factors, (), before.strengths),
+        Predictor(*common, after.means, after.factors, (), after.strengths, term),
+    )
 
 
 def calibration_before(diagnosis: Diagnosis) -> Calibration | None:
@@ -47,9 +65,9 @@ def predictors(diagnosis: Diagnosis) -> dict[str, Any] | None:
 
 
 def promised_gain(diagnosis: Diagnosis) -> float | None:
-    """Gain of the log score for each avalanche, by those left out; None if no mechanism was let in."""
+    """Gain of the log score for each avalanche, by those left out; None if nothing was let in."""
     before, after = diagnosis.before, diagnosis.after
-    if before is None or after is None or not diagnosis.steps:
+    if before is None or after is None:
         return None
     return float(np.mean(after.pointwise - before.pointwise))
 

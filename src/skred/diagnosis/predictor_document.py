@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.covariates import Standard
-from skred.diagnosis.unseen import Predictor, Term
+from skred.diagnosis.unlisted import AMPLITUDES, KINDS, MOST_KNOTS
+from skred.diagnosis.unseen import Predictor, ProfileTerm, Term
 from skred.errors import InputError
 from skred.inference.error_model import ERROR_MODELS
 from skred.laws import load_law
@@ -20,9 +21,10 @@ from skred.physics.mechanisms.spec import Mechanism, Shape
 FloatArray = NDArray[np.float64]
 FORMAT = 1
 MOST_DRAWS, MOST_TERMS, MOST_CONSTANTS = 10_000, 4, 8
-_LARGEST_LOG, _LARGEST_SCALES, _LARGEST_M, _LARGEST_NUMBER = 50.0, 20.0, 1e6, 1e12
+_MOST_EDGES = 20_000
+_LARGEST_LOG, _LARGEST_SCALES, _LARGEST_M, _LARGEST_SPEED, _LARGEST_NUMBER = 50.0, 20.0, 1e6, 1e3, 1e12
 """Beyond which a number is no draw of a posterior: logarithms, strengths in scales of their priors, places,
-others."""
+speeds, others."""
 
 
 def as_dict(predictor: Predictor) -> dict[str, Any]:
@@ -37,6 +39,16 @@ def as_dict(predictor: Predictor) -> dict[str, Any]:
         "factors": predictor.factors.tolist(),
         "terms": [_term_dict(term) for term in predictor.terms],
         "strengths": predictor.strengths.tolist(),
+        "profile": None if predictor.profile is None else _profile_dict(predictor.profile),
+    }
+
+
+def _profile_dict(term: ProfileTerm) -> dict[str, Any]:
+    return {
+        "kind": term.kind.equation,
+        "knots_m": term.knots_m.tolist(),
+        "edge_m": term.edge_m.tolist(),
+        "front_speed": term.front_speed.tolist(),
     }
 
 
@@ -79,28 +91,68 @@ def from_dict(document: Any) -> Predictor:
     n = len(law.mechanisms)
     means = _numbers(known, "means", (n,), _LARGEST_LOG)
     factors = _numbers(known, "factors", (n, n), _LARGEST_LOG)
-    strengths = _numbers(known, "strengths", (len(terms),), _LARGEST_NUMBER)
-    _check_draws(means, factors, strengths, terms)
+    profile = None if known.get("profile") is None else _profile(_mapping(known["profile"], "profile"))
+    n_added = len(terms) + (0 if profile is None else len(profile.knots_m))
+    strengths = _numbers(known, "strengths", (n_added,), _LARGEST_NUMBER)
+    _check_draws(means, factors, strengths, [*_scales(terms), *_knot_scales(profile)])
     place = _number(known, "place_sd_m", _LARGEST_M)
     smoothing = _number(known, "smoothing_m", 1000.0)
     if not place > 0.0 or smoothing < 0.0:
         raise InputError("predictor: place_sd_m must be positive, smoothing_m not negative")
-    return Predictor(law.id, error_model, place, smoothing, means, factors, terms, strengths)
+    return Predictor(law.id, error_model, place, smoothing, means, factors, terms, strengths, profile)
+
+
+def _profile(entry: Mapping[str, Any]) -> ProfileTerm:
+    name = _text(entry, "kind")
+    kind = next((one for one in KINDS if one.equation == name), None)
+    if kind is None:
+        raise InputError(
+            f"predictor: no force profile {name!r:.40}; there are: {', '.join(one.equation for one in KINDS)}"
+        )
+    knots = _places(entry, "knots_m", MOST_KNOTS)
+    edge = _places(entry, "edge_m", _MOST_EDGES)
+    speed = _column(entry, "front_speed", _MOST_EDGES, _LARGEST_SPEED)
+    if len(speed) != len(edge) or np.any(speed < 0.0):
+        raise InputError("predictor: front_speed: expected one for each edge_m, none negative")
+    return ProfileTerm(kind, knots, edge, speed)
+
+
+def _places(document: Mapping[str, Any], key: str, most: int) -> FloatArray:
+    """Increasing places on the track [m], two or more."""
+    places = _column(document, key, most, _LARGEST_M)
+    if len(places) < 2 or places[0] < 0.0 or np.any(np.diff(places) <= 0.0):
+        raise InputError(f"predictor: {key}: expected two or more increasing places on the track")
+    return places
+
+
+def _scales(terms: Sequence[Term]) -> list[tuple[str, float]]:
+    """Name and prior scale of each term."""
+    found = []
+    for term in terms:
+        added = mechanisms()[term.mechanism].added
+        assert added is not None
+        found.append((term.mechanism, added.scale))
+    return found
+
+
+def _knot_scales(profile: ProfileTerm | None) -> list[tuple[str, float]]:
+    """Name and prior scale of each knot of a profile."""
+    if profile is None:
+        return []
+    return [("the force profile", max(AMPLITUDES) * profile.kind.amplitude)] * len(profile.knots_m)
 
 
 def _check_draws(
-    means: FloatArray, factors: FloatArray, strengths: FloatArray, terms: tuple[Term, ...]
+    means: FloatArray, factors: FloatArray, strengths: FloatArray, scales: Sequence[tuple[str, float]]
 ) -> None:
     if not len(means) == len(factors) == len(strengths):
         raise InputError("predictor: means, factors and strengths must be as many")
     diagonal = np.einsum("nii->ni", factors)
     if np.any(np.triu(factors, 1) != 0.0) or np.any(diagonal < 1e-6):
         raise InputError("predictor: factors: expected lower triangular ones with a positive diagonal")
-    for term, drawn in zip(terms, strengths.T, strict=True):
-        added = mechanisms()[term.mechanism].added
-        assert added is not None
-        if np.abs(drawn).max() > _LARGEST_SCALES * added.scale:
-            raise InputError(f"predictor: strengths of {term.mechanism}: beyond all that is physical")
+    for (name, scale), drawn in zip(scales, strengths.T, strict=True):
+        if np.abs(drawn).max() > _LARGEST_SCALES * scale:
+            raise InputError(f"predictor: strengths of {name}: beyond all that is physical")
 
 
 def _term(entry: Mapping[str, Any], law: Law) -> Term:
@@ -164,6 +216,14 @@ def _number(document: Mapping[str, Any], key: str, largest: float = _LARGEST_M) 
     if not abs(value) <= largest:  # also where it is not a number
         raise InputError(f"predictor: {key}: expected at most {largest:g} in size, found {value!r:.40}")
     return float(value)
+
+
+def _column(document: Mapping[str, Any], key: str, most: int, largest: float) -> FloatArray:
+    """A list of numbers."""
+    value = document.get(key)
+    if not isinstance(value, list) or len(value) > most:
+        raise InputError(f"predictor: {key}: expected a list of at most {most} numbers")
+    return np.array([_number({key: one}, key, largest) for one in value], dtype=float)
 
 
 def _numbers(document: Mapping[str, Any], key: str, shape: tuple[int, ...], largest: float) -> FloatArray:

@@ -37,6 +37,14 @@ _DRAWS, _FRONTS = 200, 1200
 _ROUNDS = 3
 
 
+class Draws(NamedTuple):
+    """Draws of populations, and of the strengths of what is added, (n_draws, ...)."""
+
+    means: FloatArray
+    factors: FloatArray
+    strengths: FloatArray
+
+
 @dataclass(frozen=True, eq=False)
 class ProfileLaw:
     """The base law with a profile in.
@@ -52,6 +60,8 @@ class ProfileLaw:
         recordings have had theirs fitted to them, so that its p-value is rather too high.
     before, after : HeldOut
         Of avalanches left out, without the profile and with it.
+    draws_before, draws_after : Draws
+        By all avalanches; with the profile its values at the knots are the strengths.
     """
 
     profile: Profile
@@ -59,14 +69,8 @@ class ProfileLaw:
     check: Omnibus
     before: HeldOut
     after: HeldOut
-
-
-class _Draws(NamedTuple):
-    """Draws of populations, and of the strengths of what is added, (n_draws, ...)."""
-
-    means: FloatArray
-    factors: FloatArray
-    strengths: FloatArray
+    draws_before: Draws
+    draws_after: Draws
 
 
 class _Event(NamedTuple):
@@ -91,7 +95,10 @@ def profile_law(heat: Heat, most: int, seed: int) -> ProfileLaw:
     with ThreadPoolExecutor(threads()) as pool:
         parts = list(pool.map(lambda event: _left_out(base, profile, event, seed), events))
     before, after = (_held_out(base, [part[k] for part in parts]) for k in range(2))
-    return ProfileLaw(profile, base.problem.error_model.id, _check(base, profile, most, seed), before, after)
+    check, rng = _check(base, profile, most, seed), np.random.default_rng([seed, 55])
+    _, without = _plain(base, rng)
+    _, within = _with(base, profile, rng)
+    return ProfileLaw(profile, base.problem.error_model.id, check, before, after, without, within)
 
 
 def _check(base: Base, profile: Profile, most: int, seed: int) -> Omnibus:
@@ -111,18 +118,11 @@ def _left_out(base: Base, profile: Profile, event: int, seed: int) -> tuple[_Eve
     rest = _without(base, event)
     rng = _rng(seed, event)
     before = _before(base, rest, event, rng)
-    own = np.tile(base.strengths, (_DRAWS, 1))
     others = np.flatnonzero(base.rows.event != event)
     population = profile.fit.found.population(len(base.law.mechanisms))
     near = profile.mean, (population, profile.fit.points[others])
     again = fit_profile(rest, profile.kind, near, profile.prior)
-    basis = hats(base.setting.terrain, again.knots_m)
-    added = [entering(base.setting, again.kind, row) for row in basis]
-    wide = extended(base.problem, base.law, [*base.directions, *added])
-    values = rng.multivariate_normal(again.mean, again.covariance, _DRAWS)
-    middle = np.append(base.strengths, again.mean)
-    draws = _draws(rest, wide, again.fit, middle, np.column_stack([own, values]), rng)
-    return before, _event(base, wide, event, draws, rng)
+    return before, _event(base, *_with(rest, again, rng), event, rng)
 
 
 def base_left_out(base: Base, seed: int) -> HeldOut:
@@ -137,9 +137,25 @@ def _rng(seed: int, event: int) -> np.random.Generator:
 
 def _before(base: Base, rest: Base, event: int, rng: np.random.Generator) -> _Event:
     """One avalanche as the base law has it that was fitted to the rest."""
+    return _event(base, *_plain(rest, rng), event, rng)
+
+
+def _plain(base: Base, rng: np.random.Generator) -> tuple[Extension, Draws]:
+    """The base law, and draws by the base's events."""
     plain = extended(base.problem, base.law, base.directions)
     own = np.tile(base.strengths, (_DRAWS, 1))
-    return _event(base, plain, event, _draws(rest, plain, rest.fit, base.strengths, own, rng), rng)
+    return plain, _draws(base, plain, base.fit, base.strengths, own, rng)
+
+
+def _with(base: Base, profile: Profile, rng: np.random.Generator) -> tuple[Extension, Draws]:
+    """The law with a profile fitted to the base's events, each knot a strength; draws by those events."""
+    basis = hats(base.setting.terrain, profile.knots_m)
+    added = [entering(base.setting, profile.kind, row) for row in basis]
+    wide = extended(base.problem, base.law, [*base.directions, *added])
+    own = np.tile(base.strengths, (_DRAWS, 1))
+    values = rng.multivariate_normal(profile.mean, profile.covariance, _DRAWS)
+    middle = np.append(base.strengths, profile.mean)
+    return wide, _draws(base, wide, profile.fit, middle, np.column_stack([own, values]), rng)
 
 
 def _without(base: Base, event: int) -> Base:
@@ -159,7 +175,7 @@ def _draws(
     middle: FloatArray,
     strengths: FloatArray,
     rng: np.random.Generator,
-) -> _Draws:
+) -> Draws:
     """Populations by the base's events at the middle strengths, as many as there are draws of strengths."""
     n = len(base.law.mechanisms)
     population = fit.found.population(n)
@@ -167,10 +183,10 @@ def _draws(
     nodes = event_nodes(extension, base.rows, middle, population, modes, FINE, base.population).nodes
     found = evidence(nodes, base.log_scale, fit.found.psi)
     drawn = population_at(importance_draws(nodes, base.log_scale, found, len(strengths), rng), n)
-    return _Draws(drawn.mean, np.linalg.cholesky(drawn.covariance), strengths)
+    return Draws(drawn.mean, np.linalg.cholesky(drawn.covariance), strengths)
 
 
-def _event(base: Base, extension: Extension, event: int, draws: _Draws, rng: np.random.Generator) -> _Event:
+def _event(base: Base, extension: Extension, draws: Draws, event: int, rng: np.random.Generator) -> _Event:
     """Log score of an avalanche, and predictions of its readings."""
     seed = int(rng.integers(2**31))
     rows = base.rows.take(np.flatnonzero(base.rows.event == event))

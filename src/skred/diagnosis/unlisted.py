@@ -98,7 +98,7 @@ AMPLITUDES, LENGTHS_M = (1.0 / 3.0, 1.0, 3.0), (40.0, 120.0, 400.0)
 profile pays for each of its freedoms what the amplitude is off by; a listed mechanism pays that once."""
 NEAR_M, _CENTRES_M = 120.0, 150.0
 """Standard deviation of the window of a profile that is local, and the distance of the windows' centres."""
-_MOST_KNOTS, _LEAST_STEP_M = 32, 30.0
+MOST_KNOTS, _LEAST_STEP_M = 32, 30.0
 _ROUNDS, _PRIORS_TRIED, _SURE = 6, 12, 1.0
 _SHARES = (1.0, 0.4, 0.15, 0.05)
 _SETTLED = 0.05
@@ -152,7 +152,7 @@ def priors_of(kind: Kind, at: FloatArray) -> dict[Prior, float]:
 def knots(setting: Setting) -> FloatArray:
     """Places of the knots [m]: the recorded part of the track."""
     first, last = setting.recorded_m
-    n = int(np.clip(round((last - first) / _LEAST_STEP_M), 4, _MOST_KNOTS))
+    n = int(np.clip(round((last - first) / _LEAST_STEP_M), 4, MOST_KNOTS))
     return np.linspace(first, min(last, setting.terrain.length_m), n)
 
 

@@ -22,6 +22,7 @@ from skred.diagnosis.held_out import HeldOut
 from skred.diagnosis.modes import Population, Rows, campaign_rows, event_modes, log_joint
 from skred.diagnosis.predictive import Predicted, predict_event
 from skred.diagnosis.tables import exact_nodes
+from skred.diagnosis.unlisted import Kind, Profile, entering, hats
 from skred.errors import InputError
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.event_density import integrated_log_density
@@ -30,7 +31,7 @@ from skred.inference.population import population_of
 from skred.laws import load_law
 from skred.physics.law import Law
 from skred.physics.mechanisms import mechanisms
-from skred.physics.mechanisms.spec import Direction, Shape
+from skred.physics.mechanisms.spec import Direction, Setting, Shape
 from skred.physics.terrain import build_terrain
 from skred.work.calibrate import Calibration
 
@@ -67,6 +68,39 @@ class Term:
 
 
 @dataclass(frozen=True, eq=False)
+class ProfileTerm:
+    """A force profile that is added, each knot with a strength of its own.
+
+    Attributes
+    ----------
+    kind : Kind
+    knots_m : (n_knots,) array
+        Between which it is linear; 0 outside.
+    edge_m, front_speed : (n,) arrays
+        Places between the knots, and the typical speed there [m/s] that a force refers to which is nil at it.
+    """
+
+    kind: Kind
+    knots_m: FloatArray
+    edge_m: FloatArray
+    front_speed: FloatArray
+
+    @classmethod
+    def of(cls, profile: Profile, setting: Setting) -> ProfileTerm:
+        """Of a profile that was fitted in a setting."""
+        edge, at = setting.terrain.edge_s_m, profile.knots_m
+        step = np.diff(edge).max()
+        near = (edge >= at[0] - step) & (edge <= at[-1] + step)
+        return cls(profile.kind, at, edge[near], setting.front_speed[near])
+
+    def directions(self, setting: Setting) -> list[Direction]:
+        """One for each knot."""
+        speed = np.interp(setting.terrain.edge_s_m, self.edge_m, self.front_speed)
+        setting = replace(setting, front_speed=speed)
+        return [entering(setting, self.kind, row) for row in hats(setting.terrain, self.knots_m)]
+
+
+@dataclass(frozen=True, eq=False)
 class Predictor:
     """What a calibration says of avalanches to come on its path.
 
@@ -82,8 +116,10 @@ class Predictor:
         Lower Cholesky factors of their covariance.
     terms : tuple of Term
         What is added, if anything.
-    strengths : (n_draws, n_terms) array
-        Of what is added.
+    strengths : (n_draws, n_terms + n_knots) array
+        Of what is added; of a profile its values at the knots.
+    profile : ProfileTerm or None
+        The force profile that is added, if one is.
     """
 
     law: str
@@ -94,6 +130,7 @@ class Predictor:
     factors: FloatArray
     terms: tuple[Term, ...]
     strengths: FloatArray
+    profile: ProfileTerm | None = None
 
     @property
     def n_draws(self) -> int:
@@ -205,7 +242,17 @@ def extension_of(predictor: Predictor, campaign: Campaign) -> Extension:
         If what is added does not go with the campaign.
     """
     problem, law = problem_of(predictor, campaign), load_law(predictor.law)
-    return extended(problem, law, [_direction(term, problem, law) for term in predictor.terms])
+    directions = [_direction(term, problem, law) for term in predictor.terms]
+    if predictor.profile is not None:
+        _check_on_track(predictor.profile.knots_m[-1], problem)
+        directions += predictor.profile.directions(setting_of(problem, law))
+    return extended(problem, law, directions)
+
+
+def _check_on_track(place_m: float, problem: HierarchicalProblem) -> None:
+    if place_m > problem.terrain.length_m + 1.0:
+        name = problem.campaign.name
+        raise InputError(f"{name}: the predictor speaks of a place beyond the end of its track")
 
 
 def _direction(term: Term, problem: HierarchicalProblem, law: Law) -> Direction:
@@ -213,8 +260,8 @@ def _direction(term: Term, problem: HierarchicalProblem, law: Law) -> Direction:
     campaign, shape = problem.campaign, term.shape
     if shape.sensor is not None and shape.sensor not in campaign.sensor_ids:
         raise InputError(f"{campaign.name}: has no sensor {shape.sensor!r}, which the predictor speaks of")
-    if shape.s_to_m is not None and shape.s_to_m > problem.terrain.length_m + 1.0:
-        raise InputError(f"{campaign.name}: the predictor speaks of a place beyond the end of its track")
+    if shape.s_to_m is not None:
+        _check_on_track(shape.s_to_m, problem)
     covariates: Mapping[str, FloatArray] = {}
     if shape.covariate is not None and term.standard is not None:
         values = term.standard.standardised(campaign.events, shape.covariate)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from skred.diagnosis.odds import UNLISTED
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.report import document as doc
 from skred.report.diagnosis_rows import PREDICTION_ERRORS
 from skred.report.numbers import fixed, is_number
+
+_WORDS = {UNLISTED: "a force profile"}
 
 
 def locked(document: doc.Document) -> dict[str, Any] | None:
@@ -44,7 +47,8 @@ def outer_folds(document: doc.Document) -> dict[str, Any] | None:
     rows = [
         {
             "events": ", ".join(str(event) for event in doc.listed(fold, "events")),
-            "names": " and ".join(doc.listed(fold, "mechanisms")) or "nothing",
+            "names": " and ".join(_WORDS.get(name, name) for name in doc.listed(fold, "mechanisms"))
+            or "nothing",
             "difference": fixed(doc.get(fold, "elpd_diff"), 1, signed=True),
         }
         for fold in doc.listed(found, "folds")

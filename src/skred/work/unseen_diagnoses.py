@@ -17,6 +17,7 @@ from skred.campaign.parts import of_events, without_silent_sensors
 from skred.diagnosis.diagnose import Diagnosis, Effort, diagnose, too_little
 from skred.diagnosis.gain import predictors_of
 from skred.diagnosis.held_out import HeldOut, errors
+from skred.diagnosis.odds import UNLISTED
 from skred.diagnosis.unseen import log_scores, problem_of, unseen
 from skred.errors import InputError
 from skred.inference.hierarchical import HierarchicalProblem
@@ -126,6 +127,8 @@ def _fold(found: Diagnosis, left_out: Campaign, seed: int) -> tuple[dict[str, An
     second = first if after is None else log_scores(after, left_out, seed)
     difference = second - first
     names = [step.entrants[0].mechanism.id for step in found.steps]
+    if found.profile is not None:
+        names = [UNLISTED]
     entry = {
         "events": list(left_out.event_ids),
         "verdict": found.decision.verdict,
