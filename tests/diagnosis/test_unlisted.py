@@ -23,8 +23,9 @@ from skred.diagnosis.unlisted import (
     Profile,
     _climb,
     _fit_at,
-    _log_factor,
     _peak,
+    _promise,
+    _Seen,
     as_profile,
     combined,
     fit_profile,
@@ -234,7 +235,7 @@ def test_evidence_under_a_prior_from_the_peak_under_another(base: Base) -> None:
     height = nothing.found.log_evidence
     usual, other = Prior(0.8, 120.0), Prior(1.6, 120.0, 800.0)
     peak, own = (_climb(changed, kind, at, flat, one.cover(at)) for one in (usual, other))
-    found, exact = (_log_factor(one, height, other.cover(at)) for one in (peak, own))
+    found, exact = (_promise(one, height, other.cover(at)).log_factor() for one in (peak, own))
     assert exact > 20.0
     assert found == pytest.approx(exact, abs=0.5)
     precision = np.linalg.inv(other.cover(at))
@@ -281,10 +282,30 @@ def test_evidence_over_priors_against_climbing_under_each(base: Base, kind: int,
     nothing = _fit_at(changed, own, at, np.zeros(len(at)), start)
     flat = _peak(changed, own, at, np.zeros(len(at)), nothing)
     factors = [
-        _log_factor(_climb(changed, own, at, flat, cover), nothing.found.log_evidence, cover) + share
+        _promise(_climb(changed, own, at, flat, cover), nothing.found.log_evidence, cover).log_factor()
+        + share
         for prior, share in priors_of(own, at).items()
         for cover in [prior.cover(at)]
     ]
     found = fit_profile(changed, own).log_bayes_factor
     assert (found > 5.0) == bool(size)
     assert found == pytest.approx(float(np.logaddexp.reduce(factors)), abs=1.0)
+
+
+def test_what_is_only_promised_counts_no_more_than_what_was_computed(base: Base) -> None:
+    """A slope at a kink promises hundreds of nats elsewhere: enough to climb there, not to claim them."""
+    own, at = KINDS[0], knots(base.setting)
+    none = np.zeros(len(at))
+    fit = _fit_at(base, own, at, none, (base.population, base.fit.points))
+    flat = _peak(base, own, at, none, fit)
+    kinked = replace(flat, score=np.full(len(at), 300.0), information=0.1 * flat.information)
+    priors = priors_of(own, at)
+    seen = _Seen(fit.found.log_evidence, at, priors)
+    climbed = next(one for one in priors if one.centre_m is not None)
+    seen.add(climbed, replace(kinked, score=np.zeros(len(at))))
+    quiet = seen.log_factor
+    seen.add(climbed, kinked)
+    assert seen.open is not None and seen.factor(seen.open) > 50.0
+    other = next(one for one in priors if one.centre_m not in (None, climbed.centre_m))
+    assert seen.factor(other) > 50.0 > 1.0 > seen.factor(other, 0.0)
+    assert quiet <= 0.0

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -220,11 +221,33 @@ def fit_profile(base: Base, kind: Kind, near: Start | None = None, first: Prior 
         start = _highest([*starts, *seen.peaks.values()], cover)
         seen.add(next_one, _climb(base, kind, at, start, cover))
         next_one = seen.open
-    prior = max(seen.peaks, key=lambda one: seen.own[one])
+    prior = max(seen.peaks, key=seen.factor)
     peak = seen.peaks[prior]
     cover = np.linalg.inv(peak.information + np.linalg.inv(prior.cover(at)))
     gain = peak.fit.found.log_evidence - height
     return Profile(kind, prior, at, peak.values, 0.5 * (cover + cover.T), seen.log_factor, gain, peak.fit)
+
+
+class _Promise(NamedTuple):
+    """What slope and curvature at a peak say of a prior.
+
+    Attributes
+    ----------
+    gain : float
+        Of the log likelihood, at the most probable values under the prior.
+    price : float
+        Of those values.
+    freedom : float
+        Price of their freedom.
+    """
+
+    gain: float
+    price: float
+    freedom: float
+
+    def log_factor(self, most: float = math.inf) -> float:
+        """Log Bayes factor if no values gain more than the most; at least that of no force at all."""
+        return max(min(self.gain, most) - self.price, 0.0) - self.freedom
 
 
 class _Seen:
@@ -232,7 +255,8 @@ class _Seen:
 
     Where fronts stop, slope and curvature at one peak are a poor guide to another far away. A prior that was
     climbed under has its own factor; one about the same place as some that were, the least that they promise;
-    any other the most that any peak promises, so that it is climbed under while it could matter.
+    any other the most that any peak promises, so that it is climbed under while it could matter. What is only
+    promised in the end counts as if no values gained more than the best that were computed.
     """
 
     def __init__(self, height: float, at: FloatArray, priors: dict[Prior, float]) -> None:
@@ -240,49 +264,47 @@ class _Seen:
         self.shares = priors
         self.covers = {prior: prior.cover(at) for prior in priors}
         self.peaks: dict[Prior, _Peak] = {}
-        self.own: dict[Prior, float] = {}
-        self.near = dict.fromkeys(priors, math.inf)
-        self.far = dict.fromkeys(priors, -math.inf)
+        self.promises: dict[Prior, dict[Prior, _Promise]] = {prior: {} for prior in priors}
 
     def add(self, climbed: Prior, peak: _Peak) -> None:
         """A peak under a prior."""
         self.peaks[climbed] = peak
         for prior, cover in self.covers.items():
-            factor = _log_factor(peak, self.height, cover) + self.shares[prior]
-            self.far[prior] = max(self.far[prior], factor)
-            if prior.centre_m == climbed.centre_m:
-                self.near[prior] = min(self.near[prior], factor)
-            if prior == climbed:
-                self.own[prior] = factor
+            self.promises[prior][climbed] = _promise(peak, self.height, cover)
 
-    @property
-    def factors(self) -> dict[Prior, float]:
-        """Log Bayes factor and log prior probability of each prior, as far as is known."""
-        near = {prior: value for prior, value in self.near.items() if value < math.inf}
-        return self.far | near | self.own
+    def factor(self, prior: Prior, most: float = math.inf) -> float:
+        """Log Bayes factor and log prior probability of a prior, as far as is known."""
+        promises, share = self.promises[prior], self.shares[prior]
+        if prior in promises:
+            return promises[prior].log_factor() + share
+        near = [one for climbed, one in promises.items() if climbed.centre_m == prior.centre_m]
+        if near:
+            return min(one.log_factor(most) for one in near) + share
+        return max(one.log_factor(most) for one in promises.values()) + share
 
     @property
     def open(self) -> Prior | None:
         """The most probable prior not climbed under; None where all of those are improbable together."""
-        left = {prior: factor for prior, factor in self.factors.items() if prior not in self.own}
-        if not left or np.logaddexp.reduce(list(left.values())) < self.log_factor - _SURE:
+        left = {prior: self.factor(prior) for prior in self.shares if prior not in self.peaks}
+        known = np.logaddexp.reduce([self.factor(prior) for prior in self.shares])
+        if not left or np.logaddexp.reduce(list(left.values())) < known - _SURE:
             return None
         return max(left, key=lambda one: left[one])
 
     @property
     def log_factor(self) -> float:
         """Log Bayes factor over all priors."""
-        return float(np.logaddexp.reduce(list(self.factors.values())))
+        most = max(peak.fit.found.log_evidence - self.height for peak in self.peaks.values())
+        return float(np.logaddexp.reduce([self.factor(prior, max(most, 0.0)) for prior in self.shares]))
 
 
-def _log_factor(peak: _Peak, height: float, cover: FloatArray) -> float:
-    """Log Bayes factor under a prior, from a peak under another; at least that of no force at all."""
+def _promise(peak: _Peak, height: float, cover: FloatArray) -> _Promise:
+    """What a peak, perhaps one under another prior, says of a prior of this covariance."""
     precision = np.linalg.inv(cover)
     step = np.linalg.solve(peak.information + precision, peak.score - precision @ peak.values)
-    values = peak.values + step
     gain = peak.fit.found.log_evidence - height + peak.score @ step - 0.5 * step @ peak.information @ step
     _, log_det = np.linalg.slogdet(np.eye(len(cover)) + cover @ peak.information)
-    return max(float(gain - _price(values, precision)), 0.0) - 0.5 * float(log_det)
+    return _Promise(float(gain), _price(peak.values + step, precision), 0.5 * float(log_det))
 
 
 def _highest(peaks: Sequence[_Peak], cover: FloatArray) -> _Peak:
