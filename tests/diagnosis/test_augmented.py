@@ -10,6 +10,7 @@ import numpy as np
 import pytensor
 import pytensor.tensor as pt
 import pytest
+import xarray as xr
 from numpy.testing import assert_allclose
 from scipy.special import logsumexp
 from scipy.stats import halfnorm, lognorm, norm
@@ -123,6 +124,22 @@ def test_densities_are_those_of_a_dense_sum(problem: AugmentedProblem) -> None:
     assert_allclose(problem.log_likelihood(problem.base.law, samples), exact, atol=0.02)
     errors = problem.integration_errors(problem.base.law, samples)
     assert errors.shape == (3, 3) and np.abs(errors).max() < 0.02
+
+
+def test_finer_tables_cover_what_chains_visited(problem: AugmentedProblem) -> None:
+    """Far off, where few nodes are; once and no more; elsewhere nothing changes."""
+    law, strength = problem.base.law, problem.tables.mean[0]
+    far = 0.3 * np.exp(0.5 + np.array([-0.02, 0.0, 0.02]))
+    samples = {"dry_friction": far, "dry_friction_spread": np.full(3, 0.02)}
+    samples["turbulent_drag"] = np.full(3, strength)
+    chains = {name: (("chain", "draw"), np.tile(values, (4, 1))) for name, values in samples.items()}
+    again = problem.finer(law, xr.Dataset(chains))
+    assert again is not None and again.finer(law, xr.Dataset(chains)) is None
+    before, after = (np.abs(one.integration_errors(law, samples)).max() for one in (problem, again))
+    assert before > 0.25 and after < 0.4 * before
+    near = {"dry_friction": 0.3, "dry_friction_spread": 0.1, "turbulent_drag": strength}
+    samples = {name: np.array([value]) for name, value in near.items()}
+    assert_allclose(again.log_likelihood(law, samples), problem.log_likelihood(law, samples), atol=0.02)
 
 
 def test_posterior_is_that_of_a_dense_grid(problem: AugmentedProblem, calibration: Any) -> None:

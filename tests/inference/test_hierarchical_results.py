@@ -37,7 +37,7 @@ def test_a_wrong_integration_fails_the_gate(calibrated: Calibration, monkeypatch
     posterior = calibrated.tree["posterior"].to_dataset()
     [problem] = calibrated.problem.numerical_problems(calibrated.law, posterior)
     assert "wrong by 0.44 nats in 22 events" in problem
-    assert not calibrated.gate.with_problems([problem]).passed
+    assert not calibrated.gate.with_numerical_problems([problem]).passed
 
 
 def test_the_tree_holds_everything_and_comes_back(calibrated: Calibration, tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
 from skred.campaign import find_campaign, read_campaign
 from skred.campaign.parts import of_events
@@ -39,10 +40,10 @@ def test_a_rough_integration_is_made_finer() -> None:
     """The limit lies between the errors of both."""
     given, settings = problem(), SamplerSettings(draws=600, tune=400, seed=1)
     samples = {"retardation": np.array([4.0, 5.0]), "retardation_spread": np.array([0.15, 0.3])}
-    finer: Any = given.finer()
+    finer: Any = given.finer(LAW, xr.Dataset())
     rough, fine = (np.abs(one.integration_errors(LAW, samples)).max() for one in (given, finer))
     assert fine < 0.5 * rough
     found = calibrate_surely(replace(given, integration_limit=1e-7), LAW, settings)
     assert isinstance(found.problem, HierarchicalProblem) and found.problem.fineness == 2
-    assert found.problem.finer() is None
+    assert found.problem.finer(LAW, xr.Dataset()) is None
     assert "integration" in found.gate.problems[0]

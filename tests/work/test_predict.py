@@ -34,7 +34,7 @@ from skred.work.predict_track import PredictionTrack, prediction_track
 
 N_CHAINS, N_DRAWS = 2, 40
 GOOD = Gate(1.001, 900.0, 800.0, 0, ())
-BAD = GOOD.with_problems(["r-hat 1.2 exceeds 1.01: more --tune"])
+BAD = replace(GOOD, problems=("r-hat 1.2 exceeds 1.01: more --tune",))
 CENTRES = {
     "constant": {"retardation": (4.6, 0.05), "retardation_spread": (0.25, 0.15)},
     "pcm": {

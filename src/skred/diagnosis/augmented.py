@@ -7,6 +7,7 @@ grid of strengths that covers the posterior, and interpolated between.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -90,12 +91,15 @@ class AugmentedProblem(HierarchicalProblem):
     added : tuple of AddedStrength
         One or two.
     tables : Tables
+    visited : Population, optional
+        Populations that chains went to with rougher tables, and that these cover.
     """
 
     integration_limit: float = CLAIM_LIMIT
     base: Base
     added: tuple[AddedStrength, ...]
     tables: Tables = field(repr=False)
+    visited: Population | None = None
 
     def __post_init__(self) -> None:
         """Refuse recordings that the tables are not of."""
@@ -274,8 +278,28 @@ class AugmentedProblem(HierarchicalProblem):
         speeds: FloatArray = front_speeds(rows, releases, self.path, extension.contributions)
         return speeds
 
-    def finer(self) -> None:
-        """None: tables are as fine as helps."""
+    def finer(self, law: Law, posterior: xr.Dataset) -> AugmentedProblem | None:
+        """The same with tables that also cover the populations that chains went to; None where they do.
+
+        Far from all that the tables cover a few nodes stand for all, and may promise a mode that is none.
+        """
+        if self.visited is not None:
+            return None
+        samples = {
+            str(name): posterior[name].transpose("chain", "draw").values for name in posterior.data_vars
+        }
+        means, covariances = [], []
+        for chain in range(posterior.sizes["chain"]):
+            mean, factor = population_of(law, {name: values[chain] for name, values in samples.items()})
+            means.append(mean.mean(axis=0))
+            within = np.einsum("nij,nkj->ik", factor, factor) / len(mean)
+            covariances.append(within + np.atleast_2d(np.cov(mean, rowvar=False)))
+        visited = Population(np.array(means), np.array(covariances))
+        old = self.tables
+        wide = old.budget.over_population * 2 ** math.ceil(math.log2(2 + len(means)))
+        budget = old.budget._replace(over_population=wide, adapted=2 * old.budget.adapted)
+        tables = build_tables(self.base, self.extension, old.located, budget, visited)
+        return _with_tables(self.base, self.added, tables, visited)
 
     def surfaces(self, mechanisms: Sequence[Mechanism]) -> Surfaces:
         """Not there: surfaces would be those of the base law alone.
@@ -327,7 +351,9 @@ def augmented_problem(base: Base, curves: Sequence[Curve]) -> AugmentedProblem:
     return problem
 
 
-def _with_tables(base: Base, added: tuple[AddedStrength, ...], tables: Tables) -> AugmentedProblem:
+def _with_tables(
+    base: Base, added: tuple[AddedStrength, ...], tables: Tables, visited: Population | None = None
+) -> AugmentedProblem:
     old = base.problem
     return AugmentedProblem(
         old.campaign,
@@ -337,6 +363,7 @@ def _with_tables(base: Base, added: tuple[AddedStrength, ...], tables: Tables) -
         base=base,
         added=added,
         tables=tables,
+        visited=visited,
     )
 
 

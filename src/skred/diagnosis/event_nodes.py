@@ -177,8 +177,8 @@ def event_nodes(
     modes : Modes
         Around which many nodes are put.
     reference : Population, optional
-        Of one group: another population that the nodes must cover, half of those over the population are
-        put there. Without it a population that has become too narrow would never see what it misses.
+        Other populations that the nodes of all rows must cover: those over the population are shared with
+        them. Without any, a population that has become too narrow would never see what it misses.
     shifts : (n_rows, n_base + 1) array, optional
         By which each row's quasi-random numbers are moved round along each axis, 0 to 1. For means over
         rows, not differences: what is left of the integration errors then averages out.
@@ -190,10 +190,12 @@ def event_nodes(
     parts = [
         _Part(budget.around_mode, modes.points[:, None, :axes], budget.wider * np.linalg.cholesky(cover))
     ]
-    both = [population] if reference is None else [population, reference]
-    for one in both:
+    covered = [population, *([] if reference is None else reference.groups)]
+    # As many as quasi-random numbers come in.
+    size = 1 << ((budget.over_population // len(covered)).bit_length() - 1)
+    for one in covered:
         centre, over = _over(one, rows, axes, budget.population_wider)
-        parts.append(_Part(budget.over_population // len(both), centre[:, None, :], over))
+        parts.append(_Part(size, centre[:, None, :], over))
 
     def spread(part: _Part, seed: int) -> tuple[FloatArray, FloatArray]:
         """Nodes of a part, and the log likelihoods there, the release's prior included."""

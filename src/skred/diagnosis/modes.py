@@ -71,6 +71,15 @@ class Population(NamedTuple):
         result[:, n, n] = 1.0
         return result
 
+    @property
+    def groups(self) -> list[Population]:
+        """Each group by itself."""
+        return [Population(self.mean[k : k + 1], self.covariance[k : k + 1]) for k in range(len(self.mean))]
+
+    def with_more(self, more: Population) -> Population:
+        """These groups and others."""
+        return Population(*(np.concatenate([a, b]) for a, b in zip(self, more, strict=True)))
+
 
 class Modes(NamedTuple):
     """Most probable points and what the readings say around them.

@@ -308,8 +308,16 @@ def _without_failures(fits: Sequence[Fit], instead: Fit) -> list[Fit]:
     ]
 
 
-def build_tables(base: Base, extension: Extension, located: Located, budget: Budget) -> Tables:
-    """Nodes of all events at all strengths of a grid, around populations as wide as what is known of them."""
+def build_tables(
+    base: Base, extension: Extension, located: Located, budget: Budget, visited: Population | None = None
+) -> Tables:
+    """Nodes of all events at all strengths of a grid, around populations as wide as what is known of them.
+
+    Parameters
+    ----------
+    visited : Population, optional
+        Others that the nodes must cover, one or more groups.
+    """
     grid, fits = located.grid, located.fits
     n, n_tables, n_events = len(base.law.mechanisms), len(fits), len(base.rows.event)
     rows = repeated(base.rows, n_tables)
@@ -325,9 +333,8 @@ def build_tables(base: Base, extension: Extension, located: Located, budget: Bud
     wider = np.exp(np.minimum(np.sqrt(np.einsum("tii->ti", covariances)[:, n : 2 * n]), 0.7))
     wide = population.covariance * wider[:, :, None] * wider[:, None, :]
     wide = wide + np.clip(covariances[:, :n, :n], -1.0, 1.0)
-    spread = event_nodes(
-        extension, rows, given, Population(population.mean, wide), modes, budget, base.population
-    )
+    reference = base.population if visited is None else base.population.with_more(visited)
+    spread = event_nodes(extension, rows, given, Population(population.mean, wide), modes, budget, reference)
     points = modes.points.reshape(n_tables, n_events, n + 1)
     return Tables(located, spread.nodes, spread.points[:, :, n].ravel(), points, budget)
 

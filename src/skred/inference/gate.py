@@ -28,6 +28,8 @@ class Gate:
         Of NUTS; 0 for other samplers.
     problems : tuple of str
         What failed and what to do; empty if the gate is passed.
+    numerics : bool
+        Whether the numerics of the likelihood were good enough.
     """
 
     r_hat_max: float
@@ -35,6 +37,7 @@ class Gate:
     ess_tail_min: float
     divergences: int
     problems: tuple[str, ...]
+    numerics: bool = True
 
     @property
     def passed(self) -> bool:
@@ -46,13 +49,15 @@ class Gate:
         """Whether more draws could help."""
         return not (self.r_hat_max <= R_HAT_LIMIT and min(self.ess_bulk_min, self.ess_tail_min) >= ESS_LIMIT)
 
-    def with_problems(self, more: Sequence[str]) -> Gate:
-        """The same gate with further reasons to fail."""
-        return replace(self, problems=(*self.problems, *more))
+    def with_numerical_problems(self, more: Sequence[str]) -> Gate:
+        """The same gate with what is wrong with the numerics, if anything is."""
+        return replace(self, problems=(*self.problems, *more), numerics=not more)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data for files."""
-        return {"passed": self.passed, **asdict(self), "problems": list(self.problems)}
+        plain = asdict(self)
+        plain.pop("numerics")
+        return {"passed": self.passed, **plain, "problems": list(self.problems)}
 
 
 def check_gate(tree: xr.DataTree, parameters: Sequence[str]) -> Gate:

@@ -213,8 +213,8 @@ class HierarchicalProblem(Problem):
             self._surfaces[key] = self._resolve(mechanisms, self.fronts(mechanisms), self.fineness, envelope)
         return self._surfaces[key]
 
-    def finer(self) -> HierarchicalProblem | None:
-        """The same with events resolved finer; None where they are already."""
+    def finer(self, law: Law, posterior: xr.Dataset) -> HierarchicalProblem | None:
+        """The same with events resolved finer, everywhere; None where they are already."""
         return replace(self, fineness=2) if self.fineness == 1 else None
 
     def _resolve(

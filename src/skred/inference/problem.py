@@ -74,8 +74,8 @@ class Problem(ABC):
         """What is wrong with the numerics of the likelihood, and what to do."""
         return ()
 
-    def finer(self) -> Problem | None:
-        """The same problem with finer numerics; None where there are none."""
+    def finer(self, law: Law, posterior: xr.Dataset) -> Problem | None:
+        """The same problem with finer numerics where a posterior went; None where there are none."""
         return None
 
     def to_start_from(self, law: Law, prior: dict[str, FloatArray], seed: int) -> dict[str, FloatArray]:

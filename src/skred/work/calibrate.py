@@ -70,25 +70,26 @@ def calibrate(
     step = JointMetropolis(model=model, pointwise="recordings")
     posterior = sample_posterior(model, law, problem, prior, settings, step=step, progress=progress)
     gate = check_gate(posterior, [parameter.name for parameter in problem.parameters(law)])
-    gate = gate.with_problems(problem.numerical_problems(law, posterior["posterior"].to_dataset()))
+    gate = gate.with_numerical_problems(problem.numerical_problems(law, posterior["posterior"].to_dataset()))
     tree = assemble(problem, law, posterior, prior, gate, settings)
     return Calibration(law, problem, settings, model, step, tree, gate)
 
 
 def calibrate_surely(problem: Problem, law: Law, settings: SamplerSettings) -> Calibration:
-    """As `calibrate`, and once more where the gate failed.
+    """As `calibrate`, and again where the gate failed.
 
-    With `MORE` times the draws if the chains were too short, else with events resolved finer if they can be:
-    the calibration's problem is then another than was given.
+    With finer numerics if those were too rough and can be made finer: the calibration's problem is then
+    another than was given. Chains can be stuck in a mode that only rough numerics make. Then, if chains are
+    too short, with `MORE` times the draws.
     """
     found = calibrate(problem, law, settings)
-    if found.gate.passed:
-        return found
-    if found.gate.chains_too_short:
+    if not found.gate.numerics:
+        finer = problem.finer(law, found.tree["posterior"].to_dataset())
+        found = found if finer is None else calibrate(finer, law, settings)
+    if not found.gate.passed and found.gate.chains_too_short:
         more = replace(settings, draws=MORE * settings.draws, tune=MORE * settings.tune)
-        return calibrate(problem, law, more)
-    finer = problem.finer()
-    return found if finer is None else calibrate(finer, law, settings)
+        found = calibrate(found.problem, law, more)
+    return found
 
 
 def write_calibration(calibration: Calibration, folder: Path) -> None:
