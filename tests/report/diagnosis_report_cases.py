@@ -19,7 +19,7 @@ from skred.diagnosis.locate import Location
 from skred.diagnosis.odds import prior_odds
 from skred.diagnosis.omnibus import Omnibus
 from skred.diagnosis.predictive import Predicted
-from skred.diagnosis.profile_law import ProfileLaw
+from skred.diagnosis.profile_law import Draws, ProfileLaw
 from skred.diagnosis.race import Heat, Race
 from skred.diagnosis.unlisted import KINDS, Prior, Profile
 from skred.inference.gate import Gate
@@ -178,7 +178,9 @@ def profile_law(problem: HierarchicalProblem, clean: np.ndarray) -> ProfileLaw:
     mean = 0.5 * np.exp(-0.5 * ((at - 1800.0) / 60.0) ** 2)
     prior = Prior(0.8, 120.0, 1800.0)
     profile = Profile(KINDS[0], prior, at, mean, 0.01 * np.eye(20), 30.0, 42.0, Fit(None, np.empty(0)))
-    return ProfileLaw(profile, "robust", Omnibus(0.1, clean), held(problem, 0.0), held(problem, 1.1))
+    draws = Draws(np.empty((0, 1)), np.empty((0, 1, 1)), np.empty((0, 0)))
+    scores = held(problem, 0.0), held(problem, 1.1)
+    return ProfileLaw(profile, "robust", Omnibus(0.1, clean), *scores, draws, draws)
 
 
 def _steps(problem, race, names, clean, *, second):

@@ -76,6 +76,19 @@ def test_a_relief_that_opposes_a_named_drag_is_told() -> None:
     assert "(U^2 - U_0^2)" in document["equation"] and document["mechanisms"][0]["constants"][U_1] == 31.0
 
 
+def test_a_candidate_that_is_not_excluded_is_told() -> None:
+    """Of another group, where it is not improbable; those that are tied have a sentence of their own."""
+    found = diagnosis("tie")
+    document = verdict(found)
+    tied = [document["mechanism"], *document["indistinguishable"]]
+    rest = {name: 0.0 for name in document["probability"] if name not in tied}
+    told = dict.fromkeys(tied, 0.5 / len(tied))
+    near = document | {"probability": told | rest | {"release_offset": 0.38, "unlisted": 0.12}}
+    assert "Not excluded: release points not where they were noted (38 %)" in statement(found, near)
+    far = document | {"probability": told | rest | {"release_offset": 0.04, "unlisted": 0.46}}
+    assert "Not excluded" not in statement(found, far)
+
+
 def test_the_force_profile_let_in_is_told() -> None:
     """What avalanches left out gain by it, its equation and its numbers; nothing is named."""
     found = diagnosis("unexplained")

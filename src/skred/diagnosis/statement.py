@@ -13,6 +13,9 @@ from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.stretches import U_1, U_2
 
+_RIVAL = 0.05
+"""Probability from which another candidate than those named is told of."""
+
 
 def statement(found: Diagnosis, document: dict[str, Any]) -> str:
     """One paragraph in plain words."""
@@ -67,6 +70,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         others = ", ".join(_title(other) for other in ties)
         sentences.append(f"These recordings cannot tell it from: {others}.")
         sentences.append(_split(document))
+    sentences.append(_rival(document))
     if len(document["mechanisms"]) > 1:
         second = document["mechanisms"][1]
         sentences.append(
@@ -76,6 +80,16 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     sentences.append(_improvement(document))
     sentences.append(_still_fired(found.steps[-1].check))
     return [*sentences, _left(document)]
+
+
+def _rival(document: dict[str, Any]) -> str:
+    """The most probable listed candidate that is neither named nor tied, where it is not improbable."""
+    told = {NOTHING, UNLISTED, document["mechanism"], *document["indistinguishable"]}
+    others = {name: share for name, share in document["probability"].items() if name not in told}
+    name = max(others, key=lambda one: others[one], default="")
+    if not name or others[name] < _RIVAL:
+        return ""
+    return f"Not excluded: {_title(name)} ({_share(others[name])})."
 
 
 def _still_fired(check: Omnibus) -> str:
