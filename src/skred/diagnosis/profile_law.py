@@ -35,6 +35,8 @@ from skred.diagnosis.unseen import log_densities
 FloatArray = NDArray[np.float64]
 _DRAWS, _FRONTS = 200, 1200
 _ROUNDS = 3
+_PRIORS_TRIED = 4
+"""Priors climbed under without each avalanche: close to the best one of all, or those that lead then."""
 
 
 class Draws(NamedTuple):
@@ -121,7 +123,7 @@ def _left_out(base: Base, profile: Profile, event: int, seed: int) -> tuple[_Eve
     others = np.flatnonzero(base.rows.event != event)
     population = profile.fit.found.population(len(base.law.mechanisms))
     near = profile.mean, (population, profile.fit.points[others])
-    again = fit_profile(rest, profile.kind, near, profile.prior)
+    again = fit_profile(rest, profile.kind, near, profile.prior, _PRIORS_TRIED)
     return before, _event(base, *_with(rest, again, rng), event, rng)
 
 

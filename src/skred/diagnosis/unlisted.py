@@ -192,7 +192,9 @@ class _Peak:
     information: FloatArray
 
 
-def fit_profile(base: Base, kind: Kind, near: Start | None = None, first: Prior | None = None) -> Profile:
+def fit_profile(
+    base: Base, kind: Kind, near: Start | None = None, first: Prior | None = None, most: int = _PRIORS_TRIED
+) -> Profile:
     """Fit the profile by Gauss-Newton steps around the events' modes; its evidence with nodes at the top.
 
     Climbed to under one prior after the other, as long as those left could matter; the evidence under them
@@ -205,6 +207,8 @@ def fit_profile(base: Base, kind: Kind, near: Start | None = None, first: Prior 
         recorded, robust errors see outliers and no direction to go.
     first : Prior, optional
         Under which to climb first.
+    most : int
+        Priors climbed under at most.
     """
     at = knots(base.setting)
     # Nothing like everything else, so that what is left of integration errors is the same there.
@@ -216,7 +220,7 @@ def fit_profile(base: Base, kind: Kind, near: Start | None = None, first: Prior 
     height = nothing.found.log_evidence
     seen = _Seen(height, at, priors_of(kind, at))
     next_one: Prior | None = first or Prior(kind.amplitude, NEAR_M)
-    while next_one is not None and len(seen.peaks) < _PRIORS_TRIED:
+    while next_one is not None and len(seen.peaks) < most:
         cover = next_one.cover(at)
         start = _highest([*starts, *seen.peaks.values()], cover)
         seen.add(next_one, _climb(base, kind, at, start, cover))
