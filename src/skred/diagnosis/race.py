@@ -42,9 +42,9 @@ _CHECKED, _DRAWS = 5, 500
 _WITHIN, _AT_MOST, _TURNS = 3.0, 2, 3
 """Places of a mechanism that are looked at again: within so many nats of its best, so many, so many times."""
 _FAR_BEHIND, _HOPELESS = 10.0, 20.0
-"""Nats behind its mechanism's best at which a place is not looked at under another error model, and behind
-the best of all at which it is not split; nats behind the best of all at which it is not looked at again."""
-_SPLIT_FROM = 1.0
+"""Nats behind its mechanism's best at which a place is not looked at under another error model; nats behind
+the best of all at which it is not looked at again. Parts of a place may have ten nats more than the place."""
+_SPLIT_FROM = 0.3
 """Nats in favour of a place from which it is split: parts of a place without evidence have hardly any."""
 
 
@@ -288,10 +288,9 @@ def _looked_at_again(
 def _worth_splitting(
     curves: Sequence[Curve], finer: Mapping[int, list[Curve]], todo: Sequence[int]
 ) -> list[int]:
-    """Places that have some evidence, roughly or with fronts, not too far behind the best of all."""
-    best = max(one.log_bayes_factor for place in finer.values() for one in place)
+    """Places that have some evidence, roughly or with fronts."""
     height = {k: max(curves[k].log_bayes_factor, finer[k][0].log_bayes_factor) for k in todo}
-    return [k for k in todo if height[k] > max(_SPLIT_FROM, best - _FAR_BEHIND)]
+    return [k for k in todo if height[k] > _SPLIT_FROM]
 
 
 def _leading(curves: Sequence[Curve], finer: Mapping[int, list[Curve]]) -> list[int]:
