@@ -24,6 +24,7 @@ from skred.diagnosis.marginal import population_at
 from skred.diagnosis.modes import Population, Rows, take_rows
 from skred.diagnosis.tables import BUDGETS, Located, Tables, build_tables, exact_nodes, finer, locate
 from skred.diagnosis.tabulated_op import tabulated_log_densities
+from skred.diagnosis.truncated_normal import truncated_normal
 from skred.inference.event_density import integrated_log_density
 from skred.inference.hierarchical import HierarchicalProblem
 from skred.inference.population import population_of, population_samples, population_variables
@@ -138,7 +139,7 @@ class AugmentedProblem(HierarchicalProblem):
             held[name] = pt.cast(held[name], "int64")  # PyMC makes integers int32
         scales = pm.Data("added_scale", np.array([one.scale for one in self.added]))
         low, high = pm.Data("added_low", self.range[0]), pm.Data("added_high", self.range[1])
-        added = [_truncated_normal(one.name, scales[k], low[k], high[k]) for k, one in enumerate(self.added)]
+        added = [truncated_normal(one.name, scales[k], low[k], high[k]) for k, one in enumerate(self.added)]
         factor = population_variables(mechanisms)
         means = pt.alloc(pt.log(pt.stack(list(strengths))), n_events, len(mechanisms))
 
@@ -395,30 +396,3 @@ def _rough_error(problem: AugmentedProblem, located: Located) -> float:
     return float(
         22.0 * np.abs(problem.errors_at(means, factors, added, chosen, _ROUGH_RUNS).mean(axis=1)).max()
     )
-
-
-def _truncated_normal(name: str, scale: Any, low: Any, high: Any) -> Any:
-    """Normal variable around 0 between two values, as PyTensor's numba backend can draw it.
-
-    Half-normal where the lower one is 0: with the support's part that is left out, its density is only
-    higher by a factor.
-    """
-    import pymc as pm
-    import pytensor.tensor as pt
-    from pymc.distributions.transforms import Interval
-
-    root = np.sqrt(2.0)
-
-    def drawn(scale: Any, low: Any, high: Any, size: Any) -> Any:
-        share = pm.Uniform.dist(0.0, 1.0, size=size)
-        first, last = pt.erf(low / scale / root), pt.erf(high / scale / root)
-        inside: Any = pt.clip(scale * root * pt.erfinv(first + share * (last - first)), low, high)
-        return inside
-
-    def logp(value: Any, scale: Any, low: Any, high: Any) -> Any:
-        share = 0.5 * (pt.erf(high / scale / root) - pt.erf(low / scale / root))
-        density = -0.5 * (value / scale) ** 2 - pt.log(scale * share) - 0.5 * np.log(2.0 * np.pi)
-        return pt.switch((value >= low) & (value <= high), density, -np.inf)
-
-    between = Interval(bounds_fn=lambda *_: (low, high))
-    return pm.CustomDist(name, scale, low, high, dist=drawn, logp=logp, default_transform=between)
