@@ -28,6 +28,7 @@ from skred.diagnosis.truncated_normal import truncated_normal
 from skred.inference.event_density import integrated_log_density
 from skred.inference.hierarchical import HierarchicalProblem
 from skred.inference.population import population_of, population_samples, population_variables
+from skred.inference.rough_population import moments_of
 from skred.inference.surface import Surfaces
 from skred.physics.kernel import front_speeds
 from skred.physics.law import Law, Parameter
@@ -289,15 +290,12 @@ class AugmentedProblem(HierarchicalProblem):
         samples = {
             str(name): posterior[name].transpose("chain", "draw").values for name in posterior.data_vars
         }
-        means, covariances = [], []
-        for chain in range(posterior.sizes["chain"]):
-            mean, factor = population_of(law, {name: values[chain] for name, values in samples.items()})
-            means.append(mean.mean(axis=0))
-            within = np.einsum("nij,nkj->ik", factor, factor) / len(mean)
-            covariances.append(within + np.atleast_2d(np.cov(mean, rowvar=False)))
-        visited = Population(np.array(means), np.array(covariances))
+        n_chains = posterior.sizes["chain"]
+        chains = [{name: values[k] for name, values in samples.items()} for k in range(n_chains)]
+        moments = [moments_of(*population_of(law, chain)) for chain in chains]
+        visited = Population(*(np.array(values) for values in zip(*moments, strict=True)))
         old = self.tables
-        wide = old.budget.over_population * 2 ** math.ceil(math.log2(2 + len(means)))
+        wide = old.budget.over_population * 2 ** math.ceil(math.log2(2 + n_chains))
         budget = old.budget._replace(over_population=wide, adapted=2 * old.budget.adapted)
         tables = build_tables(self.base, self.extension, old.located, budget, visited)
         return _with_tables(self.base, self.added, tables, visited)

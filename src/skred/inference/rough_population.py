@@ -99,7 +99,13 @@ def rough_population(surfaces: Surfaces, prior_mean: FloatArray, prior_sd: Float
 
 
 def envelope_around(means: FloatArray, factors: FloatArray) -> Envelope:
-    """Envelope of some populations and no others.
+    """Envelope of some populations and no others; arguments as of `moments_of`."""
+    mean, covariance = moments_of(means, factors)
+    return Envelope(mean, np.linalg.inv(np.linalg.cholesky(_AROUND * covariance)))
+
+
+def moments_of(means: FloatArray, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean and covariance of some populations taken together.
 
     Parameters
     ----------
@@ -111,8 +117,7 @@ def envelope_around(means: FloatArray, factors: FloatArray) -> Envelope:
     deviation = means - means.mean(axis=0)
     between = deviation.T @ deviation / len(means)
     within = np.einsum("nij,nkj->ik", factors, factors) / len(means)
-    whiten = np.linalg.inv(np.linalg.cholesky(_AROUND * (within + between)))
-    return Envelope(means.mean(axis=0), whiten)
+    return means.mean(axis=0), within + between
 
 
 def _weights(
