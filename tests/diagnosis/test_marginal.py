@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from diagnosis_cases import dense_base, ryggfonn_base, sparse_base
 from numpy.testing import assert_allclose
+from numpy.typing import NDArray
 
 import skred.diagnosis.event_nodes as event_nodes_module
 from skred.diagnosis.curves import Base
@@ -17,6 +18,8 @@ from skred.diagnosis.marginal import (
     _factor,
     _log_correlation_constant,
     _log_prior,
+    _log_target,
+    _slopes,
     coordinates,
     evidence,
     importance_evidence,
@@ -25,6 +28,7 @@ from skred.diagnosis.modes import Population, event_modes
 from skred.inference.population import population_factor
 from skred.inference.surface import Nodes
 
+FloatArray = NDArray[np.float64]
 NONE = np.zeros(0)
 
 
@@ -120,6 +124,26 @@ def test_evidence_on_a_grid() -> None:
     assert evidence(nodes, base.log_scale, found.psi).log_evidence == pytest.approx(summed, abs=0.15)
     value, _ = importance_evidence(nodes, base.log_scale, found, 8000, 3)
     assert value == pytest.approx(summed, abs=0.05)
+
+
+@pytest.mark.parametrize("which", ["constant", "coulomb", "sparse", "dense"])
+def test_slopes_of_the_log_target_are_its_differences(which: str) -> None:
+    base = {"sparse": sparse_base, "dense": dense_base}.get(which, lambda: ryggfonn_base(which))()
+    nodes, rng = nodes_of(base, USUAL), np.random.default_rng(4)
+    n, sd = len(base.log_scale), np.sqrt(np.diag(base.fit.found.covariance))
+    psi = base.fit.found.psi + 0.7 * sd * rng.standard_normal(len(sd))
+    given = n, base.log_scale, *nodes
+
+    def target(change: FloatArray) -> float:
+        return float(_log_target(psi + change, *given))
+
+    value, gradient, hessian = _slopes(psi, *given)
+    steps = 0.02 * np.diag(sd)
+    along = [8.0 * (target(a) - target(-a)) - (target(2.0 * a) - target(-2.0 * a)) for a in steps]
+    corners = [[target(a + b) - target(a - b) - target(b - a) + target(-a - b) for b in steps] for a in steps]
+    assert value == pytest.approx(target(0.0 * sd), abs=1e-9)
+    assert_allclose(gradient * sd, np.array(along) / (12.0 * 0.02), atol=1e-3)
+    assert_allclose(hessian * np.outer(sd, sd), -np.array(corners) / (4.0 * 0.02**2), atol=5e-3)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])

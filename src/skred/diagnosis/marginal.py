@@ -16,7 +16,7 @@ from scipy.special import gammaln
 
 from skred.diagnosis.mixed import MeanPrior
 from skred.diagnosis.modes import Population
-from skred.inference.event_density import integrated_log_density
+from skred.inference.event_density import integrated_log_density, inverse_factor
 from skred.inference.population import LKJ_SHAPE
 from skred.inference.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 from skred.inference.surface import Nodes
@@ -24,6 +24,9 @@ from skred.inference.surface import Nodes
 FloatArray = NDArray[np.float64]
 _LOG_MEDIAN, _LOG_SD, _SHAPE = math.log(SPREAD_MEDIAN), SPREAD_LOG_SD, LKJ_SHAPE
 _LOG_2PI = math.log(2.0 * math.pi)
+_HALF_LOG_2PI = 0.5 * _LOG_2PI
+_NEGLIGIBLE = -25.0
+"""Log share of an event's integral below which a node does not count for slopes."""
 _STEP = 2e-3
 _DEGREES, _RESAMPLED_FROM = 5.0, 8
 
@@ -41,6 +44,15 @@ def _factor(psi, n):  # type: ignore[no-untyped-def]
             left *= math.sqrt(1.0 - r * r + 1e-12)
         factor[i, i] = left
     return factor
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _means(psi, n, n_events):  # type: ignore[no-untyped-def]
+    """The population's mean, the same for each event."""
+    means = np.empty((n_events, n))
+    for i in range(n):
+        means[:, i] = psi[i]
+    return means
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -65,42 +77,127 @@ def _log_prior(psi, n, log_scale):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _log_target(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-untyped-def]
-    n_events = first.size - 1
-    means = np.empty((n_events, n))
-    for i in range(n):
-        means[:, i] = psi[i]
+    means = _means(psi, n, first.size - 1)
     density = integrated_log_density(means, _factor(psi, n), first, points, log_weights)
-    total = _log_prior(psi, n, log_scale)
-    for event in range(n_events):
-        total += density[event]
+    total = _log_prior(psi, n, log_scale) + density.sum()
     return total if total == total else -np.inf
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _fill_statistics(point, mean, whiten, statistics):  # type: ignore[no-untyped-def]
+    """Statistics of a normal density: whitened strengths, then their products (0, 0), (1, 0), (1, 1), ...
+
+    Returns the exponent of the density.
+    """
+    n, exponent = mean.size, 0.0
+    place = n
+    for i in range(n):
+        statistics[i] = 0.0
+        for j in range(i + 1):
+            statistics[i] += whiten[i, j] * (point[j] - mean[j])
+        exponent -= 0.5 * statistics[i] ** 2
+        for j in range(i + 1):
+            statistics[place] = statistics[i] * statistics[j]
+            place += 1
+    return exponent
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _node_moments(psi, n, first, points, log_weights):  # type: ignore[no-untyped-def]
+    """Sums over events: of log integrals, and of means and covariances of the statistics over the nodes.
+
+    Each node counts by its share of its event's integral.
+    """
+    n_events, factor = first.size - 1, _factor(psi, n)
+    whiten, log_determinant = inverse_factor(factor)
+    density = integrated_log_density(_means(psi, n, n_events), factor, first, points, log_weights)
+    constant = log_determinant - n * _HALF_LOG_2PI
+    size = n + n * (n + 1) // 2
+    mean, covariance = np.zeros(size), np.zeros((size, size))
+    own, square, statistics = np.empty(size), np.empty((size, size)), np.empty(size)
+    for event in range(n_events):
+        own[:], square[:] = 0.0, 0.0
+        for k in range(first[event], first[event + 1]):
+            exponent = _fill_statistics(points[:, k], psi[:n], whiten, statistics)
+            log_share = log_weights[k] + exponent + constant - density[event]
+            if log_share < _NEGLIGIBLE:
+                continue
+            for i in range(size):
+                part = math.exp(log_share) * statistics[i]
+                own[i] += part
+                for j in range(size):
+                    square[i, j] += part * statistics[j]
+        mean += own
+        for i in range(size):
+            covariance[i] += square[i] - own[i] * own
+    return density.sum(), mean, covariance
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _natural(psi, n, centre, whiten):  # type: ignore[no-untyped-def]
+    """Natural parameters of a population in coordinates whitened about another, and its normalising term."""
+    between = whiten @ _factor(psi, n)
+    inverse, log_determinant = inverse_factor(between)
+    offset, precision = whiten @ (psi[:n] - centre), inverse.T @ inverse
+    found, place = np.empty(n + n * (n + 1) // 2), n
+    found[:n] = precision @ offset
+    for i in range(n):
+        for j in range(i + 1):
+            found[place] = -precision[i, j] if j < i else -0.5 * precision[i, i]
+            place += 1
+    return found, 0.5 * offset @ found[:n] - log_determinant
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _smooth(psi, n, log_scale, mean, n_events, centre, whiten):  # type: ignore[no-untyped-def]
+    """What the log target is beside its log integrals, those along a tangent; and natural parameters."""
+    parameters, normaliser = _natural(psi, n, centre, whiten)
+    return mean @ parameters - n_events * normaliser + _log_prior(psi, n, log_scale), parameters
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _slopes(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-untyped-def]
+    """Log target, its gradient and minus its Hessian, with one sum over the nodes.
+
+    An event's log integral is the cumulant function of the statistics of `_node_moments` in the population's
+    natural parameters: its derivatives by those are their means and covariances. What remains, the natural
+    parameters by the coordinates, and the prior, is without nodes and differenced.
+    """
+    log_integrals, mean, covariance = _node_moments(psi, n, first, points, log_weights)
+    centre, (whiten, _) = psi[:n].copy(), inverse_factor(_factor(psi, n))
+    n_events, size = first.size - 1, psi.size
+    value = log_integrals + _log_prior(psi, n, log_scale)
+    natural = np.empty((size, mean.size))
+    gradient, hessian = np.empty(size), np.empty((size, size))
+    fixed = n, log_scale, mean, n_events, centre, whiten
+    middle, _ = _smooth(psi, *fixed)
+    sides, there = np.empty(size), psi.copy()
+    for i in range(size):
+        there[i] = psi[i] + _STEP
+        high, up = _smooth(there, *fixed)
+        there[i] = psi[i] - _STEP
+        low, down = _smooth(there, *fixed)
+        there[i] = psi[i]
+        natural[i] = (up - down) / (2.0 * _STEP)
+        gradient[i] = (high - low) / (2.0 * _STEP)
+        sides[i] = high - 2.0 * middle + low
+        hessian[i, i] = -sides[i] / _STEP**2
+        for j in range(i):
+            total = 0.0
+            for side in (-_STEP, _STEP):
+                there[i], there[j] = psi[i] + side, psi[j] + side
+                total += _smooth(there, *fixed)[0]
+            there[i], there[j] = psi[i], psi[j]
+            both = total - 2.0 * middle
+            hessian[i, j] = hessian[j, i] = -(both - sides[i] - sides[j]) / (2.0 * _STEP**2)
+    return value, gradient, hessian - natural @ covariance @ natural.T
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _climb(psi, n, log_scale, first, points, log_weights, n_steps):  # type: ignore[no-untyped-def]
     """Newton's method with halved steps: the top, its height, and minus the Hessian there."""
-    size = psi.size
-    best = _log_target(psi, n, log_scale, first, points, log_weights)
-    gradient, hessian = np.empty(size), np.empty((size, size))
+    best, gradient, hessian = _slopes(psi, n, log_scale, first, points, log_weights)
     for _ in range(n_steps):
-        for i in range(size):
-            up, down = psi.copy(), psi.copy()
-            up[i] += _STEP
-            down[i] -= _STEP
-            high = _log_target(up, n, log_scale, first, points, log_weights)
-            low = _log_target(down, n, log_scale, first, points, log_weights)
-            gradient[i] = (high - low) / (2.0 * _STEP)
-            hessian[i, i] = -(high - 2.0 * best + low) / _STEP**2
-            for j in range(i):
-                total = 0.0
-                for side_i in (-1.0, 1.0):
-                    for side_j in (-1.0, 1.0):
-                        there = psi.copy()
-                        there[i] += side_i * _STEP
-                        there[j] += side_j * _STEP
-                        value = _log_target(there, n, log_scale, first, points, log_weights)
-                        total += side_i * side_j * value
-                hessian[i, j] = hessian[j, i] = -total / (4.0 * _STEP**2)
         values, axes = np.linalg.eigh(hessian)
         along = axes.T @ gradient
         step = axes @ (along / np.maximum(np.abs(values), 0.5))
@@ -117,7 +214,7 @@ def _climb(psi, n, log_scale, first, points, log_weights, n_steps):  # type: ign
         if gained < -1e-9:
             break
         psi = psi + step
-        best += gained
+        best, gradient, hessian = _slopes(psi, n, log_scale, first, points, log_weights)
         if gained < 1e-3:
             break
     return psi, best, hessian

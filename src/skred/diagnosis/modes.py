@@ -16,7 +16,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 _LARGEST_STEP = 1.0
 _STARTING_DAMPING = 1e-3
-_SETTLED = 1e-3
+_SETTLED = 1e-2
 _STEEPEST = 1e4
 """Largest change of a reading, in standard deviations, per unit of an event's log strength."""
 

@@ -364,7 +364,7 @@ def _fit_at(
     direction = combined(base.setting, kind, at, values)
     extension = extended(base.problem, base.law, [*base.directions, direction])
     strengths = np.append(base.strengths, 1.0)[None, :]
-    return refit(extension, base.rows, strengths, start, base.log_scale)[0]
+    return refit(extension, base.rows, strengths, start, base.log_scale, n_rounds=1)[0]
 
 
 def _peak(base: Base, kind: Kind, at: FloatArray, values: FloatArray, fit: Fit) -> _Peak:

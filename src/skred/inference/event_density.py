@@ -20,7 +20,7 @@ _NEGLIGIBLE = -60.0
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _whiten(factor):  # type: ignore[no-untyped-def]
+def inverse_factor(factor):  # type: ignore[no-untyped-def]
     """Inverse of a lower triangular matrix, and the log of its determinant."""
     n = factor.shape[0]
     inverse, log_determinant = np.zeros((n, n)), 0.0
@@ -109,7 +109,7 @@ def integrated_log_density(means, factor, first, points, log_weights):  # type: 
     (n_events,) array
     """
     n_events, n_strengths = means.shape
-    whiten, log_determinant = _whiten(factor)
+    whiten, log_determinant = inverse_factor(factor)
     constant = log_determinant - n_strengths * _LOG_SQRT_2PI
     exponents = np.empty(np.max(first[1:] - first[:-1]))
     density = np.empty(n_events)
@@ -132,7 +132,7 @@ def integrated_log_density_pullback(  # type: ignore[no-untyped-def]
     (n_events + n_strengths, n_strengths) array
     """
     n_events, n = means.shape
-    whiten, _ = _whiten(factor)
+    whiten, _ = inverse_factor(factor)
     exponents = np.empty(np.max(first[1:] - first[:-1]))
     pulled, z, back = np.zeros((n_events + n, n)), np.empty(n), np.empty(n)
     for event in range(n_events):
@@ -183,7 +183,7 @@ def draw_nodes(means, factors, uniforms, first, points, log_weights):  # type: i
     drawn = np.empty((n, n_events), dtype=np.int64)
     exponents = np.empty(np.max(first[1:] - first[:-1]))
     for draw in range(n):
-        whiten, _ = _whiten(factors[draw])
+        whiten, _ = inverse_factor(factors[draw])
         for event in range(n_events):
             start, size = first[event], first[event + 1] - first[event]
             largest = _exponents(start, start + size, means[draw], whiten, points, log_weights, exponents)
