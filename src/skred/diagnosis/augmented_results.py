@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from skred.diagnosis.augmented import AugmentedProblem
 from skred.diagnosis.extension import Extension
 from skred.inference.event_density import draw_nodes
-from skred.inference.event_draws import Avalanches, new_avalanches, read_with_errors
-from skred.inference.hierarchical_results import _READING, _avalanches, _thin
+from skred.inference.event_draws import Avalanches, new_avalanches
+from skred.inference.hierarchical_results import add_readings, avalanche_dataset, thinned
 from skred.inference.population import population_of
 from skred.physics.geometry import sensor_table
 from skred.physics.kernel import simulate
@@ -32,14 +32,14 @@ def predictive_groups(
     """
     rng = np.random.default_rng([seed, 1])
     n_events = problem.campaign.n_events
-    thinned = _thin(posterior, n_events)
-    samples = _samples(problem, law, thinned)
+    kept = thinned(posterior, n_events)
+    samples = _samples(problem, law, kept)
     points = recorded_points(problem, law, samples, rng)
     recorded, fronts = fronts_of(problem, points, problem.added_rows(samples))
     return {
-        "event_posterior": _avalanches(problem, law, thinned, recorded, fronts),
-        "posterior_predictive": _predict(problem, law, thinned, rng),
-        "prior_predictive": _predict(problem, law, _thin(prior, n_events), rng),
+        "event_posterior": avalanche_dataset(problem, law, kept, recorded, fronts),
+        "posterior_predictive": _predict(problem, law, kept, rng),
+        "prior_predictive": _predict(problem, law, thinned(prior, n_events), rng),
     }
 
 
@@ -54,12 +54,8 @@ def _predict(problem: AugmentedProblem, law: Law, draws: xr.Dataset, rng: np.ran
     deviation = np.where(sd > 0.0, (drawn.releases - mean) / np.where(sd > 0.0, sd, 1.0), 0.0)
     points = np.concatenate([np.log(drawn.strengths), deviation[..., None]], axis=-1)
     avalanches, fronts = fronts_of(problem, points, problem.added_rows(samples))
-    dataset = _avalanches(problem, law, draws, avalanches, fronts)
-    readings, reached = read_with_errors(problem, fronts, rng)
-    shape = dataset["front"].shape
-    dims = ("chain", "draw", "event", "sensor")
-    dataset["reading"] = (dims, readings.reshape(shape), _READING)
-    dataset["reached"] = (dims, reached.reshape(shape))
+    dataset = avalanche_dataset(problem, law, draws, avalanches, fronts)
+    add_readings(problem, dataset, fronts, rng)
     return dataset
 
 

@@ -38,18 +38,19 @@ def predictive_groups(
     prior_predictive : the same from the prior
     """
     rng = np.random.default_rng([seed, 1])
-    thinned = _thin(posterior, problem.campaign.n_events)
-    samples = _samples(problem, law, thinned)
+    kept = thinned(posterior, problem.campaign.n_events)
+    samples = _samples(problem, law, kept)
     recorded = recorded_avalanches(problem, law, samples, rng)
-    event_posterior = _avalanches(problem, law, thinned, recorded, fronts_of(problem, law, recorded))
+    event_posterior = avalanche_dataset(problem, law, kept, recorded, fronts_of(problem, law, recorded))
     return {
         "event_posterior": event_posterior,
-        "posterior_predictive": _predict(problem, law, thinned, rng),
-        "prior_predictive": _predict(problem, law, _thin(prior, problem.campaign.n_events), rng),
+        "posterior_predictive": _predict(problem, law, kept, rng),
+        "prior_predictive": _predict(problem, law, thinned(prior, problem.campaign.n_events), rng),
     }
 
 
-def _thin(draws: xr.Dataset, n_events: int) -> xr.Dataset:
+def thinned(draws: xr.Dataset, n_events: int) -> xr.Dataset:
+    """Every so many draws, so that there are no more avalanches than are kept."""
     n = draws.sizes["chain"] * draws.sizes["draw"]
     return draws.isel(draw=slice(None, None, max(1, -(-n * n_events // MOST_AVALANCHES))))
 
@@ -63,18 +64,25 @@ def _predict(
 ) -> xr.Dataset:
     avalanches = new_avalanches(problem, law, _samples(problem, law, draws), rng)
     fronts = fronts_of(problem, law, avalanches)
-    dataset = _avalanches(problem, law, draws, avalanches, fronts)
-    readings, reached = read_with_errors(problem, fronts, rng)
-    shape = dataset["front"].shape
-    dims = ("chain", "draw", "event", "sensor")
-    dataset["reading"] = (dims, readings.reshape(shape), _READING)
-    dataset["reached"] = (dims, reached.reshape(shape))
+    dataset = avalanche_dataset(problem, law, draws, avalanches, fronts)
+    add_readings(problem, dataset, fronts, rng)
     return dataset
 
 
-def _avalanches(
+def add_readings(
+    problem: HierarchicalProblem, dataset: xr.Dataset, fronts: Any, rng: np.random.Generator
+) -> None:
+    """Readings of the fronts of a dataset, with errors, and whether each front came; added to it."""
+    readings, reached = read_with_errors(problem, fronts, rng)
+    shape, dims = dataset["front"].shape, dataset["front"].dims
+    dataset["reading"] = (dims, readings.reshape(shape), _READING)
+    dataset["reached"] = (dims, reached.reshape(shape))
+
+
+def avalanche_dataset(
     problem: HierarchicalProblem, law: Law, draws: xr.Dataset, avalanches: Any, fronts: Any
 ) -> xr.Dataset:
+    """Strengths, releases and fronts of avalanches, one of each event for each draw."""
     sizes = (draws.sizes["chain"], draws.sizes["draw"], problem.campaign.n_events)
     dims = ("chain", "draw", "event")
     variables: dict[str, Any] = {
