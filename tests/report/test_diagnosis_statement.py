@@ -34,6 +34,10 @@ def test_a_lean_that_the_check_does_not_bear_out_is_told_and_not_claimed(kind: s
     assert "a force not in the list would be" in other
     plain = statement(found, document({"nothing": 0.6, "obstacle": 0.3, "unlisted": 0.1}))
     assert "would be the most probable" not in plain
+    assert "odder than clean campaigns" not in plain
+    fired = replace(found, check=Omnibus(10.0, np.zeros(120)))
+    odd = statement(fired, document({"nothing": 0.6, "obstacle": 0.3, "unlisted": 0.1}))
+    assert "to the check they are odder than clean campaigns are, all but 1 %" in odd
 
 
 def test_what_a_last_race_leaned_to_is_told() -> None:

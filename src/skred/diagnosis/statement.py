@@ -207,11 +207,23 @@ def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
     )
 
 
+def _odd(found: Diagnosis) -> str:
+    """What the check would say alone, where it says something and the race does not."""
+    assert found.check is not None
+    if not found.check.fired:
+        return ""
+    return (
+        "But to the check they are odder than clean campaigns are, all but 1 % of them: by chance, or by"
+        " something that no candidate and no force along the track describes."
+    )
+
+
 def _nothing(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     assert found.check is not None and found.table is not None
     return [
         f"The recordings do not bear out that anything is missing (p = {found.check.p_value:.2g}; probability"
         f" of nothing {_share(document['probability'][NOTHING])}).",
+        _odd(found),
         _hint(found, document),
         f"A relevant strength of what is listed would have been found in {100.0 * found.table.power:.0f} % of"
         " cases on average; the table of detection limits says from where on each would have been seen.",
@@ -226,6 +238,7 @@ def _cannot(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         f"No alarm (p = {found.check.p_value:.2g}), but these recordings cannot tell: a relevant strength of"
         f" what is listed would have been found in only {100.0 * found.table.power:.0f} % of cases on"
         " average, so silence means little.",
+        _odd(found),
         _hint(found, document),
     ]
     sensor = document["next_sensor"]
