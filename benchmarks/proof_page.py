@@ -97,6 +97,8 @@ def page(batches: Sequence[Path], document: Found, figures: Sequence[str]) -> st
     parts += [f"![{name.replace('_', ' ')}](figures/proof-{name}.png)\n" for name in figures]
     parts += ["## Open and masked\n", _masked(document)]
     parts += ["## Batch by batch\n", _IN_ORDER, _by_batch(batches, document)]
+    parts += ["## By what was hidden\n", _by_hidden(document)]
+    parts += ["## Why bars are missed\n", (RECORD / "missed.md").read_text(encoding="utf-8")]
     parts += ["## What it got wrong\n", _wrong(batches), *map(_notes, batches)]
     return "\n".join(parts)
 
@@ -120,29 +122,50 @@ def _by_batch(batches: Sequence[Path], document: Found) -> str:
         " | tie sets with the truth | median CPU s sparse, dense |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    ledgers = [
-        json.loads((one / "ledger.json").read_text(encoding="utf-8")) for one in batches if _is_open(one)
-    ]
+    ledgers = [json.loads((one / "ledger.json").read_text("utf-8")) for one in batches if _is_open(one)]
     for ledger in sorted(ledgers, key=lambda one: str(one["created_utc"])):
         own = [one for one in document["trials"] if one["trial"].startswith(f"{ledger['seed']}/")]
         clean = [one["right"] for one in own if not one["true_ids"]]
-        strong = [one for one in own if one["true_ids"] and one["snr"] >= _STRONG]
-        cells = [f"{ledger['seed']}", f"{len(own)}"]
-        cells.append(f"{len(clean)}: {clean.count('false alarm')}, {clean.count('failed')}")
-        for masked in (False, True):
-            found = [
-                one["right"] not in ("failed", "not found")
-                for one in strong
-                if (one["hidden"] == "masked") == masked
-            ]
-            cells.append(f"{sum(found)} of {len(found)}")
-        for several, good in ((False, ("right",)), (True, ("right", "in the set"))):
-            named = [one for one in own if one["names"] and (len(one["names"]) > 1) == several]
-            cells.append(f"{sum(one['right'] in good for one in named)} of {len(named)}")
+        masked = [one for one in own if one["hidden"] == "masked"]
         times = [[one["cpu_seconds"] for one in own if one["kind"] == kind] for kind in ("sparse", "dense")]
-        cells.append(", ".join(f"{median(one for one in those if one is not None):.0f}" for those in times))
+        cells = [
+            f"{ledger['seed']}",
+            f"{len(own)}",
+            f"{len(clean)}: {clean.count('false alarm')}, {clean.count('failed')}",
+            _found([one for one in own if one not in masked]),
+            _found(masked),
+            *_named(own),
+            ", ".join(f"{median(one for one in those if one is not None):.0f}" for those in times),
+        ]
         rows.append(f"| {' | '.join(cells)} |")
     return "\n".join(rows) + "\n"
+
+
+def _by_hidden(document: Found) -> str:
+    """How names fare by what was hidden, from whatever signal-to-noise."""
+    rows = [
+        "| hidden | trials | found from 5.5 on | one name: right | tie sets with the truth |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for name in ("listed", "masked", "two", "instrument", "unlisted", "nothing", "nasty"):
+        own = [one for one in document["trials"] if one["hidden"] == name]
+        rows.append(f"| {name} | {len(own)} | {_found(own)} | {' | '.join(_named(own))} |")
+    return "\n".join(rows) + "\n"
+
+
+def _found(lines: Sequence[Found]) -> str:
+    """How many of the strong effects were found."""
+    strong = [one["right"] for one in lines if one["true_ids"] and one["snr"] >= _STRONG]
+    return f"{sum(right not in ('failed', 'not found') for right in strong)} of {len(strong)}"
+
+
+def _named(lines: Sequence[Found]) -> list[str]:
+    """How many single names are right, and how many tie sets hold a truth."""
+    cells = []
+    for several, good in ((False, ("right",)), (True, ("right", "in the set"))):
+        named = [one["right"] for one in lines if one["names"] and (len(one["names"]) > 1) == several]
+        cells.append(f"{sum(right in good for right in named)} of {len(named)}")
+    return cells
 
 
 def _share(found: Found) -> str:
@@ -179,13 +202,17 @@ def _state(batch: Path) -> str:
 
 
 def _bars(document: Found) -> str:
-    rows = ["| goal | what | bar | measured (95 %) | trials | |", "| --- | --- | --- | --- | --- | --- |"]
+    rows = [
+        "| goal | what | bar | linearised ceiling | measured (95 %) | trials | |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
     for one in document["bars"]:
         limit = [f"at least {one['at_least']:g}"] if one["at_least"] is not None else []
         limit += [f"at most {one['at_most']:g}"] if one["at_most"] is not None else []
         between = f" ({one['low']:.3g} to {one['high']:.3g})" if one["low"] is not None else ""
         measured = "-" if one["measured"] is None else f"{one['measured']:.3g}{between}"
-        cells = (one["goal"], one["what"], ", ".join(limit), measured, one["n"], one["status"])
+        ceiling = "" if one["ceiling"] is None else f"{one['ceiling']:.2f}"
+        cells = (one["goal"], one["what"], ", ".join(limit), ceiling, measured, one["n"], one["status"])
         rows.append(f"| {' | '.join(map(str, cells))} |")
     return "\n".join(rows) + "\n"
 
