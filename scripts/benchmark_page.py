@@ -270,10 +270,49 @@ strengths of single avalanches.
 """
 
 
+def diagnosis() -> str:
+    """What a diagnosis and concealed trials cost."""
+    here, slower = read("forward"), read("forward_slower")
+    rows = ""
+    for law in ("coulomb", "pcm", "constant"):
+        seconds = read(f"ryggfonn/{law}")["seconds"]
+        stages = ", ".join(f"{name} {value:.0f}" for name, value in seconds.items() if value >= 0.5)
+        rows += f"| {law} | {sum(seconds.values()):.0f} | {stages} |\n"
+    more = [slower[name] / here[name] for name in ("kernel", "pure Python")]
+    proof = read("prove_throughput")
+    n = proof["plan"]["n"]
+    workers = "".join(
+        f"| {run['workers']} | {run['seconds']:.0f} | {run['cpu_seconds_per_trial']:.0f} |\n"
+        for run in proof["runs"]
+    )
+    return f"""
+## A diagnosis, and concealed trials
+
+`python benchmarks/ryggfonn_diagnoses.py` keeps the seconds of each stage of a diagnosis of the 22
+avalanches, both cores free; loading Python's packages and writing the report come on top. Asked: 60 s. These
+were measured on another machine with two cores, slower and of a varying speed: at its fastest the kernel
+takes {slower["kernel"]:.2f} us and pure Python {slower["pure Python"]:.0f} us, {more[0]:.1f} and {more[1]:.1f} times
+what they take above
+(`python benchmarks/forward.py --json benchmarks/results/forward_slower.json`).
+
+| base law | seconds | of that |
+| --- | --- | --- |
+{rows}
+`python benchmarks/prove_throughput.py --trials {n} --json benchmarks/results/prove_throughput.json`:
+{n} sparse trials that hide nothing, starting the workers included; on the first machine.
+
+| workers | seconds | CPU seconds a trial |
+| --- | --- | --- |
+{workers}
+Two workers do {proof["gain"]:.2f} times as much as one (asked: 1.8; the last trial runs alone, and with few
+trials that counts). Asked of a sparse trial: 30 CPU seconds.
+"""
+
+
 def main() -> None:
     """Write the page."""
     page = HEAD + forward() + logp() + sampling() + calibration()
-    page += hierarchical() + hierarchical_calibration()
+    page += hierarchical() + hierarchical_calibration() + diagnosis()
     (ROOT / "benchmarks" / "README.md").write_text(page, encoding="utf-8")
 
 
