@@ -291,8 +291,8 @@ def diagnosis() -> str:
 `python benchmarks/ryggfonn_diagnoses.py` keeps the seconds of each stage of a diagnosis of the 22
 avalanches, both cores free; loading Python's packages and writing the report come on top. Asked: 60 s. These
 were measured on another machine with two cores, slower and of a varying speed: at its fastest the kernel
-takes {slower["kernel"]:.2f} us and pure Python {slower["pure Python"]:.0f} us, {more[0]:.1f} and {more[1]:.1f} times
-what they take above
+takes {slower["kernel"]:.2f} us and pure Python {slower["pure Python"]:.0f} us, {more[0]:.1f} and
+{more[1]:.1f} times what they take above
 (`python benchmarks/forward.py --json benchmarks/results/forward_slower.json`).
 
 | base law | seconds | of that |
