@@ -22,7 +22,7 @@ import cyclopts
 
 from skred.prove.ledger import ledger_sha256
 from skred.prove.scorecard import DIAGNOSIS, scorecard
-from skred.work.output import write_json, write_text
+from skred.work.output import plain, write_json, write_text
 
 FAILED = ("crash", "timeout")
 ROOT = Path(__file__).resolve().parent.parent
@@ -59,7 +59,8 @@ def add(folder: Path) -> None:
     for method in sorted((folder / "answers").iterdir()):
         answers[method.name] = {name: _answer(folder, method.name, name) for name in names}
     write_json(target / "sealed.json", sealed)
-    write_json(target / "answers.json", answers)
+    # On one line: with a line for each number it is half as large again.
+    write_text(target / "answers.json", json.dumps(plain(answers), allow_nan=False) + "\n")
 
 
 def _answer(folder: Path, method: str, name: str) -> dict[str, Any]:
