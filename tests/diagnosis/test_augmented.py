@@ -126,6 +126,20 @@ def test_densities_are_those_of_a_dense_sum(problem: AugmentedProblem) -> None:
     assert errors.shape == (3, 3) and np.abs(errors).max() < 0.02
 
 
+@pytest.mark.xfail(
+    reason="farther off, between two tables, one event keeps an error of 0.29 nats of 0.33", strict=True
+)
+def test_finer_tables_cover_what_chains_visited_farther_off(problem: AugmentedProblem) -> None:
+    law, strength = problem.base.law, problem.tables.mean[0]
+    samples = {"dry_friction": 0.3 * np.exp(0.5 + np.array([-0.02, 0.0, 0.02]))}
+    samples |= {"dry_friction_spread": np.full(3, 0.02), "turbulent_drag": np.full(3, strength)}
+    chains = {name: (("chain", "draw"), np.tile(values, (4, 1))) for name, values in samples.items()}
+    again = problem.finer(law, xr.Dataset(chains))
+    assert again is not None
+    before, after = (np.abs(one.integration_errors(law, samples)).max() for one in (problem, again))
+    assert before > 0.25 and after < 0.4 * before
+
+
 def test_finer_tables_cover_what_chains_visited(problem: AugmentedProblem) -> None:
     """Far from the posterior, where few nodes are; once and no more; elsewhere nothing changes.
 
