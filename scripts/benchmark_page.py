@@ -299,7 +299,8 @@ takes {slower["kernel"]:.2f} us and pure Python {slower["pure Python"]:.0f} us, 
 | --- | --- | --- |
 {rows}
 `python benchmarks/prove_throughput.py --trials {n} --json benchmarks/results/prove_throughput.json`:
-{n} sparse trials that hide nothing, starting the workers included; in an earlier session, whose machine was not noted.
+{n} sparse trials that hide nothing, starting the workers included; in an earlier session, whose
+machine was not noted.
 
 | workers | seconds | CPU seconds a trial |
 | --- | --- | --- |
