@@ -75,6 +75,13 @@ class Sealing:
             "by default each is drawn so with probability 0.35.",
         ),
     ] = None
+    unlisted_share: Annotated[
+        float | None,
+        Parameter(
+            validator=validators.Number(gte=0.0, lte=1.0),
+            help="Share of the trials that hide something in which it is in no list; by default 2 in 13.",
+        ),
+    ] = None
     masked_share: Annotated[
         float,
         Parameter(
@@ -105,7 +112,9 @@ class Sealing:
         if n is None:
             raise InputError("--trials: how many? (or --quick for 12)")
         seed = self.seed if self.seed is not None else kept.seed if kept else random_seed()
-        return Plan(n, seed, self.kind, self.masked_share, self.nothing_share, self.quick)
+        return Plan(
+            n, seed, self.kind, self.masked_share, self.nothing_share, self.unlisted_share, self.quick
+        )
 
 
 @Parameter(name="*")

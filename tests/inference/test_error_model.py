@@ -17,11 +17,14 @@ CAMPAIGN = read_campaign(find_campaign("ryggfonn"))
 @pytest.mark.parametrize("name", ERROR_MODELS)
 def test_every_mixture_is_one(name: str) -> None:
     model = ERROR_MODELS[name]
-    weights, scales, shares, degrees, common = model.errors
-    assert model.id == name and len(weights) == len(scales) == len(shares)
-    assert_allclose(weights.sum(), 1.0, rtol=1e-12)
-    assert np.all(weights > 0) and np.all(scales > 0) and np.all((shares >= 0) & (shares < 0.1))
-    assert degrees >= 0 and 0 <= common < 1
+    errors = model.errors
+    assert model.id == name and len(errors.weights) == len(errors.scales) == len(errors.shares)
+    assert_allclose(errors.weights.sum(), 1.0, rtol=1e-12)
+    assert np.all(errors.weights > 0) and np.all(errors.scales > 0)
+    assert np.all((errors.shares >= 0) & (errors.shares < 0.1))
+    assert_allclose(np.exp(errors.log_weights), errors.weights, rtol=1e-12)
+    assert_allclose(np.exp(errors.log_scales), errors.scales, rtol=1e-12)
+    assert errors.degrees >= 0 and 0 <= errors.common < 1
 
 
 def test_factor_of_the_scaled_errors_is_log_normal() -> None:

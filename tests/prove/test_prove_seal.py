@@ -37,6 +37,17 @@ def test_shares_of_what_is_hidden() -> None:
     assert "masked" not in {one["hidden"] for one in asked(Plan(300, 2_000_000, masked_share=0.0))}
 
 
+@pytest.mark.parametrize("nothing", [None, 0.25])
+def test_the_share_of_what_is_in_no_list_can_be_asked_for(nothing: float | None) -> None:
+    trials = asked(Plan(4000, 2_000_000, nothing_share=nothing, unlisted_share=0.5))
+    drawn = Counter(one["hidden"] for one in trials)
+    n_something = 4000 - drawn["nothing"] - drawn["nasty"]
+    assert n_something / 4000 == pytest.approx(0.65 if nothing is None else 0.75, abs=0.03)
+    assert drawn["unlisted"] / n_something == pytest.approx(0.5, abs=0.04)
+    assert drawn["two"] / drawn["instrument"] == pytest.approx(1.0, abs=0.25)
+    assert drawn["listed"] > drawn["two"]
+
+
 @pytest.mark.parametrize("kind", ["mixed", "sparse", "dense"])
 def test_the_number_of_nulls_can_be_asked_for(kind: Any) -> None:
     trials = asked(Plan(300, 3_000_000, kind, nothing_share=0.4))

@@ -28,6 +28,8 @@ class Errors(NamedTuple):
     ----------
     weights, scales, shares : (n,) arrays
         Probability of each case, the factor on all stated errors in it, and its share of outliers.
+    log_weights, log_scales : (n,) arrays
+        Their logarithms, which a calibration needs millions of times.
     degrees : float
         Degrees of freedom of Student's t; 0 for the normal distribution.
     common : float
@@ -37,6 +39,8 @@ class Errors(NamedTuple):
     weights: FloatArray
     scales: FloatArray
     shares: FloatArray
+    log_weights: FloatArray
+    log_scales: FloatArray
     degrees: float
     common: float
 
@@ -61,7 +65,7 @@ def _errors(
 ) -> Errors:
     weights, scales, shares = np.broadcast_arrays(*(np.atleast_1d(x) for x in (weights, scales, shares)))
     w, s, o = (np.array(values, dtype=float) for values in (weights, scales, shares))
-    return Errors(w, s, o, degrees, common)
+    return Errors(w, s, o, np.log(w), np.log(s), degrees, common)
 
 
 _NODES = np.linspace(-4.0, 4.0, 27)

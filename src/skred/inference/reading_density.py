@@ -77,18 +77,30 @@ def _nearest(event, sensor, low, high, shift, readings):  # type: ignore[no-unty
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
+def _put_away(product, total):  # type: ignore[no-untyped-def]
+    """A product and a sum of logarithms: the product moved into the sum where it gets out of range."""
+    if _SMALL < product < 1.0 / _SMALL:
+        return product, total
+    return 1.0, total + math.log(product)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
 def _log_student(event, low, high, readings, errors, case):  # type: ignore[no-untyped-def]
     """Log likelihood of the observed readings under Student's t, in one case of the mixture."""
-    total, degrees, scale = 0.0, errors.degrees, errors.scales[case]
-    constant = math.lgamma(0.5 * (degrees + 1.0)) - math.lgamma(0.5 * degrees)
-    constant -= 0.5 * math.log(degrees * math.pi)
+    degrees, scale, n = errors.degrees, errors.scales[case], 0
+    product_sd, product_tail, total_sd, total_tail = 1.0, 1.0, 0.0, 0.0
     for j in range(readings.values.shape[1]):
         if readings.observed[event, j]:
             residual, sd = _nearest(event, j, low[j], high[j], 0.0, readings)
             wide = sd * scale
-            total += constant - math.log(wide)
-            total -= 0.5 * (degrees + 1.0) * math.log1p((residual / wide) ** 2 / degrees)
-    return total
+            product_sd, total_sd = _put_away(product_sd * wide, total_sd)
+            tail = 1.0 + (residual / wide) ** 2 / degrees
+            product_tail, total_tail = _put_away(product_tail * tail, total_tail)
+            n += 1
+    constant = math.lgamma(0.5 * (degrees + 1.0)) - math.lgamma(0.5 * degrees)
+    constant -= 0.5 * math.log(degrees * math.pi)
+    log_sd, log_tail = total_sd + math.log(product_sd), total_tail + math.log(product_tail)
+    return n * constant - log_sd - 0.5 * (degrees + 1.0) * log_tail
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -129,9 +141,7 @@ def _log_two_cases(event, low, high, readings, errors, a, b):  # type: ignore[no
             continue
         residual, sd = _nearest(event, j, low[j], high[j], 0.0, readings)
         n += 1
-        product_sd *= sd
-        if not _SMALL < product_sd < 1.0 / _SMALL:
-            total_sd, product_sd = total_sd + math.log(product_sd), 1.0
+        product_sd, total_sd = _put_away(product_sd * sd, total_sd)
         square = (residual / (sd * scale_a)) ** 2
         usual = math.exp(-0.5 * square)
         outlying = math.exp(-0.5 * square / (OUTLIER_FACTOR * OUTLIER_FACTOR))
@@ -142,22 +152,22 @@ def _log_two_cases(event, low, high, readings, errors, a, b):  # type: ignore[no
             outlying = math.exp(-0.5 * square / (OUTLIER_FACTOR * OUTLIER_FACTOR))
         product_b, total_b = _multiplied(product_b, total_b, usual, outlying, square, share_b)
     common = total_sd + math.log(product_sd) + n * _LOG_SQRT_2PI
-    log_a = total_a + math.log(product_a) - n * math.log(scale_a) - common
-    log_b = total_b + math.log(product_b) - n * math.log(scale_b) - common
+    log_a = total_a + math.log(product_a) - n * errors.log_scales[a] - common
+    log_b = total_b + math.log(product_b) - n * errors.log_scales[b] - common
     return log_a, log_b
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _normal_sums(event, low, high, readings):  # type: ignore[no-untyped-def]
     """Of the observed readings: squares in standard deviations, minus the log constants, and how many."""
-    squares, constants, n = 0.0, 0.0, 0
+    squares, product_sd, total_sd, n = 0.0, 1.0, 0.0, 0
     for j in range(readings.values.shape[1]):
         if readings.observed[event, j]:
             residual, sd = _nearest(event, j, low[j], high[j], 0.0, readings)
             squares += (residual / sd) ** 2
-            constants += math.log(sd) + _LOG_SQRT_2PI
+            product_sd, total_sd = _put_away(product_sd * sd, total_sd)
             n += 1
-    return squares, constants, n
+    return squares, total_sd + math.log(product_sd) + n * _LOG_SQRT_2PI, n
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -175,13 +185,13 @@ def _log_independent(event, low, high, readings, errors):  # type: ignore[no-unt
             term = _log_student(event, low, high, readings, errors, case)
         elif not outliers:
             scale = errors.scales[case]
-            term = -0.5 * squares / (scale * scale) - n * math.log(scale) - constants
+            term = -0.5 * squares / (scale * scale) - n * errors.log_scales[case] - constants
         elif case % 2 == 0:
             other = min(case + 1, n_cases - 1)
             term, second = _log_two_cases(event, low, high, readings, errors, case, other)
         else:
             term = second
-        term += math.log(errors.weights[case])
+        term += errors.log_weights[case]
         if term > most:
             total = total * math.exp(most - term) + 1.0
             most = term
@@ -193,19 +203,21 @@ def _log_independent(event, low, high, readings, errors):  # type: ignore[no-unt
 @njit(cache=True, error_model="numpy", nogil=True)
 def _log_correlated(event, prediction, readings, common):  # type: ignore[no-untyped-def]
     """Log likelihood of the observed readings with an error common to the velocities."""
-    n_velocities, n, log_sd, squares, total = 0, 0, 0.0, 0.0, 0.0
+    n_velocities, n, squares, total = 0, 0, 0.0, 0.0
+    product_sd, total_sd = 1.0, 0.0
     for j in range(readings.values.shape[1]):
         if not readings.observed[event, j]:
             continue
         sd = reading_sd(event, j, prediction[j], readings)
         z = (readings.values[event, j] - prediction[j]) / sd
         own = 1.0 - common if readings.is_velocity[j] else 1.0
-        log_sd += math.log(sd) + 0.5 * math.log(own)
+        product_sd, total_sd = _put_away(product_sd * sd, total_sd)
         squares += z * z / own
         n += 1
         if readings.is_velocity[j]:
             n_velocities += 1
             total += z / own
+    log_sd = total_sd + math.log(product_sd) + 0.5 * n_velocities * math.log(1.0 - common)
     inflation = 1.0 + common * n_velocities / (1.0 - common)
     squares -= common * total * total / inflation
     return -0.5 * squares - log_sd - 0.5 * math.log(inflation) - n * _LOG_SQRT_2PI

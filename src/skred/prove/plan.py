@@ -34,6 +34,8 @@ class Plan:
     nothing_share : float or None
         Of all trials, how many hide nothing, half of them nasty: to the nearest number of trials. None draws
         each trial's class by `skred.trials.draw.SHARES`.
+    unlisted_share : float or None
+        Of the trials that hide something, how many hide what is in no list; None by the same shares.
     quick : bool
         Diagnosed as by ``skred diagnose --quick``.
     """
@@ -43,6 +45,7 @@ class Plan:
     kind: Kind = "mixed"
     masked_share: float = 0.1
     nothing_share: float | None = None
+    unlisted_share: float | None = None
     quick: bool = False
 
     def __post_init__(self) -> None:
@@ -91,16 +94,31 @@ def _nulls(plan: Plan, kinds: list[str]) -> dict[int, str]:
 
 def _hidden(plan: Plan, seed: int) -> str:
     """Class of what a trial hides, from its own seed."""
-    from skred.trials.draw import SHARES
-
     rng = np.random.default_rng([seed, 50_021])
     shares = {
-        name: share for name, share in SHARES.items() if plan.nothing_share is None or name not in NULLS
+        name: share
+        for name, share in _shares(plan).items()
+        if plan.nothing_share is None or name not in NULLS
     }
     weights = np.array(list(shares.values()))
     name = str(rng.choice(list(shares), p=weights / weights.sum()))
     masked = bool(rng.random() < plan.masked_share)
     return "masked" if name == "listed" and masked else name
+
+
+def _shares(plan: Plan) -> dict[str, float]:
+    """How often each class is drawn; those that hide something as often together as ever."""
+    from skred.trials.draw import SHARES
+
+    if plan.unlisted_share is None:
+        return SHARES
+    something = sum(share for name, share in SHARES.items() if name not in NULLS)
+    listed = something - SHARES["unlisted"]
+    others = {
+        name: share if name in NULLS else share / listed * something * (1.0 - plan.unlisted_share)
+        for name, share in SHARES.items()
+    }
+    return others | {"unlisted": something * plan.unlisted_share}
 
 
 def diagnosis_settings(quick: bool) -> dict[str, Any]:
