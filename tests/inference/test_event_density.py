@@ -203,6 +203,22 @@ def test_log_likelihood_of_any_front(
         assert_allclose(found, expected, rtol=1e-7, atol=1e-7)
 
 
+@pytest.mark.parametrize("sd", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("name", [name for name in BY_HAND if name != "scaled"])
+def test_more_readings_than_a_product_holds(name: str, sd: float) -> None:
+    """Widths and tails are multiplied before logarithms are taken: 1e3 to the 400th is too much."""
+    n, rng = 400, np.random.default_rng(11)
+    z = rng.standard_normal(n) * np.where(rng.random(n) < 0.3, 30.0, 1.0)
+    values, everything = 20.0 + sd * z, np.ones((1, n), dtype=bool)
+    velocity = np.arange(n) < n - 1
+    readings = EventReadings(
+        values[None, :], everything, np.full((1, n), sd), np.zeros(n), np.zeros(n), velocity,
+        np.array([-np.inf]), np.array([np.inf]), PLACE_SD,
+    )  # fmt: skip
+    found = log_likelihood(0, np.full(n + 1, 20.0), readings, ERROR_MODELS[name].errors)
+    assert_allclose(found, BY_HAND[name](sd * z, np.full(n, sd), velocity), rtol=1e-9)
+
+
 def few_and_many(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
     sd = rng.uniform(0.5, 3.0, n)
     return rng.standard_normal(n) * sd * rng.uniform(0.6, 1.5), sd
