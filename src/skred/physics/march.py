@@ -25,6 +25,7 @@ from skred.physics.cell import (
     distance_to,
     phi1_series,
     psi_series,
+    step_v,
 )
 from skred.physics.cell_tangents import cross_tangents
 from skred.physics.columns import GRAVITY
@@ -208,22 +209,33 @@ def march(  # type: ignore[no-untyped-def]
         if at_edge:
             if speed_terms:
                 i = recur_with_speed(i, ground, table, keep, gain, per_source, u_c, limits, v)
-            else:
+            elif v[i] <= limits[i]:
                 i = _recur(i, keep, gain, limits, v)
             if i == n_cells:
                 break
         if i > first:
             start = edge[i]
-        ahead = keep[i] * v[i] + gain[i]
-        plain = at_edge and not speed_terms and 0.0 < v[i] <= limits[i] and limits[i + 1] > 0.0
-        if plain and ahead <= 0.0:
-            # A stop in contact, written out: handing arrays to a function costs as much as 50 cells.
-            mu = table[FRICTION, i]
-            a = 2.0 * (GRAVITY * (ground[0, i] - mu * ground[1, i]) - table[CONSTANT, i])
-            b = 2.0 * (table[QUADRATIC, i] + mu * ground[2, i])
-            s, stopped = start + min(distance_to(v[i], 0.0, a, b), edge[i + 1] - start), True
-            v[i + 1] = 0.0
-        else:
+        plain = at_edge and not speed_terms and v[i] > 0.0 and limits[i] > 0.0 and limits[i + 1] > 0.0
+        # No barrier then. The usual cells among those left are written out: handing arrays to a function costs
+        # as much as 50 cells.
+        done = False
+        if plain:
+            threshold = -GRAVITY * ground[1, i] / ground[2, i] if ground[2, i] < 0.0 else np.inf
+            length, drive = edge[i + 1] - edge[i], GRAVITY * ground[0, i] - table[CONSTANT, i]
+            if v[i] <= threshold:
+                ahead = keep[i] * v[i] + gain[i]
+                if ahead <= 0.0:
+                    mu = table[FRICTION, i]
+                    a = 2.0 * (drive - mu * GRAVITY * ground[1, i])
+                    b = 2.0 * (table[QUADRATIC, i] + mu * ground[2, i])
+                    s, stopped, ahead = start + min(distance_to(v[i], 0.0, a, b), length), True, 0.0
+                done = ahead <= threshold
+            else:
+                a, b = 2.0 * drive, 2.0 * table[QUADRATIC, i]
+                ahead = step_v(v[i], length, a, b)
+                done = ahead >= threshold  # still off the ground
+            v[i + 1] = ahead
+        if not done:
             cell, end = cell_at(i, ground, table, u_c, speed_terms), edge[i + 1]
             v[i + 1], s, stopped, _ = travel(v[i], start, end, end, np.inf, cell, barriers)
         i += 1

@@ -1,7 +1,7 @@
 """The march with terms in U: cell after cell where nothing happens, without a closed form.
 
 In each cell the terms in U are frozen at the mean speed of the stretch (see `cell.end_speed`), and the
-speed at its end is solved for: here by Newton's method from what the cell before lets expect, two steps as
+speed at its end is solved for: here by Newton's method from what the cells before let expect, two steps as
 a rule. What is not quickly solved is left to `cell.cross`: the same equation, its solution enclosed.
 """
 
@@ -25,9 +25,9 @@ from skred.physics.columns import GRAVITY
 from skred.physics.compiled import compiled
 from skred.physics.scaled_ground import BEND, DOUBLE
 
-_STEPS, _NEAR = 6, 1e-8
-_LEAST_SHARE = 0.25
-"""Share of v below which a cell slows a front so much that the first guess is no guess."""
+_STEPS, _NEAR = 6, 5e-8
+_LEAST_SHARE = 0.5
+"""Share of the speed below which a cell would slow a front so much that the first guess is no guess."""
 
 
 @compiled()
@@ -45,39 +45,35 @@ def recur_with_speed(first, ground, table, keep, gain, per_source, u_c, limits, 
     v0 = v[first]
     if not 0.0 < v0 <= limits[first]:
         return first
-    i, n_cells, u0, gained = first, keep.size, np.sqrt(v0), 0.0
+    i, n_cells, u0, per_scale = first, keep.size, np.sqrt(v0), 1.0 / u_c
+    gained, before = 0.0, 0.0
     while i < n_cells:
         carried = keep[i] * v0 + gain[i]
         linear = -2.0 * per_source[i] * table[LINEAR, i]
         weakening = -2.0 * per_source[i] * table[WEAKENING, i] * GRAVITY * ground[1, i]
-        # As if the speed went on as it did in the cell before.
-        mean = max(u0 + 0.5 * gained, 0.5 * u0)
-        guess = carried + linear * mean
-        if weakening != 0.0:
-            guess += weakening / (1.0 + mean / u_c)
-        if not guess > _LEAST_SHARE * v0:
+        # As if the speed went on as it did in the two cells before.
+        u1, solved = u0 + gained + (gained - before), False
+        if not u1 > _LEAST_SHARE * u0:
             break
-        u1, v1, solved = np.sqrt(guess), guess, False
         for _ in range(_STEPS):
             per_total = 1.0 / (1.5 * (u0 + u1))
             mean = (v0 + u0 * u1 + u1 * u1) * per_total
-            relative = 1.0 / (1.0 + mean / u_c) if weakening != 0.0 else 0.0
-            speed_part = linear * mean + weakening * relative
-            excess = carried + speed_part - u1 * u1
-            by_mean = linear - weakening * relative * relative / u_c
-            by_end = (2.0 * u1 + u0 - 1.5 * mean) * per_total
-            left = 2.0 * u1 - by_mean * by_end
+            relative = 1.0 / (1.0 + mean * per_scale) if weakening != 0.0 else 0.0
+            excess = carried + linear * mean + weakening * relative - u1 * u1
+            by_mean = linear - weakening * relative * relative * per_scale
+            left = 2.0 * u1 - by_mean * (2.0 * u1 + u0 - 1.5 * mean) * per_total
             if not left > u1:  # close to where there are two solutions, or none
                 break
             u1 += excess / left
-            # Newton's error is squared in each step: after this one it is below rounding.
+            # Newton's error is less than squared in each step: after this one it is below rounding.
             if abs(excess) <= _NEAR * v0:
-                v1, solved = u1 * u1, True
+                solved = True
                 break
-        if not (solved and u1 > 0.0 and v1 <= limits[i + 1]):
+        if not (solved and u1 > _LEAST_SHARE * u0 and u1 * u1 <= limits[i + 1]):
             break
-        v[i + 1] = v1
-        gained, u0, v0 = u1 - u0, u1, v1
+        v0 = u1 * u1
+        v[i + 1] = v0
+        before, gained, u0 = gained, u1 - u0, u1
         i += 1
     return i
 

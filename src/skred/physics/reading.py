@@ -10,6 +10,9 @@ from skred.physics.compiled import compiled
 from skred.physics.inputs import RUNOUT, VELOCITY_TO_STOP
 from skred.physics.march import contact_law, is_regular, start_tangents, travel, travel_tangents
 
+_SUMS = {"contract", "nsz", "reassoc"}
+_ONE = np.uint64(1)
+
 
 @compiled()
 def speed_at(  # type: ignore[no-untyped-def]
@@ -31,6 +34,28 @@ def span_end(quantity, s_from, s_to, release, runout):  # type: ignore[no-untype
     return max(min(s_to, runout), s_from)
 
 
+@compiled(fastmath=_SUMS)
+def _time_over(i, last, edge, v):  # type: ignore[no-untyped-def]
+    """Time [s] over whole cells from i to before `last`, in which nothing happens."""
+    time = 0.0
+    for cell in range(np.uint64(i), np.uint64(last)):
+        time += (edge[cell + _ONE] - edge[cell]) / (np.sqrt(v[cell]) + np.sqrt(v[cell + _ONE]))
+    return 2.0 * time
+
+
+@compiled()
+def _regular_cells(i, first, s_from, end, edge, limits, v):  # type: ignore[no-untyped-def]
+    """First cell from i on, or i itself, that is not wholly within a span, or in which something happens."""
+    if i <= first or edge[i] < s_from:
+        return i
+    last = i
+    while last < edge.size - 1 and edge[last + 1] <= end:
+        if not (v[last] <= limits[last] and 0.0 < v[last + 1] <= limits[last + 1]):
+            break
+        last += 1
+    return last
+
+
 @compiled()
 def span_speed(  # type: ignore[no-untyped-def]
     s_from, s_to, end, i, release, first, edge, ground, barriers, limits, u_c, speed_terms, table, v
@@ -46,13 +71,15 @@ def span_speed(  # type: ignore[no-untyped-def]
         return 0.0
     time = 0.0
     while i < edge.size - 1 and edge[i] < end:
-        if s_from <= edge[i] and edge[i + 1] <= end and is_regular(i, first, limits, v):
-            time += 2.0 * (edge[i + 1] - edge[i]) / (np.sqrt(v[i]) + np.sqrt(v[i + 1]))
-        else:
-            cell = cell_at(i, ground, table, u_c, speed_terms)
-            start = release if i == first else edge[i]
-            ahead = min(edge[i + 1], s_to)  # not `end`: a stop is to be met, not to be rounded to
-            time += travel(v[i], start, ahead, edge[i + 1], s_from, cell, barriers)[3]
+        last = _regular_cells(i, first, s_from, end, edge, limits, v)
+        if last > i:
+            time += _time_over(i, last, edge, v)
+            i = last
+            continue
+        cell = cell_at(i, ground, table, u_c, speed_terms)
+        start = release if i == first else edge[i]
+        ahead = min(edge[i + 1], s_to)  # not `end`: a stop is to be met, not to be rounded to
+        time += travel(v[i], start, ahead, edge[i + 1], s_from, cell, barriers)[3]
         i += 1
     return (end - s_from) / time
 
@@ -115,15 +142,32 @@ def _regular_speed_tangents(  # type: ignore[no-untyped-def]
         tangents[k] = 0.5 * change / speed
 
 
+@compiled(fastmath=_SUMS)
+def _time_tangents(i, last, edge, v, dv, d_time):  # type: ignore[no-untyped-def]
+    """Tangents of the time over whole cells from i to before `last`, added to `d_time`."""
+    for k in range(d_time.size):
+        change = 0.0
+        for cell in range(np.uint64(i), np.uint64(last)):
+            u0, u1 = np.sqrt(v[cell]), np.sqrt(v[cell + _ONE])
+            by_mean = (edge[cell + _ONE] - edge[cell]) / ((u0 + u1) * (u0 + u1))
+            change += by_mean * (dv[k, cell] / u0 + dv[k, cell + _ONE] / u1)
+        d_time[k] -= change
+
+
 @compiled()
 def _span_tangents(  # type: ignore[no-untyped-def]
-    s_from, s_to, i, speed, release, runout, first, edge, ground, barriers, u_c, speed_terms, columns,
+    s_from, s_to, i, speed, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms, columns,
     profiles, table, v, dv, step, shift, d_time, d_runout, tangents,
 ):  # fmt: skip
     """Tangents of a span's mean speed, which is `speed`."""
     end = min(s_to, runout)
     d_time[:] = 0.0
     while i < edge.size - 1 and edge[i] < end:
+        last = _regular_cells(i, first, s_from, end, edge, limits, v)
+        if last > i:
+            _time_tangents(i, last, edge, v, dv, d_time)
+            i = last
+            continue
         start = start_tangents(i, first, release, edge, dv, step, shift)
         cell, ahead = cell_at(i, ground, table, u_c, speed_terms), min(edge[i + 1], s_to)
         travel_tangents(
@@ -151,8 +195,8 @@ def read_tangents(  # type: ignore[no-untyped-def]
             tangents[:] = 0.0
         elif s_from < s_to:
             _span_tangents(
-                s_from, s_to, i, speed, release, runout, first, edge, ground, barriers, u_c, speed_terms,
-                columns, profiles, table, v, dv, step, shift, d_time, d_runout, tangents,
+                s_from, s_to, i, speed, release, runout, first, edge, ground, barriers, limits, u_c,
+                speed_terms, columns, profiles, table, v, dv, step, shift, d_time, d_runout, tangents,
             )  # fmt: skip
         elif not speed_terms and is_regular(i, first, limits, v):
             _regular_speed_tangents(
