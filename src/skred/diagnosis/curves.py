@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -40,6 +40,8 @@ _BETWEEN = 60
 _OUTSIDE = 2.2
 """A strength beyond the one that the linear model finds, relative to it, where no other is."""
 _DEEP = 40.0
+_PROMISED = 0.3
+"""Nats that a rough curve must promise for fronts to be asked at its top."""
 _FAR_OFF, _FAR_SHARE = 4.0, 0.02
 """Standard deviations beyond which a reading is far off, and the share of such readings that is many."""
 
@@ -196,6 +198,8 @@ class Curve:
         Relative to strength 0.
     fits : tuple of Fit
         One for each strength.
+    rough : bool
+        Whether readings at nodes were taken along tangents.
     """
 
     mechanism: Mechanism
@@ -204,6 +208,7 @@ class Curve:
     strengths: FloatArray
     log_evidence: FloatArray
     fits: tuple[Fit, ...]
+    rough: bool = False
 
     def nearest(self, strength: float) -> Fit:
         """The fit at the strength closest to one."""
@@ -285,7 +290,24 @@ def curve(
     if linear is not None and (added.either_sign or linear > 0.0):
         more = [linear] if abs(linear) * _OUTSIDE > grid[0] else [linear, _OUTSIDE * linear]
         strengths = np.append(strengths, more)
-    return curve_at(base, mechanism, shape, strengths, budget)
+    found = curve_at(base, mechanism, shape, strengths, budget)
+    return _by_fronts(base, found) if found.rough else found
+
+
+def _by_fronts(base: Base, rough: Curve) -> Curve:
+    """A rough curve whose evidence for anything is what fronts say at its top, in proportion elsewhere.
+
+    Where fronts stop, tangents can promise ten nats that are not there, at more places than are looked at again.
+    """
+    top = int(np.argmax(rough.log_evidence))
+    promised = float(rough.log_evidence[top])
+    if promised < _PROMISED:
+        return rough
+    strengths = rough.strengths[[top]]
+    near = curve_at(base, rough.mechanism, rough.shape, strengths, FRONTS, rough)
+    there = max(float(near.log_evidence[near.strengths == strengths[0]][0]), 0.0)
+    heights = np.where(rough.log_evidence > 0.0, rough.log_evidence * (there / promised), rough.log_evidence)
+    return replace(rough, log_evidence=heights)
 
 
 def curve_near(base: Base, mechanism: Mechanism, shape: Shape, near: Curve, first: Budget) -> Curve:
@@ -356,7 +378,7 @@ def curve_at(
     found = refit(extension, base.rows, given, start, base.log_scale, budget, first, n_rounds, fits)
     heights = np.array([fit.found.log_evidence for fit in found])
     heights = np.nan_to_num(heights - heights[strengths == 0.0], nan=-1e3, neginf=-1e3)
-    return Curve(mechanism, shape, direction, strengths, heights, tuple(found))
+    return Curve(mechanism, shape, direction, strengths, heights, tuple(found), budget.linear)
 
 
 def fit_base(
