@@ -297,7 +297,8 @@ def curve(
 def _by_fronts(base: Base, rough: Curve) -> Curve:
     """A rough curve whose evidence for anything is what fronts say at its top, in proportion elsewhere.
 
-    Where fronts stop, tangents can promise ten nats that are not there, at more places than are looked at again.
+    Where fronts stop, tangents can promise ten nats that are not there, at more places than are looked at
+    again.
     """
     top = int(np.argmax(rough.log_evidence))
     promised = float(rough.log_evidence[top])

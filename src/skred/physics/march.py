@@ -216,8 +216,8 @@ def march(  # type: ignore[no-untyped-def]
         if i > first:
             start = edge[i]
         plain = at_edge and not speed_terms and v[i] > 0.0 and limits[i] > 0.0 and limits[i + 1] > 0.0
-        # No barrier then. The usual cells among those left are written out: handing arrays to a function costs
-        # as much as 50 cells.
+        # No barrier then. What is usual among these cells is written out: handing arrays on costs as much as
+        # 50 cells.
         done = False
         if plain:
             threshold = -GRAVITY * ground[1, i] / ground[2, i] if ground[2, i] < 0.0 else np.inf
