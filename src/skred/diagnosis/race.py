@@ -174,8 +174,11 @@ def _heat(error_model: str, base: Base, tell: Tell, before: Heat | None) -> Heat
     with ThreadPoolExecutor(threads()) as pool:
         curves = _first_looks(base, budget, pool, tell, () if before is None else before.first_look)
         entrants = _looked_at_again(base, curves, budget, pool)
-        profiles = list(pool.map(lambda kind: _profile(base, kind, entrants), KINDS))
-    for name, (correction, disagreement) in _corrections(base, entrants).items():
+        # Together, so that no thread waits for the longest profile.
+        fitted = [pool.submit(_profile, base, kind, entrants) for kind in KINDS]
+        corrections = _corrections(base, entrants, pool)
+        profiles = [one.result() for one in fitted]
+    for name, (correction, disagreement) in corrections.items():
         entrants[name] = replace(entrants[name], correction=correction, disagreement=disagreement)
     for mechanism in mechanisms().values():
         other = entrants.get(mechanism.same_term_as)
@@ -230,21 +233,30 @@ def _profile(base: Base, kind: Kind, entrants: dict[str, Entrant]) -> Profile:
     return fit_profile(base, kind, as_profile(base, kind, max(near, key=lambda one: one.log_bayes_factor)))
 
 
-def _corrections(base: Base, entrants: dict[str, Entrant]) -> dict[str, tuple[float, float]]:
-    """Correction and disagreement of the leading mechanisms, at the top of their best curves."""
+def _corrections(
+    base: Base, entrants: dict[str, Entrant], pool: ThreadPoolExecutor
+) -> dict[str, tuple[float, float]]:
+    """Correction and disagreement of the leading mechanisms, at the top of their best curves.
+
+    Of those whose best curve was computed with fronts: what is wrong with a rough one is its own.
+    """
     leading = sorted(entrants, key=lambda name: -entrants[name].log_bayes_factor)[:_CHECKED]
+    leading = [name for name in leading if not entrants[name].best.rough]
     plain = extended(base.problem, base.law, base.directions)
-    nothing = _finely(base, plain, base.strengths, base.fit)
-    found = {}
-    for name in leading:
+    nothing = pool.submit(_finely, base, plain, base.strengths, base.fit)
+
+    def look(name: str) -> tuple[float, float]:
         best = entrants[name].best
         top = int(np.argmax(best.log_evidence))
         extension = extended(base.problem, base.law, (*base.directions, best.direction))
-        strengths = np.append(base.strengths, best.strengths[top])
-        laplace, sampled = _finely(base, extension, strengths, best.fits[top])
-        correction = float(sampled - nothing[1] - best.log_evidence[top])
-        found[name] = (correction, (sampled - laplace) - (nothing[1] - nothing[0]))
-    return found
+        return _finely(base, extension, np.append(base.strengths, best.strengths[top]), best.fits[top])
+
+    found, without = list(pool.map(look, leading)), nothing.result()
+    tops = [float(entrants[name].best.log_evidence.max()) for name in leading]
+    return {
+        name: (sampled - without[1] - top, (sampled - laplace) - (without[1] - without[0]))
+        for name, top, (laplace, sampled) in zip(leading, tops, found, strict=True)
+    }
 
 
 def _finely(base: Base, extension: Extension, strengths: FloatArray, fit: Fit) -> tuple[float, float]:
