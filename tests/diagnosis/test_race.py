@@ -48,6 +48,26 @@ def test_rough_look_finds_what_is_missing(base: Base) -> None:
             assert curve(base, job.mechanism, job.shape, ROUGH).log_bayes_factor > 5.0
 
 
+def test_what_tangents_promise_counts_by_what_fronts_say() -> None:
+    """In a clean campaign friction on many a stretch reads five nats along tangents; none has two."""
+    base = base_of(trial(990001, "sparse", "nothing", "pcm").campaign, "pcm")
+    friction = [one for one in candidates(base.setting) if one.mechanism.id == "segment_friction"]
+    assert first_look(base) is ROUGH and len(friction) > 15
+    found = [curve(base, one.mechanism, one.shape, ROUGH) for one in friction]
+    tangents = [
+        curve_at(base, one.mechanism, one.shape, k.strengths[k.strengths != 0.0], ROUGH)
+        for one, k in zip(friction, found, strict=True)
+    ]
+    promised = np.array([one.log_evidence.max() for one in tangents])
+    assert np.count_nonzero(promised > 5.0) > 3
+    assert max(one.log_evidence.max() for one in found) < 2.0
+    # Nothing is promised for nothing; what speaks against a strength is left as it was.
+    for one, rough in zip(found, tangents, strict=True):
+        assert one.rough and one.log_evidence[one.strengths == 0.0][0] == 0.0
+        against = rough.log_evidence < 0.0
+        np.testing.assert_allclose(one.log_evidence[against], rough.log_evidence[against], atol=1e-6)
+
+
 def test_fronts_are_looked_at_where_readings_are_far_off() -> None:
     """At Ryggfonn without drag a third of the readings are outliers: tangents miss what ends that."""
     base = ryggfonn_base("coulomb")
