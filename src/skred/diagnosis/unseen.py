@@ -39,6 +39,8 @@ FloatArray = NDArray[np.float64]
 N_DRAWS = 200
 _NODES = Budget(64, 32, 64, 1.5, 1.8)
 """Nodes of an event for each draw; their errors average out over the draws."""
+_SHARED = 8
+"""As many times the nodes where all draws share them."""
 _AT_ONCE = 20
 """Draws whose nodes are held in memory together."""
 _TRIED, _TRIED_WIDER = 64, 1.6
@@ -294,6 +296,13 @@ def log_densities(
     start = _points(extension, rows, typical, strengths.mean(axis=0), rng)
     n_events = len(rows.event)
     result = np.empty((len(means), n_events))
+    if (strengths == strengths[0]).all():
+        # Readings are then as likely at a node whichever draw it is: one set of many nodes serves all.
+        given, at = strengths[:1], start[None]
+        nodes = exact_nodes(extension, rows, given, typical, at, _NODES.times(_SHARED), typical)
+        for k, mean in enumerate(means):
+            result[k] = integrated_log_density(np.tile(mean, (n_events, 1)), factors[k], *nodes)
+        return result
     for first in range(0, len(means), _AT_ONCE):
         part = slice(first, first + _AT_ONCE)
         population = Population(means[part], covariances[part])
