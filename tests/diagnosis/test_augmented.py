@@ -17,9 +17,10 @@ from scipy.stats import halfnorm, lognorm, norm
 
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.diagnosis.augmented import AugmentedProblem, augmented_problem
-from skred.diagnosis.curves import Base, Curve, curve, curve_near, fit_base, repeated
+from skred.diagnosis.curves import Base, Curve, curve_near, fit_base, repeated
 from skred.diagnosis.event_nodes import ROUGH
 from skred.diagnosis.extension import extended
+from skred.diagnosis.first_look import curve
 from skred.diagnosis.mixed import fit_population, mean_prior, starting_population
 from skred.diagnosis.modes import Population, campaign_rows, log_joint
 from skred.diagnosis.tables import finer, highest, locate

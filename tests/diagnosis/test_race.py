@@ -13,8 +13,9 @@ import pytest
 from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
 
 from skred.diagnosis import race
-from skred.diagnosis.curves import Base, Curve, curve, curve_at, curve_near, first_look
+from skred.diagnosis.curves import Base, Curve, curve_at, curve_near
 from skred.diagnosis.event_nodes import FINE, FRONTS, ROUGH
+from skred.diagnosis.first_look import curve, first_look
 from skred.diagnosis.race import _entrants, _first_looks, _leading, _that_count, with_errors
 from skred.diagnosis.screen import Screen, candidates
 from skred.diagnosis.threads import threads

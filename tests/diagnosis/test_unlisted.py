@@ -11,9 +11,10 @@ from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal, norm
 
 from skred.campaign import Status, find_campaign, read_campaign
-from skred.diagnosis.curves import Base, curve
+from skred.diagnosis.curves import Base
 from skred.diagnosis.event_nodes import USUAL
 from skred.diagnosis.extension import extended
+from skred.diagnosis.first_look import curve
 from skred.diagnosis.locate import _band, _resolution, _stretch, _work, locate
 from skred.diagnosis.race import Heat
 from skred.diagnosis.screen import _of_profile

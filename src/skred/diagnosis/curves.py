@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import Akima1DInterpolator
 
-from skred.diagnosis.event_nodes import FIRST, FRONTS, ROUGH, USUAL, Budget, event_nodes
+from skred.diagnosis.event_nodes import FIRST, USUAL, Budget, event_nodes
 from skred.diagnosis.extension import Extension, extended, setting_of, typical_speed
 from skred.diagnosis.marginal import Evidence, coordinates, evidence, prior_log_scale
 from skred.diagnosis.mixed import mean_prior
@@ -27,8 +27,6 @@ from skred.physics.law import Law
 from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
 
 FloatArray = NDArray[np.float64]
-_GRID = (0.2, 0.6, 1.2, 2.2, 3.5)
-"""Strengths at first, in scales of the prior."""
 _NEAR = (-3.5, -2.0, -1.0, 0.0, 1.0, 2.0, 3.5)
 """Strengths around what was found before, in its standard deviations."""
 _PASSES = 4
@@ -37,13 +35,7 @@ _FAR_MEAN, _FAR_SPREAD = 0.7, 0.35
 """Change of a population after which nodes are made anew: of its mean in spreads, of a log spread."""
 _BETWEEN = 60
 """Points at which a curve is integrated between each two strengths."""
-_OUTSIDE = 2.2
-"""A strength beyond the one that the linear model finds, relative to it, where no other is."""
 _DEEP = 40.0
-_PROMISED = 0.3
-"""Nats that a rough curve must promise for fronts to be asked at its top."""
-_FAR_OFF, _FAR_SHARE = 4.0, 0.02
-"""Standard deviations beyond which a reading is far off, and the share of such readings that is many."""
 
 
 class Fit(NamedTuple):
@@ -252,63 +244,6 @@ class Curve:
         weights /= weights.sum()
         mean = float(weights @ strengths)
         return mean, math.sqrt(max(float(weights @ (strengths - mean) ** 2), 0.0))
-
-
-def first_look(base: Base) -> Budget:
-    """Nodes for a look at every place: readings along tangents, unless many readings are far off.
-
-    Robust errors take what is far from a front for outliers and see no direction to go; only fronts
-    themselves tell then that a strong effect brings them back.
-    """
-    extension = extended(base.problem, base.law, base.directions)
-    predictions = extension.predict(base.rows.event, base.fit.points, base.strengths)[:, :-1]
-    readings = base.rows.readings
-    stated = np.hypot(readings.relative_sd * predictions, readings.absolute_sd)
-    sd = np.where(readings.stated_sd > 0.0, readings.stated_sd, stated)
-    far = np.abs(readings.values - predictions) > _FAR_OFF * sd
-    return FRONTS if far[readings.observed].mean() > _FAR_SHARE else ROUGH
-
-
-def curve(
-    base: Base, mechanism: Mechanism, shape: Shape, budget: Budget, linear: float | None = None
-) -> Curve:
-    """Evidence along the strength of a mechanism, on a grid over its prior.
-
-    Many recordings tell strengths far below the prior's scale; the grid alone would then miss where the
-    evidence is. With the budget ``ROUGH`` quick enough for every place, and wrong by nats where fronts stop
-    near sensors.
-
-    Parameters
-    ----------
-    linear : float, optional
-        The most probable strength in the linear model around no such mechanism.
-    """
-    added = mechanism.added
-    assert added is not None
-    grid = added.scale * np.array(_GRID)
-    strengths = np.concatenate([-grid[::-1], grid]) if added.either_sign else grid
-    if linear is not None and (added.either_sign or linear > 0.0):
-        more = [linear] if abs(linear) * _OUTSIDE > grid[0] else [linear, _OUTSIDE * linear]
-        strengths = np.append(strengths, more)
-    found = curve_at(base, mechanism, shape, strengths, budget)
-    return _by_fronts(base, found) if found.rough else found
-
-
-def _by_fronts(base: Base, rough: Curve) -> Curve:
-    """A rough curve whose evidence for anything is what fronts say at its top, in proportion elsewhere.
-
-    Where fronts stop, tangents can promise ten nats that are not there, at more places than are looked at
-    again.
-    """
-    top = int(np.argmax(rough.log_evidence))
-    promised = float(rough.log_evidence[top])
-    if promised < _PROMISED:
-        return rough
-    strengths = rough.strengths[[top]]
-    near = curve_at(base, rough.mechanism, rough.shape, strengths, FRONTS, rough)
-    there = max(float(near.log_evidence[near.strengths == strengths[0]][0]), 0.0)
-    heights = np.where(rough.log_evidence > 0.0, rough.log_evidence * (there / promised), rough.log_evidence)
-    return replace(rough, log_evidence=heights)
 
 
 def curve_near(base: Base, mechanism: Mechanism, shape: Shape, near: Curve, first: Budget) -> Curve:

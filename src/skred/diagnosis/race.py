@@ -17,10 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.curves import Base, Curve, Fit, curve, curve_near, first_look, refit
+from skred.diagnosis.curves import Base, Curve, Fit, curve_near, refit
 from skred.diagnosis.entrant import Entrant
 from skred.diagnosis.event_nodes import FINE, USUAL, Budget, event_nodes
 from skred.diagnosis.extension import Extension, extended
+from skred.diagnosis.first_look import curve, first_look
 from skred.diagnosis.marginal import evidence, importance_evidence
 from skred.diagnosis.modes import campaign_rows, event_modes
 from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, probabilities

@@ -1,0 +1,78 @@
+"""The race's first look at a place: quick, and by fronts where tangents mislead."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from skred.diagnosis.curves import Base, Curve, curve_at
+from skred.diagnosis.event_nodes import FRONTS, ROUGH, Budget
+from skred.diagnosis.extension import extended
+from skred.physics.mechanisms.spec import Mechanism, Shape
+
+_GRID = (0.2, 0.6, 1.2, 2.2, 3.5)
+"""Strengths at first, in scales of the prior."""
+_OUTSIDE = 2.2
+"""A strength beyond the one that the linear model finds, relative to it, where no other is."""
+_PROMISED = 0.3
+"""Nats that a rough curve must promise for fronts to be asked at its top."""
+_FAR_OFF, _FAR_SHARE = 4.0, 0.02
+"""Standard deviations beyond which a reading is far off, and the share of such readings that is many."""
+
+
+def first_look(base: Base) -> Budget:
+    """Nodes for a look at every place: readings along tangents, unless many readings are far off.
+
+    Robust errors take what is far from a front for outliers and see no direction to go; only fronts
+    themselves tell then that a strong effect brings them back.
+    """
+    extension = extended(base.problem, base.law, base.directions)
+    predictions = extension.predict(base.rows.event, base.fit.points, base.strengths)[:, :-1]
+    readings = base.rows.readings
+    stated = np.hypot(readings.relative_sd * predictions, readings.absolute_sd)
+    sd = np.where(readings.stated_sd > 0.0, readings.stated_sd, stated)
+    far = np.abs(readings.values - predictions) > _FAR_OFF * sd
+    return FRONTS if far[readings.observed].mean() > _FAR_SHARE else ROUGH
+
+
+def curve(
+    base: Base, mechanism: Mechanism, shape: Shape, budget: Budget, linear: float | None = None
+) -> Curve:
+    """Evidence along the strength of a mechanism, on a grid over its prior.
+
+    Many recordings tell strengths far below the prior's scale; the grid alone would then miss where the
+    evidence is. With the budget ``ROUGH`` quick enough for every place, and wrong by nats where fronts stop
+    near sensors.
+
+    Parameters
+    ----------
+    linear : float, optional
+        The most probable strength in the linear model around no such mechanism.
+    """
+    added = mechanism.added
+    assert added is not None
+    grid = added.scale * np.array(_GRID)
+    strengths = np.concatenate([-grid[::-1], grid]) if added.either_sign else grid
+    if linear is not None and (added.either_sign or linear > 0.0):
+        more = [linear] if abs(linear) * _OUTSIDE > grid[0] else [linear, _OUTSIDE * linear]
+        strengths = np.append(strengths, more)
+    found = curve_at(base, mechanism, shape, strengths, budget)
+    return _by_fronts(base, found) if found.rough else found
+
+
+def _by_fronts(base: Base, rough: Curve) -> Curve:
+    """A rough curve whose evidence for anything is what fronts say at its top, in proportion elsewhere.
+
+    Where fronts stop, tangents can promise ten nats that are not there, at more places than are looked at
+    again.
+    """
+    top = int(np.argmax(rough.log_evidence))
+    promised = float(rough.log_evidence[top])
+    if promised < _PROMISED:
+        return rough
+    strengths = rough.strengths[[top]]
+    near = curve_at(base, rough.mechanism, rough.shape, strengths, FRONTS, rough)
+    there = max(float(near.log_evidence[near.strengths == strengths[0]][0]), 0.0)
+    heights = np.where(rough.log_evidence > 0.0, rough.log_evidence * (there / promised), rough.log_evidence)
+    return replace(rough, log_evidence=heights)
