@@ -117,7 +117,7 @@ def main(*, batches: tuple[int, ...] = (), snr: float = 5.5) -> None:
             right = sum(one["probability_unlisted"] > 0.5 for one in rows)
             mean = math.fsum(one["probability_unlisted"] for one in rows) / len(rows)
             print(
-                f"{kind}: {len(rows)} trials; the unlisted force more probable than all else in {right}, its mean"
+                f"{kind}: {len(rows)} trials; unlisted more probable than all else in {right}, its mean"
                 f" probability {mean:.2f}; gained about the leading listed one: median"
                 f" {gains[len(gains) // 2]:.1f} nats, below 3 in {sum(gain < 3.0 for gain in gains)}"
             )
