@@ -53,8 +53,8 @@ def base_of(asked: dict[str, Any], law_id: str) -> Base:
 
 def leader(raced: Race) -> str:
     """The listed candidate that is most probable."""
-    listed = [name for name in raced.probability if name not in (NOTHING, UNLISTED)]
-    return max(listed, key=lambda name: raced.probability[name])
+    listed = {name: p for name, p in raced.probability.items() if name not in (NOTHING, UNLISTED)}
+    return max(listed, key=lambda name: listed[name])
 
 
 def beyond(raced: Race, name: str) -> float:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 DONE = 0
 QUICK_TRIALS = 12
+_SHARE = validators.Number(gte=0.0, lte=1.0)
 Folder = Annotated[Path, Parameter(name="folder", help="Folder of the proof.")]
 ProofOut = Annotated[
     Path | None,
@@ -70,7 +71,7 @@ class Sealing:
     nothing_share: Annotated[
         float | None,
         Parameter(
-            validator=validators.Number(gte=0.0, lte=1.0),
+            validator=_SHARE,
             help="Share of trials, to the nearest whole number, that hide nothing, half of them nasty; "
             "by default each is drawn so with probability 0.35.",
         ),
@@ -78,14 +79,14 @@ class Sealing:
     unlisted_share: Annotated[
         float | None,
         Parameter(
-            validator=validators.Number(gte=0.0, lte=1.0),
+            validator=_SHARE,
             help="Share of the trials that hide something in which it is in no list; by default 2 in 13.",
         ),
     ] = None
     masked_share: Annotated[
         float,
         Parameter(
-            validator=validators.Number(gte=0.0, lte=1.0),
+            validator=_SHARE,
             help="Share of the trials with one listed mechanism in which the base law hides it on average.",
         ),
     ] = 0.1

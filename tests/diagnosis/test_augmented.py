@@ -143,6 +143,8 @@ def test_finer_tables_cover_what_chains_visited_farther_off(problem: AugmentedPr
         errors.append([np.abs(one.integration_errors(law, samples)).max() for one in (problem, again)])
     before, after = np.array(errors).T
     assert before.min() > 0.1 and np.all(after < before) and after.sum() < 0.5 * before.sum()
+    # The third is the case that was asked for first, at a time when 0.29 of its 0.33 nats were left.
+    assert before[2] > 0.25 and after[2] < 0.4 * before[2]
 
 
 def test_finer_tables_cover_what_chains_visited(problem: AugmentedProblem) -> None:

@@ -14,9 +14,10 @@ from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
 
 from skred.diagnosis import race
 from skred.diagnosis.curves import Base, Curve, curve_at, curve_near
+from skred.diagnosis.entrant import Entrant
 from skred.diagnosis.event_nodes import FINE, FRONTS, ROUGH
 from skred.diagnosis.first_look import curve, first_look
-from skred.diagnosis.race import _entrants, _first_looks, _leading, _that_count, with_errors
+from skred.diagnosis.race import _corrections, _entrants, _first_looks, _leading, _that_count, with_errors
 from skred.diagnosis.screen import Screen, candidates
 from skred.diagnosis.threads import threads
 from skred.physics.mechanisms import mechanisms
@@ -67,6 +68,22 @@ def test_what_tangents_promise_counts_by_what_fronts_say() -> None:
         assert one.rough and one.log_evidence[one.strengths == 0.0][0] == 0.0
         against = rough.log_evidence < 0.0
         np.testing.assert_allclose(one.log_evidence[against], rough.log_evidence[against], atol=1e-6)
+
+
+def test_only_what_fronts_computed_is_corrected(base: Base) -> None:
+    """What is wrong with a rough curve is its own, and not its mechanism's."""
+    job = next(one for one in candidates(base.setting) if one.mechanism.id == "turbulent_drag")
+    rough = curve(base, job.mechanism, job.shape, ROUGH)
+    fronts = curve_near(base, job.mechanism, job.shape, rough, ROUGH)
+    assert rough.rough and not fronts.rough
+    with ThreadPoolExecutor(1) as pool:
+        found = [
+            _corrections(base, {"turbulent_drag": Entrant(job.mechanism, (one,), np.zeros(1))}, pool)
+            for one in (rough, fronts)
+        ]
+    assert found[0] == {}
+    correction, disagreement = found[1]["turbulent_drag"]
+    assert 0.0 < abs(correction) < 0.5 and abs(disagreement) < 0.5
 
 
 def test_fronts_are_looked_at_where_readings_are_far_off() -> None:

@@ -118,11 +118,12 @@ def test_what_was_missing_predicts_unseen_avalanches_better(
     assert 0.7 < held.covered[seen].mean() <= 1.0
 
 
-def test_scores_are_those_of_a_dense_sum() -> None:
-    """Of each event's own retardation, for three draws with three strengths of a biased sensor."""
+@pytest.mark.parametrize("strengths", [[[-0.05], [0.0], [0.08]], [[0.06], [0.06], [0.06]]])
+def test_scores_are_those_of_a_dense_sum(strengths: list[list[float]]) -> None:
+    """Of each event's own retardation, for three draws with three strengths of a biased sensor, or one."""
     few = of_events(campaign(), [0, 3, 4])
     term = Term("sensor_bias", Shape(sensor=few.sensors[GATE].id))
-    predictor = by_hand(3, term, strengths=[[-0.05], [0.0], [0.08]])
+    predictor = by_hand(3, term, strengths=strengths)
     extension = extension_of(predictor, few)
     readings, errors = extension.problem.readings, extension.problem.error_model.errors
     logs = np.linspace(np.log(0.8), np.log(6.0), 20001)

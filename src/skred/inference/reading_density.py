@@ -116,9 +116,7 @@ def _multiplied(product, total, usual, outlying, square, share):  # type: ignore
         total += math.log(share / OUTLIER_FACTOR) - 0.5 * square / (OUTLIER_FACTOR * OUTLIER_FACTOR)
     else:
         total -= 0.5 * square
-    if product < _SMALL:
-        return 1.0, total + math.log(product)
-    return product, total
+    return _put_away(product, total)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

@@ -298,7 +298,7 @@ def _fill_increment(column, profile, scaled, u_c, mean, by_source, by_decay, inc
 
 
 @compiled()
-def _regular_until(first, end, limits, v):  # type: ignore[no-untyped-def]
+def regular_until(first, end, limits, v):  # type: ignore[no-untyped-def]
     """First cell from `first` on, or `end`, in which something happens; see `is_regular`."""
     i, stop = np.uint64(first), np.uint64(end)
     while i < stop and v[i] <= limits[i] and 0.0 < v[i + _ONE] <= limits[i + _ONE]:
@@ -336,7 +336,7 @@ def march_tangents(  # type: ignore[no-untyped-def]
     d_runout[:] = 0.0
     i = first
     while i <= last:
-        regular_to = i if i == first else _regular_until(i, last + 1, limits, v)
+        regular_to = i if i == first else regular_until(i, last + 1, limits, v)
         if regular_to > i:
             for k in range(n_tangents):
                 _recur_tangent(k, i, regular_to, carry, increment, dv)

@@ -65,7 +65,7 @@ def recur_with_speed(first, ground, table, keep, gain, per_source, u_c, limits, 
             if not left > u1:  # close to where there are two solutions, or none
                 break
             u1 += excess / left
-            # Newton's error is less than squared in each step: after this one it is below rounding.
+            # What this step leaves goes with the square of the excess: it is below rounding.
             if abs(excess) <= _NEAR * v0:
                 solved = True
                 break

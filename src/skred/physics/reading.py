@@ -7,8 +7,15 @@ import numpy as np
 from skred.physics.cell import CONSTANT, FRICTION, QUADRATIC, cell_at, phi1, psi
 from skred.physics.columns import GRAVITY
 from skred.physics.compiled import compiled
-from skred.physics.inputs import RUNOUT, VELOCITY_TO_STOP
-from skred.physics.march import contact_law, is_regular, start_tangents, travel, travel_tangents
+from skred.physics.inputs import RUNOUT, VELOCITY_TO_STOP, cell_of
+from skred.physics.march import (
+    contact_law,
+    is_regular,
+    regular_until,
+    start_tangents,
+    travel,
+    travel_tangents,
+)
 
 _SUMS = {"contract", "nsz", "reassoc"}
 _ONE = np.uint64(1)
@@ -44,16 +51,9 @@ def _time_over(i, last, edge, v):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _regular_cells(i, first, s_from, end, edge, limits, v):  # type: ignore[no-untyped-def]
-    """First cell from i on, or i itself, that is not wholly within a span, or in which something happens."""
-    if i <= first or edge[i] < s_from:
-        return i
-    last = i
-    while last < edge.size - 1 and edge[last + 1] <= end:
-        if not (v[last] <= limits[last] and 0.0 < v[last + 1] <= limits[last + 1]):
-            break
-        last += 1
-    return last
+def _whole_until(i, first, s_from, whole_to, limits, edge, v):  # type: ignore[no-untyped-def]
+    """Where the cells from i on end that lie wholly within a span and in which nothing happens."""
+    return regular_until(i, whole_to, limits, v) if i > first and edge[i] >= s_from else i
 
 
 @compiled()
@@ -69,9 +69,9 @@ def span_speed(  # type: ignore[no-untyped-def]
     """
     if end <= s_from:
         return 0.0
-    time = 0.0
+    time, whole_to = 0.0, cell_of(edge, end)
     while i < edge.size - 1 and edge[i] < end:
-        last = _regular_cells(i, first, s_from, end, edge, limits, v)
+        last = _whole_until(i, first, s_from, whole_to, limits, edge, v)
         if last > i:
             time += _time_over(i, last, edge, v)
             i = last
@@ -161,9 +161,10 @@ def _span_tangents(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Tangents of a span's mean speed, which is `speed`."""
     end = min(s_to, runout)
+    whole_to = cell_of(edge, end)
     d_time[:] = 0.0
     while i < edge.size - 1 and edge[i] < end:
-        last = _regular_cells(i, first, s_from, end, edge, limits, v)
+        last = _whole_until(i, first, s_from, whole_to, limits, edge, v)
         if last > i:
             _time_tangents(i, last, edge, v, dv, d_time)
             i = last
