@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from skred.diagnosis.augmented import CLAIM_LIMIT, AugmentedProblem, augmented_problem
 from skred.diagnosis.clock import Clock, Tell
@@ -175,7 +176,9 @@ def diagnose(
     if reason:
         return Diagnosis(problem, law, cannot=reason)
     try:
-        return _steps(problem, law, settings, effort, clock)
+        # A diagnosis has its own threads: those of matrix products, small as these are, get in their way.
+        with threadpool_limits(1, user_api="blas"):
+            return _steps(problem, law, settings, effort, clock)
     except np.linalg.LinAlgError as error:
         clock.end()
         why = f"the numerics broke down in {list(clock.seconds)[-1]!r}: {error}"

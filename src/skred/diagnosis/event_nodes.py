@@ -132,6 +132,9 @@ def _log_mixture(points, centres):  # type: ignore[no-untyped-def]
                 squares[centre] = 0.0
                 for axis in range(n_axes):
                     squares[centre] += (points[row, k, axis] - centres[row, centre, axis]) ** 2
+            if n_centres == 1:
+                result[row, k] = -0.5 * squares[0]
+                continue
             least, total = squares.min(), 0.0
             for centre in range(n_centres):
                 total += math.exp(0.5 * (least - squares[centre]))
@@ -252,7 +255,7 @@ def _adapted(points: FloatArray, log_posterior: FloatArray, cover: FloatArray, s
     weights /= weights.sum(axis=1, keepdims=True)
     effective = 1.0 / np.sum(weights**2, axis=1)
     deviation = points - np.sum(weights[:, :, None] * points, axis=1)[:, None, :]
-    covariance = np.einsum("rk,rki,rkj->rij", weights, deviation, deviation, optimize=True)
+    covariance = deviation.transpose(0, 2, 1) @ (weights[:, :, None] * deviation)
     shrink = (_SHRUNK / (_SHRUNK + effective))[:, None, None]
     covariance = shrink * cover + (1.0 - shrink) * covariance
     # Systematic resampling, and the usual bandwidth of a kernel density of so many.

@@ -107,9 +107,7 @@ class Modes(NamedTuple):
     @property
     def information(self) -> FloatArray:
         """Of the readings about the points, (n_rows, n_base + 1, n_base + 1)."""
-        result: FloatArray = np.einsum(
-            "rij,ri,rik->rjk", self.by_points, self.curvature, self.by_points, optimize=True
-        )
+        result: FloatArray = self.by_points.transpose(0, 2, 1) @ (self.curvature[:, :, None] * self.by_points)
         return result
 
 

@@ -328,7 +328,10 @@ def _climb(base: Base, kind: Kind, at: FloatArray, peak: _Peak, cover: FloatArra
     for _ in range(_ROUNDS):
         step = np.linalg.solve(peak.information + precision, peak.score - precision @ peak.values)
         height = peak.fit.found.log_evidence - _price(peak.values, precision)
+        promised = 0.5 * float(step @ (peak.score - precision @ peak.values))
         for share in _SHARES:
+            if share * (2.0 - share) * promised < _SETTLED:
+                return _at_top(peak, precision)
             values = peak.values + share * step
             fit = _fit_at(base, kind, at, values, _start(base, peak.fit))
             gained = fit.found.log_evidence - _price(values, precision) - height
@@ -339,7 +342,11 @@ def _climb(base: Base, kind: Kind, at: FloatArray, peak: _Peak, cover: FloatArra
         peak = _peak(base, kind, at, values, fit)
         if gained < _SETTLED:
             break
-    # Where fronts stop the likelihood has kinks: a slope that no step could use up promises nothing.
+    return _at_top(peak, precision)
+
+
+def _at_top(peak: _Peak, precision: FloatArray) -> _Peak:
+    """A peak that was climbed to: a slope that is left over, at kinks where fronts stop, promises none."""
     return replace(peak, score=precision @ peak.values)
 
 
