@@ -291,6 +291,21 @@ def test_many_readings() -> None:
     assert np.abs(differences(problem, "pcm", around, 300)).max() < TOLERANCE
 
 
+def test_how_little_drag_there_is_stays_open() -> None:
+    """Recordings of fronts without drag: a tenth of next to none is as likely, however little that is."""
+    law = load_law("pcm")
+    strengths = [[friction, 1e-9] for friction in (0.31, 0.34, 0.36, 0.39, 0.42, 0.45)]
+    problem = hierarchical_problem(with_sensors(gates(8, 0.0, 0.05), strengths, 0.05))
+    scale = law.mechanisms[1].strength.prior_scale
+    drag = scale * np.exp([-7.0, -8.0, -9.0])
+    samples = {"dry_friction": [0.38] * 3, "turbulent_drag": drag, "dry_friction_spread": [0.12] * 3}
+    samples |= {"turbulent_drag_spread": [0.2] * 3, "dry_friction_turbulent_drag_correlation": [0.0] * 3}
+    samples = {name: np.array(values) for name, values in samples.items()}
+    found = problem.log_likelihood(law, samples).sum(axis=1)
+    assert abs(found[0] - found[1]) < 0.5 and abs(found[1] - found[2]) < 0.1
+    assert np.abs(problem.integration_errors(law, samples)).max() < TOLERANCE
+
+
 def test_spans() -> None:
     """Mean speeds over 120 m, read up to the stop of a front that stops inside one."""
     campaign = with_sensors(gates(8, 120.0, 0.1), TRUTH, 0.1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -43,16 +43,31 @@ class Resolution:
         Width in logarithms of strengths at which a box counts as narrow: its bound is then no longer
         believed, because a front that just passes a counter-slope makes a jump, across which the bound
         promises all.
+    release : float
+        Largest width of a box on the axis of the release, in its standard deviations: with two nodes each
+        boxes of 4/3 integrate a normal density, or half of one, to 0.03 %, and boxes of 1 to 0.001 %.
+    release_change : float
+        How many times the change is allowed where the release is uncertain: one axis more smooths, and makes
+        each halving dearer.
     """
 
     change: float = 1.75
     depth: float = 16.0
     share: float = 1e-3
     narrow: float = 2e-3
+    release: float = 4.0 / 3.0
+    release_change: float = 1.4
 
     def finer(self) -> Resolution:
         """Half the spacing, and deeper: to check against."""
-        return Resolution(0.5 * self.change, self.depth + 8.0, 0.25 * self.share, 0.5 * self.narrow)
+        return replace(
+            self,
+            change=0.5 * self.change,
+            depth=self.depth + 8.0,
+            share=0.25 * self.share,
+            narrow=0.5 * self.narrow,
+            release=0.75 * self.release,
+        )
 
 
 COARSE = Resolution(change=6.0, depth=14.0, share=1e-2, narrow=4e-2)
@@ -145,7 +160,12 @@ class Bisection:
         return result
 
     def log_envelope(self, points: FloatArray) -> FloatArray:
-        """Logarithm of the envelope at points (..., n_axes)."""
+        """Logarithm of the envelope at points (..., n_axes); that of a release is its own prior."""
+        release = points[..., self.n_strengths :]
+        return self._log_strengths(points) - 0.5 * np.sum(release * release, axis=-1)
+
+    def _log_strengths(self, points: FloatArray) -> FloatArray:
+        """Logarithm of the envelope of the strengths at points (..., n_axes)."""
         if self.envelope is None:
             return np.zeros(points.shape[:-1])
         z = (points[..., : self.n_strengths] - self.envelope.mean) @ self.envelope.whiten.T
@@ -156,12 +176,14 @@ class Bisection:
         """Logarithm of the envelope, (n_boxes, 1 + n_corners): an upper bound, and at the corners."""
         corners = boxes.low[:, None, :] + _sides(boxes.low.shape[1]) * boxes.width[:, None, :]
         result = np.zeros((len(corners), 1 + corners.shape[1]))
+        result[:, 1:] = self.log_envelope(corners)
+        middle, half = boxes.low + 0.5 * boxes.width, 0.5 * boxes.width
         if self.envelope is not None:
-            result[:, 1:] = self.log_envelope(corners)
-            middle, half = boxes.low + 0.5 * boxes.width, 0.5 * boxes.width[:, : self.n_strengths]
-            distance = np.sqrt(-2.0 * self.log_envelope(middle))
-            reach = np.linalg.norm(half @ np.abs(self.envelope.whiten.T), axis=1)
+            distance = np.sqrt(-2.0 * self._log_strengths(middle))
+            reach = np.linalg.norm(half[:, : self.n_strengths] @ np.abs(self.envelope.whiten.T), axis=1)
             result[:, 0] = -0.5 * np.maximum(distance - reach, 0.0) ** 2
+        nearest = np.maximum(np.abs(middle) - half, 0.0)[:, self.n_strengths :]
+        result[:, 0] -= 0.5 * np.sum(nearest**2, axis=1)
         return result
 
     def boxes(self, events: IntArray, edges: Sequence[FloatArray]) -> _Boxes:
@@ -256,6 +278,8 @@ class Bisection:
             boxes, bound, change, depth = boxes.take(kept), bound[kept], change[kept], depth[kept]
             # Coarser far below the best, where a larger relative error does no harm.
             allowed = resolution.change * (1.0 + np.maximum(depth, 0.0) / 8.0)
+            if n_axes > self.n_strengths:
+                allowed *= resolution.release_change
             excess = np.maximum(change / allowed[:, None], boxes.width / self.widest(n_axes))
             done = (excess.max(axis=1, initial=0.0) <= 1.0) | (
                 narrow & (log_share < math.log(resolution.share))
@@ -269,7 +293,7 @@ class Bisection:
 
     def widest(self, n_axes: int) -> FloatArray:
         """Largest width of a box on each axis."""
-        return self.cell if n_axes == self.n_strengths else np.append(self.cell, 1.0)
+        return self.cell if n_axes == self.n_strengths else np.append(self.cell, self.resolution.release)
 
     def narrowest(self, n_axes: int) -> FloatArray:
         """Width on each axis at which a box counts as narrow."""

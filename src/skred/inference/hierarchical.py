@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -43,16 +43,26 @@ _BELOW_SCALE, _ABOVE_SCALE = 6.0, 7.0
 
 Far above it: for a slow avalanche any drag beyond some size may do, and spreads can be above 1.
 """
+_AT_EDGE, _FARTHER_BELOW = 2.0, 10.0
+"""How near to the least strength looked for a population is where it is looked for farther below: recordings
+without drag leave open how little there is, and chains go down to where nothing was computed."""
 _WIDER_CHECK = 1.0
 _MEDIAN_LOG_MEAN, _MEDIAN_LOG_SD = -0.64, 1.1
 """Mean and standard deviation of the log of a half-normal variable of scale 1."""
 _COARSE_CELL = 0.25
 _CHECKED_EVENTS, _CHECKED_DRAWS = 24, 40
-_LEAST_CHECKED, _CHECKED_RUNS, _FINER_COSTS = 6, 3_000_000, 6.0
+_LEAST_CHECKED, _CHECKED_RUNS, _FINER_COSTS = 6, 2_000_000, 6.0
 """Events checked at least, runs of the kernel a check may take, and how many more it takes than usual."""
 _SHARP_RUNOUT_M = 4.0
 INTEGRATION_LIMIT = 0.2
 """Largest error of the log likelihood over 22 events, in nats."""
+
+
+class Found(NamedTuple):
+    """Where a population is, roughly, and the box of log strengths, (n_strengths, 2), that is looked at."""
+
+    population: RoughPopulation
+    box: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +86,7 @@ class HierarchicalProblem(Problem):
     integration_limit: float = INTEGRATION_LIMIT
     # Not init: a problem made from this one by `replace` must not keep what belongs to other recordings.
     _surfaces: dict[tuple[str, ...], Surfaces] = field(init=False, default_factory=dict, repr=False)
-    _rough: dict[tuple[str, ...], RoughPopulation] = field(init=False, default_factory=dict, repr=False)
+    _rough: dict[tuple[str, ...], Found] = field(init=False, default_factory=dict, repr=False)
     _errors: dict[tuple[str, ...], FloatArray] = field(init=False, default_factory=dict, repr=False)
 
     likelihood = "hierarchical"
@@ -209,7 +219,7 @@ class HierarchicalProblem(Problem):
         """Surfaces of all events under a law, made once: coarsely, then finely where it matters."""
         key = _key(mechanisms)
         if key not in self._surfaces:
-            envelope = self._found(mechanisms).envelope(self.fineness)
+            envelope = self._found(mechanisms).population.envelope(self.fineness)
             self._surfaces[key] = self._resolve(mechanisms, self.fronts(mechanisms), self.fineness, envelope)
         return self._surfaces[key]
 
@@ -225,20 +235,29 @@ class HierarchicalProblem(Problem):
         for _ in range(fineness - 1):
             resolution = resolution.finer()
         resolution = replace(resolution, narrow=resolution.narrow * self._sharpness)
-        box = _box(mechanisms, _WIDER_CHECK * (fineness - 1.0))
-        return build_surfaces(fronts, box, resolution, self._found(mechanisms).cell / fineness, envelope)
+        population, box = self._found(mechanisms)
+        box = box + _WIDER_CHECK * (fineness - 1.0) * np.array([-1.0, 1.0])
+        return build_surfaces(fronts, box, resolution, population.cell / fineness, envelope)
 
-    def _found(self, mechanisms: Sequence[Mechanism]) -> RoughPopulation:
-        """Where the population of a law is, roughly."""
+    def _found(self, mechanisms: Sequence[Mechanism]) -> Found:
+        """Where the population of a law is, roughly, and where it is to be looked for."""
         key = _key(mechanisms)
         if key not in self._rough:
-            n = len(mechanisms)
-            mean, sd = _log_scales(mechanisms) + _MEDIAN_LOG_MEAN, np.full(n, _MEDIAN_LOG_SD)
-            coarse = build_surfaces(
-                self.fronts(mechanisms), _box(mechanisms), COARSE, np.full(n, _COARSE_CELL)
-            )
-            self._rough[key] = rough_population(coarse, mean, sd)
+            box = _log_scales(mechanisms)[:, None] + np.array([-_BELOW_SCALE, _ABOVE_SCALE])
+            found = self._looked_for(mechanisms, box)
+            at_edge = found.mean < box[:, 0] + _AT_EDGE
+            if at_edge.any():
+                box[at_edge, 0] -= _FARTHER_BELOW - _BELOW_SCALE
+                found = self._looked_for(mechanisms, box)
+            self._rough[key] = Found(found, box)
         return self._rough[key]
+
+    def _looked_for(self, mechanisms: Sequence[Mechanism], box: FloatArray) -> RoughPopulation:
+        """Where the population of a law is within a box, roughly."""
+        n = len(mechanisms)
+        mean, sd = _log_scales(mechanisms) + _MEDIAN_LOG_MEAN, np.full(n, _MEDIAN_LOG_SD)
+        coarse = build_surfaces(self.fronts(mechanisms), box, COARSE, np.full(n, _COARSE_CELL))
+        return rough_population(coarse, mean, sd)
 
     @cached_property
     def _sharpness(self) -> float:
@@ -282,12 +301,6 @@ def _log_scales(mechanisms: Sequence[Mechanism]) -> FloatArray:
     """Logarithms of the scales of the strengths' priors."""
     scales: FloatArray = np.log([mechanism.strength.prior_scale for mechanism in mechanisms])
     return scales
-
-
-def _box(mechanisms: Sequence[Mechanism], wider: float = 0.0) -> FloatArray:
-    """Where the logarithm of each strength is looked for, (n_strengths, 2)."""
-    scale = _log_scales(mechanisms)
-    return np.column_stack([scale - _BELOW_SCALE - wider, scale + _ABOVE_SCALE + wider])
 
 
 def _key(mechanisms: Sequence[Mechanism]) -> tuple[str, ...]:

@@ -128,7 +128,7 @@ def build_surfaces(
         bisection = Bisection(fronts, resolution, cell, envelope)
         edges = [_edges(low - step, high, step) for (low, high), step in zip(box, steps, strict=True)]
         if uncertain[events[0]]:
-            edges.append(_edges(0.0, 1.0, 1.0 / (2.0 * RELEASE_REACH)))
+            edges.append(_edges(0.0, 1.0, resolution.release / (2.0 * RELEASE_REACH)))
         nodes = bisection.nodes(events, edges)
         origin = box[:, 0] - steps + stagger(np.arange(n_events), steps)
         return _patches(events, *nodes, origin, cell, bisection.n_runs)
