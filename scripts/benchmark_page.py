@@ -309,8 +309,8 @@ trials that counts). Asked of a sparse trial: 30 CPU seconds.
 
 Development sets (`python benchmarks/development_set.py`, seeds 1000 to 999 999) are what was tuned on, and no
 claim is made from them. The goals are measured on sealed trials of the same simulator with other seeds, and
-so other tracks, avalanches and effects: [the record](../docs/proof.md) has the table, with numbers of trials and
-intervals.
+so other tracks, avalanches and effects: [the record](../docs/proof.md) has the table, with numbers of trials
+and intervals.
 """
 
 

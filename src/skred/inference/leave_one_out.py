@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import arviz as az
+import arviz_stats as az
 import numpy as np
 import pymc as pm
 import xarray as xr

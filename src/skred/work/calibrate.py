@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import arviz as az
+import arviz_stats as az
 import pymc as pm
 import xarray as xr
 

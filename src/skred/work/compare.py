@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import arviz as az
+import arviz_stats as az
 import numpy as np
 from numpy.typing import NDArray
 
