@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import norm
 
 from skred.campaign import Campaign, Event, Sensor, Status, find_campaign, read_campaign
+from skred.inference.bisection import RELEASE_REACH, Resolution
 from skred.inference.event_density import integrated_log_density
 from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
 from skred.inference.reading_density import log_likelihoods
@@ -214,6 +215,21 @@ def test_a_release_matters() -> None:
     candidates = [Population([-0.65], [0.02])]
     one, other = (from_surfaces(p.surfaces(mechanisms), candidates)[0, 0] for p in (known, uncertain))
     assert abs(one - other) > 0.05
+
+
+def two_nodes(width: float, information: float) -> float:
+    """Log of two nodes a box over the exact integral of the release's prior times a centred likelihood."""
+    low = -RELEASE_REACH + width * np.arange(round(2 * RELEASE_REACH / width))
+    nodes = np.concatenate([low + width * (0.5 + side / math.sqrt(12.0)) for side in (-1.0, 1.0)])
+    sd = 1.0 / math.sqrt(1.0 + information)
+    exact = sd * math.sqrt(2.0 * math.pi) * (1.0 - 2.0 * norm.sf(RELEASE_REACH / sd))
+    return math.log(0.5 * width * float(np.exp(-0.5 * (nodes / sd) ** 2).sum()) / exact)
+
+
+def test_boxes_of_a_release_are_narrow_enough() -> None:
+    usual, finer = Resolution().release, Resolution().finer().release
+    assert abs(two_nodes(usual, 0.0)) < 2e-5 and abs(two_nodes(usual, 1.0)) < 2.5e-3
+    assert 0.02 < abs(two_nodes(usual, 3.0)) < 0.04 and abs(two_nodes(finer, 3.0)) < 4e-3
 
 
 @pytest.mark.parametrize("release", [0.0, 40.0])

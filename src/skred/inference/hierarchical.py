@@ -58,7 +58,7 @@ INTEGRATION_LIMIT = 0.2
 """Largest error of the log likelihood over 22 events, in nats."""
 
 
-class Found(NamedTuple):
+class _Found(NamedTuple):
     """Where a population is, roughly, and the box of log strengths, (n_strengths, 2), that is looked at."""
 
     population: RoughPopulation
@@ -86,7 +86,7 @@ class HierarchicalProblem(Problem):
     integration_limit: float = INTEGRATION_LIMIT
     # Not init: a problem made from this one by `replace` must not keep what belongs to other recordings.
     _surfaces: dict[tuple[str, ...], Surfaces] = field(init=False, default_factory=dict, repr=False)
-    _rough: dict[tuple[str, ...], Found] = field(init=False, default_factory=dict, repr=False)
+    _rough: dict[tuple[str, ...], _Found] = field(init=False, default_factory=dict, repr=False)
     _errors: dict[tuple[str, ...], FloatArray] = field(init=False, default_factory=dict, repr=False)
 
     likelihood = "hierarchical"
@@ -239,7 +239,7 @@ class HierarchicalProblem(Problem):
         box = box + _WIDER_CHECK * (fineness - 1.0) * np.array([-1.0, 1.0])
         return build_surfaces(fronts, box, resolution, population.cell / fineness, envelope)
 
-    def _found(self, mechanisms: Sequence[Mechanism]) -> Found:
+    def _found(self, mechanisms: Sequence[Mechanism]) -> _Found:
         """Where the population of a law is, roughly, and where it is to be looked for."""
         key = _key(mechanisms)
         if key not in self._rough:
@@ -249,7 +249,7 @@ class HierarchicalProblem(Problem):
             if at_edge.any():
                 box[at_edge, 0] -= _FARTHER_BELOW - _BELOW_SCALE
                 found = self._looked_for(mechanisms, box)
-            self._rough[key] = Found(found, box)
+            self._rough[key] = _Found(found, box)
         return self._rough[key]
 
     def _looked_for(self, mechanisms: Sequence[Mechanism], box: FloatArray) -> RoughPopulation:

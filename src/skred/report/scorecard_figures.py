@@ -94,7 +94,7 @@ def false_alarms_figure(document: Document) -> Figure | None:
             linewidth=1.6,
             label="bar for the upper limit",
         )
-        axes.text(limit + 0.008, place, f"{one['hits']} of {one['n']}", va="center", fontsize=7.5)
+        axes.text(max(limit, bar) + 0.008, place, f"{one['hits']} of {one['n']}", va="center", fontsize=7.5)
     axes.set_yticks(range(len(rows)), [figure_text(row[0], 30) for row in rows])
     axes.tick_params(axis="y", length=0)
     axes.set_ylim(len(rows) - 0.4, -0.6)
