@@ -13,12 +13,14 @@ import pytest
 from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
 
 from skred.diagnosis import race
+from skred.diagnosis import second_look as looking
 from skred.diagnosis.curves import Base, Curve, curve_at, curve_near
 from skred.diagnosis.entrant import Entrant
 from skred.diagnosis.event_nodes import FINE, FRONTS, ROUGH
 from skred.diagnosis.first_look import curve, first_look
-from skred.diagnosis.race import _corrections, _entrants, _first_looks, _leading, _that_count, with_errors
+from skred.diagnosis.race import _corrections, _first_looks, _that_count, with_errors
 from skred.diagnosis.screen import Screen, candidates
+from skred.diagnosis.second_look import Place, entrants_of, leading
 from skred.diagnosis.threads import threads
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Direction, Shape
@@ -109,12 +111,12 @@ def made(name: str, place: float, height: float) -> Curve:
 
 def test_those_that_lead_after_a_second_look_are_looked_at_too() -> None:
     curves = [made("segment_drag", 100.0 * k, height) for k, height in enumerate([9.0, 7.5, 8.0, 5.0, 1.0])]
-    assert _leading(curves, {}) == [0, 2]
+    assert leading(curves, {}) == [0, 2]
     # The first falls behind, so the next ones lead.
-    finer = {0: [made("segment_drag", 0.0, 2.0)], 2: [made("segment_drag", 200.0, 7.0)]}
-    assert _leading(curves, finer) == [1, 2]
+    finer = {0: Place((made("segment_drag", 0.0, 2.0),)), 2: Place((made("segment_drag", 200.0, 7.0),))}
+    assert leading(curves, finer) == [1, 2]
     # Far behind the best is not looked at.
-    assert _leading(curves, {1: [made("segment_drag", 100.0, 20.0)]}) == [1]
+    assert leading(curves, {1: Place((made("segment_drag", 100.0, 20.0),))}) == [1]
 
 
 def test_what_is_far_behind_is_not_looked_at_again() -> None:
@@ -122,8 +124,8 @@ def test_what_is_far_behind_is_not_looked_at_again() -> None:
     curves = [made(name, 100.0 * k, one) for name, row in heights.items() for k, one in enumerate(row)]
     assert _that_count(dict(enumerate(curves))) == [0, 2, 3, 4, 5]
     # A second look at what is hopeless against the best of all would change nothing that is said.
-    assert _leading(curves, {}) == [0, 3, 5]
-    assert _leading([made("segment_drag", 300.0, 45.0), *curves], {}) == [0]
+    assert leading(curves, {}) == [0, 3, 5]
+    assert leading([made("segment_drag", 300.0, 45.0), *curves], {}) == [0]
 
 
 def test_under_another_error_model_each_mechanism_is_looked_at_until_the_rest_is_far_behind(
@@ -153,15 +155,55 @@ def test_strengths_of_other_sensors_are_other_strengths() -> None:
     one, other = made("sensor_bias", 0.0, 1.0), made("sensor_bias", 100.0, 1.0)
     slope = 4.0 * np.arange(len(other.strengths))
     other = replace(other, log_evidence=0.9 + slope - slope.max(), shape=Shape(sensor="b"))
-    (entrant,) = _entrants([replace(one, shape=Shape(sensor="a")), other], {}).values()
+    (entrant,) = entrants_of([replace(one, shape=Shape(sensor="a")), other], {}).values()
     assert entrant.strength_between_shapes() == 0.0
 
 
 def test_finer_curves_share_the_weight_of_their_place() -> None:
     curves = [made("segment_drag", 100.0 * k, 1.0) for k in range(3)]
-    (entrant,) = _entrants(curves, {1: [made("segment_drag", 100.0, 1.0)] * 4}).values()
-    assert len(entrant.curves) == 6 and np.exp(entrant.log_weights).sum() == pytest.approx(1.0)
+    same = made("segment_drag", 100.0, 1.0)
+    place = Place((same,)).parted(0, [same] * 3).parted(2, [same] * 2)
+    assert np.exp(place.log_shares) == pytest.approx([1 / 4, 1 / 4, 1 / 12, 1 / 4, 1 / 12, 1 / 12])
+    (entrant,) = entrants_of(curves, {1: place}).values()
+    assert len(entrant.curves) == 8 and np.exp(entrant.log_weights).sum() == pytest.approx(1.0)
     assert entrant.log_bayes_factor == pytest.approx(curves[0].log_bayes_factor)
+
+
+@pytest.mark.parametrize("width_m", [5.0, 10.0, 1000.0])
+def test_a_place_is_parted_until_its_parts_gain_no_more(
+    monkeypatch: pytest.MonkeyPatch, base: Base, width_m: float
+) -> None:
+    """Bayes factors of 40 nats on a stretch of its own, and less in proportion to squares beside it."""
+    setting = replace(base.setting, recorded_m=(100.0, 900.0))
+    base, true = replace(base, setting=setting), (431.0, 587.0)
+
+    def height(shape: Shape) -> float:
+        assert shape.s_from_m is not None and shape.s_to_m is not None
+        apart = np.array([shape.s_from_m, shape.s_to_m]) - true
+        return float(40.0 - 0.5 * np.sum((apart / width_m) ** 2))
+
+    looked: list[Shape] = []
+
+    def curve_near(base: Any, mechanism: Any, shape: Shape, near: Curve, budget: Any) -> Curve:
+        looked.append(shape)
+        return replace(made("segment_friction", 0.0, height(shape)), shape=shape)
+
+    monkeypatch.setattr(looking, "curve_near", curve_near)
+    added = mechanisms()["segment_friction"].added
+    assert added is not None
+    shapes = added.shapes(setting)
+    rough = [replace(made("segment_friction", 0.0, height(one)), shape=one) for one in shapes]
+    with ThreadPoolExecutor(1) as pool:
+        entrant = looking.second_look(base, rough, FRONTS, pool)["segment_friction"]
+    assert np.exp(entrant.log_weights).sum() == pytest.approx(1.0)
+    once = max(height(part) for one in shapes for part in added.split(setting, one, 1.0))
+    best = height(entrant.best.shape)
+    if width_m > 500.0:  # nothing to gain
+        assert len(looked) <= 3 * 7 and best > 39.0
+    else:
+        assert best > max(once + 0.5, 34.0) and len(looked) <= 3 * 2 * (1 + 6 * 4)
+    wrong = [abs(a - b) for a, b in zip(entrant.stretch() or (), true, strict=True)]
+    assert max(wrong) < max(2.0 * width_m, 10.0)
 
 
 def test_not_knowing_the_place_widens_a_strength() -> None:
@@ -169,13 +211,13 @@ def test_not_knowing_the_place_widens_a_strength() -> None:
     flat, steep = made("segment_drag", 0.0, 1.0), made("segment_drag", 100.0, 1.0)
     slope = 4.0 * np.arange(len(steep.strengths))
     steep = replace(steep, log_evidence=1.0 + slope - slope.max())
-    (entrant,) = _entrants([flat, steep], {}).values()
+    (entrant,) = entrants_of([flat, steep], {}).values()
     weights, between = entrant.shape_weights, entrant.strength_between_shapes()
     within = weights @ np.array([one.moments[1] ** 2 for one in entrant.curves])
     mean = entrant.strength()[0]
     about_best = entrant.strength()[1] ** 2 + (mean - entrant.best.moments[0]) ** 2
     assert between > 0.0 and about_best == pytest.approx(within + between**2)
-    assert _entrants([flat], {})["segment_drag"].strength_between_shapes() == 0.0
+    assert entrants_of([flat], {})["segment_drag"].strength_between_shapes() == 0.0
 
 
 def test_other_error_models_start_from_any() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from skred.diagnosis.decide import decide, smallest_set
-from skred.diagnosis.odds import prior_odds, probabilities
+from skred.diagnosis.odds import Calibration, prior_odds, probabilities
 from skred.diagnosis.omnibus import LIMIT, Omnibus
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group
@@ -136,3 +136,30 @@ def test_the_race_alone_and_the_check_alone() -> None:
     assert decide(shares(0.011, 0.0, obstacle=0.989), 0.3, True).verdict == "nothing_missing"
     assert decide(shares(0.51, 0.0, obstacle=0.49), 0.005, True).verdict == "nothing_missing"
     assert decide(shares(0.49, 0.0, obstacle=0.51), 0.005, True).names == ("obstacle",)
+
+
+def test_calibration_by_hand() -> None:
+    """Odds of 0.2 to 0.4 to the power 2, times 3: 3 to 4 of what is not nothing."""
+    plain = {"nothing": 0.4, "unlisted": 0.2, "obstacle": 0.3, "sensor_bias": 0.1}
+    found = Calibration(np.log(3.0), 2.0).of(plain)
+    assert found == pytest.approx(
+        {
+            "nothing": 0.4,
+            "unlisted": 0.6 * 3.0 / 7.0,
+            "obstacle": 0.75 * 0.6 * 4.0 / 7.0,
+            "sensor_bias": 0.25 * 0.6 * 4.0 / 7.0,
+        }
+    )
+    assert Calibration(0.0, 1.0).of(plain) == pytest.approx(plain)
+
+
+@pytest.mark.parametrize("power", [0.2, 1.0])
+def test_calibration_of_what_is_all_but_sure(power: float) -> None:
+    calibration = Calibration(-1.0, power)
+    for plain in (
+        {"nothing": 1.0, "unlisted": 0.0, "obstacle": 0.0},
+        {"nothing": 0.0, "unlisted": 1.0, "obstacle": 0.0},
+        {"nothing": 0.0, "unlisted": 0.0, "obstacle": 1.0},
+    ):
+        found = calibration.of(plain)
+        assert sum(found.values()) == pytest.approx(1.0) and min(found.values()) >= 0.0

@@ -249,7 +249,7 @@ def test_shapes_and_their_parts_are_on_the_track(mechanism: Mechanism, settings:
     for setting in settings:
         shapes = added.shapes(setting)
         assert shapes and len(set(shapes)) == len(shapes)
-        for shape in [*shapes, *(part for one in shapes for part in added.split(setting, one))]:
+        for shape in [*shapes, *(part for one in shapes for part in added.split(setting, one, 1.0))]:
             if shape.place_m is not None:
                 assert shape.s_from_m is not None and shape.s_to_m is not None
                 assert 0.0 <= shape.s_from_m < shape.s_to_m <= setting.terrain.length_m
@@ -280,7 +280,7 @@ def test_parts_of_a_shape_are_near_it(settings: list[Setting]) -> None:
     for mechanism in ALL.values():
         added = added_to(mechanism)
         for shape in added.shapes(settings[0]):
-            for part in added.split(settings[0], shape):
+            for part in (*added.split(settings[0], shape, 1.0), *added.split(settings[0], shape, 0.25)):
                 assert shape.s_from_m is not None and shape.s_to_m is not None
                 assert part.s_from_m is not None and part.s_to_m is not None
                 assert part != shape and dict(part.constants).keys() == dict(shape.constants).keys()

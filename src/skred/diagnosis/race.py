@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.curves import Base, Curve, Fit, curve_near, refit
+from skred.diagnosis.curves import Base, Curve, Fit, refit
 from skred.diagnosis.entrant import Entrant
 from skred.diagnosis.event_nodes import FINE, USUAL, Budget, event_nodes
 from skred.diagnosis.extension import Extension, extended
@@ -26,12 +26,12 @@ from skred.diagnosis.marginal import evidence, importance_evidence
 from skred.diagnosis.modes import campaign_rows, event_modes
 from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, probabilities
 from skred.diagnosis.screen import Screen, candidates
+from skred.diagnosis.second_look import second_look
 from skred.diagnosis.threads import threads
 from skred.diagnosis.unlisted import KINDS, Kind, Profile, alike, as_profile, fit_profile, log_evidence_of
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Shape
-from skred.physics.mechanisms.stretches import shares
 
 FloatArray = NDArray[np.float64]
 Tell = Callable[[int, int], None]
@@ -40,13 +40,8 @@ ERROR_SHARES = {"robust": 0.55, "student": 0.15, "correlated": 0.15, "scaled": 0
 _PREFERRED_BY = 1.0
 _CHECKED, _DRAWS = 5, 500
 """Leading mechanisms whose best curve is looked at with many more nodes."""
-_WITHIN, _AT_MOST, _TURNS = 3.0, 2, 3
-"""Places of a mechanism that are looked at again: within so many nats of its best, so many, so many times."""
-_FAR_BEHIND, _HOPELESS = 10.0, 20.0
-"""Nats behind its mechanism's best at which a place is not looked at under another error model; nats behind
-the best of all at which it is not looked at again. Parts of a place may have ten nats more than the place."""
-_SPLIT_FROM = 0.3
-"""Nats in favour of a place from which it is split: parts of a place without evidence have hardly any."""
+_FAR_BEHIND = 10.0
+"""Nats behind its mechanism's best at which a place is not looked at under another error model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +169,7 @@ def _heat(error_model: str, base: Base, tell: Tell, before: Heat | None) -> Heat
     budget = first_look(base)
     with ThreadPoolExecutor(threads()) as pool:
         curves = _first_looks(base, budget, pool, tell, () if before is None else before.first_look)
-        entrants = _looked_at_again(base, curves, budget, pool)
+        entrants = second_look(base, curves, budget, pool)
         # Together, so that no thread waits for the longest profile.
         fitted = [pool.submit(_profile, base, kind, entrants) for kind in KINDS]
         corrections = _corrections(base, entrants, pool)
@@ -270,77 +265,3 @@ def _finely(base: Base, extension: Extension, strengths: FloatArray, fit: Fit) -
     found = evidence(nodes, base.log_scale, fits[0].found.psi)
     sampled, _ = importance_evidence(nodes, base.log_scale, found, _DRAWS, seed=0)
     return found.log_evidence, sampled
-
-
-def _looked_at_again(
-    base: Base, curves: Sequence[Curve], budget: Budget, pool: ThreadPoolExecutor
-) -> dict[str, Entrant]:
-    """Entrants whose leading places are computed with fronts and then split; rough curves for the others.
-
-    Once a place is looked at it may fall behind others that then lead, and are looked at in their turn.
-    """
-    finer: dict[int, list[Curve]] = {}
-
-    def look(job: tuple[int, Shape]) -> Curve:
-        near = curves[job[0]]
-        return curve_near(base, near.mechanism, job[1], near, budget)
-
-    for _ in range(_TURNS):
-        todo = [k for k in _leading(curves, finer) if k not in finer]
-        if not todo:
-            break
-        places = pool.map(look, [(k, curves[k].shape) for k in todo])
-        finer.update({k: [one] for k, one in zip(todo, places, strict=True)})
-        split = _worth_splitting(curves, finer, todo)
-        jobs = [(k, shape) for k in split for shape in _split(base, curves[k])]
-        for (k, _), one in zip(jobs, pool.map(look, jobs), strict=True):
-            finer[k].append(one)
-    return _entrants(curves, finer)
-
-
-def _worth_splitting(
-    curves: Sequence[Curve], finer: Mapping[int, list[Curve]], todo: Sequence[int]
-) -> list[int]:
-    """Places that have some evidence, roughly or with fronts."""
-    height = {k: max(curves[k].log_bayes_factor, finer[k][0].log_bayes_factor) for k in todo}
-    return [k for k in todo if height[k] > _SPLIT_FROM]
-
-
-def _leading(curves: Sequence[Curve], finer: Mapping[int, list[Curve]]) -> list[int]:
-    """The places of each mechanism that lead it, as far as is known."""
-    own = [one.log_bayes_factor for one in curves]
-    height = np.array([_mean_log_factor(finer[k]) if k in finer else own[k] for k in range(len(curves))])
-    leading: list[int] = []
-    for name in dict.fromkeys(one.mechanism.id for one in curves):
-        members = np.array([k for k, one in enumerate(curves) if one.mechanism.id == name])
-        best = members[np.argsort(-height[members])][:_AT_MOST]
-        least = max(height[members].max() - _WITHIN, height.max() - _HOPELESS)
-        leading += [int(k) for k in best if height[k] > least]
-    return leading
-
-
-def _mean_log_factor(curves: Sequence[Curve]) -> float:
-    return float(np.logaddexp.reduce([one.log_bayes_factor for one in curves])) - math.log(len(curves))
-
-
-def _split(base: Base, curve: Curve) -> tuple[Shape, ...]:
-    """The finer shapes that a curve stands for beside its own."""
-    added = curve.mechanism.added
-    assert added is not None
-    return tuple(added.split(base.setting, curve.shape))
-
-
-def _entrants(curves: Sequence[Curve], finer: Mapping[int, list[Curve]]) -> dict[str, Entrant]:
-    """Curves by mechanism; finer ones share the weight of the one that they stand in for."""
-    gathered: dict[str, tuple[list[Curve], list[float]]] = {}
-    for name in dict.fromkeys(one.mechanism.id for one in curves):
-        own = [k for k, one in enumerate(curves) if one.mechanism.id == name]
-        members, weights = gathered.setdefault(name, ([], []))
-        for k, share in zip(own, shares([curves[k].shape for k in own]), strict=True):
-            stand_ins = finer.get(k, [curves[k]])
-            members += stand_ins
-            weights += [math.log(share / len(stand_ins))] * len(stand_ins)
-    return {
-        name: Entrant(members[0].mechanism, tuple(members), np.array(weights))
-        for name, (members, weights) in gathered.items()
-    }

@@ -86,7 +86,7 @@ def looked_for(mechanism: Mechanism) -> str:
             {round(s.s_to_m - s.s_from_m) for s in shapes if s.s_to_m and s.s_from_m is not None}
         )
         where = f"stretches of {_either(lengths)} m over the recorded part of the track"
-        if added.split(setting, first):
+        if added.split(setting, first, 1.0):
             where += ", finer around the likeliest"
     elif first.sensor is not None:
         where = "each sensor of front velocity, where there are several"

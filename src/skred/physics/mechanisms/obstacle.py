@@ -34,11 +34,11 @@ def _shapes(setting: Setting) -> tuple[Shape, ...]:
     )
 
 
-def _split(setting: Setting, shape: Shape) -> tuple[Shape, ...]:
+def _split(setting: Setting, shape: Shape, steps: float) -> tuple[Shape, ...]:
     assert shape.s_from_m is not None and shape.s_to_m is not None
     return tuple(
         replace(shape, s_from_m=shape.s_from_m + shift, s_to_m=shape.s_to_m + shift)
-        for shift in (-_STEP_M / 3.0, _STEP_M / 3.0)
+        for shift in (-_STEP_M * steps / 3.0, _STEP_M * steps / 3.0)
         if shape.s_from_m + shift > 0.0 and shape.s_to_m + shift < setting.terrain.length_m
     )
 

@@ -166,7 +166,8 @@ class Added:
     joins : callable
         Ids of the base law's mechanisms to whether it can be missing there.
     split : callable
-        Setting and shape to finer shapes around it, which share its weight.
+        Setting, shape and steps to finer shapes around it, which share its weight; steps are 1 about a shape
+        of the first look, and less about its parts.
     """
 
     scale: float
@@ -175,7 +176,7 @@ class Added:
     shapes: Callable[[Setting], tuple[Shape, ...]]
     either_sign: bool = False
     joins: Callable[[tuple[str, ...]], bool] = lambda base: True
-    split: Callable[[Setting, Shape], tuple[Shape, ...]] = lambda setting, shape: ()
+    split: Callable[[Setting, Shape, float], tuple[Shape, ...]] = lambda setting, shape, steps: ()
 
     @property
     def relevant(self) -> float:

@@ -116,10 +116,10 @@ def _opposed(setting: Setting, shape: Shape) -> Shape | None:
     return replace(shape, constants=constants)
 
 
-def split_stretch(setting: Setting, shape: Shape) -> tuple[Shape, ...]:
-    """The stretch moved by a fifth of its length, shortened, lengthened; opposed if it was."""
+def split_stretch(setting: Setting, shape: Shape, steps: float) -> tuple[Shape, ...]:
+    """The stretch moved by a fifth of its length, times steps, shortened, lengthened; opposed if it was."""
     first, last = ends_of(shape)
-    length, end = last - first, setting.terrain.length_m
+    length, end = steps * (last - first), setting.terrain.length_m
     changes = ((-0.2, -0.2), (0.2, 0.2), (0.15, -0.15), (-0.25, 0.25), (-0.4, 0.0), (0.0, 0.4))
     moved = [
         Shape(max(first + before * length, 0.0), min(last + after * length, end)) for before, after in changes

@@ -1,0 +1,155 @@
+"""Opened trials raced again by the present code: what it says of forces that are in no list.
+
+``python benchmarks/race_again.py [--batches SEED ...] [--hidden CLASS ...] [--workers 2]`` draws trials of
+opened batches in which something was found again from their seeds and races them. The leading listed
+mechanism is let in at its best strength, and the unlisted force fitted about it: each kind, its amplitude,
+smoothness and place open. What that gains, before any price of its freedom, is all that could tell a force
+that is in no list from the listed one that passes for it; beside it stands the same for trials whose truth
+is listed. Results are kept trial by trial in ``results/raced_again.json``; the same command goes on with a
+run that was ended. Trials come in random order, so a run that was ended is a sample of them.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import cyclopts
+import numpy as np
+
+from skred.campaign import read_campaign, write_campaign
+from skred.cli_options import DIAGNOSIS_SAMPLING
+from skred.diagnosis.augmented import CLAIM_LIMIT
+from skred.diagnosis.curves import Base, fit_base
+from skred.diagnosis.diagnose import population_draws, typical
+from skred.diagnosis.odds import NOTHING, UNLISTED
+from skred.diagnosis.race import Race, race
+from skred.diagnosis.unlisted import KINDS, fit_profile
+from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
+from skred.laws import load_law
+from skred.prove.scores_answers import pairs_of
+from skred.trials.draw import draw_trial
+from skred.work.calibrate import calibrate_surely
+from skred.work.output import write_json
+
+RESULTS = Path(__file__).resolve().parent / "results"
+CLASSES = ("listed", "masked", "two", "instrument", "unlisted")
+app = cyclopts.App(help=__doc__)
+
+
+def base_of(asked: dict[str, Any], law_id: str) -> Base | None:
+    """The base law of a trial, fitted as a diagnosis fits it; None where its gate fails."""
+    campaign = draw_trial(asked["seed"], kind=asked["kind"], hidden=asked["hidden"]).campaign
+    with tempfile.TemporaryDirectory(prefix="again-") as scratch:
+        # As a diagnosis reads it: files round what they hold.
+        write_campaign(campaign, Path(scratch) / "campaign")
+        campaign = read_campaign(Path(scratch) / "campaign")
+    law = load_law(law_id)
+    problem = replace(hierarchical_problem(campaign), integration_limit=CLAIM_LIMIT)
+    calibration = calibrate_surely(problem, law, DIAGNOSIS_SAMPLING.settings("hierarchical"))
+    if not calibration.gate.passed:
+        return None
+    assert isinstance(calibration.problem, HierarchicalProblem)
+    return fit_base(calibration.problem, law, typical(population_draws(calibration, 120, 0)))
+
+
+def leader(raced: Race) -> str:
+    """The listed candidate that is most probable."""
+    listed = {name: p for name, p in raced.probability.items() if name not in (NOTHING, UNLISTED)}
+    return max(listed, key=lambda name: listed[name])
+
+
+def beyond(raced: Race, name: str) -> float:
+    """What the unlisted force gains about a listed mechanism at its best strength, in nats, at most."""
+    heat = raced.leading(name)
+    best = heat.entrants[name].best
+    top = int(np.argmax(best.log_evidence))
+    about = replace(
+        heat.base,
+        fit=best.fits[top],
+        directions=(*heat.base.directions, best.direction),
+        strengths=np.append(heat.base.strengths, best.strengths[top]),
+    )
+    return max(fit_profile(about, kind).gain for kind in KINDS)
+
+
+def look(sealed: dict[str, Any]) -> dict[str, Any]:
+    """One trial."""
+    truth = sealed["truth"]
+    told = {
+        "kind": truth["kind"],
+        "hidden": truth["hidden"],
+        "truth": [one["id"] for one in truth["mechanisms"]],
+        "snr": truth["snr"],
+    }
+    base = base_of(sealed["asked"], truth["base_model"])
+    if base is None:
+        return told | {"gate": "failed"}
+    raced = race(base)
+    name = leader(raced)
+    return told | {
+        "leader": name,
+        "log_bayes_factors": raced.log_factors,
+        "probability": raced.probability,
+        "gain_about_leader": beyond(raced, name),
+    }
+
+
+def found_trials(batches: Sequence[int], hidden: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Opened trials in which something was found, whatever it was called: key and what was sealed."""
+    trials = {}
+    for file in sorted((RESULTS / "proof").glob("*/sealed.json")):
+        if batches and int(file.parent.name) not in batches:
+            continue
+        sealed, answers = (
+            json.loads((file.parent / name).read_text(encoding="utf-8"))
+            for name in ("sealed.json", "answers.json")
+        )
+        for pair in pairs_of(list(sealed.values()), answers["skred"]):
+            if pair.alarm and pair.hidden in hidden:
+                trials[f"{file.parent.name}:{pair.trial}"] = sealed[pair.trial]
+    return trials
+
+
+@app.default
+def main(
+    *, batches: tuple[int, ...] = (), hidden: tuple[str, ...] = CLASSES, workers: int = 2, seed: int = 0
+) -> None:
+    """Race opened trials again.
+
+    Parameters
+    ----------
+    batches
+        Their seeds; by default all that are opened.
+    hidden
+        Classes of what they hide.
+    workers
+        Processes.
+    seed
+        Of the order.
+    """
+    path = RESULTS / "raced_again.json"
+    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    trials = found_trials(batches, hidden)
+    open_ones = [key for key in np.random.default_rng(seed).permutation(sorted(trials)) if key not in found]
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        at_work = {pool.submit(look, trials[key]): str(key) for key in open_ones}
+        for done in as_completed(at_work):
+            key = at_work[done]
+            found[key] = done.result()
+            write_json(path, dict(sorted(found.items())))
+            print(
+                key,
+                {name: found[key].get(name) for name in ("hidden", "leader", "gain_about_leader")},
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,153 @@
+"""The race's second look: leading places with fronts, then in parts as fine as recordings tell them apart.
+
+A first look stands for all that is near its place. Where a mechanism leads, its place is computed with
+fronts and moved, shortened and lengthened; the best of these parts is parted again, in half the steps, as
+long as that finds clearly more. A strong effect on a stretch whose ends are wrong by a tenth of its length
+loses several nats, and a force of no shape in particular would not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from skred.diagnosis.curves import Base, Curve, curve_near
+from skred.diagnosis.entrant import Entrant
+from skred.diagnosis.event_nodes import Budget
+from skred.physics.mechanisms.spec import Shape
+from skred.physics.mechanisms.stretches import shares
+
+_WITHIN, _AT_MOST, _TURNS = 3.0, 2, 3
+"""Places of a mechanism that are looked at again: within so many nats of its best, so many, so many times."""
+_HOPELESS = 20.0
+"""Nats behind the best of all at which a place is not looked at again. Its parts may have ten nats more."""
+_SPLIT_FROM = 0.3
+"""Nats in favour of a place from which it is split: parts of a place without evidence have hardly any."""
+_STILL_RISING, _HALVINGS = 1.0, 3
+"""Nats that a part must gain on what it is a part of to be parted itself, and how often at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A place and, where it was split, its parts.
+
+    Attributes
+    ----------
+    curves : tuple of Curve
+        The place itself first.
+    log_shares : tuple of float
+        Prior weight of each within the place; they sum to 1.
+    """
+
+    curves: tuple[Curve, ...]
+    log_shares: tuple[float, ...] = (0.0,)
+
+    @property
+    def log_bayes_factor(self) -> float:
+        """Over the parts."""
+        return float(np.logaddexp.reduce([s + c.log_bayes_factor for s, c in self._members]))
+
+    @property
+    def _members(self) -> list[tuple[float, Curve]]:
+        return list(zip(self.log_shares, self.curves, strict=True))
+
+    @property
+    def best(self) -> int:
+        """Number of the part with the highest Bayes factor."""
+        return int(np.argmax([one.log_bayes_factor for one in self.curves]))
+
+    def parted(self, number: int, parts: Sequence[Curve]) -> Place:
+        """With parts that share the weight of one that is in it."""
+        share = self.log_shares[number] - math.log(1 + len(parts))
+        before = [share if k == number else own for k, own in enumerate(self.log_shares)]
+        return Place((*self.curves, *parts), (*before, *(share for _ in parts)))
+
+
+def second_look(
+    base: Base, curves: Sequence[Curve], budget: Budget, pool: ThreadPoolExecutor
+) -> dict[str, Entrant]:
+    """Entrants whose leading places are computed with fronts and then split; rough curves for the others.
+
+    Once a place is looked at it may fall behind others that then lead, and are looked at in their turn.
+    """
+    places: dict[int, Place] = {}
+
+    def look(near: Curve) -> Place:
+        return Place((curve_near(base, near.mechanism, near.shape, near, budget),))
+
+    for _ in range(_TURNS):
+        todo = [k for k in leading(curves, places) if k not in places]
+        if not todo:
+            break
+        places.update(zip(todo, pool.map(look, [curves[k] for k in todo]), strict=True))
+        height = {k: max(curves[k].log_bayes_factor, places[k].log_bayes_factor) for k in todo}
+        _split(base, [k for k in todo if height[k] > _SPLIT_FROM], places, budget, pool)
+    return entrants_of(curves, places)
+
+
+def _split(
+    base: Base, numbers: Sequence[int], places: dict[int, Place], budget: Budget, pool: ThreadPoolExecutor
+) -> None:
+    """Places in parts, and the best part again in half the steps where it still gains."""
+
+    def look(job: tuple[Curve, Shape]) -> Curve:
+        near, shape = job
+        return curve_near(base, near.mechanism, shape, near, budget)
+
+    splitting = {k: 0 for k in numbers}
+    for halving in range(1 + _HALVINGS):
+        jobs = [
+            (k, (places[k].curves[number], shape))
+            for k, number in splitting.items()
+            for shape in _parts(base, places[k].curves[number], 0.5**halving)
+        ]
+        found: dict[int, list[Curve]] = {k: [] for k in splitting}
+        for (k, _), one in zip(jobs, pool.map(look, [job for _, job in jobs]), strict=True):
+            found[k].append(one)
+        rising = {}
+        for k, number in splitting.items():
+            before = places[k].curves[number].log_bayes_factor
+            places[k] = places[k].parted(number, found[k])
+            best = places[k].best
+            if best != number and places[k].curves[best].log_bayes_factor > before + _STILL_RISING:
+                rising[k] = best
+        splitting = rising
+
+
+def _parts(base: Base, curve: Curve, steps: float) -> tuple[Shape, ...]:
+    """The finer shapes that a curve stands for beside its own."""
+    added = curve.mechanism.added
+    assert added is not None
+    return tuple(added.split(base.setting, curve.shape, steps))
+
+
+def leading(curves: Sequence[Curve], places: Mapping[int, Place]) -> list[int]:
+    """Numbers of the places of each mechanism that lead it, as far as is known."""
+    height = np.array([(places.get(k) or one).log_bayes_factor for k, one in enumerate(curves)])
+    found: list[int] = []
+    for name in dict.fromkeys(one.mechanism.id for one in curves):
+        members = np.array([k for k, one in enumerate(curves) if one.mechanism.id == name])
+        best = members[np.argsort(-height[members])][:_AT_MOST]
+        least = max(height[members].max() - _WITHIN, height.max() - _HOPELESS)
+        found += [int(k) for k in best if height[k] > least]
+    return found
+
+
+def entrants_of(curves: Sequence[Curve], places: Mapping[int, Place]) -> dict[str, Entrant]:
+    """Curves by mechanism; parts of a place share the weight of the one that they stand in for."""
+    gathered: dict[str, tuple[list[Curve], list[float]]] = {}
+    for name in dict.fromkeys(one.mechanism.id for one in curves):
+        own = [k for k, one in enumerate(curves) if one.mechanism.id == name]
+        members, weights = gathered.setdefault(name, ([], []))
+        for k, share in zip(own, shares([curves[k].shape for k in own]), strict=True):
+            place = places.get(k, Place((curves[k],)))
+            members += place.curves
+            weights += [math.log(share) + own_share for own_share in place.log_shares]
+    return {
+        name: Entrant(members[0].mechanism, tuple(members), np.array(weights))
+        for name, (members, weights) in gathered.items()
+    }
