@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from skred.diagnosis.decide import decide, smallest_set
-from skred.diagnosis.odds import Calibration, prior_odds, probabilities
+from skred.diagnosis.odds import POWER, prior_odds, probabilities, stated
 from skred.diagnosis.omnibus import LIMIT, Omnibus
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group
@@ -138,28 +141,25 @@ def test_the_race_alone_and_the_check_alone() -> None:
     assert decide(shares(0.49, 0.0, obstacle=0.51), 0.005, True).names == ("obstacle",)
 
 
-def test_calibration_by_hand() -> None:
-    """Odds of 0.2 to 0.4 to the power 2, times 3: 3 to 4 of what is not nothing."""
-    plain = {"nothing": 0.4, "unlisted": 0.2, "obstacle": 0.3, "sensor_bias": 0.1}
-    found = Calibration(np.log(3.0), 2.0).of(plain)
+def test_stated_probabilities_by_hand() -> None:
+    """Nothing keeps its own; odds of 4 between the others count half in nats, as 2, times their priors."""
+    odds = {"nothing": 0.5, "obstacle": 0.3, "unlisted": 0.2}
+    factors = {"obstacle": np.log(16.0), "unlisted": np.log(4.0)}
+    found = stated(factors, odds, 0.5)
     assert found == pytest.approx(
-        {
-            "nothing": 0.4,
-            "unlisted": 0.6 * 3.0 / 7.0,
-            "obstacle": 0.75 * 0.6 * 4.0 / 7.0,
-            "sensor_bias": 0.25 * 0.6 * 4.0 / 7.0,
-        }
+        {"nothing": 0.5 / 6.1, "obstacle": 5.6 / 6.1 * 0.75, "unlisted": 5.6 / 6.1 * 0.25}
     )
-    assert Calibration(0.0, 1.0).of(plain) == pytest.approx(plain)
+    assert stated(factors, odds, 1.0) == pytest.approx(probabilities(factors, odds))
+    assert stated({}, odds) == pytest.approx(odds)
 
 
-@pytest.mark.parametrize("power", [0.2, 1.0])
-def test_calibration_of_what_is_all_but_sure(power: float) -> None:
-    calibration = Calibration(-1.0, power)
-    for plain in (
-        {"nothing": 1.0, "unlisted": 0.0, "obstacle": 0.0},
-        {"nothing": 0.0, "unlisted": 1.0, "obstacle": 0.0},
-        {"nothing": 0.0, "unlisted": 0.0, "obstacle": 1.0},
-    ):
-        found = calibration.of(plain)
+def test_stated_probabilities_of_what_is_all_but_sure() -> None:
+    odds = {"nothing": 0.5, "obstacle": 0.3, "unlisted": 0.2}
+    for factors in ({"obstacle": 2000.0, "unlisted": -2000.0}, {"obstacle": -2000.0, "unlisted": -2000.0}):
+        found = stated(factors, odds)
         assert sum(found.values()) == pytest.approx(1.0) and min(found.values()) >= 0.0
+
+
+def test_the_power_is_the_one_that_trials_gave() -> None:
+    result = Path(__file__).parents[2] / "benchmarks" / "results" / "calibrate_odds.json"
+    assert json.loads(result.read_text(encoding="utf-8"))["power"] == POWER

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,40 +13,11 @@ NOTHING, UNLISTED = "nothing", "unlisted"
 SHARES = {NOTHING: 0.5, Group.PHYSICS: 0.35, Group.INSTRUMENT: 0.1, UNLISTED: 0.05}
 """Prior probability of each group, shared equally by its members."""
 
-_LEAST = 1e-12
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """What trials say of the odds of a force that is in no list against the listed ones.
-
-    Attributes
-    ----------
-    offset, power : float
-        Calibrated log odds are the offset plus the power times those stated by the evidence.
-    """
-
-    offset: float
-    power: float
-
-    @staticmethod
-    def log_odds(plain: Mapping[str, float]) -> float:
-        """Log odds of the unlisted force against all that is listed, as evidence and prior have them."""
-        return math.log(max(plain[UNLISTED], _LEAST)) - math.log(max(_listed(plain), _LEAST))
-
-    def of(self, plain: Mapping[str, float]) -> dict[str, float]:
-        """Calibrated probabilities; that of nothing stays, and so do the odds between listed ids."""
-        something, listed = 1.0 - plain[NOTHING], _listed(plain)
-        if listed <= 0.0:
-            return dict(plain)
-        unlisted = something / (1.0 + math.exp(-self.offset - self.power * self.log_odds(plain)))
-        found = {name: share / listed * (something - unlisted) for name, share in plain.items()}
-        return found | {NOTHING: plain[NOTHING], UNLISTED: unlisted}
-
-
-def _listed(probability: Mapping[str, float]) -> float:
-    """Probability of all that is listed, faults of instruments too."""
-    return math.fsum(share for name, share in probability.items() if name not in (NOTHING, UNLISTED))
+CALIBRATION_VERSION = 1
+POWER = 0.75
+"""Of Bayes factors between whatever may be missing. Every model is wrong in edges and exponents, and evidence
+says more for the less wrong one than trials bear out. Frozen from opened trials, by
+``benchmarks/calibrate_odds.py``, before those that claims are made from."""
 
 
 def prior_odds(raced: Iterable[Mechanism]) -> dict[str, float]:
@@ -71,3 +41,14 @@ def probabilities(log_factors: Mapping[str, float], odds: Mapping[str, float]) -
     weights = {name: math.exp(max(value - most, -700.0)) for name, value in logs.items()}
     total = float(np.sum(list(weights.values())))
     return {name: weight / total for name, weight in weights.items()}
+
+
+def stated(
+    log_factors: Mapping[str, float], odds: Mapping[str, float], power: float = POWER
+) -> dict[str, float]:
+    """Probabilities with Bayes factors to a power among all but nothing, which keeps its own."""
+    nothing = probabilities(log_factors, odds)[NOTHING]
+    among = probabilities({name: power * value for name, value in log_factors.items()}, odds)
+    something = math.fsum(share for name, share in among.items() if name != NOTHING)
+    rest = {name: share / something * (1.0 - nothing) for name, share in among.items()}
+    return rest | {NOTHING: nothing}

@@ -24,7 +24,7 @@ from skred.diagnosis.extension import Extension, extended
 from skred.diagnosis.first_look import curve, first_look
 from skred.diagnosis.marginal import evidence, importance_evidence
 from skred.diagnosis.modes import campaign_rows, event_modes
-from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, probabilities
+from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, stated
 from skred.diagnosis.screen import Screen, candidates
 from skred.diagnosis.second_look import second_look
 from skred.diagnosis.threads import threads
@@ -101,8 +101,8 @@ class Race:
 
     @property
     def probability(self) -> dict[str, float]:
-        """Posterior probability of each id."""
-        return probabilities(self.log_factors, self.odds)
+        """Probability of each id, as it is stated."""
+        return stated(self.log_factors, self.odds)
 
     @property
     def log_odds(self) -> float:

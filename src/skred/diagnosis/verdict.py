@@ -12,7 +12,7 @@ from skred.diagnosis.entrant import Entrant
 from skred.diagnosis.held_out import errors, paired
 from skred.diagnosis.identify import Told
 from skred.diagnosis.next_sensor import next_sensor
-from skred.diagnosis.odds import NOTHING
+from skred.diagnosis.odds import CALIBRATION_VERSION, NOTHING, POWER
 from skred.diagnosis.profile_law import ProfileLaw
 from skred.diagnosis.race import Race
 from skred.diagnosis.statement import statement
@@ -204,6 +204,7 @@ def _more(found: Diagnosis) -> dict[str, Any]:
     if found.race is not None and found.check is not None:
         more["alarm"] = alarmed(found.race.probability, found.check.p_value)
         more["log_bayes_factors"] = found.race.log_factors
+        more["calibration"] = {"version": CALIBRATION_VERSION, "power": POWER}
         more["error_models"] = [heat.error_model for heat in found.race.heats]
         more["candidates"] = [_candidate(found.race, name) for name in found.race.heats[0].entrants]
     if found.steps:
