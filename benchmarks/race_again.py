@@ -12,9 +12,10 @@ sample of them.
 
 from __future__ import annotations
 
+import itertools
 import json
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from multiprocessing import get_context
@@ -29,11 +30,12 @@ from skred.cli_options import DIAGNOSIS_SAMPLING
 from skred.diagnosis.augmented import CLAIM_LIMIT
 from skred.diagnosis.curves import Base, fit_base
 from skred.diagnosis.diagnose import population_draws, typical
-from skred.diagnosis.odds import NOTHING, UNLISTED
+from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, stated
 from skred.diagnosis.race import Race, race
 from skred.diagnosis.unlisted import KINDS, fit_profile
 from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
 from skred.laws import load_law
+from skred.physics.mechanisms import mechanisms
 from skred.prove.hashes import source_sha256
 from skred.prove.scores_answers import pairs_of
 from skred.trials.draw import draw_trial
@@ -152,17 +154,29 @@ def main(
             found[key] = done.result()
             write_json(path, dict(sorted(found.items())))
             print(key, found[key]["hidden"], found[key].get("leader"), flush=True)
-    for name in CLASSES:
-        gains = sorted(
-            one["gain_about_leader"]
-            for one in found.values()
-            if one["hidden"] == name and "failed" not in one
+    summarise(found.values())
+
+
+def summarise(found: Collection[dict[str, Any]]) -> None:
+    """What a free force gains about the leading listed mechanism, by what is hidden; and what it is given."""
+    for hidden, kind in itertools.product(CLASSES, ("sparse", "dense")):
+        own = [one for one in found if (one["hidden"], one["kind"]) == (hidden, kind) and "failed" not in one]
+        if not own:
+            continue
+        gains = sorted(one["gain_about_leader"] for one in own)
+        unlisted = [probability_of_unlisted(one["log_bayes_factors"]) for one in own]
+        print(
+            f"{hidden}, {kind}: {len(own)} trials; a force gains about the leading listed mechanism: median"
+            f" {np.median(gains):.1f} nats, less than 3 in {sum(gain < 3.0 for gain in gains)}; its own"
+            f" probability is above one half in {sum(p > 0.5 for p in unlisted)}, on average"
+            f" {np.mean(unlisted):.2f}"
         )
-        if gains:
-            print(
-                f"{name}: {len(gains)} trials; a force gains about the leading listed mechanism: median"
-                f" {gains[len(gains) // 2]:.1f} nats, less than 3 in {sum(gain < 3.0 for gain in gains)}"
-            )
+
+
+def probability_of_unlisted(log_factors: Mapping[str, float]) -> float:
+    """As it is stated."""
+    raced = [mechanisms()[name] for name in log_factors if name in mechanisms()]
+    return stated(log_factors, prior_odds(raced))[UNLISTED]
 
 
 if __name__ == "__main__":
