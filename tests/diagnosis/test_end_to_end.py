@@ -75,6 +75,25 @@ def test_verdict_has_every_key(which: str, request: pytest.FixtureRequest) -> No
     assert document["diagnostics"]["r_hat_max"] < 1.02 and document["statement"].endswith(".")
 
 
+@pytest.mark.parametrize("which", ["clean", "biased"])
+def test_a_program_can_follow_the_probabilities(which: str, request: pytest.FixtureRequest) -> None:
+    """From the verdict alone: prior odds of the format, the factors, and the power that it says."""
+    document = verdict(request.getfixturevalue(which))
+    factors, power = document["log_bayes_factors"], document["calibration"]["power"]
+    assert document["calibration"]["version"] == 1 and 0.5 < power < 1.0
+    faults = [name for name in factors if name in ("sensor_bias", "release_offset")]
+    physics = [name for name in factors if name not in ("nothing", "unlisted", *faults)]
+    prior = {"nothing": 0.5, "unlisted": 0.05}
+    prior |= {name: 0.1 / len(faults) for name in faults} | {name: 0.35 / len(physics) for name in physics}
+    full = {name: share * np.exp(factors[name]) for name, share in prior.items()}
+    nothing = full["nothing"] / sum(full.values())
+    among = {
+        name: share * np.exp(power * factors[name]) for name, share in prior.items() if name != "nothing"
+    }
+    expected = {name: (1.0 - nothing) * share / sum(among.values()) for name, share in among.items()}
+    assert document["probability"] == pytest.approx(expected | {"nothing": nothing}, rel=1e-6)
+
+
 def test_nothing_is_named_where_nothing_is(clean: Diagnosis) -> None:
     document = verdict(clean)
     assert document["verdict"] in ("nothing_missing", "cannot_tell")
