@@ -42,6 +42,8 @@ _IN_ORDER = """Each batch was diagnosed by the code of its day, so these rows ar
 two (1471600277, 1152334902) did not look for forces that are nil on average. Clean trials whose diagnosis
 crashed or timed out are counted as failures; CPU times are of different machines.
 """
+_BEFORE_OPPOSED = 2
+"""Opened batches whose code did not look for forces that are nil on average."""
 _STRONG = 5.5
 """Signal-to-noise from which on effects should be found."""
 
@@ -96,7 +98,7 @@ def page(batches: Sequence[Path], document: Found, figures: Sequence[str]) -> st
     """The whole page."""
     parts = [_HEAD, "## Batches\n", _batches(batches), "## Bars\n", _bars(document)]
     parts += [f"![{name.replace('_', ' ')}](figures/proof-{name}.png)\n" for name in figures]
-    parts += ["## Open and masked\n", _masked(document)]
+    parts += ["## Open and masked\n", _masked(batches, document)]
     parts += ["## Batch by batch\n", _IN_ORDER, _by_batch(batches, document)]
     parts += ["## By what was hidden\n", _by_hidden(document)]
     parts += ["## Why bars are missed\n", (RECORD / "missed.md").read_text(encoding="utf-8")]
@@ -104,8 +106,11 @@ def page(batches: Sequence[Path], document: Found, figures: Sequence[str]) -> st
     return "\n".join(parts)
 
 
-def _masked(document: Found) -> str:
-    """Found, of trials of which the base law shows on average something, and of those where it hides it."""
+def _masked(batches: Sequence[Path], document: Found) -> str:
+    """Found, of trials of which the base law shows on average something, and of those where it hides it.
+
+    Also without the batches whose code did not look for what is nil on average.
+    """
     head = ["| signal-to-noise | open: found | masked: found |", "| --- | --- | --- |"]
     scores = document["methods"][DIAGNOSIS]
     both = [scores[which]["all"]["detection"]["by_snr"] for which in ("open", "masked")]
@@ -113,7 +118,21 @@ def _masked(document: Found) -> str:
         f"| {row['snr_from']:g} to {row['snr_to']:g} | {_share(row)} | {_share(other)} |"
         for row, other in zip(*both, strict=True)
     ]
-    return "\n".join([*head, *rows]) + "\n"
+    later = {ledger["seed"] for ledger in _in_order(batches)[_BEFORE_OPPOSED:]}
+    lines = [one for one in document["trials"] if int(one["trial"].partition("/")[0]) in later]
+    masked = [one for one in lines if one["hidden"] == "masked"]
+    text = (
+        "\nFrom 5.5 on, without the first two batches, which did not look for forces that are nil on average:"
+        f" {_found([one for one in lines if one not in masked])} open effects were found,"
+        f" {_found(masked)} masked ones."
+    )
+    return "\n".join([*head, *rows, text]) + "\n"
+
+
+def _in_order(batches: Sequence[Path]) -> list[Found]:
+    """Ledgers of the opened batches as they were sealed."""
+    ledgers = [json.loads((one / "ledger.json").read_text("utf-8")) for one in batches if _is_open(one)]
+    return sorted(ledgers, key=lambda one: str(one["created_utc"]))
 
 
 def _by_batch(batches: Sequence[Path], document: Found) -> str:
@@ -123,8 +142,7 @@ def _by_batch(batches: Sequence[Path], document: Found) -> str:
         " | tie sets with the truth | median CPU s sparse, dense |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    ledgers = [json.loads((one / "ledger.json").read_text("utf-8")) for one in batches if _is_open(one)]
-    for ledger in sorted(ledgers, key=lambda one: str(one["created_utc"])):
+    for ledger in _in_order(batches):
         own = [one for one in document["trials"] if one["trial"].startswith(f"{ledger['seed']}/")]
         clean = [one["right"] for one in own if not one["true_ids"]]
         masked = [one for one in own if one["hidden"] == "masked"]
