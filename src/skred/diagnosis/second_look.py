@@ -31,8 +31,8 @@ _HOLDS_MOST, _LEVELS = 0.5, 4
 """Share of its place's evidence from which a part is parted itself, and how many times places are parted."""
 _SMALLER = 0.5
 """Steps within a part, in those that led to it. At 0.38 a part of a stretch would stand for as much of the
-prior as it has of the weight;
-half finds narrow peaks that 0.38 misses, and costs them up to 0.6 nats a level."""
+prior as it has of the weight; half finds narrow peaks that 0.38 misses, and costs them up to 0.6 nats each
+time."""
 
 
 @dataclass(frozen=True, eq=False)
