@@ -20,18 +20,16 @@ from pathlib import Path
 import cyclopts
 import numpy as np
 from numpy.typing import NDArray
-from race_again import CLASSES, found_trials
+from race_again import CLASSES, found_trials, stated_of
 
 from skred.diagnosis.decide import decide
-from skred.diagnosis.odds import UNLISTED, prior_odds, stated
-from skred.physics.mechanisms import mechanisms
+from skred.diagnosis.odds import UNLISTED
 from skred.prove.scores_standards import LOG_SCORE_FLOOR
+from skred.trials.draw import SHARES
 from skred.work.output import write_json
 
 FloatArray = NDArray[np.float64]
 RESULTS = Path(__file__).resolve().parent / "results"
-SHARES = {"listed": 0.35, "two": 0.1, "instrument": 0.1, UNLISTED: 0.1}
-"""Of what is drawn by default."""
 POWERS = tuple(round(0.05 * k, 2) for k in range(20, 5, -1))
 app = cyclopts.App(help=__doc__)
 
@@ -56,27 +54,27 @@ class Case:
     log_factors: Mapping[str, float]
     weight: float
 
-    def stated(self, power: float) -> dict[str, float]:
-        """Probabilities with Bayes factors to a power."""
-        raced = [mechanisms()[name] for name in self.log_factors if name in mechanisms()]
-        return stated(self.log_factors, prior_odds(raced), power)
-
     def log_score(self, power: float) -> float:
         """Of the truth, as the scorecard has it."""
-        probability = self.stated(power)
+        probability = stated_of(self.log_factors, power)
         return math.log(max(sum(probability.get(name, 0.0) for name in self.truth), LOG_SCORE_FLOOR))
 
 
 def cases() -> list[Case]:
     """All trials that were raced again; a class weighs what is found of it where it is drawn by default."""
-    drawn = Counter(
-        _class(one["truth"]["hidden"])
-        for file in (RESULTS / "proof").glob("*/sealed.json")
-        for one in json.loads(file.read_text(encoding="utf-8")).values()
-    )
-    found = Counter(_class(sealed["truth"]["hidden"]) for sealed in found_trials((), CLASSES).values())
     again = json.loads((RESULTS / "raced_again.json").read_text(encoding="utf-8"))
     again = {key: one for key, one in again.items() if "failed" not in one}
+    # Of these batches alone: what is opened later must not change what was frozen before.
+    batches = sorted({key.partition(":")[0] for key in again})
+    drawn = Counter(
+        _class(one["truth"]["hidden"])
+        for batch in batches
+        for one in json.loads(
+            (RESULTS / "proof" / batch / "sealed.json").read_text(encoding="utf-8")
+        ).values()
+    )
+    of_these = found_trials(tuple(map(int, batches)), CLASSES)
+    found = Counter(_class(sealed["truth"]["hidden"]) for sealed in of_these.values())
     raced = Counter(_class(one["hidden"]) for one in again.values())
     weight = {name: SHARES[name] * found[name] / drawn[name] / n for name, n in raced.items()}
     total = sum(weight[name] * n for name, n in raced.items())
@@ -101,10 +99,10 @@ def told(some: Sequence[Case], power: float) -> dict[str, tuple[int, int]]:
     """Of single names, tie sets and `unexplained`, how many hold the truth."""
     right, n = Counter[str](), Counter[str]()
     for one in some:
-        names = decide(one.stated(power), 0.0, True).names
-        kind = {0: "unexplained", 1: "single names"}.get(len(names), "tie sets")
+        found = decide(stated_of(one.log_factors, power), 0.0, True)
+        kind = {0: found.verdict, 1: "single names"}.get(len(found.names), "tie sets")
         n[kind] += 1
-        right[kind] += bool(one.truth & set(names or (UNLISTED,)))
+        right[kind] += bool(one.truth & set(found.names or (UNLISTED,)))
     return {kind: (right[kind], n[kind]) for kind in ("single names", "tie sets", "unexplained")}
 
 

@@ -42,6 +42,8 @@ _IN_ORDER = """Each batch was diagnosed by the code of its day, so these rows ar
 two (1471600277, 1152334902) did not look for forces that are nil on average. Clean trials whose diagnosis
 crashed or timed out are counted as failures; CPU times are of different machines.
 """
+_LAST = """By the latest code that has a batch; few trials, and wide intervals.
+"""
 _BEFORE_OPPOSED = 2
 """Opened batches whose code did not look for forces that are nil on average."""
 _STRONG = 5.5
@@ -98,6 +100,7 @@ def page(batches: Sequence[Path], document: Found, figures: Sequence[str]) -> st
     """The whole page."""
     parts = [_HEAD, "## Batches\n", _batches(batches), "## Bars\n", _bars(document)]
     parts += [f"![{name.replace('_', ' ')}](figures/proof-{name}.png)\n" for name in figures]
+    parts += ["## The last batch alone\n", _LAST, _bars(_of_last(batches))]
     parts += ["## Open and masked\n", _masked(batches, document)]
     parts += ["## Batch by batch\n", _IN_ORDER, _by_batch(batches, document)]
     parts += ["## By what was hidden\n", _by_hidden(document)]
@@ -127,6 +130,13 @@ def _masked(batches: Sequence[Path], document: Found) -> str:
         f" {_found(masked)} masked ones."
     )
     return "\n".join([*head, *rows, text]) + "\n"
+
+
+def _of_last(batches: Sequence[Path]) -> Found:
+    """Scores of the batch that was sealed last, of those that are opened."""
+    last = _in_order(batches)[-1]["seed"]
+    trials, answers = gathered([one for one in batches if one.name == str(last)])
+    return scorecard({"n": len(trials)}, trials, answers)
 
 
 def _in_order(batches: Sequence[Path]) -> list[Found]:

@@ -30,7 +30,7 @@ from skred.cli_options import DIAGNOSIS_SAMPLING
 from skred.diagnosis.augmented import CLAIM_LIMIT
 from skred.diagnosis.curves import Base, fit_base
 from skred.diagnosis.diagnose import population_draws, typical
-from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, stated
+from skred.diagnosis.odds import POWER, UNLISTED, prior_odds, stated
 from skred.diagnosis.race import Race, race
 from skred.diagnosis.unlisted import KINDS, fit_profile
 from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
@@ -38,6 +38,7 @@ from skred.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.prove.hashes import source_sha256
 from skred.prove.scores_answers import pairs_of
+from skred.report.diagnosis_words import leading_name
 from skred.trials.draw import draw_trial
 from skred.work.calibrate import calibrate_surely
 from skred.work.output import write_json
@@ -66,12 +67,6 @@ def base_of(sealed: dict[str, Any]) -> Base | None:
         return None
     assert isinstance(calibration.problem, HierarchicalProblem)
     return fit_base(calibration.problem, law, typical(population_draws(calibration, 120, 0)))
-
-
-def leader(raced: Race) -> str:
-    """The listed candidate that is most probable."""
-    listed = {name: p for name, p in raced.probability.items() if name not in (NOTHING, UNLISTED)}
-    return max(listed, key=lambda name: listed[name])
 
 
 def beyond(raced: Race, name: str) -> float:
@@ -103,7 +98,7 @@ def look(sealed: dict[str, Any]) -> dict[str, Any]:
         if base is None:
             return told | {"failed": "gate"}
         raced = race(base)
-        name = leader(raced)
+        name = leading_name(raced)
         gain = beyond(raced, name)
     except np.linalg.LinAlgError as error:
         return told | {"failed": repr(error)}
@@ -163,8 +158,8 @@ def summarise(found: Collection[dict[str, Any]]) -> None:
         own = [one for one in found if (one["hidden"], one["kind"]) == (hidden, kind) and "failed" not in one]
         if not own:
             continue
-        gains = sorted(one["gain_about_leader"] for one in own)
-        unlisted = [probability_of_unlisted(one["log_bayes_factors"]) for one in own]
+        gains = [one["gain_about_leader"] for one in own]
+        unlisted = [stated_of(one["log_bayes_factors"])[UNLISTED] for one in own]
         print(
             f"{hidden}, {kind}: {len(own)} trials; a force gains about the leading listed mechanism: median"
             f" {np.median(gains):.1f} nats, less than 3 in {sum(gain < 3.0 for gain in gains)}; its own"
@@ -173,10 +168,10 @@ def summarise(found: Collection[dict[str, Any]]) -> None:
         )
 
 
-def probability_of_unlisted(log_factors: Mapping[str, float]) -> float:
-    """As it is stated."""
+def stated_of(log_factors: Mapping[str, float], power: float = POWER) -> dict[str, float]:
+    """Probabilities as they are stated of a race, or would be with another power."""
     raced = [mechanisms()[name] for name in log_factors if name in mechanisms()]
-    return stated(log_factors, prior_odds(raced))[UNLISTED]
+    return stated(log_factors, prior_odds(raced), power)
 
 
 if __name__ == "__main__":

@@ -306,7 +306,7 @@ takes {slower["kernel"]:.2f} us and pure Python {slower["pure Python"]:.0f} us, 
 {workers}
 Two workers do {proof["gain"]:.2f} times as much as one (asked: 1.8; the last trial runs alone, and with few
 trials that counts). Asked of a sparse trial: 30 CPU seconds. Python was told there to write no bytecode, so
-each trial compiled all that it imports: some five of its CPU seconds.
+each trial compiled all that it imports, and that is in these times.
 
 Development sets (`python benchmarks/development_set.py`, seeds 1000 to 999 999) are what was tuned on, and no
 claim is made from them. The goals are measured on sealed trials of the same simulator with other seeds, and
