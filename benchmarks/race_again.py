@@ -31,8 +31,9 @@ from skred.diagnosis.augmented import CLAIM_LIMIT
 from skred.diagnosis.curves import Base, fit_base
 from skred.diagnosis.diagnose import population_draws, typical
 from skred.diagnosis.odds import POWER, UNLISTED, prior_odds, stated
+from skred.diagnosis.profile_fit import fit_profile
 from skred.diagnosis.race import Race, race
-from skred.diagnosis.unlisted import KINDS, fit_profile
+from skred.diagnosis.unlisted import KINDS
 from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
 from skred.laws import load_law
 from skred.physics.mechanisms import mechanisms

@@ -16,9 +16,10 @@ from skred.diagnosis.diagnose import Diagnosis, Effort, _before
 from skred.diagnosis.extension import extended, setting_of
 from skred.diagnosis.gain import predictors_of, promised_gain
 from skred.diagnosis.predictor_document import as_dict, from_dict
+from skred.diagnosis.profile_fit import fit_profile
 from skred.diagnosis.profile_law import ProfileLaw, _left_out, profile_law
 from skred.diagnosis.race import Heat, Race
-from skred.diagnosis.unlisted import KINDS, combined, fit_profile, knots
+from skred.diagnosis.unlisted import KINDS, combined, knots
 from skred.diagnosis.unseen import ProfileTerm, log_scores
 from skred.errors import InputError
 from skred.inference.sampling import SamplerSettings

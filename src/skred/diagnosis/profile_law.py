@@ -26,10 +26,11 @@ from skred.diagnosis.marginal import evidence, importance_draws, population_at
 from skred.diagnosis.modes import event_modes
 from skred.diagnosis.omnibus import Omnibus, omnibus
 from skred.diagnosis.predictive import Predicted, predict_event
+from skred.diagnosis.profile_fit import fit_profile
 from skred.diagnosis.race import Heat
 from skred.diagnosis.screen import Screen
 from skred.diagnosis.threads import threads
-from skred.diagnosis.unlisted import Profile, combined, entering, fit_profile, hats, most_probable
+from skred.diagnosis.unlisted import Profile, combined, entering, hats, most_probable
 from skred.diagnosis.unseen import log_densities
 from skred.physics.mechanisms.spec import Direction
 

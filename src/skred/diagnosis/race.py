@@ -25,10 +25,11 @@ from skred.diagnosis.first_look import curve, first_look
 from skred.diagnosis.marginal import evidence, importance_evidence
 from skred.diagnosis.modes import campaign_rows, event_modes
 from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, stated
+from skred.diagnosis.profile_fit import as_profile, fit_profile
 from skred.diagnosis.screen import Screen, candidates
 from skred.diagnosis.second_look import second_look
 from skred.diagnosis.threads import threads
-from skred.diagnosis.unlisted import KINDS, Kind, Profile, alike, as_profile, fit_profile, log_evidence_of
+from skred.diagnosis.unlisted import KINDS, Kind, Profile, alike, log_evidence_of
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Shape
