@@ -6,7 +6,6 @@ profile of an unexplained diagnosis is tried by; the first is what every diagnos
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +23,8 @@ def main(*, law: str = "pcm", errors: str = "scaled", seed: int = 0) -> None:
     """Score Ryggfonn's avalanches, each by the others."""
     from skred.campaign import find_campaign, read_campaign
     from skred.cli_options import DIAGNOSIS_SAMPLING
-    from skred.diagnosis.augmented import CLAIM_LIMIT
     from skred.diagnosis.curves import fit_base
-    from skred.diagnosis.diagnose import population_draws, typical
+    from skred.diagnosis.diagnose import as_diagnosed, population_draws, typical
     from skred.diagnosis.extension import extended
     from skred.diagnosis.held_out import held_out
     from skred.diagnosis.profile_law import base_left_out
@@ -35,7 +33,7 @@ def main(*, law: str = "pcm", errors: str = "scaled", seed: int = 0) -> None:
     from skred.work.calibrate import calibrate_surely
 
     campaign = read_campaign(find_campaign("ryggfonn"))
-    problem = replace(hierarchical_problem(campaign, error_model=errors), integration_limit=CLAIM_LIMIT)
+    problem = as_diagnosed(hierarchical_problem(campaign, error_model=errors))
     base_law = load_law(law)
     calibration = calibrate_surely(problem, base_law, DIAGNOSIS_SAMPLING.settings("hierarchical"))
     used: Any = calibration.problem

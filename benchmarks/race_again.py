@@ -27,9 +27,8 @@ import numpy as np
 
 from skred.campaign import read_campaign, write_campaign
 from skred.cli_options import DIAGNOSIS_SAMPLING
-from skred.diagnosis.augmented import CLAIM_LIMIT
 from skred.diagnosis.curves import Base, fit_base
-from skred.diagnosis.diagnose import population_draws, typical
+from skred.diagnosis.diagnose import as_diagnosed, population_draws, typical
 from skred.diagnosis.odds import POWER, UNLISTED, prior_odds, stated
 from skred.diagnosis.profile_fit import fit_profile
 from skred.diagnosis.race import Race, race
@@ -62,7 +61,7 @@ def base_of(sealed: dict[str, Any]) -> Base | None:
         write_campaign(campaign, Path(scratch) / "campaign")
         campaign = read_campaign(Path(scratch) / "campaign")
     law = load_law(truth["base_model"])
-    problem = replace(hierarchical_problem(campaign), integration_limit=CLAIM_LIMIT)
+    problem = as_diagnosed(hierarchical_problem(campaign))
     calibration = calibrate_surely(problem, law, DIAGNOSIS_SAMPLING.settings("hierarchical"))
     if not calibration.gate.passed:
         return None

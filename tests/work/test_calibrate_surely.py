@@ -10,7 +10,7 @@ import xarray as xr
 
 from skred.campaign import find_campaign, read_campaign
 from skred.campaign.parts import of_events
-from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
+from skred.inference.hierarchical import COARSER, HierarchicalProblem, hierarchical_problem
 from skred.inference.sampling import SamplerSettings
 from skred.laws import load_law
 from skred.work.calibrate import MORE, calibrate_surely
@@ -26,6 +26,25 @@ def test_enough_the_first_time() -> None:
     given, settings = problem(), SamplerSettings(draws=600, tune=400, seed=1)
     found = calibrate_surely(given, LAW, settings)
     assert found.gate.passed and found.settings == settings and found.problem is given
+
+
+def test_coarser_surfaces_cost_less_and_are_nearly_as_good() -> None:
+    """What a diagnosis calibrates with; where it does not do it is made finer step by step."""
+    law, campaign = load_law("pcm"), read_campaign(find_campaign("ryggfonn"))
+    usual = hierarchical_problem(campaign)
+    coarser: Any = replace(usual, fineness=COARSER)
+    runs = [one.surfaces(law.mechanisms).n_runs for one in (usual, coarser)]
+    assert runs[1] < 0.95 * runs[0]
+    samples = {
+        "dry_friction": np.array([0.3, 0.28]),
+        "turbulent_drag": np.array([2e-3, 1e-3]),
+        "dry_friction_spread": np.array([0.1, 0.2]),
+        "turbulent_drag_spread": np.array([0.3, 1.0]),
+        "dry_friction_turbulent_drag_correlation": np.array([-0.3, 0.3]),
+    }
+    errors = coarser.integration_errors(law, samples)
+    assert 1e-6 < 22.0 * np.abs(errors.mean(axis=1)).max() < 0.2
+    assert [coarser.finer(law, xr.Dataset()).fineness, usual.finer(law, xr.Dataset()).fineness] == [1.0, 2.0]
 
 
 def test_short_chains_are_made_longer() -> None:

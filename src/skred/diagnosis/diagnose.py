@@ -24,7 +24,7 @@ from skred.diagnosis.omnibus import Omnibus, omnibus
 from skred.diagnosis.profile_law import ProfileLaw, profile_law
 from skred.diagnosis.race import Race, race
 from skred.diagnosis.screen import Screen
-from skred.inference.hierarchical import HierarchicalProblem
+from skred.inference.hierarchical import COARSER, HierarchicalProblem
 from skred.inference.population import population_of
 from skred.inference.sampling import SamplerSettings
 from skred.physics.law import Law
@@ -190,8 +190,7 @@ def _steps(
 ) -> Diagnosis:
     """All steps of a diagnosis."""
     clock.stage("base", f"{law.id}: calibrating the base law")
-    problem = replace(problem, integration_limit=CLAIM_LIMIT)
-    calibration = calibrate_surely(problem, law, settings)
+    calibration = calibrate_surely(as_diagnosed(problem), law, settings)
     problem = _problem_of(calibration)
     if not calibration.gate.passed:
         clock.end()
@@ -230,6 +229,11 @@ def _steps(
         problem, law, cannot, calibration, screen, table, check, raced, decision, location, steps,
         reference, profile, before, after, left, clock.seconds,
     )  # fmt: skip
+
+
+def as_diagnosed(problem: HierarchicalProblem) -> HierarchicalProblem:
+    """How a base law's recordings are integrated: what a claim rests on is computed apart from that."""
+    return replace(problem, integration_limit=CLAIM_LIMIT, fineness=COARSER)
 
 
 def _location(raced: Race, decision: Decision) -> Location:

@@ -22,7 +22,7 @@ from skred.diagnosis.unlisted import NEAR_M, Kind, Prior, Profile, combined, ent
 FloatArray = NDArray[np.float64]
 Start = tuple[FloatArray, tuple[Population, FloatArray]]
 _PRIORS_TRIED = 12
-_ROUNDS, _SURE = 6, 1.0
+_ROUNDS, _SURE, _NO_FORCE = 6, 1.0, -0.5
 _SHARES = (1.0, 0.4, 0.15, 0.05)
 _SETTLED = 0.05
 
@@ -64,10 +64,11 @@ def fit_profile(
         starts.append(_peak(base, kind, at, near[0], _fit_at(base, kind, at, *near)))
     height = nothing.found.log_evidence
     seen = _Seen(height, at, priors_of(kind, at))
-    next_one: Prior | None = first or _first(kind, starts[-1], seen)
-    while next_one is not None and len(seen.peaks) < most:
-        seen.add(next_one, _top(base, kind, at, [*starts, *seen.peaks.values()], next_one.cover(at)))
-        next_one = seen.open
+    waiting = [first] if first is not None else _first(kind, starts[-1], seen)
+    while waiting and len(seen.peaks) < most:
+        prior = waiting.pop()
+        seen.add(prior, _top(base, kind, at, [*starts, *seen.peaks.values()], prior.cover(at)))
+        waiting = waiting or seen.open
     prior = max(seen.peaks, key=seen.factor)
     peak = seen.peaks[prior]
     cover = np.linalg.inv(peak.information + np.linalg.inv(prior.cover(at)))
@@ -130,13 +131,16 @@ class _Seen:
         return max(one.log_factor(most) for one in promises.values()) + share
 
     @property
-    def open(self) -> Prior | None:
-        """The most probable prior not climbed under; None where all of those are improbable together."""
+    def open(self) -> list[Prior]:
+        """The most probable prior not climbed under; none where all of those are improbable together.
+
+        Nor where all priors are less probable than no force, even by what is promised.
+        """
         left = {prior: self.factor(prior) for prior in self.shares if prior not in self.peaks}
         known = np.logaddexp.reduce([self.factor(prior) for prior in self.shares])
-        if not left or np.logaddexp.reduce(list(left.values())) < known - _SURE:
-            return None
-        return max(left, key=lambda one: left[one])
+        if not left or known < _NO_FORCE or np.logaddexp.reduce(list(left.values())) < known - _SURE:
+            return []
+        return [max(left, key=lambda one: left[one])]
 
     @property
     def log_factor(self) -> float:
@@ -159,14 +163,19 @@ def _highest(peaks: Sequence[_Peak], cover: FloatArray) -> _Peak:
     return max(peaks, key=lambda one: one.fit.found.log_evidence - _price(one.values, precision))
 
 
-def _first(kind: Kind, start: _Peak, seen: _Seen) -> Prior:
-    """The usual prior; where a start is more probable than no force, the prior under which it is most so."""
+def _first(kind: Kind, start: _Peak, seen: _Seen) -> list[Prior]:
+    """Under which priors to climb whatever is promised: the usual one, and last, that is first, one more.
+
+    Where a start is more probable than no force, the prior under which it is most so.
+    """
+    usual = Prior(kind.amplitude, NEAR_M)
     gain = start.fit.found.log_evidence - seen.height
     price = {prior: _price(start.values, np.linalg.inv(cover)) for prior, cover in seen.covers.items()}
     if gain <= min(price.values()):
-        return Prior(kind.amplitude, NEAR_M)
+        return [usual]
     freedom = {prior: _freedom(start, cover) for prior, cover in seen.covers.items()}
-    return max(price, key=lambda prior: seen.shares[prior] - price[prior] - freedom[prior])
+    own = max(price, key=lambda prior: seen.shares[prior] - price[prior] - freedom[prior])
+    return [usual, own] if own != usual else [usual]
 
 
 def _price(values: FloatArray, precision: FloatArray) -> float:

@@ -25,7 +25,7 @@ _WITHIN, _AT_MOST, _TURNS = 3.0, 2, 3
 """Places of a mechanism that are looked at again: within so many nats of its best, so many, so many times."""
 _HOPELESS = 20.0
 """Nats behind the best of all at which a place is not looked at again. Its parts may have ten nats more."""
-_SPLIT_FROM = 0.3
+_SPLIT_FROM = 1.0
 """Nats in favour of a place from which it is split: parts of a place without evidence have hardly any."""
 _HOLDS_MOST, _LEVELS = 0.5, 4
 """Share of its place's evidence from which a part is parted itself, and how many times places are parted."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -54,6 +55,7 @@ _CHECKED_EVENTS, _CHECKED_DRAWS = 24, 40
 _LEAST_CHECKED, _CHECKED_RUNS, _FINER_COSTS = 6, 2_000_000, 6.0
 """Events checked at least, runs of the kernel a check may take, and how many more it takes than usual."""
 _SHARP_RUNOUT_M = 4.0
+COARSER, _FINEST = 0.7, 2.0
 INTEGRATION_LIMIT = 0.2
 """Largest error of the log likelihood over 22 events, in nats."""
 
@@ -74,15 +76,17 @@ class HierarchicalProblem(Problem):
     error_model : ErrorModel
     place_sd_m : float
         How well it is known where a front stopped relative to a sensor.
-    fineness : int
-        1 as usual; 2 for events resolved finer, over a wider envelope, at several times the cost.
+    fineness : float
+        1 as usual; 2 for events resolved finer, over a wider envelope, at several times the cost. Below 1
+        patches and changes of readings across a box are that much larger: `COARSER` costs half to three
+        quarters of the usual, and is off by about 0.05 nats in 22 events.
     integration_limit : float
         Largest error of the log likelihood over 22 events that is let pass, in nats.
     """
 
     error_model: ErrorModel = ERROR_MODELS[DEFAULT_ERRORS]
     place_sd_m: float = PLACE_SD_M
-    fineness: int = 1
+    fineness: float = 1.0
     integration_limit: float = INTEGRATION_LIMIT
     # Not init: a problem made from this one by `replace` must not keep what belongs to other recordings.
     _surfaces: dict[tuple[str, ...], Surfaces] = field(init=False, default_factory=dict, repr=False)
@@ -219,24 +223,30 @@ class HierarchicalProblem(Problem):
         """Surfaces of all events under a law, made once: coarsely, then finely where it matters."""
         key = _key(mechanisms)
         if key not in self._surfaces:
-            envelope = self._found(mechanisms).population.envelope(self.fineness)
+            envelope = self._found(mechanisms).population.envelope(max(self.fineness, 1.0))
             self._surfaces[key] = self._resolve(mechanisms, self.fronts(mechanisms), self.fineness, envelope)
         return self._surfaces[key]
 
     def finer(self, law: Law, posterior: xr.Dataset) -> HierarchicalProblem | None:
         """The same with events resolved finer, everywhere; None where they are already."""
-        return replace(self, fineness=2) if self.fineness == 1 else None
+        return replace(self, fineness=self._next_fineness) if self.fineness < _FINEST else None
+
+    @property
+    def _next_fineness(self) -> float:
+        return math.floor(self.fineness) + 1.0
 
     def _resolve(
-        self, mechanisms: Sequence[Mechanism], fronts: Fronts, fineness: int, envelope: Envelope
+        self, mechanisms: Sequence[Mechanism], fronts: Fronts, fineness: float, envelope: Envelope
     ) -> Surfaces:
         """Surfaces with patches `fineness` times smaller, and a box wider, than usual (1)."""
         resolution = Resolution()
-        for _ in range(fineness - 1):
+        if fineness < 1.0:
+            resolution = replace(resolution, change=resolution.change / fineness)
+        for _ in range(math.floor(fineness) - 1):
             resolution = resolution.finer()
         resolution = replace(resolution, narrow=resolution.narrow * self._sharpness)
         population, box = self._found(mechanisms)
-        box = box + _WIDER_CHECK * (fineness - 1.0) * np.array([-1.0, 1.0])
+        box = box + _WIDER_CHECK * max(fineness - 1.0, 0.0) * np.array([-1.0, 1.0])
         return build_surfaces(fronts, box, resolution, population.cell / fineness, envelope)
 
     def _found(self, mechanisms: Sequence[Mechanism]) -> _Found:
@@ -291,10 +301,14 @@ class HierarchicalProblem(Problem):
             ),
             releases=releases._replace(mean=releases.mean[chosen], sd=releases.sd[chosen]),
         )
-        finer = self._resolve(law.mechanisms, fronts, self.fineness + 1, envelope_around(means, factors))
+        finer = self._resolve(law.mechanisms, fronts, self._next_fineness, envelope_around(means, factors))
         exact = self._log_likelihood(finer, law, samples)
-        difference: FloatArray = self.log_likelihood(law, samples)[:, chosen] - exact
-        return difference
+        found = self.log_likelihood(law, samples)[:, chosen]
+        # Where neither has any density, nothing was computed that could be right.
+        result: FloatArray = np.subtract(
+            found, exact, out=np.full(exact.shape, np.inf), where=exact > -np.inf
+        )
+        return result
 
 
 def _log_scales(mechanisms: Sequence[Mechanism]) -> FloatArray:

@@ -83,9 +83,11 @@ def calibrate_surely(problem: Problem, law: Law, settings: SamplerSettings) -> C
     too short, with `MORE` times the draws.
     """
     found = calibrate(problem, law, settings)
-    if not found.gate.numerics:
-        finer = problem.finer(law, found.tree["posterior"].to_dataset())
-        found = found if finer is None else calibrate(finer, law, settings)
+    while not found.gate.numerics:
+        finer = found.problem.finer(law, found.tree["posterior"].to_dataset())
+        if finer is None:
+            break
+        found = calibrate(finer, law, settings)
     if not found.gate.passed and found.gate.chains_too_short:
         more = replace(settings, draws=MORE * settings.draws, tune=MORE * settings.tune)
         found = calibrate(found.problem, law, more)
