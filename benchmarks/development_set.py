@@ -2,7 +2,8 @@
 
 ``python benchmarks/development_set.py --n 40 --seed 1000 --out DIR [--kind mixed] [--hidden two] [--snr 7]``.
 
-Trial i has the seed ``seed + i``; every other one is sparse, the rest dense, unless a kind is given. Folders:
+Trial i has the seed ``seed + i``; every other one is sparse, the rest dense, unless a kind is given. With
+``--each`` they hide, in turn, each mechanism, nothing, each force that is in no list, ... (`EACH`). Folders:
 ``DIR/trial-0001/campaign/`` is what a diagnosis may see, ``DIR/trial-0001/request.json`` which base law it is
 asked to calibrate, ``DIR/truth/trial-0001.json`` what it may not see. Trials that are there already are
 skipped, so the same command goes on with a run that was ended.
@@ -15,17 +16,22 @@ from __future__ import annotations
 
 import json
 import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import cyclopts
 from rich.console import Console
 
 from skred.campaign import write_campaign
 from skred.trials.draw import draw_trial
+from skred.trials.listed import LISTED
+from skred.trials.unlisted import UNLISTED
 
 app = cyclopts.App(help=__doc__)
 KINDS: tuple[Literal["sparse", "dense"], ...] = ("sparse", "dense")
+EACH = (*LISTED, *UNLISTED, *["masked"] * 5, *["nothing", "nasty"] * 4, *["two"] * 2)
 
 
 def write_trial(
@@ -60,11 +66,13 @@ def write_trial(
 def main(
     *,
     out: Path,
-    n: int = 40,
+    n: int | None = None,
     seed: int = 1000,
     kind: Literal["sparse", "dense", "mixed"] = "mixed",
     hidden: str | None = None,
+    each: Annotated[bool, cyclopts.Parameter(negative="")] = False,
     snr: float | None = None,
+    workers: int = 2,
 ) -> None:
     """Write trials to develop on.
 
@@ -73,23 +81,37 @@ def main(
     out
         Folder of the set.
     n
-        Number of trials.
+        Number of trials; 40 by default, with --each one of each, or of each sparse and dense.
     seed
         Seed of the first.
     kind
         What is recorded: few speeds of many avalanches, many of few, or each in turn.
     hidden
         What is hidden: a class or an id, see `skred.trials.draw`; by default drawn.
+    each
+        Each class and id in turn.
     snr
         Signal-to-noise; by default drawn evenly from 2 to 12.
+    workers
+        Trials drawn at a time.
     """
     console = Console()
     (out / "truth").mkdir(parents=True, exist_ok=True)
-    for i in range(n):
-        drawn_kind = KINDS[i % 2] if kind == "mixed" else kind
-        line = write_trial(out, i + 1, seed + i, drawn_kind, hidden, snr)
-        if line is not None:
-            console.print(line, highlight=False, soft_wrap=True)
+    kinds = KINDS if kind == "mixed" else (kind,)
+    n = n or (len(EACH) * len(kinds) if each else 40)
+    with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+        jobs = [
+            pool.submit(
+                write_trial,
+                *(out, i + 1, seed + i, kinds[i % len(kinds)]),
+                EACH[i // len(kinds) % len(EACH)] if each else hidden,
+                snr,
+            )
+            for i in range(n)
+        ]
+        for job in jobs:
+            if line := job.result():
+                console.print(line, highlight=False, soft_wrap=True)
 
 
 if __name__ == "__main__":

@@ -98,9 +98,9 @@ def gathered(batches: Sequence[Path]) -> tuple[list[dict[str, Any]], dict[str, d
 
 def page(batches: Sequence[Path], document: Found, figures: Sequence[str]) -> str:
     """The whole page."""
-    parts = [_HEAD, "## Batches\n", _batches(batches), "## Bars\n", _bars(document)]
+    parts = [_HEAD, "## Batches\n", _batches(batches), "## Bars\n", bars_table(document)]
     parts += [f"![{name.replace('_', ' ')}](figures/proof-{name}.png)\n" for name in figures]
-    parts += ["## The last batch alone\n", _LAST, _bars(_of_last(batches))]
+    parts += ["## The last batch alone\n", _LAST, bars_table(_of_last(batches))]
     parts += ["## Open and masked\n", _masked(batches, document)]
     parts += ["## Batch by batch\n", _IN_ORDER, _by_batch(batches, document)]
     parts += ["## By what was hidden\n", _by_hidden(document)]
@@ -126,8 +126,8 @@ def _masked(batches: Sequence[Path], document: Found) -> str:
     masked = [one for one in lines if one["hidden"] == "masked"]
     text = (
         "\nFrom 5.5 on, without the first two batches, which did not look for forces that are nil on average:"
-        f" {_found([one for one in lines if one not in masked])} open effects were found,"
-        f" {_found(masked)} masked ones."
+        f" {found_of([one for one in lines if one not in masked])} open effects were found,"
+        f" {found_of(masked)} masked ones."
     )
     return "\n".join([*head, *rows, text]) + "\n"
 
@@ -161,9 +161,9 @@ def _by_batch(batches: Sequence[Path], document: Found) -> str:
             f"{ledger['seed']}",
             f"{len(own)}",
             f"{len(clean)}: {clean.count('false alarm')}, {clean.count('failed')}",
-            _found([one for one in own if one not in masked]),
-            _found(masked),
-            *_named(own),
+            found_of([one for one in own if one not in masked]),
+            found_of(masked),
+            *named_of(own),
             ", ".join(f"{median(one for one in those if one is not None):.0f}" for those in times),
         ]
         rows.append(f"| {' | '.join(cells)} |")
@@ -178,17 +178,17 @@ def _by_hidden(document: Found) -> str:
     ]
     for name in ("listed", "masked", "two", "instrument", "unlisted", "nothing", "nasty"):
         own = [one for one in document["trials"] if one["hidden"] == name]
-        rows.append(f"| {name} | {len(own)} | {_found(own)} | {' | '.join(_named(own))} |")
+        rows.append(f"| {name} | {len(own)} | {found_of(own)} | {' | '.join(named_of(own))} |")
     return "\n".join(rows) + "\n"
 
 
-def _found(lines: Sequence[Found]) -> str:
+def found_of(lines: Sequence[Found]) -> str:
     """How many of the strong effects were found."""
     strong = [one["right"] for one in lines if one["true_ids"] and one["snr"] >= _STRONG]
     return f"{sum(right not in ('failed', 'not found') for right in strong)} of {len(strong)}"
 
 
-def _named(lines: Sequence[Found]) -> list[str]:
+def named_of(lines: Sequence[Found]) -> list[str]:
     """How many single names are right, and how many tie sets hold a truth."""
     cells = []
     for several, good in ((False, ("right",)), (True, ("right", "in the set"))):
@@ -230,7 +230,8 @@ def _state(batch: Path) -> str:
     return "given up unopened, see below" if (batch / "notes.md").exists() else "not opened yet"
 
 
-def _bars(document: Found) -> str:
+def bars_table(document: Found) -> str:
+    """Goals, their bars, and what was measured."""
     rows = [
         "| goal | what | bar | linearised ceiling | measured (95 %) | trials | |",
         "| --- | --- | --- | --- | --- | --- | --- |",

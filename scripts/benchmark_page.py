@@ -309,9 +309,9 @@ trials that counts). Asked of a sparse trial: 30 CPU seconds. Python was told th
 each trial compiled all that it imports, and that is in these times.
 
 Development sets (`python benchmarks/development_set.py`, seeds 1000 to 999 999) are what was tuned on, and no
-claim is made from them. The goals are measured on sealed trials of the same simulator with other seeds, and
-so other tracks, avalanches and effects: [the record](../docs/proof.md) has the table, with numbers of trials
-and intervals.
+claim is made from them. [development.md](development.md) has the goals on one that was not tuned on, with
+each mechanism; [the record](../docs/proof.md) has them on sealed trials of the same simulator with other
+seeds, and so other tracks, avalanches and effects.
 """
 
 

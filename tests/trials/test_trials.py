@@ -134,6 +134,15 @@ def test_integration_over_events_against_a_grid() -> None:
     assert fit(setting, target, None, theta, FINAL_NODES).deviance == pytest.approx(best, abs=0.3)
 
 
+def test_each_mechanism_in_turn_sparse_and_dense(tmp_path: Path) -> None:
+    command = [sys.executable, str(ROOT / "benchmarks" / "development_set.py"), "--each", "--n", "4"]
+    subprocess.run([*command, "--seed", "1000", "--out", str(tmp_path)], check=True, capture_output=True)
+    truths = [json.loads((tmp_path / "truth" / f"trial-000{k}.json").read_text()) for k in (1, 2, 3, 4)]
+    assert [one["kind"] for one in truths] == ["sparse", "dense"] * 2
+    ids = [one["mechanisms"][0]["id"] for one in truths]
+    assert ids == [name for name in list(LISTED)[:2] for _ in range(2)]
+
+
 def test_the_development_set_resumes(tmp_path: Path) -> None:
     command = [sys.executable, str(ROOT / "benchmarks" / "development_set.py"), "--seed", "1000"]
     command += ["--hidden", "nothing", "--out", str(tmp_path)]
