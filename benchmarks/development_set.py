@@ -31,7 +31,7 @@ from skred.trials.unlisted import UNLISTED
 
 app = cyclopts.App(help=__doc__)
 KINDS: tuple[Literal["sparse", "dense"], ...] = ("sparse", "dense")
-EACH = (*LISTED, *UNLISTED, *["masked"] * 5, *["nothing", "nasty"] * 4, *["two"] * 2)
+EACH = (*LISTED, *UNLISTED, *["masked"] * 3, *["nothing", "nasty"] * 2, "two")
 
 
 def write_trial(

@@ -339,15 +339,16 @@ def augmented_problem(base: Base, curves: Sequence[Curve]) -> AugmentedProblem:
         raise ValueError(f"mechanisms with different U_c cannot be added together: {sorted(speeds)} m/s")
     extension = _extension(base, added)
     located = locate(base, extension, curves)
+    if len(added) == MOST_ADDED:
+        # Of two, most of the error is between the tables' strengths: twice the nodes are twice the cost only.
+        return _with_tables(base, added, build_tables(base, extension, located, BUDGETS[0]))
     for budget in BUDGETS:
         problem = _with_tables(base, added, build_tables(base, extension, located, budget))
         if _rough_error(problem, located) < _ENOUGH * CLAIM_LIMIT:
             return problem
-    if len(added) == 1:
-        # More nodes do not help where a likelihood bends with the strength, between the tables' strengths.
-        located = finer(base, extension, located)
-        problem = _with_tables(base, added, build_tables(base, extension, located, BUDGETS[-1]))
-    return problem
+    # More nodes do not help where a likelihood bends with the strength, between the tables' strengths.
+    located = finer(base, extension, located)
+    return _with_tables(base, added, build_tables(base, extension, located, BUDGETS[-1]))
 
 
 def _with_tables(
