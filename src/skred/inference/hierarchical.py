@@ -324,6 +324,8 @@ def _key(mechanisms: Sequence[Mechanism]) -> tuple[str, ...]:
 
 def _of_22_events(errors: FloatArray) -> float:
     """Largest error over draws, for 22 events like those checked."""
+    if not np.isfinite(errors).all():
+        return math.inf
     return float(22.0 * np.abs(errors.mean(axis=1)).max())
 
 
