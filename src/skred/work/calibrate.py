@@ -79,8 +79,8 @@ def calibrate_surely(problem: Problem, law: Law, settings: SamplerSettings) -> C
     """As `calibrate`, and again where the gate failed.
 
     With finer numerics as long as those were too rough and can be made finer: the calibration's problem is
-    then another than was given. Chains can be stuck in a mode that only rough numerics make. Then, if chains are
-    too short, with `MORE` times the draws.
+    then another than was given. Chains can be stuck in a mode that only rough numerics make. Then, if chains
+    are too short, with `MORE` times the draws.
     """
     found = calibrate(problem, law, settings)
     while not found.gate.numerics:
