@@ -97,6 +97,11 @@ def _local_client(workers: int) -> Iterator[Any]:
         "distributed.scheduler.allowed-failures": _MANY,
         "distributed.scheduler.worker-saturation": 1.0,
         "distributed.comm.timeouts.connect": f"{_PATIENCE_S}s",
+        # Jobs are few and long; by default Dask watches itself for a seventh of a core.
+        "distributed.worker.profile.enabled": False,
+        "distributed.admin.system-monitor.interval": "10s",
+        "distributed.admin.tick.interval": "1s",
+        "distributed.admin.tick.cycle": "5s",
     }
     with (
         dask.config.set(settings),
