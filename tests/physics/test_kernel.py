@@ -283,6 +283,28 @@ def test_the_far_corner_of_the_prior_is_finite(name: str) -> None:
         assert np.all(readings[:, 2] <= end)
 
 
+@pytest.mark.parametrize("name", TERRAINS)
+def test_a_front_with_terms_in_speed_is_the_same_alone_and_beside_others(name: str) -> None:
+    terrain = TERRAINS[name]
+    rng = np.random.default_rng(5)
+    n = 37  # not a multiple of how many go abreast
+    strengths = np.array([2.0, 0.1, 0.004, 0.4, 0.2]) * rng.uniform(0.0, 1.5, (n, 5))
+    releases = rng.uniform(0.0, 0.5 * terrain.length_m, n)
+    releases[::5] = terrain.edge_s_m[terrain.n_cells // 4]
+    law = make_contributions(COLUMNS, np.ones((5, terrain.n_cells)), WEAKENING_SPEED)
+    end = terrain.length_m
+    path = path_of(terrain, ((0.6 * end, 5.0, 50.0),))
+    sensors = sensor_table([(0.5 * end, 0.5 * end), (0.3 * end, 0.9 * end), None])
+    together = simulate_with_jacobian(strengths, releases, path, law, sensors)
+    speeds = front_speeds(strengths, releases, path, law)
+    assert len(np.unique(together[0][:, 2])) > 3
+    for k in range(n):
+        alone = simulate_with_jacobian(strengths[[k]], releases[[k]], path, law, sensors)
+        for one, own in zip(together, alone, strict=True):
+            np.testing.assert_array_equal(one[k], own[0])
+        np.testing.assert_array_equal(speeds[k], front_speeds(strengths[[k]], releases[[k]], path, law)[0])
+
+
 def test_compiled_code_is_cached_under_the_source_of_the_whole_ring(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

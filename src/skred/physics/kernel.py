@@ -12,7 +12,7 @@ from skred.physics.columns import Column
 from skred.physics.compiled import compiled
 from skred.physics.inputs import cell_of
 from skred.physics.march import fill_increments, fill_steps, fill_table, march, march_tangents
-from skred.physics.march_speed import fill_sources
+from skred.physics.march_abreast import ABREAST, march_abreast, room
 from skred.physics.reading import read, read_tangents
 from skred.physics.scaled_ground import scale_ground
 
@@ -39,7 +39,7 @@ def _simulate(strengths, releases, path, law, sensors, readings, jacobian):  # t
     scaled, cells = scale_ground(edge, ground), _cells_of(sensors, edge)
     table = np.zeros((_N_COLUMNS, n_cells))
     keep, gain, v = np.empty(n_cells), np.empty(n_cells), np.empty(n_cells + 1)
-    per_source = np.empty(n_cells if speed_terms else 0)
+    own, work, rows, runouts, lasts, firsts = room(columns.size, n_cells if speed_terms else 0)
     # All that only tangents need is empty without them.
     n_rows = n_cells if n_tangents > 0 else 0
     increment, dv = np.zeros((n_tangents, n_rows)), np.zeros((n_tangents, n_rows + 1))
@@ -50,12 +50,20 @@ def _simulate(strengths, releases, path, law, sensors, readings, jacobian):  # t
     for run in range(releases.size):
         release = releases[run]
         fill_table(run, strengths, columns, profiles, table)
-        halvings = fill_steps(scaled, table, keep, gain)
+        halvings = 0
+        if not speed_terms or n_tangents > 0:
+            halvings = fill_steps(scaled, table, keep, gain)
         if speed_terms:
-            fill_sources(scaled, table, per_source)
-        runout, last, first = march(
-            release, edge, ground, barriers, limits, u_c, speed_terms, table, keep, gain, per_source, v
-        )
+            place = run % ABREAST
+            if place == 0:
+                march_abreast(
+                    run, strengths, releases, edge, ground, scaled, barriers, limits, columns, profiles, u_c,
+                    own, work, rows, runouts, lasts, firsts,
+                )  # fmt: skip
+            v[:] = rows[place]
+            runout, last, first = runouts[place], lasts[place], firsts[place]
+        else:
+            runout, last, first = march(release, edge, ground, barriers, limits, table, keep, gain, v)
         read(
             run, sensors, cells, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms,
             table, v, readings,
@@ -122,19 +130,22 @@ def simulate_with_jacobian(strengths, releases, path, law, sensors):  # type: ig
 def front_speeds(strengths, releases, path, law):  # type: ignore[no-untyped-def]
     """Front speed U [m/s] at every cell edge, (n_runs, n_cells + 1); parameters as `simulate`."""
     edge, ground, barriers, limits = path.edge, path.ground, path.barriers, path.limits
-    n_cells = ground.shape[1]
+    columns, profiles, n_cells = law.columns, law.profiles, ground.shape[1]
     scaled, table = scale_ground(edge, ground), np.zeros((_N_COLUMNS, n_cells))
     keep, gain = np.empty(n_cells), np.empty(n_cells)
-    per_source = np.empty(n_cells if law.speed_terms else 0)
-    speeds = np.empty((releases.size, n_cells + 1))
+    own, work, rows, runouts, lasts, firsts = room(columns.size, n_cells if law.speed_terms else 0)
+    v = np.empty((releases.size, n_cells + 1))
     for run in range(releases.size):
-        fill_table(run, strengths, law.columns, law.profiles, table)
-        fill_steps(scaled, table, keep, gain)
         if law.speed_terms:
-            fill_sources(scaled, table, per_source)
-        march(
-            releases[run], edge, ground, barriers, limits, law.weakening_speed, law.speed_terms,
-            table, keep, gain, per_source, speeds[run],
-        )  # fmt: skip
-        speeds[run] = np.sqrt(speeds[run])
-    return speeds
+            place = run % ABREAST
+            if place == 0:
+                march_abreast(
+                    run, strengths, releases, edge, ground, scaled, barriers, limits, columns, profiles,
+                    law.weakening_speed, own, work, rows, runouts, lasts, firsts,
+                )  # fmt: skip
+            v[run] = rows[place]
+        else:
+            fill_table(run, strengths, columns, profiles, table)
+            fill_steps(scaled, table, keep, gain)
+            march(releases[run], edge, ground, barriers, limits, table, keep, gain, v[run])
+    return np.sqrt(v)

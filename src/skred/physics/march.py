@@ -3,8 +3,8 @@
 Two passes make it fast. The first turns the coefficients of all cells into the multiplier and the
 increment of the exact step v1 = keep v0 + gain, by a short series that vectorises. The second is a
 bare multiply-add recursion, two cells at a time to halve the chain of dependent operations. Every
-cell in which something happens (release, stop, switch of the normal force, barrier, terms in U) is
-left to `cell.cross`.
+cell in which something happens (release, stop, switch of the normal force, barrier) is left to
+`cell.cross`. Fronts with terms in U march abreast, see `march_abreast`.
 
 Indices are unsigned in the loops that matter: a signed one costs a test for wrap-around per access.
 """
@@ -31,7 +31,7 @@ from skred.physics.cell_tangents import cross_tangents
 from skred.physics.columns import GRAVITY
 from skred.physics.compiled import compiled
 from skred.physics.inputs import cell_of
-from skred.physics.march_speed import fill_speed_changes, recur_with_speed
+from skred.physics.march_speed import fill_speed_changes
 from skred.physics.scaled_ground import BEND, DOUBLE, DRIVE, WEIGHT
 
 _FAST = {"contract", "nsz", "arcp", "nnan"}
@@ -195,10 +195,11 @@ def contact_law(i, ground, table):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def march(  # type: ignore[no-untyped-def]
-    release, edge, ground, barriers, limits, u_c, speed_terms, table, keep, gain, per_source, v
-):
-    """Fill v at every edge; returns (runout [m], last cell entered, cell of the release)."""
+def march(release, edge, ground, barriers, limits, table, keep, gain, v):  # type: ignore[no-untyped-def]
+    """Fill v at every edge; returns (runout [m], last cell entered, cell of the release).
+
+    Without terms in U; for these see `march_abreast`.
+    """
     n_cells = keep.size
     first = cell_of(edge, release)
     for edge_above in range(first + 1):
@@ -206,16 +207,13 @@ def march(  # type: ignore[no-untyped-def]
     i, start, stopped, s = first, release, False, release
     while not stopped and i < n_cells:
         at_edge = i > first or release == edge[i]
-        if at_edge:
-            if speed_terms:
-                i = recur_with_speed(i, ground, table, keep, gain, per_source, u_c, limits, v)
-            elif v[i] <= limits[i]:
-                i = _recur(i, keep, gain, limits, v)
+        if at_edge and v[i] <= limits[i]:
+            i = _recur(i, keep, gain, limits, v)
             if i == n_cells:
                 break
         if i > first:
             start = edge[i]
-        plain = at_edge and not speed_terms and v[i] > 0.0 and limits[i] > 0.0 and limits[i + 1] > 0.0
+        plain = at_edge and v[i] > 0.0 and limits[i] > 0.0 and limits[i + 1] > 0.0
         # No barrier then. What is usual among these cells is written out: handing arrays on costs as much as
         # 50 cells.
         done = False
@@ -236,7 +234,7 @@ def march(  # type: ignore[no-untyped-def]
                 done = ahead >= threshold  # still off the ground
             v[i + 1] = ahead
         if not done:
-            cell, end = cell_at(i, ground, table, u_c, speed_terms), edge[i + 1]
+            cell, end = cell_at(i, ground, table, np.inf, False), edge[i + 1]
             v[i + 1], s, stopped, _ = travel(v[i], start, end, end, np.inf, cell, barriers)
         i += 1
     for edge_below in range(i + 1, n_cells + 1):
