@@ -23,7 +23,8 @@ from skred.diagnosis.extension import extended
 from skred.diagnosis.first_look import curve
 from skred.diagnosis.mixed import fit_population, mean_prior, starting_population
 from skred.diagnosis.modes import Population, campaign_rows, log_joint
-from skred.diagnosis.tables import finer, highest, locate
+from skred.diagnosis.strength_grid import finer, locate
+from skred.diagnosis.tables import highest
 from skred.diagnosis.tabulated_op import TabulatedLogDensity, tabulated_log_density
 from skred.inference.event_density import integrated_log_density
 from skred.inference.hierarchical import hierarchical_problem

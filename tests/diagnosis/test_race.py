@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from types import SimpleNamespace
@@ -21,7 +20,6 @@ from skred.diagnosis.first_look import curve, first_look
 from skred.diagnosis.race import _corrections, _first_looks, _that_count, with_errors
 from skred.diagnosis.screen import Screen, candidates
 from skred.diagnosis.second_look import Place, entrants_of, leading
-from skred.diagnosis.threads import threads
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Direction, Shape
 
@@ -251,12 +249,6 @@ def test_other_error_models_start_from_any() -> None:
     assert replace(again, fit=there.fit).problem.error_model.id == "robust"
     # Two routes: nodes around modes, and the law's likelihood surfaces.
     assert there.fit.found.log_evidence == pytest.approx(base.fit.found.log_evidence, abs=0.3)
-
-
-@pytest.mark.parametrize(("said", "n"), [("3", 3), ("1", 1), ("0", None), ("many", None), ("", None)])
-def test_threads_are_as_many_as_allowed(monkeypatch: pytest.MonkeyPatch, said: str, n: int | None) -> None:
-    monkeypatch.setenv("OMP_NUM_THREADS", said)
-    assert threads() == (n or os.cpu_count())
 
 
 def test_a_first_look_sees_strengths_far_below_the_grid() -> None:

@@ -22,7 +22,8 @@ from skred.diagnosis.event_nodes import Budget
 from skred.diagnosis.extension import Extension
 from skred.diagnosis.marginal import population_at
 from skred.diagnosis.modes import Population, Rows, take_rows
-from skred.diagnosis.tables import BUDGETS, Located, Tables, build_tables, exact_nodes, finer, locate
+from skred.diagnosis.strength_grid import Located, finer, locate
+from skred.diagnosis.tables import BUDGETS, Tables, build_tables, exact_nodes
 from skred.diagnosis.tabulated_op import tabulated_log_densities
 from skred.diagnosis.truncated_normal import truncated_normal
 from skred.inference.event_density import integrated_log_density

@@ -9,6 +9,7 @@ every strength, which makes differences between strengths smoother than the inte
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
@@ -80,6 +81,11 @@ class Spread(NamedTuple):
 
     points: FloatArray
     log_weights: FloatArray
+
+    @classmethod
+    def joined(cls, parts: Sequence[Spread]) -> Spread:
+        """Those of some rows, then those of others."""
+        return cls(*(np.concatenate(values) for values in zip(*parts, strict=True)))
 
     @property
     def nodes(self) -> Nodes:

@@ -8,6 +8,7 @@ price of looking at many mechanisms and places is paid; sampling stops as soon a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import batched
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from skred.diagnosis.mixed import fit_population
 from skred.diagnosis.modes import Population, Rows
 from skred.diagnosis.replicas import replicas
 from skred.diagnosis.screen import Screen
+from skred.diagnosis.threads import side_by_side, threads
 
 FloatArray = NDArray[np.float64]
 LIMIT = 0.01
@@ -72,17 +74,24 @@ def omnibus(
     """
     statistic = float(_refitted(screen, rows, start)[0])
     rng = np.random.default_rng([seed, 21])
-    extension = screen.extension
     simulated: list[FloatArray] = []
-    for first in range(0, most, _BATCH):
-        batch = slice(first, min(first + _BATCH, most))
-        means, factors = draws[0][batch], draws[1][batch]
-        made, points = replicas(extension, screen.strengths, means, factors, rng)
-        population = Population(means.copy(), np.einsum("gij,gkj->gik", factors, factors))
-        simulated.append(_refitted(screen, made, (population, points)))
-        if np.sum(np.concatenate(simulated) >= statistic) >= _ENOUGH_ABOVE:
-            break
+    for some in batched(range(0, most, _BATCH), threads()):
+        # Simulated one after the other and counted in order: how many threads there are changes nothing.
+        made = [_simulated(screen, draws, slice(first, min(first + _BATCH, most)), rng) for first in some]
+        for refitted in side_by_side(lambda clean: _refitted(screen, *clean), made):
+            simulated.append(refitted)
+            if np.sum(np.concatenate(simulated) >= statistic) >= _ENOUGH_ABOVE:
+                return Omnibus(statistic, np.concatenate(simulated))
     return Omnibus(statistic, np.concatenate(simulated))
+
+
+def _simulated(
+    screen: Screen, draws: tuple[FloatArray, FloatArray], batch: slice, rng: np.random.Generator
+) -> tuple[Rows, tuple[Population, FloatArray]]:
+    """Clean campaigns from some of the draws, and where to begin refitting them."""
+    means, factors = draws[0][batch], draws[1][batch]
+    rows, points = replicas(screen.extension, screen.strengths, means, factors, rng)
+    return rows, (Population(means.copy(), np.einsum("gij,gkj->gik", factors, factors)), points)
 
 
 def _refitted(screen: Screen, rows: Rows, start: tuple[Population, FloatArray]) -> FloatArray:

@@ -1,11 +1,28 @@
-"""How many threads a diagnosis may take."""
+"""Work in threads: the compiled code and the linear algebra let others run meanwhile."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
+import numpy as np
 
 
 def threads() -> int:
     """As many as OMP_NUM_THREADS allows, which `skred prove` sets for its trials; all cores without it."""
     allowed = os.environ.get("OMP_NUM_THREADS", "")
     return int(allowed) if allowed.isdecimal() and int(allowed) > 0 else os.cpu_count() or 1
+
+
+def side_by_side[Job, Result](work: Callable[[Job], Result], jobs: Sequence[Job]) -> list[Result]:
+    """What comes of jobs that know nothing of each other, in their order."""
+    with ThreadPoolExecutor(threads()) as pool:
+        return list(pool.map(work, jobs))
+
+
+def in_parts(n: int) -> list[slice]:
+    """Numbers from 0 to n in as many parts of like size as there are threads, none empty."""
+    ends = np.unique(np.linspace(0, n, threads() + 1).round().astype(int))
+    return [slice(int(first), int(end)) for first, end in pairwise(ends)]

@@ -1,0 +1,68 @@
+"""How many threads there are changes how long it takes, and nothing else."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pytest
+from diagnosis_cases import screen_of, sparse_base
+
+from skred.diagnosis.curves import curve_near
+from skred.diagnosis.event_nodes import ROUGH
+from skred.diagnosis.extension import extended
+from skred.diagnosis.first_look import curve
+from skred.diagnosis.omnibus import omnibus
+from skred.diagnosis.strength_grid import locate
+from skred.diagnosis.tables import BUDGETS, build_tables
+from skred.diagnosis.threads import in_parts, side_by_side, threads
+from skred.physics.mechanisms import mechanisms
+
+
+@pytest.mark.parametrize(("said", "n"), [("3", 3), ("1", 1), ("0", None), ("many", None), ("", None)])
+def test_threads_are_as_many_as_allowed(monkeypatch: pytest.MonkeyPatch, said: str, n: int | None) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", said)
+    assert threads() == (n or os.cpu_count())
+
+
+@pytest.mark.parametrize(("n", "parts"), [(0, 0), (1, 1), (2, 2), (3, 3), (10, 3)])
+def test_parts_are_everything_once(monkeypatch: pytest.MonkeyPatch, n: int, parts: int) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    found = in_parts(n)
+    assert len(found) == parts
+    assert [k for part in found for k in range(n)[part]] == list(range(n))
+    assert side_by_side(lambda part: part.stop - part.start, found) == [one.stop - one.start for one in found]
+
+
+def test_the_check_is_the_same_in_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    base = sparse_base()
+    n = len(base.law.mechanisms)
+    rng = np.random.default_rng(3)
+    means = base.population.mean + 0.05 * rng.standard_normal((120, n))
+    draws = means, np.tile(0.1 * np.eye(n), (120, 1, 1))
+    found = []
+    for said in ("1", "2"):
+        monkeypatch.setenv("OMP_NUM_THREADS", said)
+        found.append(omnibus(screen_of(base), base.rows, (base.population, base.fit.points), draws, 5, 120))
+    one, two = found
+    assert one.statistic == two.statistic
+    assert 25 <= len(one.simulated) < 120  # it stopped early, with batches begun that do not count
+    np.testing.assert_array_equal(one.simulated, two.simulated)
+
+
+def test_tables_are_the_same_in_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    base = sparse_base()
+    mechanism = mechanisms()["viscous_drag"]
+    assert mechanism.added is not None
+    shape = mechanism.added.shapes(base.setting)[0]
+    near = curve_near(base, mechanism, shape, curve(base, mechanism, shape, ROUGH), ROUGH)
+    extension = extended(base.problem, base.law, (near.direction,))
+    found = []
+    for said in ("1", "3"):
+        monkeypatch.setenv("OMP_NUM_THREADS", said)
+        found.append(build_tables(base, extension, locate(base, extension, [near]), BUDGETS[0]))
+    one, two = found
+    np.testing.assert_array_equal(one.grid.points, two.grid.points)
+    np.testing.assert_array_equal(one.modes, two.modes)
+    for name, values in one.arrays.items():
+        np.testing.assert_array_equal(values, two.arrays[name])
