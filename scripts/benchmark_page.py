@@ -278,6 +278,11 @@ def diagnosis() -> str:
         seconds = read(f"ryggfonn/{law}")["seconds"]
         stages = ", ".join(f"{name} {value:.0f}" for name, value in seconds.items() if value >= 0.5)
         rows += f"| {law} | {sum(seconds.values()):.0f} | {stages} |\n"
+    whole = "".join(
+        f"| {row['campaign']} | {row['base_model']} | {row['events']} events, {row['sensors']} sensors"
+        f" | {row['seconds']:.0f} | {row['verdict']} |\n"
+        for row in read("diagnose_time")
+    )
     more = [slower[name] / here[name] for name in ("kernel", "pure Python")]
     proof = read("prove_throughput")
     n = proof["plan"]["n"]
@@ -288,9 +293,15 @@ def diagnosis() -> str:
     return f"""
 ## A diagnosis, and concealed trials
 
-`python benchmarks/ryggfonn_diagnoses.py` keeps the seconds of each stage of a diagnosis of the 22
-avalanches, both cores free; loading Python's packages and writing the report come on top. Asked: 60 s. These
-were measured on another machine with two cores, slower and of a varying speed: at its fastest the kernel
+`python benchmarks/diagnose_time.py --json benchmarks/results/diagnose_time.json`: `skred diagnose` by the
+clock, everything compiled, both cores free, loading packages and writing the report included. Asked: 60 s for
+22 sparse events, 120 s for 15 events with 40 gates.
+
+| campaign | base law | recordings | seconds | verdict |
+| --- | --- | --- | --- | --- |
+{whole}
+Of that the stages, as `python benchmarks/ryggfonn_diagnoses.py` keeps them. All of this
+was measured on another machine with two cores, slower and of a varying speed: at its fastest the kernel
 takes {slower["kernel"]:.2f} us and pure Python {slower["pure Python"]:.0f} us, {more[0]:.1f} and
 {more[1]:.1f} times what they take above
 (`python benchmarks/forward.py --json benchmarks/results/forward_slower.json`).
