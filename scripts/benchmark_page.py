@@ -318,7 +318,7 @@ takes {slower["kernel"]:.2f} us and pure Python {slower["pure Python"]:.0f} us, 
 Two workers do {proof["gain"]:.2f} times as much as one (asked: 1.8; the last trial runs alone, and with few
 trials that counts). Asked of a sparse trial: 30 CPU seconds, on what machine is not said; this one takes
 {more[0]:.1f} times as long as the one above. Bytecode was compiled before: where Python is told to
-write none, each trial takes 5 s more.
+write none, each trial compiles all that it imports on top.
 
 Development sets (`python benchmarks/development_set.py`, seeds 1000 to 999 999) are what was tuned on, and no
 claim is made from them. [development.md](development.md) has the goals on one that was not tuned on, with

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -29,7 +28,7 @@ from skred.diagnosis.predictive import Predicted, predict_event
 from skred.diagnosis.profile_fit import fit_profile
 from skred.diagnosis.race import Heat
 from skred.diagnosis.screen import Screen
-from skred.diagnosis.threads import threads
+from skred.diagnosis.threads import side_by_side
 from skred.diagnosis.unlisted import Profile, combined, entering, hats, most_probable
 from skred.diagnosis.unseen import log_densities
 from skred.physics.mechanisms.spec import Direction
@@ -96,8 +95,7 @@ def profile_law(heat: Heat, most: int, seed: int) -> ProfileLaw:
     """
     base, profile = heat.base, most_probable(heat.profiles)
     events = range(len(base.rows.event))
-    with ThreadPoolExecutor(threads()) as pool:
-        parts = list(pool.map(lambda event: _left_out(base, profile, event, seed), events))
+    parts = side_by_side(lambda event: _left_out(base, profile, event, seed), events)
     before, after = (_held_out(base, [part[k] for part in parts]) for k in range(2))
     check, rng = _check(base, profile, most, seed), np.random.default_rng([seed, 55])
     _, without = _plain(base, rng)

@@ -97,7 +97,7 @@ def _local_client(workers: int) -> Iterator[Any]:
         "distributed.scheduler.allowed-failures": _MANY,
         "distributed.scheduler.worker-saturation": 1.0,
         "distributed.comm.timeouts.connect": f"{_PATIENCE_S}s",
-        # Jobs are few and long; by default Dask watches itself for a seventh of a core.
+        # Jobs are few and long; by default Dask watches itself fifty times a second and more.
         "distributed.worker.profile.enabled": False,
         "distributed.admin.system-monitor.interval": "10s",
         "distributed.admin.tick.interval": "1s",
