@@ -35,32 +35,53 @@ def inverse_factor(factor):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _exponents(first, last, mean, whiten, points, log_weights, result):  # type: ignore[no-untyped-def]
+def _of_one(at, shift, scale, log_weights, result):  # type: ignore[no-untyped-def]
+    """`_exponents` of one strength; nodes as slices, or the compiler makes no vectors of them."""
+    for k in range(result.size):
+        z = scale * (at[k] - shift)
+        result[k] = log_weights[k] - 0.5 * z * z
+
+
+@njit(cache=True, error_model="numpy", nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+def _of_two(at_0, at_1, mean, whiten, log_weights, result):  # type: ignore[no-untyped-def]
+    """`_exponents` of two strengths."""
+    shift_0, shift_1, a, b, c = mean[0], mean[1], whiten[0, 0], whiten[1, 0], whiten[1, 1]
+    for k in range(result.size):
+        x, y = at_0[k] - shift_0, at_1[k] - shift_1
+        z_0, z_1 = a * x, b * x + c * y
+        result[k] = log_weights[k] - 0.5 * z_0 * z_0 - 0.5 * z_1 * z_1
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _largest(values):  # type: ignore[no-untyped-def]
+    """The largest value; in four runs, because each comparison waits for the one before."""
+    a = b = c = d = -np.inf
+    whole = values.size // 4
+    for k in range(whole):
+        a, b = max(a, values[4 * k]), max(b, values[4 * k + 1])
+        c, d = max(c, values[4 * k + 2]), max(d, values[4 * k + 3])
+    for k in range(4 * whole, values.size):
+        a = max(a, values[k])
+    return max(max(a, b), max(c, d))
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _exponents(first, last, mean, whiten, points, log_weights, room):  # type: ignore[no-untyped-def]
     """Log weight times normal density, but for its constant, at nodes first to last; returns the largest."""
-    n_strengths = mean.size
-    for k in range(last - first):
-        result[k] = log_weights[first + k]
-    for i in range(n_strengths):
-        if n_strengths == 1:
-            shift, scale = mean[0], whiten[0, 0]
-            for k in range(last - first):
-                z = scale * (points[0, first + k] - shift)
-                result[k] -= 0.5 * z * z
-        elif n_strengths == 2:
-            a, b, at_0, at_1 = whiten[i, 0], whiten[i, 1], mean[0], mean[1]
-            for k in range(last - first):
-                z = a * (points[0, first + k] - at_0) + b * (points[1, first + k] - at_1)
-                result[k] -= 0.5 * z * z
-        else:
-            for k in range(last - first):
+    n_strengths, result = mean.size, room[: last - first]
+    if n_strengths == 1:
+        _of_one(points[0, first:last], mean[0], whiten[0, 0], log_weights[first:last], result)
+    elif n_strengths == 2:
+        _of_two(points[0, first:last], points[1, first:last], mean, whiten, log_weights[first:last], result)
+    else:
+        for k in range(last - first):
+            result[k] = log_weights[first + k]
+            for i in range(n_strengths):
                 z = 0.0
                 for j in range(i + 1):
                     z += whiten[i, j] * (points[j, first + k] - mean[j])
                 result[k] -= 0.5 * z * z
-    largest = -np.inf
-    for k in range(last - first):
-        largest = max(largest, result[k])
-    return largest
+    return _largest(result)
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
