@@ -7,21 +7,16 @@ only to second order there (`test_reference.py` holds the reference against an i
 
 from __future__ import annotations
 
-import inspect
-import shutil
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numba.core.caching import CacheImpl
 from numpy.testing import assert_allclose
 from test_reference import counter_slope, plane, roll_over_slope, terrain_from_slope
 
 from skred.campaign import find_campaign, read_campaign
-from skred.physics import compiled
 from skred.physics.columns import GRAVITY, Column
 from skred.physics.geometry import path_of, sensor_table
 from skred.physics.inputs import make_contributions
@@ -303,20 +298,3 @@ def test_a_front_with_terms_in_speed_is_the_same_alone_and_beside_others(name: s
         for one, own in zip(together, alone, strict=True):
             np.testing.assert_array_equal(one[k], own[0])
         np.testing.assert_array_equal(speeds[k], front_speeds(strengths[[k]], releases[[k]], path, law)[0])
-
-
-def test_compiled_code_is_cached_under_the_source_of_the_whole_ring(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Numba stamps a function with its own file only: a change in a callee's file would go unnoticed."""
-    file = inspect.getsourcefile(simulate.py_func)
-    locators = (kind.from_function(simulate.py_func, file) for kind in CacheImpl._locator_classes)
-    chosen = next(locator for locator in locators if locator is not None)
-    assert chosen.get_source_stamp() == compiled.KERNEL_FINGERPRINT
-    for source in compiled._FOLDER.glob("*.py"):
-        shutil.copy(source, tmp_path)
-    monkeypatch.setattr(compiled, "_FOLDER", tmp_path)
-    assert compiled._fingerprint() == compiled.KERNEL_FINGERPRINT
-    with open(tmp_path / "cell.py", "a") as callee:
-        callee.write("# changed\n")
-    assert compiled._fingerprint() != compiled.KERNEL_FINGERPRINT

@@ -14,11 +14,11 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
+from skred.diagnosis.compiled import compiled
 from skred.diagnosis.extension import Extension
 from skred.diagnosis.modes import Modes, Population, Rows
 from skred.inference.reading_density import log_likelihoods
@@ -126,7 +126,7 @@ class _Part(NamedTuple):
         return result
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _log_mixture(points, centres):  # type: ignore[no-untyped-def]
     """Log of the mean of unit normal densities around centres, but for their constant, row by row."""
     n_rows, n_points, n_axes = points.shape

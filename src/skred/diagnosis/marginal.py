@@ -10,10 +10,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
+from skred.diagnosis.compiled import compiled
 from skred.diagnosis.mixed import MeanPrior
 from skred.diagnosis.modes import Population
 from skred.inference.event_density import integrated_log_density, inverse_factor
@@ -31,7 +31,7 @@ _STEP = 2e-3
 _DEGREES, _RESAMPLED_FROM = 5.0, 8
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _factor(psi, n):  # type: ignore[no-untyped-def]
     """Lower Cholesky factor of the covariance; partial correlations as in `population.population_factor`."""
     factor = np.zeros((n, n))
@@ -46,7 +46,7 @@ def _factor(psi, n):  # type: ignore[no-untyped-def]
     return factor
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _means(psi, n, n_events):  # type: ignore[no-untyped-def]
     """The population's mean, the same for each event."""
     means = np.empty((n_events, n))
@@ -55,7 +55,7 @@ def _means(psi, n, n_events):  # type: ignore[no-untyped-def]
     return means
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _log_prior(psi, n, log_scale):  # type: ignore[no-untyped-def]
     """Log prior density in these coordinates, but for the constants of the correlations."""
     total = 0.0
@@ -75,7 +75,7 @@ def _log_prior(psi, n, log_scale):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _log_target(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-untyped-def]
     means = _means(psi, n, first.size - 1)
     density = integrated_log_density(means, _factor(psi, n), first, points, log_weights)
@@ -83,7 +83,7 @@ def _log_target(psi, n, log_scale, first, points, log_weights):  # type: ignore[
     return total if total == total else -np.inf
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _fill_statistics(point, mean, whiten, statistics):  # type: ignore[no-untyped-def]
     """Statistics of a normal density: whitened strengths, then their products (0, 0), (1, 0), (1, 1), ...
 
@@ -102,7 +102,7 @@ def _fill_statistics(point, mean, whiten, statistics):  # type: ignore[no-untype
     return exponent
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _node_moments(psi, n, first, points, log_weights):  # type: ignore[no-untyped-def]
     """Sums over events: of log integrals, and of means and covariances of the statistics over the nodes.
 
@@ -133,7 +133,7 @@ def _node_moments(psi, n, first, points, log_weights):  # type: ignore[no-untype
     return density.sum(), mean, covariance
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _natural(psi, n, centre, whiten):  # type: ignore[no-untyped-def]
     """Natural parameters of a population in coordinates whitened about another, and its normalising term."""
     between = whiten @ _factor(psi, n)
@@ -148,14 +148,14 @@ def _natural(psi, n, centre, whiten):  # type: ignore[no-untyped-def]
     return found, 0.5 * offset @ found[:n] - log_determinant
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _smooth(psi, n, log_scale, mean, n_events, centre, whiten):  # type: ignore[no-untyped-def]
     """What the log target is beside its log integrals, those along a tangent; and natural parameters."""
     parameters, normaliser = _natural(psi, n, centre, whiten)
     return mean @ parameters - n_events * normaliser + _log_prior(psi, n, log_scale), parameters
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _slopes(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-untyped-def]
     """Log target, its gradient and minus its Hessian, with one sum over the nodes.
 
@@ -193,7 +193,7 @@ def _slopes(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-u
     return value, gradient, hessian - natural @ covariance @ natural.T
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _climb(psi, n, log_scale, first, points, log_weights, n_steps):  # type: ignore[no-untyped-def]
     """Newton's method with halved steps: the top, its height, and minus the Hessian there."""
     best, gradient, hessian = _slopes(psi, n, log_scale, first, points, log_weights)
@@ -220,7 +220,7 @@ def _climb(psi, n, log_scale, first, points, log_weights, n_steps):  # type: ign
     return psi, best, hessian
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _log_targets(psis, n, log_scale, first, points, log_weights):  # type: ignore[no-untyped-def]
     result = np.empty(len(psis))
     for k in range(len(psis)):

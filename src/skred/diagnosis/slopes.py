@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from skred.diagnosis.compiled import compiled
 from skred.inference.reading_density import OUTLIER_FACTOR
 
 _SQRT_2 = math.sqrt(2.0)
@@ -18,7 +18,7 @@ _SQRT_2PI = math.sqrt(2.0 * math.pi)
 _FAR = 6.0
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _stop_slopes(stop, reached, not_reached, place_sd):  # type: ignore[no-untyped-def]
     """Slope and curvature of the log probability that a stop is seen between two places."""
     if reached == -np.inf and not_reached == np.inf:
@@ -38,7 +38,7 @@ def _stop_slopes(stop, reached, not_reached, place_sd):  # type: ignore[no-untyp
     return slope / place_sd, min(max(curvature, 0.0), 1.0) / place_sd**2
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def reading_slopes(rows, predictions, readings, errors):  # type: ignore[no-untyped-def]
     """Slope and curvature of the log likelihood by each prediction.
 

@@ -9,17 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from hashlib import sha256
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
 from pytensor.graph.basic import Variable
 from pytensor.link.numba.dispatch.basic import numba_njit, register_funcify_default_op_cache_key
 
+from skred.diagnosis.compiled import DIAGNOSIS_CACHE_KEY, compiled
 from skred.inference.array_op import ArrayOp
-from skred.inference.event_density import EVENT_DENSITY_CACHE_KEY, integrated_log_density
+from skred.inference.event_density import integrated_log_density
 
 LEAST_TABLES = 4
 """Along each axis: what a cubic polynomial goes through."""
@@ -27,11 +25,9 @@ _WALL = 12.0
 """Nats that all events lose a step outside the tables: chains turn back, and yet find in from anywhere."""
 _OVERSHOOT = 0.5
 """How far beyond the densities at the tables an interpolated one may be, in nats."""
-_CACHE_KEY = EVENT_DENSITY_CACHE_KEY ^ int(sha256(Path(__file__).read_bytes()).hexdigest()[:12], 16)
-"""From the content of this file and of the one it calls."""
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _cubic_weights(place, size, weights):  # type: ignore[no-untyped-def]
     """Fill the weights of four neighbours on the grid 0, 1, ..., size - 1; returns the first of them."""
     lowest = int(min(max(math.floor(place) - 1.0, 0.0), size - 4.0))
@@ -43,7 +39,7 @@ def _cubic_weights(place, size, weights):  # type: ignore[no-untyped-def]
     return lowest
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def tabulated_log_density(  # type: ignore[no-untyped-def]
     means, factor, strengths, origin, steps, size, first, points, log_weights
 ):
@@ -107,7 +103,7 @@ def tabulated_log_density(  # type: ignore[no-untyped-def]
     return density
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def tabulated_log_densities(  # type: ignore[no-untyped-def]
     means, factors, strengths, n_events, origin, steps, size, first, points, log_weights
 ):
@@ -174,4 +170,4 @@ def _funcify(op: TabulatedLogDensity, node: Any = None, **kwargs: Any) -> Any:
             means, factor, strengths, origin, steps, size, first, points, log_weights
         )
 
-    return tabulated_density, _CACHE_KEY
+    return tabulated_density, DIAGNOSIS_CACHE_KEY

@@ -8,14 +8,13 @@ ones, are all at most 0.
 from __future__ import annotations
 
 import math
-from hashlib import sha256
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.special import roots_legendre
+
+from skred.inference.compiled import compiled
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -25,8 +24,6 @@ MAX_NOT_REACHED = 4
 _NODE, _WEIGHT = (np.ascontiguousarray(a) for a in roots_legendre(24))
 _SQRT_HALF = math.sqrt(0.5)
 _INV_SQRT_2PI = 1.0 / math.sqrt(2.0 * math.pi)
-DENSITY_CACHE_KEY = int(sha256(Path(__file__).read_bytes()).hexdigest()[:12], 16)
-"""From this file's content: PyTensor caches compiled callers of its functions under it."""
 
 
 class PooledArrays(NamedTuple):
@@ -113,12 +110,12 @@ def pooled_arrays(
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _normal_cdf(x):  # type: ignore[no-untyped-def]
     return 0.5 * math.erfc(-x * _SQRT_HALF)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _bound(level, mean, factor, z):  # type: ignore[no-untyped-def]
     """Largest z_level with x_level <= 0, given the z above it."""
     bound = -mean[level]
@@ -127,14 +124,14 @@ def _bound(level, mean, factor, z):  # type: ignore[no-untyped-def]
     return bound / factor[level, level]
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _stretch(bound):  # type: ignore[no-untyped-def]
     """Upper end and width of the stretch below a bound that holds its probability to e^-36."""
     upper = min(bound, 8.5)
     return upper, (upper + 8.5 if upper > 0.0 else upper + math.sqrt(upper * upper + 72.0))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _tightest_first(size, mean, covariance):  # type: ignore[no-untyped-def]
     """Mean and Cholesky factor with the largest mean in standard deviations first.
 
@@ -159,7 +156,7 @@ def _tightest_first(size, mean, covariance):  # type: ignore[no-untyped-def]
     return ordered, factor
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _orthant(size, unordered, covariance):  # type: ignore[no-untyped-def]
     """P(x_1 <= 0, ..., x_size <= 0) for x ~ N(unordered, covariance).
 
@@ -190,7 +187,7 @@ def _orthant(size, unordered, covariance):  # type: ignore[no-untyped-def]
         node[level] += 1
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _latent_mean(event, response, data, mean):  # type: ignore[no-untyped-def]
     """Mean of the latent readings at the sensors not reached, given the observed ones."""
     row = response[data.release_of_event[event]]
@@ -200,7 +197,7 @@ def _latent_mean(event, response, data, mean):  # type: ignore[no-untyped-def]
             mean[k] += data.regression[event, k, j] * (data.readings[event, j] - row[j])
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def pooled_log_density(response, data):  # type: ignore[no-untyped-def]
     """Log density of each event's readings.
 
@@ -230,7 +227,7 @@ def pooled_log_density(response, data):  # type: ignore[no-untyped-def]
     return density
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _orthant_slopes(size, mean, covariance, slopes):  # type: ignore[no-untyped-def]
     """Derivatives of log P(x <= 0) by the mean: the density at x_j = 0 times the rest given that."""
     probability = _orthant(size, mean, covariance)
@@ -251,7 +248,7 @@ def _orthant_slopes(size, mean, covariance, slopes):  # type: ignore[no-untyped-
         slopes[j] = -density * rest / probability
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def pooled_log_density_pullback(cotangent, response, data):  # type: ignore[no-untyped-def]
     """Cotangent of the response, (n_releases, n_sensors), from that of the densities, (n_events,)."""
     n_events, n_sensors = data.readings.shape

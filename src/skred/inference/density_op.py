@@ -10,8 +10,8 @@ from pytensor.graph.basic import Variable
 from pytensor.link.numba.dispatch.basic import numba_njit, register_funcify_default_op_cache_key
 
 from skred.inference.array_op import ArrayOp
+from skred.inference.compiled import INFERENCE_CACHE_KEY
 from skred.inference.density import (
-    DENSITY_CACHE_KEY,
     PooledArrays,
     pooled_log_density,
     pooled_log_density_pullback,
@@ -76,7 +76,7 @@ def _funcify_density(op: PooledLogDensity, node: Any = None, **kwargs: Any) -> A
         )
         return pooled_log_density(response, data)
 
-    return pooled_density, DENSITY_CACHE_KEY
+    return pooled_density, INFERENCE_CACHE_KEY
 
 
 @register_funcify_default_op_cache_key(PooledLogDensityPullback)
@@ -99,4 +99,4 @@ def _funcify_pullback(op: PooledLogDensityPullback, node: Any = None, **kwargs: 
         )
         return pooled_log_density_pullback(cotangent, response, data)
 
-    return pooled_density_pullback, DENSITY_CACHE_KEY
+    return pooled_density_pullback, INFERENCE_CACHE_KEY

@@ -1,25 +1,18 @@
-"""Density of one event over a population, in numba: sums over the nodes of its surface, and draws from them.
-
-All compiled functions that call each other stand in this one file, because numba's cache notices a
-change only in a function's own file.
-"""
+"""Density of one event over a population, in numba: sums over the nodes of its surface, draws from them."""
 
 from __future__ import annotations
 
 import math
-from hashlib import sha256
-from pathlib import Path
 
 import numpy as np
-from numba import njit
 
-EVENT_DENSITY_CACHE_KEY = int(sha256(Path(__file__).read_bytes()).hexdigest()[:12], 16)
-"""From this file's content: PyTensor caches compiled callers of its functions under it."""
+from skred.inference.compiled import compiled
+
 _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 _NEGLIGIBLE = -60.0
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def inverse_factor(factor):  # type: ignore[no-untyped-def]
     """Inverse of a lower triangular matrix, and the log of its determinant."""
     n = factor.shape[0]
@@ -34,7 +27,7 @@ def inverse_factor(factor):  # type: ignore[no-untyped-def]
     return inverse, log_determinant
 
 
-@njit(cache=True, error_model="numpy", nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+@compiled(fastmath={"contract", "reassoc", "nsz", "arcp"})
 def _of_one(at, shift, scale, log_weights, result):  # type: ignore[no-untyped-def]
     """`_exponents` of one strength; nodes as slices, or the compiler makes no vectors of them."""
     for k in range(result.size):
@@ -42,7 +35,7 @@ def _of_one(at, shift, scale, log_weights, result):  # type: ignore[no-untyped-d
         result[k] = log_weights[k] - 0.5 * z * z
 
 
-@njit(cache=True, error_model="numpy", nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+@compiled(fastmath={"contract", "reassoc", "nsz", "arcp"})
 def _of_two(at_0, at_1, mean, whiten, log_weights, result):  # type: ignore[no-untyped-def]
     """`_exponents` of two strengths."""
     shift_0, shift_1, a, b, c = mean[0], mean[1], whiten[0, 0], whiten[1, 0], whiten[1, 1]
@@ -52,7 +45,7 @@ def _of_two(at_0, at_1, mean, whiten, log_weights, result):  # type: ignore[no-u
         result[k] = log_weights[k] - 0.5 * z_0 * z_0 - 0.5 * z_1 * z_1
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _largest(values):  # type: ignore[no-untyped-def]
     """The largest value; in four runs, because each comparison waits for the one before."""
     a = b = c = d = -np.inf
@@ -65,7 +58,7 @@ def _largest(values):  # type: ignore[no-untyped-def]
     return max(max(a, b), max(c, d))
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _exponents(first, last, mean, whiten, points, log_weights, room):  # type: ignore[no-untyped-def]
     """Log weight times normal density, but for its constant, at nodes first to last; returns the largest."""
     n_strengths, result = mean.size, room[: last - first]
@@ -84,7 +77,7 @@ def _exponents(first, last, mean, whiten, points, log_weights, room):  # type: i
     return _largest(result)
 
 
-@njit(cache=True, error_model="numpy", nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+@compiled(fastmath={"contract", "reassoc", "nsz", "arcp"})
 def _sum_of_exponentials(exponents, size, largest):  # type: ignore[no-untyped-def]
     """Sum of exp(exponent - largest): exp(x / 1024) by its series, squared ten times, which vectorises.
 
@@ -110,7 +103,7 @@ def _sum_of_exponentials(exponents, size, largest):  # type: ignore[no-untyped-d
     return total
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def integrated_log_density(means, factor, first, points, log_weights):  # type: ignore[no-untyped-def]
     """Log likelihood of each event, its own strengths integrated over the population.
 
@@ -142,7 +135,7 @@ def integrated_log_density(means, factor, first, points, log_weights):  # type: 
     return density
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def integrated_log_density_pullback(  # type: ignore[no-untyped-def]
     cotangent, means, factor, first, points, log_weights
 ):
@@ -184,7 +177,7 @@ def integrated_log_density_pullback(  # type: ignore[no-untyped-def]
     return pulled
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def draw_nodes(means, factors, uniforms, first, points, log_weights):  # type: ignore[no-untyped-def]
     """A node of each event for each population, drawn by its share of the integral.
 

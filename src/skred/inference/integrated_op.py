@@ -10,8 +10,8 @@ from pytensor.graph.basic import Variable
 from pytensor.link.numba.dispatch.basic import numba_njit, register_funcify_default_op_cache_key
 
 from skred.inference.array_op import ArrayOp
+from skred.inference.compiled import INFERENCE_CACHE_KEY
 from skred.inference.event_density import (
-    EVENT_DENSITY_CACHE_KEY,
     integrated_log_density,
     integrated_log_density_pullback,
 )
@@ -67,7 +67,7 @@ def _funcify_density(op: IntegratedLogDensity, node: Any = None, **kwargs: Any) 
     def integrated_density(means, factor, first, points, log_weights):  # type: ignore[no-untyped-def]
         return integrated_log_density(means, factor, first, points, log_weights)
 
-    return integrated_density, EVENT_DENSITY_CACHE_KEY
+    return integrated_density, INFERENCE_CACHE_KEY
 
 
 @register_funcify_default_op_cache_key(IntegratedLogDensityPullback)
@@ -78,4 +78,4 @@ def _funcify_pullback(op: IntegratedLogDensityPullback, node: Any = None, **kwar
     ):
         return integrated_log_density_pullback(cotangent, means, factor, first, points, log_weights)
 
-    return integrated_density_pullback, EVENT_DENSITY_CACHE_KEY
+    return integrated_density_pullback, INFERENCE_CACHE_KEY

@@ -18,13 +18,15 @@ from typing import Any
 import numpy as np
 import pymc as pm
 import pytensor.tensor as pt
-from numba import njit, typeof, types
+from numba import typeof, types
 from numpy.typing import NDArray
 from pymc.blocking import RaveledVars
 from pymc.pytensorf import compile as compile_pytensor
 from pymc.pytensorf import join_nonshared_inputs
 from pymc.step_methods.metropolis import MetropolisState
 from pymc.step_methods.state import dataclass_state
+
+from skred.inference.compiled import compiled
 
 FloatArray = NDArray[np.float64]
 MOVES_PER_DRAW = 4
@@ -39,7 +41,7 @@ _FORGET_UNTIL = 10
 """Adaptation steps after which the chain's past counts in full (the start is forgotten)."""
 
 
-@njit(error_model="numpy", cache=True)
+@compiled()
 def _weighted_sum(rest, pointwise, weights):  # type: ignore[no-untyped-def]
     """Log density of the model with every pointwise term weighted; NaN becomes -inf."""
     total = rest.item()
@@ -49,7 +51,7 @@ def _weighted_sum(rest, pointwise, weights):  # type: ignore[no-untyped-def]
     return -np.inf if np.isnan(total) else total
 
 
-@njit(error_model="numpy", cache=True)
+@compiled()
 def _log_t(z):  # type: ignore[no-untyped-def]
     """Log density of a multivariate Student t at standardised z, but for its constant."""
     square = 0.0
@@ -58,7 +60,7 @@ def _log_t(z):  # type: ignore[no-untyped-def]
     return -0.5 * (DEGREES_OF_FREEDOM + z.size) * np.log1p(square / DEGREES_OF_FREEDOM)
 
 
-@njit(error_model="numpy", cache=True)
+@compiled()
 def _standardise(x, mean, factor, z):  # type: ignore[no-untyped-def]
     """Solve x = mean + factor z."""
     for i in range(x.size):
@@ -68,7 +70,7 @@ def _standardise(x, mean, factor, z):  # type: ignore[no-untyped-def]
         z[i] /= factor[i, i]
 
 
-@njit(error_model="numpy", cache=True)
+@compiled()
 def _add_product(start, factor, z, result):  # type: ignore[no-untyped-def]
     """Write start + factor z to `result`."""
     for i in range(z.size):
@@ -130,7 +132,7 @@ def _chain_for(density: types.FunctionType, data: types.BaseTuple) -> Callable[.
     signature = (
         density, data, vector, vector, vector, matrix, types.float64, cube, matrix, matrix, matrix
     )  # fmt: skip
-    chain: Callable[..., tuple[float, float]] = njit(signature, error_model="numpy", cache=True)(_run_chain)
+    chain: Callable[..., tuple[float, float]] = compiled(signature)(_run_chain)
     return chain
 
 

@@ -1,15 +1,12 @@
-"""Densities of one event's readings given a front, and their bounds, in numba.
-
-All compiled functions that call each other stand in this one file, because numba's cache notices a
-change only in a function's own file.
-"""
+"""Densities of one event's readings given a front, and their bounds, in numba."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from numba import njit
+
+from skred.inference.compiled import compiled
 
 OUTLIER_FACTOR = 6.0
 """How much wider than its stated error an outlying reading scatters."""
@@ -21,7 +18,7 @@ _TINY, _SMALL = 1e-30, 1e-200
 _COMMON_STEPS, _COMMON_STEP = 28, 0.5
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def reading_sd(event, sensor, prediction, readings):  # type: ignore[no-untyped-def]
     """Standard deviation of a reading [m/s or m]: its own, else from the prediction."""
     if readings.stated_sd[event, sensor] > 0.0:
@@ -29,7 +26,7 @@ def reading_sd(event, sensor, prediction, readings):  # type: ignore[no-untyped-
     return math.hypot(readings.relative_sd[sensor] * prediction, readings.absolute_sd[sensor])
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _log_stop(stop, reached, not_reached, place_sd):  # type: ignore[no-untyped-def]
     """Log probability that a front that stops at `stop` is seen to stop between two places."""
     above = (reached - stop) / place_sd * _SQRT_HALF
@@ -41,7 +38,7 @@ def _log_stop(stop, reached, not_reached, place_sd):  # type: ignore[no-untyped-
     return math.log(max(probability, _LEAST))
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _unshifted(value, shift, event, sensor, readings):  # type: ignore[no-untyped-def]
     """The prediction whose reading, `shift` standard deviations higher, is the value.
 
@@ -59,7 +56,7 @@ def _unshifted(value, shift, event, sensor, readings):  # type: ignore[no-untype
     return value - shift * reading_sd(event, sensor, value, readings)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _nearest(event, sensor, low, high, shift, readings):  # type: ignore[no-untyped-def]
     """The residual of smallest size, and its standard deviation, for predictions between two values.
 
@@ -76,7 +73,7 @@ def _nearest(event, sensor, low, high, shift, readings):  # type: ignore[no-unty
     return value - prediction - shift * sd, sd
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _put_away(product, total):  # type: ignore[no-untyped-def]
     """A product and a sum of logarithms: the product moved into the sum where it gets out of range."""
     if _SMALL < product < 1.0 / _SMALL:
@@ -84,7 +81,7 @@ def _put_away(product, total):  # type: ignore[no-untyped-def]
     return 1.0, total + math.log(product)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _log_student(event, low, high, readings, errors, case):  # type: ignore[no-untyped-def]
     """Log likelihood of the observed readings under Student's t, in one case of the mixture."""
     degrees, scale, n = errors.degrees, errors.scales[case], 0
@@ -103,7 +100,7 @@ def _log_student(event, low, high, readings, errors, case):  # type: ignore[no-u
     return n * constant - log_sd - 0.5 * (degrees + 1.0) * log_tail
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _multiplied(product, total, usual, outlying, square, share):  # type: ignore[no-untyped-def]
     """A product of densities with one more: as a product, and a sum of logarithms where it is tiny.
 
@@ -119,7 +116,7 @@ def _multiplied(product, total, usual, outlying, square, share):  # type: ignore
     return _put_away(product, total)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _log_two_cases(event, low, high, readings, errors, a, b):  # type: ignore[no-untyped-def]
     """Log likelihood of the observed readings in two cases of the mixture, of the same scale or not.
 
@@ -155,7 +152,7 @@ def _log_two_cases(event, low, high, readings, errors, a, b):  # type: ignore[no
     return log_a, log_b
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _normal_sums(event, low, high, readings):  # type: ignore[no-untyped-def]
     """Of the observed readings: squares in standard deviations, minus the log constants, and how many."""
     squares, product_sd, total_sd, n = 0.0, 1.0, 0.0, 0
@@ -168,7 +165,7 @@ def _normal_sums(event, low, high, readings):  # type: ignore[no-untyped-def]
     return squares, total_sd + math.log(product_sd) + n * _LOG_SQRT_2PI, n
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _log_independent(event, low, high, readings, errors):  # type: ignore[no-untyped-def]
     """Log likelihood of the observed readings, independent within each case of the mixture."""
     n_cases, outliers = errors.weights.size, False
@@ -198,7 +195,7 @@ def _log_independent(event, low, high, readings, errors):  # type: ignore[no-unt
     return most + math.log(total)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _log_correlated(event, prediction, readings, common):  # type: ignore[no-untyped-def]
     """Log likelihood of the observed readings with an error common to the velocities."""
     n_velocities, n, squares, total = 0, 0, 0.0, 0.0
@@ -221,7 +218,7 @@ def _log_correlated(event, prediction, readings, common):  # type: ignore[no-unt
     return -0.5 * squares - log_sd - 0.5 * math.log(inflation) - n * _LOG_SQRT_2PI
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def _bound_correlated(event, low, high, readings, common):  # type: ignore[no-untyped-def]
     """Largest log likelihood for predictions between two values, over a grid of the common error."""
     most = -np.inf
@@ -238,7 +235,7 @@ def _bound_correlated(event, low, high, readings, common):  # type: ignore[no-un
     return most
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def log_likelihood(event, prediction, readings, errors):  # type: ignore[no-untyped-def]
     """Log likelihood of an event's readings given what its front does.
 
@@ -257,7 +254,7 @@ def log_likelihood(event, prediction, readings, errors):  # type: ignore[no-unty
     return at_stop + _log_independent(event, prediction, prediction, readings, errors)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def log_likelihood_bound(event, low, high, readings, errors):  # type: ignore[no-untyped-def]
     """Upper bound of `log_likelihood` over all predictions between two, each by itself."""
     last = low.size - 1
@@ -272,7 +269,7 @@ def log_likelihood_bound(event, low, high, readings, errors):  # type: ignore[no
     return at_stop + _log_independent(event, low, high, readings, errors)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def log_likelihoods(events, predictions, readings, errors):  # type: ignore[no-untyped-def]
     """Log likelihood of each event for each of its runs, (n,) and (n, n_sensors + 1) to (n,)."""
     result = np.empty(events.size)
@@ -281,7 +278,7 @@ def log_likelihoods(events, predictions, readings, errors):  # type: ignore[no-u
     return result
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@compiled()
 def assess(events, predictions, readings, errors, envelope, change, bound, top, mean):  # type: ignore[no-untyped-def]
     """Fill, for each box, the change of its readings along each axis, and what its likelihood may be.
 
