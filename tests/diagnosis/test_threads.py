@@ -15,8 +15,8 @@ from skred.diagnosis.first_look import curve
 from skred.diagnosis.omnibus import omnibus
 from skred.diagnosis.strength_grid import locate
 from skred.diagnosis.tables import BUDGETS, build_tables
-from skred.diagnosis.threads import in_parts, side_by_side, threads
 from skred.physics.mechanisms import mechanisms
+from skred.threads import in_parts, side_by_side, threads
 
 
 @pytest.mark.parametrize(("said", "n"), [("3", 3), ("1", 1), ("0", None), ("many", None), ("", None)])

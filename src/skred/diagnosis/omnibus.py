@@ -17,7 +17,7 @@ from skred.diagnosis.mixed import fit_population
 from skred.diagnosis.modes import Population, Rows
 from skred.diagnosis.replicas import replicas
 from skred.diagnosis.screen import Screen
-from skred.diagnosis.threads import side_by_side, threads
+from skred.threads import side_by_side, threads
 
 FloatArray = NDArray[np.float64]
 LIMIT = 0.01

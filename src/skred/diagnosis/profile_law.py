@@ -28,10 +28,10 @@ from skred.diagnosis.predictive import Predicted, predict_event
 from skred.diagnosis.profile_fit import fit_profile
 from skred.diagnosis.race import Heat
 from skred.diagnosis.screen import Screen
-from skred.diagnosis.threads import side_by_side
 from skred.diagnosis.unlisted import Profile, combined, entering, hats, most_probable
 from skred.diagnosis.unseen import log_densities
 from skred.physics.mechanisms.spec import Direction
+from skred.threads import side_by_side
 
 FloatArray = NDArray[np.float64]
 _DRAWS, _FRONTS = 200, 1200

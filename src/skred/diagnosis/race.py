@@ -28,11 +28,11 @@ from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, stated
 from skred.diagnosis.profile_fit import as_profile, fit_profile
 from skred.diagnosis.screen import Screen, candidates
 from skred.diagnosis.second_look import second_look
-from skred.diagnosis.threads import threads
 from skred.diagnosis.unlisted import KINDS, Kind, Profile, alike, log_evidence_of
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Shape
+from skred.threads import threads
 
 FloatArray = NDArray[np.float64]
 Tell = Callable[[int, int], None]

@@ -13,8 +13,8 @@ from scipy.interpolate import RegularGridInterpolator
 from skred.diagnosis.curves import Base, Curve, Fit, refit
 from skred.diagnosis.extension import Extension
 from skred.diagnosis.modes import Population
-from skred.diagnosis.threads import in_parts, side_by_side
 from skred.physics.mechanisms.spec import Added
+from skred.threads import in_parts, side_by_side
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -13,8 +13,8 @@ from skred.diagnosis.event_nodes import Budget, Spread, event_nodes
 from skred.diagnosis.extension import Extension
 from skred.diagnosis.modes import Population, Rows, event_modes, log_joint
 from skred.diagnosis.strength_grid import Grid, Located
-from skred.diagnosis.threads import in_parts, side_by_side
 from skred.inference.surface import Nodes
+from skred.threads import in_parts, side_by_side
 
 FloatArray = NDArray[np.float64]
 _LEAST = Budget(128, 128, 256, 1.5, 1.8)

@@ -157,8 +157,7 @@ class JointMetropolis(pm.Metropolis):
     moves_per_draw : int
         Metropolis moves between two draws; every second one is a jump.
     pointwise : str, optional
-        Observed variable whose terms can be weighted one by one through `weights`, as exact
-        leave-one-out needs; all weights are 1 to begin with.
+        Observed variable whose terms `run` can weigh one by one, as exact leave-one-out needs.
     model, rng, initial_point :
         As in `pymc.Metropolis`.
 
@@ -195,7 +194,7 @@ class JointMetropolis(pm.Metropolis):
         self._density, self._data = self._compile_density(model, initial_point, pointwise)
         size = sum(int(np.prod(initial_point[v.name].shape)) for v in self.vars)
         data = self._data_values()
-        self.weights = np.ones(len(self._density(np.zeros(size), *data)[1]))
+        self.n_terms = len(self._density(np.zeros(size), *data)[1])
         [signature] = self._density.nopython_signatures
         self._chain = _chain_for(types.FunctionType(signature), typeof(data))
         self._start = 0.1 * np.eye(size)
@@ -267,8 +266,10 @@ class JointMetropolis(pm.Metropolis):
             acceptance = self._run(q, 1, rng, with_terms=False)[-1]
             self._adapt(q, acceptance)
 
-    def run(self, q: FloatArray, n_draws: int, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-        """Draw with the present proposal and weights, without adapting.
+    def run(
+        self, q: FloatArray, n_draws: int, rng: np.random.Generator, weights: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Draw with the present proposal, without adapting; may be called from several threads.
 
         Parameters
         ----------
@@ -276,6 +277,8 @@ class JointMetropolis(pm.Metropolis):
             Raveled values of the (transformed) variables.
         n_draws : int
         rng : numpy Generator
+        weights : (n_terms,) array, optional
+            Of the pointwise terms; by default all are 1.
 
         Returns
         -------
@@ -283,22 +286,28 @@ class JointMetropolis(pm.Metropolis):
         terms : (n_draws, n_terms) array
             The pointwise log densities, unweighted.
         """
-        return self._run(q, n_draws, rng, with_terms=True)[:2]
+        return self._run(q, n_draws, rng, with_terms=True, weights=weights)[:2]
 
     def _run(
-        self, q: FloatArray, n_draws: int, rng: np.random.Generator, *, with_terms: bool
+        self,
+        q: FloatArray,
+        n_draws: int,
+        rng: np.random.Generator,
+        *,
+        with_terms: bool,
+        weights: FloatArray | None = None,
     ) -> tuple[FloatArray, FloatArray, float, float]:
         shape = (n_draws, self.moves_per_draw)
         noise, log_uniforms = rng.standard_normal((*shape, len(q))), np.log(rng.random(shape))
         jumps = noise[:, 1::2]
         jumps /= np.sqrt(rng.chisquare(DEGREES_OF_FREEDOM, jumps.shape[:2]) / DEGREES_OF_FREEDOM)[..., None]
         draws = np.empty((n_draws, len(q)))
-        terms = np.empty((n_draws if with_terms else 0, len(self.weights)))
+        terms = np.empty((n_draws if with_terms else 0, self.n_terms))
         scale = 2.38 / np.sqrt(len(q)) * float(np.exp(self.log_scale))
         accepted, acceptance = self._chain(
             self._density,
             self._data_values(),
-            self.weights,
+            np.ones(self.n_terms) if weights is None else weights,
             q,
             self.mean,
             self.factor,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import arviz_stats as az
@@ -15,6 +15,7 @@ from scipy.special import logsumexp
 
 from skred.inference.gate import R_HAT_LIMIT
 from skred.inference.joint_metropolis import JointMetropolis
+from skred.threads import side_by_side
 
 FloatArray = NDArray[np.float64]
 REFIT_CHAINS, REFIT_DRAWS, REFIT_BURN = 4, 500, 100
@@ -57,50 +58,47 @@ def exact_leave_one_out(
     step: JointMetropolis,
     events: Sequence[str],
     seed: int,
-    tell: Callable[[int, int], None] = lambda done, of: None,
     which: Sequence[int] | None = None,
 ) -> ExactLoo:
-    """Refit without each event and predict it.
+    """Refit without each event and predict it; chains go in threads, each with random numbers of its own.
 
     Parameters
     ----------
     model : pymc.Model
     step : JointMetropolis
-        Made with ``pointwise="recordings"``; its weights are restored.
+        Made with ``pointwise="recordings"``.
     events : sequence of str
         Ids, in the order of the pointwise terms.
     seed : int
-    tell : callable, optional
-        Told the number of refits done and of all.
     which : sequence of int, optional
         Numbers of the events to leave out; by default all.
     """
-    left_out = range(len(events)) if which is None else which
+    left_out = list(range(len(events)) if which is None else which)
     rng = np.random.default_rng([seed, 2])
     start = DictToArrayBijection.map(model.initial_point()).data.astype(float)
-    step.weights[:] = 1.0
     step.adapt(start, _ADAPTATION, rng)
-    draws, terms = [], []
-    try:
-        for done, number in enumerate(left_out):
-            step.weights[:] = 1.0
-            step.weights[number] = 0.0
-            chains = [_refit(step, start.copy(), rng) for _ in range(REFIT_CHAINS)]
-            draws.append([chain[0] for chain in chains])
-            terms.append([chain[1][:, number] for chain in chains])
-            tell(done + 1, len(left_out))
-    finally:
-        step.weights[:] = 1.0
-    r_hat = _r_hat(np.array(draws))
+    numbers = np.repeat(left_out, REFIT_CHAINS)
+    jobs = list(zip(numbers.tolist(), rng.spawn(len(numbers)), strict=True))
+    refits = side_by_side(lambda job: _refit(step, start.copy(), *job), jobs)
+    draws, densities = (np.array(parts) for parts in zip(*refits, strict=True))
+    draws, densities = (
+        one.reshape(len(left_out), REFIT_CHAINS, *one.shape[1:]) for one in (draws, densities)
+    )
+    r_hat = _r_hat(draws)
     failed = tuple(events[k] for k, value in zip(left_out, r_hat, strict=True) if not value <= R_HAT_LIMIT)
-    densities = np.array(terms)
     pointwise = logsumexp(densities, axis=(1, 2)) - np.log(densities[0].size)
     return ExactLoo(pointwise, float(np.sqrt(np.sum(_mcse(densities) ** 2))), failed)
 
 
-def _refit(step: JointMetropolis, q: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    step.run(q, REFIT_BURN, rng)
-    return step.run(q, REFIT_DRAWS * max(1, (len(q) + 1) // 2), rng)
+def _refit(
+    step: JointMetropolis, q: FloatArray, number: int, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """A chain without an event: its draws, and the event's log density there."""
+    weights = np.ones(step.n_terms)
+    weights[number] = 0.0
+    step.run(q, REFIT_BURN, rng, weights)
+    draws, terms = step.run(q, REFIT_DRAWS * max(1, (len(q) + 1) // 2), rng, weights)
+    return draws, terms[:, number].copy()  # a view would keep the terms of all events
 
 
 def _r_hat(draws: FloatArray) -> FloatArray:
