@@ -2,7 +2,8 @@
 
 ``python benchmarks/proof_page.py --add DIR`` takes a revealed proof folder into the record
 (``results/proof/<seed>/``: ledger, opened truths with their salts, answers without their predictors);
-without ``--add`` it only writes the page anew. The page scores all batches together.
+without ``--add`` it only writes the page anew. The page scores the largest batch, which one version of the
+code diagnosed from first to last, and then all batches together.
 
 A batch is one ledger. Batches are added as time allows, each with a seed of its own. One that is given up
 keeps its ledger, and its ``notes.md`` says why.
@@ -38,11 +39,21 @@ reveal`). A crash or a time-out is a wrong answer; every trial of every opened b
 batch that was given up is listed with its reason. Scores are defined
 in `src/skred/prove/scores*.py`.
 """
+_RUN = """Seed {seed}: {n} trials, {nothing} of them with nothing hidden ({nasty} nasty), all diagnosed by one
+version of the code, which was frozen before the seed was chosen. With the source of that version the same
+trials, with other salts, are drawn, diagnosed and scored by
+
+```console
+skred prove seal DIR --trials {n} --nothing-share {share:g} --seed {seed}
+skred prove run DIR
+skred prove reveal DIR
+python benchmarks/run_baselines.py --trials DIR
+skred prove reveal DIR
+```
+"""
 _IN_ORDER = """Each batch was diagnosed by the code of its day, so these rows are also a history. The first
 two (1471600277, 1152334902) did not look for forces that are nil on average. Clean trials whose diagnosis
 crashed or timed out are counted as failures; CPU times are of different machines.
-"""
-_LAST = """By the latest code that has a batch; few trials, and wide intervals.
 """
 _BEFORE_OPPOSED = 2
 """Opened batches whose code did not look for forces that are nil on average."""
@@ -96,24 +107,44 @@ def gathered(batches: Sequence[Path]) -> tuple[list[dict[str, Any]], dict[str, d
     return trials, answers
 
 
-def page(batches: Sequence[Path], document: Found, figures: Sequence[str]) -> str:
-    """The whole page."""
-    parts = [_HEAD, "## Batches\n", _batches(batches), "## Bars\n", bars_table(document)]
+def page(batches: Sequence[Path], run: Found, document: Found, figures: Sequence[str]) -> str:
+    """The whole page: the largest batch's scores are `run`, those of all together `document`."""
+    parts = [_HEAD, "## Batches\n", _batches(batches)]
+    parts += ["## One blind run\n", _about(_largest(batches)), bars_table(run)]
     parts += [f"![{name.replace('_', ' ')}](figures/proof-{name}.png)\n" for name in figures]
-    parts += ["## The last batch alone\n", _LAST, bars_table(_of_last(batches))]
-    parts += ["## Open and masked\n", _masked(batches, document)]
-    parts += ["## Batch by batch\n", _IN_ORDER, _by_batch(batches, document)]
-    parts += ["## By what was hidden\n", _by_hidden(document)]
-    parts += ["## Why bars are missed\n", (RECORD / "missed.md").read_text(encoding="utf-8")]
+    parts += ["### Open and masked\n", _masked(run), "### By what was hidden\n", _by_hidden(run)]
+    parts += ["### Why bars are missed\n", (RECORD / "missed.md").read_text(encoding="utf-8")]
+    parts += ["## All batches together\n", _IN_ORDER, _by_batch(batches, document), bars_table(document)]
+    parts += [_later(batches, document), _by_hidden(document)]
     parts += ["## What it got wrong\n", _wrong(batches), *map(_notes, batches)]
     return "\n".join(parts)
 
 
-def _masked(batches: Sequence[Path], document: Found) -> str:
-    """Found, of trials of which the base law shows on average something, and of those where it hides it.
+def _largest(batches: Sequence[Path]) -> Path:
+    """The opened batch with most trials."""
 
-    Also without the batches whose code did not look for what is nil on average.
-    """
+    def size(batch: Path) -> int:
+        return int(json.loads((batch / "ledger.json").read_text(encoding="utf-8"))["n"])
+
+    return max(filter(_is_open, batches), key=size)
+
+
+def _about(batch: Path) -> str:
+    """What a batch consists of, and how to repeat it."""
+    ledger = json.loads((batch / "ledger.json").read_text(encoding="utf-8"))
+    trials, _ = gathered([batch])
+    clean = [one["truth"] for one in trials if not one["truth"]["mechanisms"]]
+    return _RUN.format(
+        seed=ledger["seed"],
+        n=ledger["n"],
+        nothing=len(clean),
+        nasty=sum(truth["hidden"] == "nasty" for truth in clean),
+        share=len(clean) / ledger["n"],
+    )
+
+
+def _masked(document: Found) -> str:
+    """Found, of trials of which the base law shows on average something, and of those where it hides it."""
     head = ["| signal-to-noise | open: found | masked: found |", "| --- | --- | --- |"]
     scores = document["methods"][DIAGNOSIS]
     both = [scores[which]["all"]["detection"]["by_snr"] for which in ("open", "masked")]
@@ -121,22 +152,20 @@ def _masked(batches: Sequence[Path], document: Found) -> str:
         f"| {row['snr_from']:g} to {row['snr_to']:g} | {_share(row)} | {_share(other)} |"
         for row, other in zip(*both, strict=True)
     ]
+    return "\n".join([*head, *rows, f"\nFrom {_STRONG:g} on: {_open_and_masked(document['trials'])}."]) + "\n"
+
+
+def _later(batches: Sequence[Path], document: Found) -> str:
+    """The same of the batches whose code looked for what is nil on average."""
     later = {ledger["seed"] for ledger in _in_order(batches)[_BEFORE_OPPOSED:]}
     lines = [one for one in document["trials"] if int(one["trial"].partition("/")[0]) in later]
+    return f"From {_STRONG:g} on, without the first two batches: {_open_and_masked(lines)}.\n"
+
+
+def _open_and_masked(lines: Sequence[Found]) -> str:
     masked = [one for one in lines if one["hidden"] == "masked"]
-    text = (
-        "\nFrom 5.5 on, without the first two batches, which did not look for forces that are nil on average:"
-        f" {found_of([one for one in lines if one not in masked])} open effects were found,"
-        f" {found_of(masked)} masked ones."
-    )
-    return "\n".join([*head, *rows, text]) + "\n"
-
-
-def _of_last(batches: Sequence[Path]) -> Found:
-    """Scores of the batch that was sealed last, of those that are opened."""
-    last = _in_order(batches)[-1]["seed"]
-    trials, answers = gathered([one for one in batches if one.name == str(last)])
-    return scorecard({"n": len(trials)}, trials, answers)
+    open_ones = [one for one in lines if one["hidden"] != "masked"]
+    return f"{found_of(open_ones)} open effects were found, {found_of(masked)} masked ones"
 
 
 def _in_order(batches: Sequence[Path]) -> list[Found]:
@@ -272,6 +301,11 @@ def _wrong(batches: Sequence[Path]) -> str:
     return "\n".join(rows) + "\n"
 
 
+def _scores(batches: Sequence[Path]) -> Found:
+    trials, answers = gathered(batches)
+    return scorecard({"n": len(trials)}, trials, answers)
+
+
 app = cyclopts.App(help=__doc__)
 
 
@@ -286,13 +320,12 @@ def main(
     if new is not None:
         add(new)
     batches = sorted((one for one in RECORD.iterdir() if one.is_dir()), key=lambda one: int(one.name))
-    trials, answers = gathered(batches)
-    document = scorecard({"n": len(trials)}, trials, answers)
+    run, document = _scores([_largest(batches)]), _scores(batches)
     with TemporaryDirectory() as folder:
-        figures = save_scorecard_figures(document, Path(folder))
+        figures = save_scorecard_figures(run, Path(folder))
         for name, file in figures.items():
             shutil.copy(file, FIGURES / f"proof-{name}.png")
-    write_text(ROOT / "docs" / "proof.md", page(batches, document, list(figures)))
+    write_text(ROOT / "docs" / "proof.md", page(batches, run, document, list(figures)))
 
 
 if __name__ == "__main__":
