@@ -20,6 +20,7 @@ from pathlib import Path
 import cyclopts
 import numpy as np
 from numpy.typing import NDArray
+from proof_record import RECORD, sealed_of
 from race_again import CLASSES, found_trials, stated_of
 
 from skred.diagnosis.decide import decide
@@ -67,11 +68,7 @@ def cases() -> list[Case]:
     # Of these batches alone: what is opened later must not change what was frozen before.
     batches = sorted({key.partition(":")[0] for key in again})
     drawn = Counter(
-        _class(one["truth"]["hidden"])
-        for batch in batches
-        for one in json.loads(
-            (RESULTS / "proof" / batch / "sealed.json").read_text(encoding="utf-8")
-        ).values()
+        _class(one["truth"]["hidden"]) for batch in batches for one in sealed_of(RECORD / batch).values()
     )
     of_these = found_trials(tuple(map(int, batches)), CLASSES)
     found = Counter(_class(sealed["truth"]["hidden"]) for sealed in of_these.values())

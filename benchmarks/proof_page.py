@@ -1,9 +1,8 @@
 """The published record: concealed trials that were sealed, diagnosed, revealed; and docs/proof.md.
 
 ``python benchmarks/proof_page.py --add DIR`` takes a revealed proof folder into the record
-(``results/proof/<seed>/``: ledger, opened truths with their salts, answers without their predictors);
-without ``--add`` it only writes the page anew. The page scores the largest batch, which one version of the
-code diagnosed from first to last, and then all batches together.
+(``proof_record.py`` has its form); without ``--add`` it only writes the page anew. The page scores the
+largest batch, which one version of the code diagnosed from first to last, and then all batches together.
 
 A batch is one ledger. Batches are added as time allows, each with a seed of its own. One that is given up
 keeps its ledger, and its ``notes.md`` says why.
@@ -11,7 +10,6 @@ keeps its ledger, and its ``notes.md`` says why.
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -20,14 +18,14 @@ from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import cyclopts
+from proof_record import RECORD, add, answers_of, batches, is_open, ledger_of, sealed_of
 
 from skred.prove.ledger import ledger_sha256
 from skred.prove.scorecard import DIAGNOSIS, scorecard
-from skred.work.output import plain, write_json, write_text
+from skred.work.output import write_text
 
 FAILED = ("crash", "timeout")
 ROOT = Path(__file__).resolve().parent.parent
-RECORD = ROOT / "benchmarks" / "results" / "proof"
 FIGURES = ROOT / "docs" / "figures"
 Found = Mapping[str, Any]
 _HEAD = """# The record of concealed trials
@@ -61,47 +59,13 @@ _STRONG = 5.5
 """Signal-to-noise from which on effects should be found."""
 
 
-def add(folder: Path) -> None:
-    """Take a revealed proof folder into the record."""
-    ledger = json.loads((folder / "ledger.json").read_text(encoding="utf-8"))
-    target = RECORD / str(ledger["seed"])
-    names = [entry["trial"] for entry in ledger["trials"]]
-    target.mkdir(parents=True, exist_ok=True)
-    # As it was published, to the last byte.
-    shutil.copyfile(folder / "ledger.json", target / "ledger.json")
-    sealed = {name: json.loads((folder / "sealed" / f"{name}.json").read_text("utf-8")) for name in names}
-    answers: dict[str, dict[str, Any]] = {}
-    for method in sorted((folder / "answers").iterdir()):
-        answers[method.name] = {name: _answer(folder, method.name, name) for name in names}
-    write_json(target / "sealed.json", sealed)
-    # On one line: with a line for each number it is half as large again.
-    write_text(target / "answers.json", json.dumps(plain(answers), allow_nan=False) + "\n")
-
-
-def _answer(folder: Path, method: str, name: str) -> dict[str, Any]:
-    """An answer without its predictors, its realised gain with it."""
-    answer = json.loads((folder / "answers" / method / f"{name}.json").read_text(encoding="utf-8"))
-    answer.pop("predictors", None)
-    gain = folder / "gains" / method / f"{name}.json"
-    if gain.exists():
-        found = json.loads(gain.read_text(encoding="utf-8"))["gain"]
-        answer["gain"] = {**(answer.get("gain") or {}), **found}
-    return answer
-
-
-def _is_open(batch: Path) -> bool:
-    """Whether a batch has been revealed; until then its folder holds the ledger alone."""
-    return (batch / "sealed.json").exists()
-
-
 def gathered(batches: Sequence[Path]) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
     """Trials with their truths, and answers by method, of all batches, named by seed and trial."""
     trials, answers = [], dict[str, dict[str, Any]]()
-    for batch in filter(_is_open, batches):
-        sealed = json.loads((batch / "sealed.json").read_text(encoding="utf-8"))
+    for batch in filter(is_open, batches):
+        sealed = sealed_of(batch)
         trials += [{"trial": f"{batch.name}/{name}", "truth": one["truth"]} for name, one in sealed.items()]
-        given = json.loads((batch / "answers.json").read_text(encoding="utf-8"))
-        for method, by_trial in given.items():
+        for method, by_trial in answers_of(batch).items():
             mine = answers.setdefault(method, {})
             mine.update({f"{batch.name}/{name}": answer for name, answer in by_trial.items()})
     return trials, answers
@@ -122,16 +86,12 @@ def page(batches: Sequence[Path], run: Found, document: Found, figures: Sequence
 
 def _largest(batches: Sequence[Path]) -> Path:
     """The opened batch with most trials."""
-
-    def size(batch: Path) -> int:
-        return int(json.loads((batch / "ledger.json").read_text(encoding="utf-8"))["n"])
-
-    return max(filter(_is_open, batches), key=size)
+    return max(filter(is_open, batches), key=lambda batch: int(ledger_of(batch)["n"]))
 
 
 def _about(batch: Path) -> str:
     """What a batch consists of, and how to repeat it."""
-    ledger = json.loads((batch / "ledger.json").read_text(encoding="utf-8"))
+    ledger = ledger_of(batch)
     trials, _ = gathered([batch])
     clean = [one["truth"] for one in trials if not one["truth"]["mechanisms"]]
     return _RUN.format(
@@ -170,7 +130,7 @@ def _open_and_masked(lines: Sequence[Found]) -> str:
 
 def _in_order(batches: Sequence[Path]) -> list[Found]:
     """Ledgers of the opened batches as they were sealed."""
-    ledgers = [json.loads((one / "ledger.json").read_text("utf-8")) for one in batches if _is_open(one)]
+    ledgers = [ledger_of(one) for one in batches if is_open(one)]
     return sorted(ledgers, key=lambda one: str(one["created_utc"]))
 
 
@@ -244,7 +204,7 @@ def _batches(batches: Sequence[Path]) -> str:
         "| --- | --- | --- | --- | --- | --- |",
     ]
     for batch in batches:
-        ledger = json.loads((batch / "ledger.json").read_text(encoding="utf-8"))
+        ledger = ledger_of(batch)
         rows.append(
             f"| {ledger['seed']} | {ledger['n']} ({ledger['kind']}) | {ledger['created_utc']} |"
             f" `{ledger_sha256(ledger)}` | `{ledger['source_sha256'][:12]}` |"
@@ -254,7 +214,7 @@ def _batches(batches: Sequence[Path]) -> str:
 
 
 def _state(batch: Path) -> str:
-    if _is_open(batch):
+    if is_open(batch):
         return "opened"
     return "given up unopened, see below" if (batch / "notes.md").exists() else "not opened yet"
 
@@ -319,13 +279,13 @@ def main(
 
     if new is not None:
         add(new)
-    batches = sorted((one for one in RECORD.iterdir() if one.is_dir()), key=lambda one: int(one.name))
-    run, document = _scores([_largest(batches)]), _scores(batches)
+    every = batches()
+    run, document = _scores([_largest(every)]), _scores(every)
     with TemporaryDirectory() as folder:
         figures = save_scorecard_figures(run, Path(folder))
         for name, file in figures.items():
             shutil.copy(file, FIGURES / f"proof-{name}.png")
-    write_text(ROOT / "docs" / "proof.md", page(batches, run, document, list(figures)))
+    write_text(ROOT / "docs" / "proof.md", page(every, run, document, list(figures)))
 
 
 if __name__ == "__main__":

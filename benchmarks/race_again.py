@@ -24,6 +24,7 @@ from typing import Any
 
 import cyclopts
 import numpy as np
+from proof_record import diagnosed, opened_batches, sealed_of
 
 from skred.campaign import read_campaign, write_campaign
 from skred.cli_options import DIAGNOSIS_SAMPLING
@@ -37,7 +38,6 @@ from skred.inference.hierarchical import HierarchicalProblem, hierarchical_probl
 from skred.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.prove.hashes import source_sha256
-from skred.prove.scores_answers import pairs_of
 from skred.report.diagnosis_words import leading_name
 from skred.trials.draw import draw_trial
 from skred.work.calibrate import calibrate_surely
@@ -108,16 +108,13 @@ def look(sealed: dict[str, Any]) -> dict[str, Any]:
 def found_trials(batches: Sequence[int], hidden: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Opened trials in which something was found, whatever it was called: key and what was sealed."""
     trials = {}
-    for file in sorted((RESULTS / "proof").glob("*/sealed.json")):
-        if batches and int(file.parent.name) not in batches:
+    for batch in opened_batches():
+        if batches and int(batch.name) not in batches:
             continue
-        sealed, answers = (
-            json.loads((file.parent / name).read_text(encoding="utf-8"))
-            for name in ("sealed.json", "answers.json")
-        )
-        for pair in pairs_of(list(sealed.values()), answers["skred"]):
+        sealed = sealed_of(batch)
+        for pair in diagnosed(batch):
             if pair.alarm and pair.hidden in hidden:
-                trials[f"{file.parent.name}:{pair.trial}"] = sealed[pair.trial]
+                trials[f"{batch.name}:{pair.trial}"] = sealed[pair.trial]
     return trials
 
 

@@ -6,18 +6,15 @@ prints how many true strengths the 90 % intervals hold for several values.
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path
 
 import cyclopts
+from proof_record import RECORD, diagnosed
 
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group
-from skred.prove.scores_answers import pairs_of
 from skred.prove.scores_places import CREDIBLE, comparable
 
-RECORD = Path(__file__).resolve().parent / "results" / "proof"
 BATCHES = (1471600277, 1152334902, 60796182)
 app = cyclopts.App(help=__doc__)
 
@@ -27,9 +24,7 @@ def main() -> None:
     """Count."""
     known = []
     for seed in BATCHES:
-        sealed, answers = (json.loads((RECORD / str(seed) / name).read_text(encoding="utf-8"))
-                           for name in ("sealed.json", "answers.json"))  # fmt: skip
-        for pair in pairs_of(list(sealed.values()), answers["skred"]):
+        for pair in diagnosed(RECORD / str(seed)):
             truth = comparable(pair) if pair.right_name else None
             if truth is not None and mechanisms()[str(pair.name)].group is Group.PHYSICS:
                 known.append(
