@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from skred.diagnosis.decide import decide, smallest_set
+from skred.diagnosis.decide import Decision, decide, smallest_set
 from skred.diagnosis.odds import POWER, prior_odds, probabilities, stated
 from skred.diagnosis.omnibus import LIMIT, Omnibus
 from skred.physics.mechanisms import mechanisms
@@ -75,9 +75,15 @@ def test_silence() -> None:
     for can_tell, expected in ((True, "nothing_missing"), (False, "cannot_tell")):
         found = decide(quiet, p_value=0.3, can_tell=can_tell)
         assert (found.verdict, found.names) == (expected, ())
-    # Not fired: a race at three to one is no alarm.
+
+
+def test_short_of_an_alarm_nothing_is_not_claimed() -> None:
+    """A race at three to one is no alarm, and no reason to say that nothing is missing; nor is a check."""
     loud = shares(0.25, 0.05, obstacle=0.65, sensor_bias=0.05)
-    assert decide(loud, p_value=0.3, can_tell=True).verdict == "nothing_missing"
+    assert decide(loud, p_value=0.3, can_tell=True) == Decision("cannot_tell", ())
+    even = shares(0.5, 0.0, obstacle=0.5)
+    assert decide(even, p_value=0.3, can_tell=True).verdict == "nothing_missing"
+    assert decide(even, p_value=0.01, can_tell=True) == Decision("cannot_tell", ())
 
 
 def test_one_name() -> None:
@@ -132,12 +138,12 @@ def test_the_race_alone_and_the_check_alone() -> None:
     """
     nearly = shares(0.09, 0.01, obstacle=0.9)
     assert decide(nearly, p_value=0.05, can_tell=True).names == ("obstacle",)
-    assert decide(nearly, p_value=0.06, can_tell=True).verdict == "nothing_missing"
-    assert decide(shares(0.11, 0.0, obstacle=0.89), 0.05, True).verdict == "nothing_missing"
+    assert decide(nearly, p_value=0.06, can_tell=True).verdict == "cannot_tell"
+    assert decide(shares(0.11, 0.0, obstacle=0.89), 0.05, True).verdict == "cannot_tell"
     sure = shares(0.009, 0.001, obstacle=0.99)
     assert decide(sure, p_value=0.3, can_tell=True).names == ("obstacle",)
-    assert decide(shares(0.011, 0.0, obstacle=0.989), 0.3, True).verdict == "nothing_missing"
-    assert decide(shares(0.51, 0.0, obstacle=0.49), 0.005, True).verdict == "nothing_missing"
+    assert decide(shares(0.011, 0.0, obstacle=0.989), 0.3, True).verdict == "cannot_tell"
+    assert decide(shares(0.51, 0.0, obstacle=0.49), 0.005, True).verdict == "cannot_tell"
     assert decide(shares(0.49, 0.0, obstacle=0.51), 0.005, True).names == ("obstacle",)
 
 

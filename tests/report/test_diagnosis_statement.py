@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from diagnosis_report_cases import diagnosis
 
+from skred.diagnosis.decide import Decision
 from skred.diagnosis.diagnose import Left
 from skred.diagnosis.omnibus import Omnibus
 from skred.diagnosis.statement import statement
@@ -23,9 +24,12 @@ def document(probability: dict[str, float]) -> dict:
 
 @pytest.mark.parametrize("kind", ["nothing", "silent"])
 def test_a_lean_that_the_check_does_not_bear_out_is_told_and_not_claimed(kind: str) -> None:
-    found = diagnosis(kind)
-    assert found.check is not None
+    found = replace(diagnosis(kind), decision=Decision("cannot_tell", ()))
+    assert found.check is not None and found.table is not None
     leaning = statement(found, document({"nothing": 0.2, "obstacle": 0.5, "unlisted": 0.3}))
+    assert f"{100.0 * found.table.power:.0f} % of cases" in leaning
+    assert ("no silence either" in leaning) == found.table.can_tell == (kind == "nothing")
+    assert ("so silence means little" in leaning) == (kind == "silent")
     assert "an obstacle: a dam, a wall, a step would be the most probable (50 %)" in leaning
     assert (
         f"{100.0 * found.check.p_value:.0f} % of clean campaigns look as odd, so none is claimed" in leaning

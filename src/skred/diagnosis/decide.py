@@ -42,6 +42,11 @@ def alarmed(probability: Mapping[str, float], p_value: float) -> bool:
     return any(p_value <= most and probability[NOTHING] < below for most, below in ALARMS)
 
 
+def _silent(probability: Mapping[str, float], p_value: float) -> bool:
+    """Whether neither check nor race gives a reason to add anything; less than an alarm is reason enough."""
+    return p_value > LIMIT and probability[NOTHING] >= NOTHING_AT_MOST
+
+
 def decide(probability: Mapping[str, float], p_value: float, can_tell: bool) -> Decision:
     """Verdict from probabilities.
 
@@ -53,9 +58,16 @@ def decide(probability: Mapping[str, float], p_value: float, can_tell: bool) -> 
         Of the omnibus check.
     can_tell : bool
         Whether relevant strengths would mostly have been found.
+
+    Returns
+    -------
+    Decision
+        Without an alarm `nothing_missing`, if relevant strengths would have been found, the check does not
+        fire and nothing is not less probable than it was beforehand; else `cannot_tell`.
     """
     if not alarmed(probability, p_value):
-        return Decision("nothing_missing" if can_tell else "cannot_tell", ())
+        nothing = can_tell and _silent(probability, p_value)
+        return Decision("nothing_missing" if nothing else "cannot_tell", ())
     groups: dict[str, dict[str, float]] = {UNLISTED: {UNLISTED: probability[UNLISTED]}}
     for name, share in probability.items():
         if name not in (NOTHING, UNLISTED):

@@ -223,8 +223,6 @@ def _nothing(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     return [
         f"The recordings do not bear out that anything is missing (p = {found.check.p_value:.2g}; probability"
         f" of nothing {_share(document['probability'][NOTHING])}).",
-        _odd(found),
-        _hint(found, document),
         f"A relevant strength of what is listed would have been found in {100.0 * found.table.power:.0f} % of"
         " cases on average; the table of detection limits says from where on each would have been seen.",
     ]
@@ -234,10 +232,20 @@ def _cannot(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     if found.cannot:
         return [f"These recordings cannot tell: {found.cannot}."]
     assert found.check is not None and found.table is not None
+    alarm = (
+        f"No alarm (p = {found.check.p_value:.2g}; probability of nothing"
+        f" {_share(document['probability'][NOTHING])}), but"
+    )
+    power = f"{100.0 * found.table.power:.0f} % of cases on average"
+    silence = (
+        f"{alarm} no silence either: these recordings cannot tell whether anything is missing. A relevant"
+        f" strength of what is listed would have been found in {power}."
+        if found.table.can_tell
+        else f"{alarm} these recordings cannot tell: a relevant strength of what is listed would have been"
+        f" found in only {power}, so silence means little."
+    )
     sentences = [
-        f"No alarm (p = {found.check.p_value:.2g}), but these recordings cannot tell: a relevant strength of"
-        f" what is listed would have been found in only {100.0 * found.table.power:.0f} % of cases on"
-        " average, so silence means little.",
+        silence,
         _odd(found),
         _hint(found, document),
     ]
