@@ -90,9 +90,7 @@ def main(*, workers: int = 2, kind: str = "") -> None:
         own = [one["at_its_place"] for one in known.values() if one["kind"] == of and one["at_its_place"]]
         gains = [max(factors.values()) - factors["1"] for factors in own]
         if gains:
-            print(
-                f"{of}: {len(gains)} trials; another speed gains {np.median(gains):.1f} nats (median),"
-            )
+            print(f"{of}: {len(gains)} trials; another speed gains {np.median(gains):.1f} nats (median),")
             print(f"  more than 1 in {sum(gain > 1.0 for gain in gains)}, at most {max(gains):.1f}")
 
 
