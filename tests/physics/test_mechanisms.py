@@ -25,7 +25,7 @@ from skred.physics.law import Law
 from skred.physics.mechanisms import Mechanism, mechanisms
 from skred.physics.mechanisms.coulomb_friction import WITHOUT_CURVATURE
 from skred.physics.mechanisms.spec import Added, Direction, Group, Setting, Shape
-from skred.physics.mechanisms.stretches import OPPOSED_SHARE, equation_of, is_opposed, shares
+from skred.physics.mechanisms.stretches import OPPOSED_SHARE, U_1, equation_of, is_opposed, shares
 from skred.physics.terrain import Terrain
 
 ALL = mechanisms()
@@ -224,7 +224,7 @@ def test_what_is_opposed_does_not_show_in_a_typical_front(name: str, settings: l
         assert abs(change[0]) < 0.02 and faster > 5 * abs(change[0]) and slower > 5 * abs(change[0])
 
 
-def test_opposed_shapes_share_a_tenth(settings: list[Setting]) -> None:
+def test_opposed_shapes_share_a_quarter(settings: list[Setting]) -> None:
     """As the opposed kinds of the unlisted force do; without any, or with nothing else, all are alike."""
     shapes = added_to(ALL["segment_drag"]).shapes(settings[1])
     opposed = np.array([is_opposed(shape) for shape in shapes])
@@ -235,6 +235,33 @@ def test_opposed_shapes_share_a_tenth(settings: list[Setting]) -> None:
         chosen = [shape for shape, one in zip(shapes, some_of, strict=True) if one]
         np.testing.assert_allclose(shares(chosen), 1.0 / len(chosen))
     assert not any(is_opposed(shape) for shape in added_to(ALL["segment_friction"]).shapes(settings[1]))
+
+
+def test_parts_of_an_opposed_stretch_keep_its_relief_or_vary_it(settings: list[Setting]) -> None:
+    """Where it is, by another relief; elsewhere by the same one, relative to the typical speed there."""
+    setting, added = settings[1], added_to(ALL["segment_drag"])
+    first = next(one for one in added.shapes(setting) if is_opposed(one))
+    assert added.scale_of(first) == pytest.approx(3.0 * added.scale)
+    shape = max(added.split(setting, first, 1.0), key=lambda one: relief_of(setting, one))
+    assert (shape.s_from_m, shape.s_to_m) == (first.s_from_m, first.s_to_m)
+    assert relief_of(setting, shape) == pytest.approx(1.08, rel=0.01)
+    for steps in (1.0, 0.5):
+        parts = added.split(setting, shape, steps)
+        reliefs = np.array([relief_of(setting, one) for one in parts])
+        changed = np.abs(reliefs - 1.08) > 0.01
+        np.testing.assert_allclose(
+            np.sort(reliefs[changed]) / 1.08, [1 - 0.08 * steps, 1 + 0.08 * steps], atol=0.01
+        )
+        assert all(is_opposed(one) and one.prior_scales == first.prior_scales for one in parts)
+        for part, other in zip(parts, changed, strict=True):
+            assert not other or (part.s_from_m, part.s_to_m) == (shape.s_from_m, shape.s_to_m)
+
+
+def relief_of(setting: Setting, shape: Shape) -> float:
+    """Speed at which relief and drag are equal, over the typical one."""
+    assert shape.s_from_m is not None
+    typical = np.interp(shape.s_from_m, setting.terrain.edge_s_m, setting.front_speed)
+    return float(dict(shape.constants)[U_1] / typical)
 
 
 def test_where_no_front_comes_nothing_is_opposed(settings: list[Setting]) -> None:

@@ -80,7 +80,7 @@ def test_a_relief_that_opposes_a_named_drag_is_told() -> None:
     )
     step = replace(found.steps[0], entrants=(replace(entrant, curves=curves), *found.steps[0].entrants[1:]))
     document = verdict(replace(found, steps=(step,)))
-    assert "a relief equals it at the typical speed (31 to 24 m/s)" in document["statement"]
+    assert "a relief equals it at about the typical speed (31 to 24 m/s)" in document["statement"]
     assert "(U^2 - U_0^2)" in document["equation"] and document["mechanisms"][0]["constants"][U_1] == 31.0
 
 

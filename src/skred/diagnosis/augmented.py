@@ -81,7 +81,7 @@ class AddedStrength:
     def scale(self) -> float:
         """Scale of the prior: half-normal, or normal where either sign may be."""
         assert self.mechanism.added is not None
-        return self.mechanism.added.scale
+        return self.mechanism.added.scale_of(self.shape)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

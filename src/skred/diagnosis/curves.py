@@ -210,7 +210,7 @@ class Curve:
         """Strengths on a fine grid, and the log posterior density there, not normalised."""
         added = self.mechanism.added
         assert added is not None
-        scale = added.scale if scale is None else scale
+        scale = added.scale_of(self.shape) if scale is None else scale
         # As many between each two that were computed: these lie close where the curve is narrow.
         parts = np.linspace(self.strengths[:-1], self.strengths[1:], _BETWEEN, endpoint=False, axis=1)
         strengths = np.append(parts.ravel(), self.strengths[-1])
@@ -256,7 +256,8 @@ def curve_near(base: Base, mechanism: Mechanism, shape: Shape, near: Curve, firs
     first : Budget
         For finding where to look; what counts is computed there with fronts.
     """
-    least = 0.03 * _scale(mechanism)
+    assert mechanism.added is not None
+    least = 0.03 * mechanism.added.scale_of(shape)
     for number in range(_PASSES):
         budget = first if number == 0 and first.linear else USUAL
         before = near.moments
@@ -268,17 +269,12 @@ def curve_near(base: Base, mechanism: Mechanism, shape: Shape, near: Curve, firs
     return near
 
 
-def _scale(mechanism: Mechanism) -> float:
-    assert mechanism.added is not None
-    return mechanism.added.scale
-
-
 def _strengths_near(near: Curve) -> FloatArray:
     """Strengths around the mean of a curve, without 0."""
     added = near.mechanism.added
     assert added is not None
     mean, sd = near.moments
-    sd = max(sd, 0.03 * added.scale)
+    sd = max(sd, 0.03 * added.scale_of(near.shape))
     strengths = mean + sd * np.array(_NEAR)
     if abs(mean) > 2.0 * abs(_NEAR[0]) * sd:  # nothing between 0 and there otherwise
         strengths = np.append(strengths, 0.5 * (mean - math.copysign(abs(_NEAR[0]) * sd, mean)))
@@ -305,7 +301,7 @@ def curve_at(
     direction = added.direction(base.setting, shape)
     extension = extended(base.problem, base.law, (*base.directions, direction))
     # Strength 0 like all others, so that what is left of integration errors is the same there.
-    strengths = np.sort(np.append(strengths[np.abs(strengths) > 1e-3 * added.scale], 0.0))
+    strengths = np.sort(np.append(strengths[np.abs(strengths) > 1e-3 * added.scale_of(shape)], 0.0))
     given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
     start = (base.population, base.fit.points)
     fits = None if near is None else [near.nearest(strength) for strength in strengths]

@@ -52,7 +52,7 @@ def curve(
     """
     added = mechanism.added
     assert added is not None
-    grid = added.scale * np.array(_GRID)
+    grid = added.scale_of(shape) * np.array(_GRID)
     strengths = np.concatenate([-grid[::-1], grid]) if added.either_sign else grid
     if linear is not None and (added.either_sign or linear > 0.0):
         more = [linear] if abs(linear) * _OUTSIDE > grid[0] else [linear, _OUTSIDE * linear]

@@ -148,8 +148,9 @@ class Screen:
         for k, candidate in enumerate(self.candidates):
             added = candidate.mechanism.added
             assert added is not None
-            precision = information[:, k] + added.scale**-2.0
-            result[:, k] = 0.5 * score[:, k] ** 2 / precision - 0.5 * np.log(added.scale**2 * precision)
+            scale = added.scale_of(candidate.shape)
+            precision = information[:, k] + scale**-2.0
+            result[:, k] = 0.5 * score[:, k] ** 2 / precision - 0.5 * np.log(scale**2 * precision)
             if not added.either_sign:
                 result[:, k] += math.log(2.0) + log_ndtr(score[:, k] / np.sqrt(precision))
         return result
@@ -161,7 +162,7 @@ class Screen:
         for k, candidate in enumerate(self.candidates):
             added = candidate.mechanism.added
             assert added is not None
-            precision = float(information[0, k]) + added.scale**-2.0
+            precision = float(information[0, k]) + added.scale_of(candidate.shape) ** -2.0
             if abs(score[0, k]) > math.sqrt(precision):
                 found[candidate.mechanism.id, candidate.shape] = float(score[0, k]) / precision
         return found

@@ -107,7 +107,7 @@ def _opposed(constants: dict[str, float]) -> str:
     if U_1 not in constants:
         return ""
     return (
-        "On the same stretch a relief equals it at the typical speed"
+        "On the same stretch a relief equals it at about the typical speed"
         f" ({constants[U_1]:.0f} to {constants[U_2]:.0f} m/s), so that it shows in fronts that are faster or"
         " slower than most, not on average."
     )

@@ -118,10 +118,10 @@ class Located(NamedTuple):
 
 def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located:
     """Look for the added strengths where their curves had them, and around, until the range is settled."""
-    priors = [_prior(curve) for curve in curves]
     n_axes, n_base = len(curves), len(base.law.mechanisms)
-    scale = np.array([p.scale for p in priors])
-    lowest = np.array([-_MOST_SCALES * p.scale if p.either_sign else 0.0 for p in priors])
+    scale = np.array([_prior(curve).scale_of(curve.shape) for curve in curves])
+    either_sign = np.array([_prior(curve).either_sign for curve in curves])
+    lowest = np.where(either_sign, -_MOST_SCALES * scale, 0.0)
     support = Support(lowest, _MOST_SCALES * scale)
     mean, sd = (np.array(values) for values in zip(*(curve.moments for curve in curves), strict=True))
     factor = np.diag(np.clip(sd, 0.01 * scale, scale))

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from skred.diagnosis.curves import Curve, Fit
 from skred.physics.columns import Column
 from skred.physics.mechanisms.spec import Direction, Setting
-from skred.physics.mechanisms.stretches import OPPOSED_SHARE, is_opposed
+from skred.physics.mechanisms.stretches import OPPOSED_SCALES, OPPOSED_SHARE, is_opposed
 from skred.physics.terrain import Terrain
 
 FloatArray = NDArray[np.float64]
@@ -86,8 +86,7 @@ class Prior:
 KINDS = (
     Kind(Column.CONSTANT, False, "m s-2", 0.8, 0.5 * (1.0 - OPPOSED_SHARE), "-f(s)"),
     Kind(Column.QUADRATIC, False, "m-1", 1.5e-3, 0.5 * (1.0 - OPPOSED_SHARE), "-f(s) U^2"),
-    # U^2 varies by a third or so between fronts: the same work, then, as without opposition.
-    Kind(Column.QUADRATIC, True, "m-1", 4.5e-3, OPPOSED_SHARE, "-f(s) (U^2 - U_0^2)"),
+    Kind(Column.QUADRATIC, True, "m-1", OPPOSED_SCALES * 1.5e-3, OPPOSED_SHARE, "-f(s) (U^2 - U_0^2)"),
 )
 AMPLITUDES, LENGTHS_M = (1.0 / 3.0, 1.0, 3.0), (40.0, 120.0, 400.0)
 """Amplitudes in typical ones, and correlation lengths, all of equal prior probability. With one amplitude, a

@@ -150,7 +150,7 @@ def _shape_text(curve: Curve) -> str:
     if shape.s_from_m is not None and shape.s_to_m is not None:
         parts.append(f"s = {shape.s_from_m:.0f} to {shape.s_to_m:.0f} m")
     if is_opposed(shape):
-        parts.append("with a relief equal to it at the typical speed")
+        parts.append("with a relief equal to it at about the typical speed")
     else:
         parts += [f"{symbol_text(symbol)} = {value:g}" for symbol, value in shape.constants]
     parts += [f"sensor {shape.sensor}"] if shape.sensor else []
@@ -161,8 +161,9 @@ def _shape_text(curve: Curve) -> str:
 def _log_prior(curve: Curve, strengths: FloatArray) -> FloatArray:
     added = curve.mechanism.added
     assert added is not None
-    constant = -0.5 * math.log(2.0 * math.pi * added.scale**2) + (0.0 if added.either_sign else math.log(2.0))
-    return np.asarray(-0.5 * (strengths / added.scale) ** 2 + constant)
+    scale = added.scale_of(curve.shape)
+    constant = -0.5 * math.log(2.0 * math.pi * scale**2) + (0.0 if added.either_sign else math.log(2.0))
+    return np.asarray(-0.5 * (strengths / scale) ** 2 + constant)
 
 
 def _evidence(axes: Axes, curve: Curve) -> None:

@@ -101,7 +101,7 @@ def factor_at(entrant: Entrant, relative: float) -> float:
     """Log Bayes factor of an entrant with its prior's scale multiplied."""
     added = entrant.mechanism.added
     assert added is not None
-    factors = [one.log_bayes_factor_at(relative * added.scale) for one in entrant.curves]
+    factors = [one.log_bayes_factor_at(relative * added.scale_of(one.shape)) for one in entrant.curves]
     return float(logsumexp(entrant.log_weights + np.array(factors)))
 
 

@@ -103,6 +103,8 @@ class Shape:
         What it depends on, which instrument it blames.
     constants : mapping
         Other constants by symbol with unit, as ``U_c [m s-1]``.
+    prior_scales : float
+        How many times its mechanism's prior scale the prior of its strength has.
     """
 
     s_from_m: float | None = None
@@ -110,6 +112,7 @@ class Shape:
     covariate: str | None = None
     sensor: str | None = None
     constants: tuple[tuple[str, float], ...] = ()
+    prior_scales: float = 1.0
 
     @property
     def place_m(self) -> float | None:
@@ -177,6 +180,10 @@ class Added:
     either_sign: bool = False
     joins: Callable[[tuple[str, ...]], bool] = lambda base: True
     split: Callable[[Setting, Shape, float], tuple[Shape, ...]] = lambda setting, shape, steps: ()
+
+    def scale_of(self, shape: Shape) -> float:
+        """Scale of the prior of the strength of a shape."""
+        return self.scale * shape.prior_scales
 
     @property
     def relevant(self) -> float:

@@ -24,9 +24,19 @@ STRETCHES_M = (75.0, 200.0, 500.0)
 _STEP_IN_LENGTHS = 0.4
 U_1, U_2 = "U_1 [m s-1]", "U_2 [m s-1]"
 """Front speeds at both ends of a stretch at which a relief on it equals the drag; U_0^2 is linear between."""
-OPPOSED_SHARE = 0.1
-"""Prior probability, among the shapes of a force, that it is opposed: two things that happen to be equal."""
+OPPOSED_SHARE = 0.25
+"""Prior probability, among the shapes of a force, that it is opposed.
+
+About what opposed stretches have where all stretches are equally probable, a fifth to a quarter.
+"""
+OPPOSED_SCALES = 3.0
+"""Prior scale of a drag that is opposed, in that of one that is not.
+
+U^2 varies by a third or so between fronts: the same work, then, on fronts that are not typical.
+"""
 _OPPOSED_FROM_M = 150.0
+_OTHER_RELIEF = 0.08
+"""By how much of its speed a relief may be another than one that equals the drag at the typical speed."""
 _LEAST_SPEED = 5.0
 """Front speed [m/s] below which nothing is opposed: fronts are about to stop there."""
 
@@ -107,17 +117,27 @@ def stretches_of_drag(setting: Setting) -> tuple[Shape, ...]:
     return (*plain, *(one for one in opposed if one is not None))
 
 
-def _opposed(setting: Setting, shape: Shape) -> Shape | None:
-    """The stretch with a relief that equals the drag at the typical speed; None where fronts stop."""
-    speeds = np.interp(ends_of(shape), setting.terrain.edge_s_m, setting.front_speed)
+def _opposed(setting: Setting, shape: Shape, relief: float = 1.0) -> Shape | None:
+    """The stretch with a relief that equals the drag at a multiple of the typical speed; None if all stop."""
+    speeds = relief * np.interp(ends_of(shape), setting.terrain.edge_s_m, setting.front_speed)
     if speeds.min() < _LEAST_SPEED:
         return None
     constants = tuple((name, round(float(u), 1)) for name, u in zip((U_1, U_2), speeds, strict=True))
-    return replace(shape, constants=constants)
+    return replace(shape, constants=constants, prior_scales=OPPOSED_SCALES)
+
+
+def _relief_of(setting: Setting, shape: Shape) -> float:
+    """At how much of the typical speed the relief of an opposed stretch equals the drag."""
+    typical = np.interp(ends_of(shape), setting.terrain.edge_s_m, setting.front_speed)
+    constants = dict(shape.constants)
+    return (constants[U_1] + constants[U_2]) / float(typical.sum())
 
 
 def split_stretch(setting: Setting, shape: Shape, steps: float) -> tuple[Shape, ...]:
-    """The stretch moved by a fifth of its length, times steps, shortened, lengthened; opposed if it was."""
+    """The stretch moved by a fifth of its length, times steps, shortened, lengthened.
+
+    If it is opposed so are these, each by as much, and it itself by more and by less.
+    """
     first, last = ends_of(shape)
     length, end = steps * (last - first), setting.terrain.length_m
     changes = ((-0.2, -0.2), (0.2, 0.2), (0.15, -0.15), (-0.25, 0.25), (-0.4, 0.0), (0.0, 0.4))
@@ -126,5 +146,7 @@ def split_stretch(setting: Setting, shape: Shape, steps: float) -> tuple[Shape, 
     ]
     if not is_opposed(shape):
         return tuple(moved)
-    opposed = [_opposed(setting, one) for one in moved]
+    relief, other = _relief_of(setting, shape), steps * _OTHER_RELIEF
+    opposed = [_opposed(setting, one, relief) for one in moved]
+    opposed += [_opposed(setting, shape, relief * factor) for factor in (1.0 - other, 1.0 + other)]
     return tuple(one for one in opposed if one is not None)
