@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -96,6 +96,8 @@ class AugmentedProblem(HierarchicalProblem):
     tables : Tables
     visited : Population, optional
         Populations that chains went to with rougher tables, and that these cover.
+    refined : bool
+        Whether there are tables at half the steps between strengths, because those were too rough.
     """
 
     integration_limit: float = CLAIM_LIMIT
@@ -103,6 +105,7 @@ class AugmentedProblem(HierarchicalProblem):
     added: tuple[AddedStrength, ...]
     tables: Tables = field(repr=False)
     visited: Population | None = None
+    refined: bool = False
 
     def __post_init__(self) -> None:
         """Refuse recordings that the tables are not of."""
@@ -282,12 +285,19 @@ class AugmentedProblem(HierarchicalProblem):
         return speeds
 
     def finer(self, law: Law, posterior: xr.Dataset) -> AugmentedProblem | None:
-        """The same with tables that also cover the populations that chains went to; None where they do.
+        """The same with finer tables; None where there are such already.
 
-        Far from all that the tables cover a few nodes stand for all, and may promise a mode that is none.
+        First those that also cover the populations that chains went to: far from all that the tables cover a
+        few nodes stand for all, and may promise a mode that is none. What is wrong then is wrong between the
+        tables' strengths.
         """
-        if self.visited is not None:
+        old = self.tables
+        if self.refined:
             return None
+        if self.visited is not None:
+            located = finer(self.base, self.extension, old.located)
+            tables = build_tables(self.base, self.extension, located, old.budget, self.visited)
+            return replace(self, tables=tables, refined=True)
         samples = {
             str(name): posterior[name].transpose("chain", "draw").values for name in posterior.data_vars
         }
@@ -295,11 +305,10 @@ class AugmentedProblem(HierarchicalProblem):
         chains = [{name: values[k] for name, values in samples.items()} for k in range(n_chains)]
         moments = [moments_of(*population_of(law, chain)) for chain in chains]
         visited = Population(*(np.array(values) for values in zip(*moments, strict=True)))
-        old = self.tables
         wide = old.budget.over_population * 2 ** math.ceil(math.log2(2 + n_chains))
         budget = old.budget._replace(over_population=wide, adapted=2 * old.budget.adapted)
         tables = build_tables(self.base, self.extension, old.located, budget, visited)
-        return _with_tables(self.base, self.added, tables, visited)
+        return replace(self, tables=tables, visited=visited)
 
     def surfaces(self, mechanisms: Sequence[Mechanism]) -> Surfaces:
         """Not there: surfaces would be those of the base law alone.
@@ -352,19 +361,10 @@ def augmented_problem(base: Base, curves: Sequence[Curve]) -> AugmentedProblem:
     return _with_tables(base, added, build_tables(base, extension, located, BUDGETS[-1]))
 
 
-def _with_tables(
-    base: Base, added: tuple[AddedStrength, ...], tables: Tables, visited: Population | None = None
-) -> AugmentedProblem:
+def _with_tables(base: Base, added: tuple[AddedStrength, ...], tables: Tables) -> AugmentedProblem:
     old = base.problem
     return AugmentedProblem(
-        old.campaign,
-        old.terrain,
-        old.error_model,
-        old.place_sd_m,
-        base=base,
-        added=added,
-        tables=tables,
-        visited=visited,
+        old.campaign, old.terrain, old.error_model, old.place_sd_m, base=base, added=added, tables=tables
     )
 
 
