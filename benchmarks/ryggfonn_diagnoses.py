@@ -104,7 +104,8 @@ def diagnose_case(case: Case, replicas: int) -> dict[str, Any]:
 def _best_factor(race: Any, name: str, factor: float) -> float:
     """Log Bayes factor of a mechanism's best shape if its prior were wider or narrower."""
     entrant = race.leading(name).entrants[name]
-    return float(entrant.best.log_bayes_factor_at(factor * entrant.mechanism.added.scale))
+    scale = entrant.mechanism.added.scale_of(entrant.best.shape)
+    return float(entrant.best.log_bayes_factor_at(factor * scale))
 
 
 app = cyclopts.App(help=__doc__)

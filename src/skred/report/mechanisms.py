@@ -9,7 +9,7 @@ import numpy as np
 
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group, Mechanism, Setting
-from skred.physics.mechanisms.stretches import is_opposed
+from skred.physics.mechanisms.stretches import OPPOSED_SCALES, is_opposed
 from skred.physics.terrain import Terrain
 from skred.report.tables import plain_table, plain_text
 
@@ -97,7 +97,8 @@ def looked_for(mechanism: Mechanism) -> str:
     else:
         where = "all avalanches alike"
     if any(is_opposed(shape) for shape in shapes):
-        where += "; the longer ones also with a relief that equals it at about the typical speed"
+        where += "; the longer ones also with a relief that equals it at about the typical speed,"
+        where += f" the prior of its strength {OPPOSED_SCALES:g} times as wide"
     plain = [shape for shape in shapes if not is_opposed(shape)]
     names = dict.fromkeys(name for shape in plain for name, _ in shape.constants)
     values = {name: sorted({dict(shape.constants)[name] for shape in plain}) for name in names}
