@@ -30,14 +30,14 @@ from skred.work.output import write_json
 
 RESULT = Path(__file__).resolve().parent / "results" / "masked_relief.json"
 FACTORS = (0.9, 0.95, 1.0, 1.05, 1.1)
-BEFORE = ("1471600277", "1152334902")
-"""Batches whose diagnoses did not look for what is opposed."""
+LEFT_OUT = ("1471600277", "1152334902", "1324747921")
+"""Batches whose diagnoses did not look for what is opposed; and what came of this study was in the last."""
 STRENGTHS = (0.1, 0.25, 0.5, 1.0, 2.0, 3.5)
 """In scales of the prior."""
 app = cyclopts.App(help=__doc__)
 
 
-def told_of(key: str, sealed: dict[str, Any], found: float | None) -> dict[str, Any]:
+def told_of(sealed: dict[str, Any], found: float | None) -> dict[str, Any]:
     """Log Bayes factor at the true place by the relief's factor; the trial's own; None where a gate fails."""
     truth = sealed["truth"]
     hidden = truth["mechanisms"][0]
@@ -52,6 +52,7 @@ def told_of(key: str, sealed: dict[str, Any], found: float | None) -> dict[str, 
 
 def _at(base: Base, name: str, place: tuple[float, float], factor: float) -> float:
     """Log Bayes factor of a mechanism on a stretch, opposed at a multiple of the typical speed."""
+    # The prior as it was in those diagnoses, not three times as wide.
     mechanism = mechanisms()[name]
     assert mechanism.added is not None
     speeds = factor * np.interp(place, base.setting.terrain.edge_s_m, base.setting.front_speed)
@@ -64,7 +65,7 @@ def opposed_trials() -> dict[str, tuple[dict[str, Any], float | None]]:
     """Opened trials whose effect a relief opposes: what was sealed, and what the diagnosis found for it."""
     trials = {}
     for batch in opened_batches():
-        if batch.name in BEFORE:
+        if batch.name in LEFT_OUT:
             continue
         answers = answers_of(batch)[DIAGNOSIS]
         for name, sealed in sealed_of(batch).items():
@@ -76,16 +77,12 @@ def opposed_trials() -> dict[str, tuple[dict[str, Any], float | None]]:
 
 
 @app.default
-def main(*, workers: int = 2, kind: str = "") -> None:
+def main(*, workers: int = 2) -> None:
     """Work out what is not known yet, and say how much a relief's speed costs."""
     known = json.loads(RESULT.read_text(encoding="utf-8")) if RESULT.exists() else {}
-    todo = {
-        key: one
-        for key, one in opposed_trials().items()
-        if key not in known and kind in ("", one[0]["truth"]["kind"])
-    }
+    todo = {key: one for key, one in opposed_trials().items() if key not in known}
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-        jobs = {pool.submit(told_of, key, *one): key for key, one in todo.items()}
+        jobs = {pool.submit(told_of, *one): key for key, one in todo.items()}
         for job in as_completed(jobs):
             known[jobs[job]] = job.result()
             write_json(RESULT, known)

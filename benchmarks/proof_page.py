@@ -124,9 +124,7 @@ def _later(batches: Sequence[Path], document: Found) -> str:
     later = {ledger["seed"] for ledger in _in_order(batches)[_BEFORE_OPPOSED:]}
     lines = [one for one in document["trials"] if int(one["trial"].partition("/")[0]) in later]
     text = f"From {_STRONG:g} on, without the first two batches: {_open_and_masked(lines)}.\n\n"
-    text += (
-        "Share of masked effects found less that of open ones of the same signal-to-noise (bins as above, "
-    )
+    text += "Share of masked effects found less that of open ones of like signal-to-noise (bins as above, "
     text += "as many open ones as there are masked ones in each; 95 % by bootstrap; asked: within 0.10):\n\n"
     rows = ["| | all | sparse | dense |", "| --- | --- | --- | --- |"]
     for least in (0.0, _STRONG):
