@@ -155,25 +155,28 @@ def test_finer_tables_cover_what_chains_visited(problem: AugmentedProblem) -> No
     """
     law, grid = problem.base.law, problem.tables.grid
     strength = grid.points[grid.nearest(problem.tables.mean[None])[0], 0]
-    far = 0.3 * np.exp(0.3 + np.array([-0.02, 0.0, 0.02]))
+    far = 0.3 * np.exp(0.45 + np.array([-0.02, 0.0, 0.02]))
     samples = {"dry_friction": far, "dry_friction_spread": np.full(3, 0.02)}
     samples["turbulent_drag"] = np.full(3, strength)
     chains = {name: (("chain", "draw"), np.tile(values, (4, 1))) for name, values in samples.items()}
     again = problem.finer(law, xr.Dataset(chains))
     assert again is not None
     before, after = (np.abs(one.integration_errors(law, samples)).max() for one in (problem, again))
-    assert before > 0.2 and after < 0.05
+    assert before > 0.2 and after < 0.1 * before
     near = {"dry_friction": 0.3, "dry_friction_spread": 0.1, "turbulent_drag": strength}
     samples = {name: np.array([value]) for name, value in near.items()}
     assert_allclose(again.log_likelihood(law, samples), problem.log_likelihood(law, samples), atol=0.02)
 
 
 def test_finest_tables_are_at_half_the_steps_between_strengths(problem: AugmentedProblem) -> None:
-    """The second time that tables are too rough, and no more than that: less error between two is left."""
+    """The second time that tables are too rough, and no more than that: little error between two is left.
+
+    In a narrow population beside the posterior's, whose likelihood bends most with the strength.
+    """
     law, grid = problem.base.law, problem.tables.grid
     at = grid.nearest(problem.tables.mean[None])[0]
     strengths = grid.points[at, 0] + 0.5 * grid.steps[0] * np.array([-1.0, 1.0])
-    samples = {"dry_friction": np.full(2, 0.3), "dry_friction_spread": np.full(2, 0.1)}
+    samples = {"dry_friction": np.full(2, 0.3 * np.exp(0.2)), "dry_friction_spread": np.full(2, 0.02)}
     samples["turbulent_drag"] = strengths
     chains = {name: (("chain", "draw"), np.tile(values, (4, 1))) for name, values in samples.items()}
     covered = problem.finer(law, xr.Dataset(chains))
@@ -182,7 +185,7 @@ def test_finest_tables_are_at_half_the_steps_between_strengths(problem: Augmente
     assert finest is not None and np.all(finest.tables.grid.steps == 0.5 * grid.steps)
     assert finest.finer(law, xr.Dataset(chains)) is None
     before, after = (np.abs(one.integration_errors(law, samples)).sum() for one in (covered, finest))
-    assert after < before
+    assert before > 0.2 and after < 0.1 * before
 
 
 def test_posterior_is_that_of_a_dense_grid(problem: AugmentedProblem, calibration: Any) -> None:

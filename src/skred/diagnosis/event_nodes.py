@@ -1,9 +1,10 @@
-"""Importance nodes: each event's likelihood over its own strengths, where a population makes them likely.
+"""Nodes: each event's likelihood over its own strengths, where a population makes them likely.
 
 A mixture of proposals, many nodes around the event's own mode, some over the whole population, and many
 where those have found the weight to be, weighs each node by the mixture's density; so a second mode
 (reached, not reached) that the first proposal misses is still counted. The same quasi-random numbers serve
-every strength, which makes differences between strengths smoother than the integrals themselves.
+every strength, which makes differences between strengths smoother than the integrals themselves. Where there
+is one strength and nothing else that is free, nodes lie on a line (`line_nodes`) and nothing is random.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from scipy.stats import qmc
 
 from skred.diagnosis.compiled import compiled
 from skred.diagnosis.extension import Extension
+from skred.diagnosis.line_nodes import line_nodes
 from skred.diagnosis.modes import Modes, Population, Rows
 from skred.inference.reading_density import log_likelihoods
 from skred.inference.surface import Nodes
@@ -49,6 +51,11 @@ class Budget(NamedTuple):
     wider: float = 1.35
     population_wider: float = 1.6
     linear: bool = False
+
+    @property
+    def total(self) -> int:
+        """All of an event's nodes."""
+        return self.around_mode + self.over_population + self.adapted
 
     def times(self, more: int) -> Budget:
         """So many times the nodes."""
@@ -190,12 +197,15 @@ def event_nodes(
         them. Without any, a population that has become too narrow would never see what it misses.
     shifts : (n_rows, n_base + 1) array, optional
         By which each row's quasi-random numbers are moved round along each axis, 0 to 1. For means over
-        rows, not differences: what is left of the integration errors then averages out.
+        rows, not differences: what is left of the integration errors then averages out. On a line there are
+        no such numbers, and nothing is moved.
     """
     n = population.mean.shape[1]
     axes = n + 1 if (extension.problem.releases.sd[rows.event] > 0.0).any() else n
     cover = np.linalg.inv(modes.information + population.precision[rows.group])[:, :axes, :axes]
     cover = 0.5 * (cover + cover.transpose(0, 2, 1))
+    if axes == 1:
+        return _on_a_line(extension, rows, strengths, population, modes, budget, reference, cover)
     parts = [
         _Part(budget.around_mode, modes.points[:, None, :axes], budget.wider * np.linalg.cholesky(cover))
     ]
@@ -226,6 +236,36 @@ def event_nodes(
     full = np.zeros((n_rows, n_nodes, n + 1))
     full[:, :, :axes] = points
     return Spread(full, log_weights - math.log(n_nodes))
+
+
+def _on_a_line(
+    extension: Extension,
+    rows: Rows,
+    strengths: FloatArray,
+    population: Population,
+    modes: Modes,
+    budget: Budget,
+    reference: Population | None,
+    cover: FloatArray,
+) -> Spread:
+    """Nodes of all rows where there is one axis: as `event_nodes`, not random."""
+    over = [
+        _over(one, rows, 1, 1.0) for one in [population, *([] if reference is None else reference.groups)]
+    ]
+    centres = np.column_stack([modes.points[:, 0], *(centre[:, 0] for centre, _ in over)])
+    widths = [budget.wider * np.sqrt(cover[:, 0, 0])]
+    widths += [budget.population_wider * factor[:, 0, 0] for _, factor in over]
+
+    def log_likelihoods_at(points: FloatArray) -> FloatArray:
+        return _log_likelihoods(extension, rows, strengths, modes, points[:, :, None], budget.linear)
+
+    populations = centres[:, 1:], np.column_stack([factor[:, 0, 0] for _, factor in over])
+    points, log_weights = line_nodes(
+        log_likelihoods_at, centres, np.column_stack(widths), populations, budget.total
+    )
+    full = np.zeros((*points.shape, 2))
+    full[:, :, 0] = points
+    return Spread(full, log_weights)
 
 
 def _log_likelihoods(
