@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from diagnosis_cases import base_of, first_events, trial, with_sensors
+from numpy.testing import assert_allclose
 
 from skred.campaign import Campaign, CampaignError, Sensor, Status, write_campaign
 from skred.diagnosis.curves import Base
@@ -106,7 +107,7 @@ def test_all_runouts_censored() -> None:
 
 
 def test_constant_covariate() -> None:
-    """It divides by nothing: left out; one that differs is kept, standardised."""
+    """It divides by nothing: left out; one that differs is kept, standardised; 0 has no logarithm."""
     campaign = small()
     events = tuple(
         replace(event, covariates={"density_kg_m3": 250.0, "snow_type": "dry", "volume_m3": float(k)})
@@ -116,6 +117,21 @@ def test_constant_covariate() -> None:
     assert list(setting.covariates) == ["volume_m3"]
     volume = setting.covariates["volume_m3"]
     assert volume.mean() == pytest.approx(0.0, abs=1e-12) and volume.std() == pytest.approx(1.0)
+
+
+def test_a_volume_of_another_order_of_magnitude_does_not_decide_alone() -> None:
+    """It enters by its logarithm, in which it is one of many; a temperature stays as it is."""
+    campaign = small()
+    volumes = [1.1e3, 2.3e3, 0.7e3, 5.2e3, 1.6e3, 3.1e3, 90e3]
+    events = tuple(
+        replace(event, covariates={"volume_m3": volumes[k % 7], "snow_degC": -1.0 - 0.5 * (k % 5)})
+        for k, event in enumerate(campaign.events)
+    )
+    setting = setting_of(hierarchical_problem(replace(campaign, events=events)), load_law("constant"))
+    logs = np.log([event.covariates["volume_m3"] for event in events])
+    assert_allclose(setting.covariates["volume_m3"], (logs - logs.mean()) / logs.std(), atol=1e-12)
+    raw = np.array([event.covariates["snow_degC"] for event in events], dtype=float)
+    assert_allclose(setting.covariates["snow_degC"], (raw - raw.mean()) / raw.std(), atol=1e-12)
 
 
 def test_two_sensors_at_the_same_place() -> None:

@@ -163,6 +163,16 @@ def test_text_of_two_kinds_and_what_is_not_known() -> None:
     assert standard.standardised(events, "snow").tolist() == [1.0, -1.0, 0.0, 0.0, 0.0]
 
 
+def test_a_logarithm_of_what_has_none_is_not_known() -> None:
+    standard = Standard(np.log(100.0), np.log(10.0), logarithm=True)
+    values = (1000.0, 100.0, 0.0, -3.0, None)
+    events = [
+        replace(one, covariates={"volume_m3": value})
+        for one, value in zip(campaign().events, values, strict=False)
+    ]
+    assert_allclose(standard.standardised(events, "volume_m3"), [1.0, 0.0, 0.0, 0.0, 0.0], atol=1e-12)
+
+
 def test_predictions_hold_what_they_should() -> None:
     """A front of the mean population, read by a sensor that is biased by a known factor."""
     few, sensor = of_events(campaign(), [0, 3]), campaign().sensors[GATE].id
@@ -193,7 +203,7 @@ def test_a_predictor_comes_back_as_it_was(augmented: Calibration) -> None:
 
 def document() -> dict[str, Any]:
     shape = Shape(400.0, 500.0)
-    covariate = Term("covariate_friction", Shape(covariate="x"), Standard(1.0, 2.0))
+    covariate = Term("covariate_friction", Shape(covariate="x"), Standard(1.0, 2.0, logarithm=True))
     terms = (Term("segment_drag", shape), covariate)
     return as_dict(by_hand(2, *terms, strengths=[[1e-3, 0.1], [2e-3, 0.1]]))
 
@@ -225,7 +235,8 @@ IN_TERMS: list[tuple[int, str, Any]] = [
     (0, "mechanism", "gnomes"), (0, "mechanism", ["segment_drag"]), (0, "mechanism", "constant_retardation"),
     (0, "s_from_m", None), (0, "s_from_m", 600.0), (0, "s_to_m", float("nan")), (0, "constants", {"c": -1.0}),
     (0, "constants", [1.0]), (1, "standard", {"centre": 0.0, "scale": 0.0, "kinds": []}),
-    (1, "standard", {"centre": 0.0, "scale": 1.0, "kinds": ["a"]}), (1, "covariate", 3.0),
+    (1, "standard", {"centre": 0.0, "scale": 1.0, "kinds": ["a"]}),
+    (1, "standard", {"centre": 0.0, "scale": 1.0, "kinds": [], "logarithm": 1}), (1, "covariate", 3.0),
 ]  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -61,9 +62,7 @@ def _term_dict(term: Term) -> dict[str, Any]:
         "covariate": shape.covariate,
         "sensor": shape.sensor,
         "constants": dict(shape.constants),
-        "standard": None
-        if standard is None
-        else {"centre": standard.centre, "scale": standard.scale, "kinds": list(standard.kinds)},
+        "standard": None if standard is None else {**asdict(standard), "kinds": list(standard.kinds)},
     }
 
 
@@ -193,7 +192,10 @@ def _standard(entry: Mapping[str, Any]) -> Standard | None:
     scale = _number(standard, "scale", _LARGEST_NUMBER)
     if not scale > 1e-12:
         raise InputError("predictor: standard: scale must be positive")
-    return Standard(centre, scale, tuple(kinds))
+    logarithm = standard.get("logarithm", False)  # not there in those of before
+    if not isinstance(logarithm, bool) or (logarithm and kinds):
+        raise InputError("predictor: standard: logarithm: expected true or false, and false for a text")
+    return Standard(centre, scale, tuple(kinds), logarithm)
 
 
 def _mapping(value: Any, where: str) -> Mapping[str, Any]:

@@ -6,6 +6,7 @@ import math
 import re
 from typing import TYPE_CHECKING, Any
 
+from skred.diagnosis.covariates import standard_of
 from skred.physics.mechanisms.spec import Group
 from skred.physics.mechanisms.stretches import U_1, U_2, equation_of, is_opposed
 from skred.report.draws import chains_of, interval
@@ -134,7 +135,9 @@ def _added_rows(found: Diagnosis, step: Step, number: int) -> list[dict[str, Any
         symbol, _, unit = named.partition(" [")
         rows.append(_row(_short(symbol), unit.rstrip("]") or "1", f"{symbol}, here {value:g}", new=True))
     if shape.covariate:
-        rows.append(_row("x", "1", f"{shape.covariate}, standardised", new=True))
+        standard = standard_of(found.problem.campaign.events, shape.covariate)
+        what = "logarithm standardised" if standard is not None and standard.logarithm else "standardised"
+        rows.append(_row("x", "1", f"{shape.covariate}, {what}", new=True))
     return rows
 
 

@@ -23,7 +23,8 @@ MECHANISM = Mechanism(
         prior_scale=0.12,
         prior_reason="per standard deviation of the covariate: as much as avalanches differ anyhow",
     ),
-    equation="-(exp(beta x) - 1) mu max(0, g cos(phi) + kappa U^2), x the standardised covariate; b for mu",
+    equation="-(exp(beta x) - 1) mu max(0, g cos(phi) + kappa U^2),"
+    " x the covariate or its logarithm, standardised; b for mu",
     mark="fronts with a high value of the covariate retard more, or less, all along the track",
     reference="Hooker (2009), Biometrics 65, 928-936: what drives a lack of fit in the equation of motion",
     doi="10.1111/j.1541-0420.2008.01172.x",

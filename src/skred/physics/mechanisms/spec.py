@@ -68,7 +68,8 @@ class Setting:
     velocities : tuple of bool
         Which of them read a front velocity.
     covariates : mapping
-        Numeric covariates of the events by name, standardised, (n_events,) each; constant ones left out.
+        Covariates of the events by name, standardised as `skred.diagnosis.covariates` has it, (n_events,)
+        each; constant ones left out.
     n_events : int
     front_speed : (n_cells + 1,) array
         Typical speed of the base law's fronts at the cells' edges [m/s]: the root of the mean square over the
