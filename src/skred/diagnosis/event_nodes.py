@@ -179,10 +179,7 @@ def event_nodes(
     reference: Population | None = None,
     shifts: FloatArray | None = None,
 ) -> Spread:
-    """Nodes of all rows, as many for each.
-
-    All are weighted by the mixture of all that was proposed, what was found by adaptation included (adaptive
-    multiple importance sampling: Cornuet and others, 2012, doi 10.1111/j.1467-9469.2011.00756.x).
+    """Nodes of all rows, as many for each: on a line where one strength is free, else importance nodes.
 
     Parameters
     ----------
@@ -200,12 +197,28 @@ def event_nodes(
         rows, not differences: what is left of the integration errors then averages out. On a line there are
         no such numbers, and nothing is moved.
     """
-    n = population.mean.shape[1]
-    axes = n + 1 if (extension.problem.releases.sd[rows.event] > 0.0).any() else n
-    cover = np.linalg.inv(modes.information + population.precision[rows.group])[:, :axes, :axes]
-    cover = 0.5 * (cover + cover.transpose(0, 2, 1))
-    if axes == 1:
-        return _on_a_line(extension, rows, strengths, population, modes, budget, reference, cover)
+    if _axes(extension, rows) == 1:
+        return on_a_line(extension, rows, strengths, population, modes, budget, reference)
+    return importance_nodes(extension, rows, strengths, population, modes, budget, reference, shifts)
+
+
+def importance_nodes(
+    extension: Extension,
+    rows: Rows,
+    strengths: FloatArray,
+    population: Population,
+    modes: Modes,
+    budget: Budget,
+    reference: Population | None = None,
+    shifts: FloatArray | None = None,
+) -> Spread:
+    """As `event_nodes`, over any number of strengths, with the release where it is uncertain.
+
+    All are weighted by the mixture of all that was proposed, what was found by adaptation included (adaptive
+    multiple importance sampling: Cornuet and others, 2012, doi 10.1111/j.1467-9469.2011.00756.x).
+    """
+    n, axes = population.mean.shape[1], _axes(extension, rows)
+    cover = _cover(rows, population, modes, axes)
     parts = [
         _Part(budget.around_mode, modes.points[:, None, :axes], budget.wider * np.linalg.cholesky(cover))
     ]
@@ -238,17 +251,17 @@ def event_nodes(
     return Spread(full, log_weights - math.log(n_nodes))
 
 
-def _on_a_line(
+def on_a_line(
     extension: Extension,
     rows: Rows,
     strengths: FloatArray,
     population: Population,
     modes: Modes,
     budget: Budget,
-    reference: Population | None,
-    cover: FloatArray,
+    reference: Population | None = None,
 ) -> Spread:
-    """Nodes of all rows where there is one axis: as `event_nodes`, not random."""
+    """As `event_nodes`, where one strength is all that is free; see `line_nodes`."""
+    cover = _cover(rows, population, modes, 1)
     over = [
         _over(one, rows, 1, 1.0) for one in [population, *([] if reference is None else reference.groups)]
     ]
@@ -266,6 +279,18 @@ def _on_a_line(
     full = np.zeros((*points.shape, 2))
     full[:, :, 0] = points
     return Spread(full, log_weights)
+
+
+def _axes(extension: Extension, rows: Rows) -> int:
+    """How many there are to integrate over: the base's strengths, and the release where it is uncertain."""
+    return extension.n_base + int((extension.problem.releases.sd[rows.event] > 0.0).any())
+
+
+def _cover(rows: Rows, population: Population, modes: Modes, axes: int) -> FloatArray:
+    """Covariance of the linear model about each row's mode, (n_rows, axes, axes)."""
+    cover = np.linalg.inv(modes.information + population.precision[rows.group])[:, :axes, :axes]
+    result: FloatArray = 0.5 * (cover + cover.transpose(0, 2, 1))
+    return result
 
 
 def _log_likelihoods(
