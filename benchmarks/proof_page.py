@@ -59,7 +59,7 @@ crashed or timed out are counted as failures; CPU times are of different machine
 """
 _BEFORE_OPPOSED = 2
 """Opened batches whose code did not look for forces that are nil on average."""
-_STRONG = 5.5
+_WEAK, _STRONG = 4.0, 5.5
 """Signal-to-noise from which on effects should be found."""
 
 
@@ -126,12 +126,15 @@ def _later(batches: Sequence[Path], document: Found) -> str:
     text = f"From {_STRONG:g} on, without the first two batches: {_open_and_masked(lines)}.\n\n"
     text += "Share of masked effects found less that of open ones of like signal-to-noise (bins as above, "
     text += "as many open ones as there are masked ones in each; 95 % by bootstrap; asked: within 0.10):\n\n"
+    last = str(_in_order(batches)[-1]["seed"])
+    newest = [one for one in lines if one["trial"].startswith(f"{last}/")]
     rows = ["| | all | sparse | dense |", "| --- | --- | --- | --- |"]
-    for least in (0.0, _STRONG):
-        kinds = [[one for one in lines if one["kind"] in kind] for kind in (KINDS, KINDS[:1], KINDS[1:])]
-        cells = [_difference([one for one in own if one["snr"] >= least]) for own in kinds]
-        which = f"{least:g} and more" if least else "any"
-        rows.append(f"| signal-to-noise {which} | {' | '.join(cells)} |")
+    for which, of in (("these batches", lines), (f"the last of them alone, {last}", newest)):
+        for least in (0.0, _WEAK, _STRONG):
+            kinds = [[one for one in of if one["kind"] in kind] for kind in (KINDS, KINDS[:1], KINDS[1:])]
+            cells = [_difference([one for one in own if one["snr"] >= least]) for own in kinds]
+            at = f"signal-to-noise {least:g} and more" if least else "any signal-to-noise"
+            rows.append(f"| {which}: {at} | {' | '.join(cells)} |")
     return text + "\n".join(rows) + "\n"
 
 
