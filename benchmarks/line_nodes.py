@@ -2,8 +2,8 @@
 
 ``python benchmarks/line_nodes.py [--json FILE]`` keeps one in eight of the integrations of Ryggfonn's race,
 under each error model that is raced, and does each again by both rules with the race's budgets, and with
-nodes on a line sixteen times as close, which stand for exact. Importance nodes, as many as a minute allows,
-are the second route to those.
+nodes on a line sixteen times as close, which stand for exact. Importance nodes, as many as a minute or so
+allows, are the second route to those.
 """
 
 from __future__ import annotations
@@ -16,19 +16,14 @@ from typing import Annotated, Any
 
 import cyclopts
 import numpy as np
+from race_again import base_on
 from threadpoolctl import threadpool_limits
 
 from skred.campaign import find_campaign, read_campaign
-from skred.cli_options import DIAGNOSIS_SAMPLING
 from skred.diagnosis import curves
-from skred.diagnosis.curves import Base, fit_base
-from skred.diagnosis.diagnose import as_diagnosed, population_draws, typical
 from skred.diagnosis.event_nodes import FINE, FIRST, FRONTS, USUAL, Budget, importance_nodes, on_a_line
 from skred.diagnosis.marginal import coordinates, evidence
 from skred.diagnosis.race import race
-from skred.inference.hierarchical import hierarchical_problem
-from skred.laws import load_law
-from skred.work.calibrate import calibrate_surely
 from skred.work.output import write_json
 
 app = cyclopts.App(help=__doc__)
@@ -40,14 +35,6 @@ KEPT = 0.125
 MOST = 40
 QUANTILES = {"median": 0.5, "nine in ten": 0.9, "97 in 100": 0.97}
 RULES = {"line": on_a_line, "importance": importance_nodes}
-
-
-def base_of(law_id: str) -> Base:
-    """The base law on Ryggfonn, fitted as a diagnosis fits it."""
-    law = load_law(law_id)
-    problem = as_diagnosed(hierarchical_problem(read_campaign(find_campaign("ryggfonn"))))
-    calibration: Any = calibrate_surely(problem, law, DIAGNOSIS_SAMPLING.settings("hierarchical"))
-    return fit_base(calibration.problem, law, typical(population_draws(calibration, 120, 0)))
 
 
 @contextmanager
@@ -86,7 +73,8 @@ def measured(law_id: str) -> dict[str, Any]:
 
     Not the largest: at strengths that are hopeless by thousands of nats no rule finds what is left.
     """
-    base, calls = base_of(law_id), list[tuple[Any, ...]]()
+    base, calls = base_on(read_campaign(find_campaign("ryggfonn")), law_id), list[tuple[Any, ...]]()
+    assert base is not None
     with watched(calls), threadpool_limits(1, user_api="blas"):
         race(base)
     chosen = np.random.default_rng(1).permutation(len(calls))[:MOST]

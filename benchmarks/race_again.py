@@ -26,7 +26,7 @@ import cyclopts
 import numpy as np
 from proof_record import diagnosed, opened_batches, sealed_of
 
-from skred.campaign import read_campaign, write_campaign
+from skred.campaign import Campaign, read_campaign, write_campaign
 from skred.cli_options import DIAGNOSIS_SAMPLING
 from skred.diagnosis.curves import Base, fit_base
 from skred.diagnosis.diagnose import as_diagnosed, population_draws, typical
@@ -48,6 +48,17 @@ CLASSES = ("listed", "masked", "two", "instrument", "unlisted")
 app = cyclopts.App(help=__doc__)
 
 
+def base_on(campaign: Campaign, law_id: str) -> Base | None:
+    """A base law on a campaign, fitted as a diagnosis fits it; None where its gate fails."""
+    law = load_law(law_id)
+    problem = as_diagnosed(hierarchical_problem(campaign))
+    calibration = calibrate_surely(problem, law, DIAGNOSIS_SAMPLING.settings("hierarchical"))
+    if not calibration.gate.passed:
+        return None
+    assert isinstance(calibration.problem, HierarchicalProblem)
+    return fit_base(calibration.problem, law, typical(population_draws(calibration, 120, 0)))
+
+
 def base_of(sealed: dict[str, Any]) -> Base | None:
     """The base law of a trial, fitted as a diagnosis fits it; None where its gate fails."""
     asked, truth = sealed["asked"], sealed["truth"]
@@ -60,13 +71,7 @@ def base_of(sealed: dict[str, Any]) -> Base | None:
         # As a diagnosis reads it: files round what they hold.
         write_campaign(campaign, Path(scratch) / "campaign")
         campaign = read_campaign(Path(scratch) / "campaign")
-    law = load_law(truth["base_model"])
-    problem = as_diagnosed(hierarchical_problem(campaign))
-    calibration = calibrate_surely(problem, law, DIAGNOSIS_SAMPLING.settings("hierarchical"))
-    if not calibration.gate.passed:
-        return None
-    assert isinstance(calibration.problem, HierarchicalProblem)
-    return fit_base(calibration.problem, law, typical(population_draws(calibration, 120, 0)))
+    return base_on(campaign, truth["base_model"])
 
 
 def beyond(raced: Race, name: str) -> float:

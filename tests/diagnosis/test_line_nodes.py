@@ -1,4 +1,4 @@
-"""Nodes on a line against closed forms, and against many more importance nodes on recordings."""
+"""Nodes on a line against closed forms; `test_marginal` has them against surfaces, on recordings."""
 
 import numpy as np
 import pytest

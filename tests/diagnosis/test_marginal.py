@@ -1,4 +1,4 @@
-"""Evidence over the population: importance nodes against surfaces, Laplace against importance sampling."""
+"""Evidence over the population: nodes against surfaces, Laplace against importance sampling."""
 
 from __future__ import annotations
 

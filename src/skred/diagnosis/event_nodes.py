@@ -33,6 +33,8 @@ _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 class Budget(NamedTuple):
     """How many nodes an event gets, and how much wider than the linear model the proposals are.
 
+    On a line only their total counts.
+
     Attributes
     ----------
     around_mode, over_population : int
@@ -222,7 +224,7 @@ def importance_nodes(
     parts = [
         _Part(budget.around_mode, modes.points[:, None, :axes], budget.wider * np.linalg.cholesky(cover))
     ]
-    covered = [population, *([] if reference is None else reference.groups)]
+    covered = _covered(population, reference)
     # As many as quasi-random numbers come in.
     size = 1 << ((budget.over_population // len(covered)).bit_length() - 1)
     for one in covered:
@@ -262,9 +264,7 @@ def on_a_line(
 ) -> Spread:
     """As `event_nodes`, where one strength is all that is free; see `line_nodes`."""
     cover = _cover(rows, population, modes, 1)
-    over = [
-        _over(one, rows, 1, 1.0) for one in [population, *([] if reference is None else reference.groups)]
-    ]
+    over = [_over(one, rows, 1, 1.0) for one in _covered(population, reference)]
     centres = np.column_stack([modes.points[:, 0], *(centre[:, 0] for centre, _ in over)])
     widths = [budget.wider * np.sqrt(cover[:, 0, 0])]
     widths += [budget.population_wider * factor[:, 0, 0] for _, factor in over]
@@ -284,6 +284,11 @@ def on_a_line(
 def _axes(extension: Extension, rows: Rows) -> int:
     """How many there are to integrate over: the base's strengths, and the release where it is uncertain."""
     return extension.n_base + int((extension.problem.releases.sd[rows.event] > 0.0).any())
+
+
+def _covered(population: Population, reference: Population | None) -> list[Population]:
+    """The rows' own population first, then each that the nodes of all rows must cover."""
+    return [population, *([] if reference is None else reference.groups)]
 
 
 def _cover(rows: Rows, population: Population, modes: Modes, axes: int) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Tables of importance nodes on a grid of added strengths that covers their posterior."""
+"""Tables of nodes on a grid of added strengths that covers their posterior."""
 
 from __future__ import annotations
 
