@@ -3,23 +3,37 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import numpy as np
 
+_inside = threading.local()
+
 
 def threads() -> int:
-    """As many as OMP_NUM_THREADS allows, which `skred prove` sets for its trials; all cores without it."""
+    """As many as OMP_NUM_THREADS allows, which `skred prove` sets for its trials; all cores without it.
+
+    One within a thread of `side_by_side`: threads of threads would wait for each other.
+    """
+    if getattr(_inside, "one_of_many", False):
+        return 1
     allowed = os.environ.get("OMP_NUM_THREADS", "")
     return int(allowed) if allowed.isdecimal() and int(allowed) > 0 else os.cpu_count() or 1
 
 
 def side_by_side[Job, Result](work: Callable[[Job], Result], jobs: Sequence[Job]) -> list[Result]:
     """What comes of jobs that know nothing of each other, in their order."""
-    with ThreadPoolExecutor(threads()) as pool:
+    if threads() == 1:
+        return [work(job) for job in jobs]
+    with ThreadPoolExecutor(threads(), initializer=_enter) as pool:
         return list(pool.map(work, jobs))
+
+
+def _enter() -> None:
+    _inside.one_of_many = True
 
 
 def in_parts(n: int) -> list[slice]:

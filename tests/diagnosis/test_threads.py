@@ -34,6 +34,12 @@ def test_parts_are_everything_once(monkeypatch: pytest.MonkeyPatch, n: int, part
     assert side_by_side(lambda part: part.stop - part.start, found) == [one.stop - one.start for one in found]
 
 
+def test_there_are_no_threads_within_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    assert side_by_side(lambda _: (threads(), len(in_parts(10))), range(5)) == [(1, 1)] * 5
+    assert threads() == 3
+
+
 def test_the_check_is_the_same_in_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     base = sparse_base()
     n = len(base.law.mechanisms)

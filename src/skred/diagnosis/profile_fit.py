@@ -21,7 +21,9 @@ from skred.diagnosis.unlisted import NEAR_M, Kind, Prior, Profile, combined, ent
 
 FloatArray = NDArray[np.float64]
 Start = tuple[FloatArray, tuple[Population, FloatArray]]
-_PRIORS_TRIED = 12
+_PRIORS_TRIED, _PRIORS_AGAIN = 12, 4
+"""Priors climbed under at most; again, by some of the avalanches: close to the best one of all, or those that
+lead then."""
 _ROUNDS, _SURE, _NO_FORCE = 6, 1.0, -0.5
 _SHARES = (1.0, 0.4, 0.15, 0.05)
 _SETTLED = 0.05
@@ -37,9 +39,7 @@ class _Peak:
     information: FloatArray
 
 
-def fit_profile(
-    base: Base, kind: Kind, near: Start | None = None, first: Prior | None = None, most: int = _PRIORS_TRIED
-) -> Profile:
+def fit_profile(base: Base, kind: Kind, near: Start | None = None, again: Prior | None = None) -> Profile:
     """Fit the profile by Gauss-Newton steps around the events' modes; its evidence with nodes at the top.
 
     Climbed to under one prior after the other, as long as those left could matter; the evidence under them
@@ -50,10 +50,9 @@ def fit_profile(
     near : (values, (Population, points)), optional
         A profile, population and events' points: where to begin, beside no force. Far from what was
         recorded, robust errors see outliers and no direction to go.
-    first : Prior, optional
-        Under which to climb first.
-    most : int
-        Priors climbed under at most.
+    again : Prior, optional
+        Under which to climb first: `near` is what was found for it by all of some avalanches, of which the
+        base has a part. Fewer priors are climbed under then, and from one start each.
     """
     at = knots(base.setting)
     # Nothing like everything else, so that what is left of integration errors is the same there.
@@ -64,10 +63,12 @@ def fit_profile(
         starts.append(_peak(base, kind, at, near[0], _fit_at(base, kind, at, *near)))
     height = nothing.found.log_evidence
     seen = _Seen(height, at, priors_of(kind, at))
-    waiting = [first] if first is not None else _first(kind, starts[-1], seen)
+    waiting, climb, most = _first(kind, starts[-1], seen), _top, _PRIORS_TRIED
+    if again is not None:
+        waiting, climb, most = [again], _top_from_one, _PRIORS_AGAIN
     while waiting and len(seen.peaks) < most:
         prior = waiting.pop()
-        seen.add(prior, _top(base, kind, at, [*starts, *seen.peaks.values()], prior.cover(at)))
+        seen.add(prior, climb(base, kind, at, [*starts, *seen.peaks.values()], prior.cover(at)))
         waiting = waiting or seen.open
     prior = max(seen.peaks, key=seen.factor)
     peak = seen.peaks[prior]
@@ -189,11 +190,18 @@ def _top(base: Base, kind: Kind, at: FloatArray, starts: Sequence[_Peak], cover:
     Sharp edges of a listed shape cost more under a smooth prior than they gain; but where recordings are far
     from what no force does, there may be no other way up.
     """
-    top = _climb(base, kind, at, _highest(starts, cover), cover)
+    top = _top_from_one(base, kind, at, starts, cover)
     best = max(starts, key=lambda one: one.fit.found.log_evidence)
     if best.fit.found.log_evidence < top.fit.found.log_evidence + _SURE:
         return top
     return _highest([top, _climb(base, kind, at, best, cover)], cover)
+
+
+def _top_from_one(
+    base: Base, kind: Kind, at: FloatArray, starts: Sequence[_Peak], cover: FloatArray
+) -> _Peak:
+    """The top under a prior, from the start with the highest posterior."""
+    return _climb(base, kind, at, _highest(starts, cover), cover)
 
 
 def _freedom(peak: _Peak, cover: FloatArray) -> float:

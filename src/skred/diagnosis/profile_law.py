@@ -36,8 +36,6 @@ from skred.threads import side_by_side
 FloatArray = NDArray[np.float64]
 _DRAWS, _FRONTS = 200, 1200
 _BUDGET = USUAL.times(2)
-_PRIORS_TRIED = 4
-"""Priors climbed under without each avalanche: close to the best one of all, or those that lead then."""
 
 
 class Draws(NamedTuple):
@@ -122,7 +120,7 @@ def _left_out(base: Base, profile: Profile, event: int, seed: int) -> tuple[_Eve
     others = np.flatnonzero(base.rows.event != event)
     population = profile.fit.found.population(len(base.law.mechanisms))
     near = profile.mean, (population, profile.fit.points[others])
-    again = fit_profile(rest, profile.kind, near, profile.prior, _PRIORS_TRIED)
+    again = fit_profile(rest, profile.kind, near, profile.prior)
     return before, _event(base, *_with(rest, again, rng), event, rng)
 
 
