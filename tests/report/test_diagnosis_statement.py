@@ -124,3 +124,27 @@ def test_what_the_form_of_a_term_is_uncertain_by_is_in_the_strength(kind: str) -
     shapes = step.entrants[0].strength_between_shapes()
     form = 0.0 if kind == "sensor" else FORM * mean
     assert sd == pytest.approx(float(np.sqrt(draws.std(ddof=1) ** 2 + shapes**2 + form**2)))
+
+
+@pytest.mark.parametrize("logarithm", [False, True])
+def test_how_a_covariate_enters_is_told(logarithm: bool) -> None:
+    """To programs with what it is standardised by, to readers in the statement."""
+    found = diagnosis("two")
+    name = verdict(found)["covariate"]
+    sizes = np.geomspace(1.0, 1e4, 22) if logarithm else np.linspace(1.0, 2.0, 22)
+    campaign = found.problem.campaign
+    events = tuple(
+        replace(event, covariates={name: float(size)})
+        for event, size in zip(campaign.events, sizes, strict=True)
+    )
+    problem = replace(found.problem, campaign=replace(campaign, events=events))
+    document = verdict(replace(found, problem=problem))
+    values = np.log(sizes) if logarithm else sizes
+    standard = document["mechanisms"][0]["standard"]
+    assert standard["logarithm"] is logarithm and standard["kinds"] == []
+    assert standard["centre"] == pytest.approx(values.mean()) and standard["scale"] == pytest.approx(
+        values.std()
+    )
+    assert (f"({name}, by its logarithm)" in document["statement"]) is logarithm
+    assert (f"({name})" in document["statement"]) is not logarithm
+    assert document["mechanisms"][1]["standard"] is None

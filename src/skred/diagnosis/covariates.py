@@ -7,7 +7,8 @@ one avalanche four standard deviations off would decide alone what all of them s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,10 @@ class Standard:
         if self.logarithm:
             values = np.log(np.where(values > 0.0, values, np.nan))
         return np.where(np.isfinite(values), (values - self.centre) / self.scale, 0.0)
+
+    def as_dict(self) -> dict[str, Any]:
+        """As plain data."""
+        return {**asdict(self), "kinds": list(self.kinds)}
 
 
 def standard_of(events: Sequence[Event], name: str) -> Standard | None:

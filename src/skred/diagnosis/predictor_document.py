@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -62,7 +61,7 @@ def _term_dict(term: Term) -> dict[str, Any]:
         "covariate": shape.covariate,
         "sensor": shape.sensor,
         "constants": dict(shape.constants),
-        "standard": None if standard is None else {**asdict(standard), "kinds": list(standard.kinds)},
+        "standard": None if standard is None else standard.as_dict(),
     }
 
 

@@ -55,7 +55,9 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     strength, probability = document["strength"], document["probability"]
     what = "The recordings are off" if found.decision.verdict == "instrument" else "Physics is missing"
     subject = document["covariate"] or document["sensor"]
-    about = f" ({subject})" if subject else ""
+    standard = document["mechanisms"][0]["standard"]
+    by_logarithm = ", by its logarithm" if standard is not None and standard["logarithm"] else ""
+    about = f" ({subject}{by_logarithm})" if subject else ""
     sentences = [
         f"{what}: {_title(name)}{about}{_where(document['location'])}, with a probability of"
         f" {_share(probability[name])} (nothing: {_share(probability[NOTHING])}; a force not in the list:"

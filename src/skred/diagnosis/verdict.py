@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from skred.diagnosis.covariates import standard_of
 from skred.diagnosis.decide import alarmed
 from skred.diagnosis.diagnose import Diagnosis
 from skred.diagnosis.entrant import Entrant
@@ -81,11 +82,18 @@ def _mechanism(found: Diagnosis, number: int) -> dict[str, Any]:
         "location": None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]},
         "equation": equation_of(entrant.mechanism, shape),
         "covariate": shape.covariate,
+        "standard": _standard(found, shape.covariate),
         "sensor": shape.sensor,
         "constants": dict(shape.constants),
         "tied_with": [other.mechanism.id for other in step.entrants[1:]],
         "log_bayes_factor": step.race.log_factors[entrant.mechanism.id],
     }
+
+
+def _standard(found: Diagnosis, covariate: str | None) -> dict[str, Any] | None:
+    """By what a covariate is standardised before its strength multiplies it."""
+    standard = None if covariate is None else standard_of(found.problem.campaign.events, covariate)
+    return None if standard is None else standard.as_dict()
 
 
 def _evidence(found: Diagnosis) -> dict[str, float | None]:
