@@ -24,6 +24,7 @@ from typing import Any
 
 import cyclopts
 import numpy as np
+from numpy.typing import NDArray
 from proof_record import diagnosed, opened_batches, sealed_of
 
 from skred.campaign import Campaign, read_campaign, write_campaign
@@ -44,19 +45,28 @@ from skred.work.calibrate import calibrate_surely
 from skred.work.output import write_json
 
 RESULTS = Path(__file__).resolve().parent / "results"
+FloatArray = NDArray[np.float64]
+REPLICAS = 120
 CLASSES = ("listed", "masked", "two", "instrument", "unlisted")
 app = cyclopts.App(help=__doc__)
 
 
 def base_on(campaign: Campaign, law_id: str) -> Base | None:
     """A base law on a campaign, fitted as a diagnosis fits it; None where its gate fails."""
+    found = base_and_draws(campaign, law_id)
+    return None if found is None else found[0]
+
+
+def base_and_draws(campaign: Campaign, law_id: str) -> tuple[Base, tuple[FloatArray, FloatArray]] | None:
+    """And draws of its populations, means and factors."""
     law = load_law(law_id)
     problem = as_diagnosed(hierarchical_problem(campaign))
     calibration = calibrate_surely(problem, law, DIAGNOSIS_SAMPLING.settings("hierarchical"))
     if not calibration.gate.passed:
         return None
     assert isinstance(calibration.problem, HierarchicalProblem)
-    return fit_base(calibration.problem, law, typical(population_draws(calibration, 120, 0)))
+    draws = population_draws(calibration, REPLICAS, 0)
+    return fit_base(calibration.problem, law, typical(draws)), draws
 
 
 def base_of(sealed: dict[str, Any]) -> Base | None:
