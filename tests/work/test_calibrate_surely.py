@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 import xarray as xr
 
 from skred.campaign import find_campaign, read_campaign
@@ -13,7 +14,7 @@ from skred.campaign.parts import of_events
 from skred.inference.hierarchical import COARSER, HierarchicalProblem, hierarchical_problem
 from skred.inference.sampling import SamplerSettings
 from skred.laws import load_law
-from skred.work.calibrate import MORE, calibrate_surely
+from skred.work.calibrate import LONGER, MORE, calibrate_surely
 
 LAW = load_law("constant")
 
@@ -47,11 +48,13 @@ def test_coarser_surfaces_cost_less_and_are_nearly_as_good() -> None:
     assert [coarser.finer(law, xr.Dataset()).fineness, usual.finer(law, xr.Dataset()).fineness] == [1.0, 2.0]
 
 
-def test_short_chains_are_made_longer() -> None:
+@pytest.mark.parametrize(("draws", "times"), [(60, MORE), (5, MORE**LONGER)])
+def test_short_chains_are_made_longer(draws: int, times: int) -> None:
+    """Twice at most: five draws are too few even so."""
     given = problem()
-    found = calibrate_surely(given, LAW, SamplerSettings(draws=60, tune=100, seed=1))
-    assert found.gate.passed
-    assert (found.settings.draws, found.settings.tune) == (MORE * 60, MORE * 100)
+    found = calibrate_surely(given, LAW, SamplerSettings(draws=draws, tune=100, seed=1))
+    assert found.gate.passed == (draws > 5)
+    assert (found.settings.draws, found.settings.tune) == (times * draws, times * 100)
     assert found.problem is given
 
 

@@ -21,8 +21,8 @@ from skred.inference.sampling import SamplerSettings, sample_posterior, sample_p
 from skred.physics.law import Law, Parameter
 from skred.work.output import write_json
 
-MORE = 4
-"""How many times the draws a second attempt makes."""
+MORE, LONGER = 4, 2
+"""How many times the draws a further attempt makes, and how many attempts with more there are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +79,9 @@ def calibrate_surely(problem: Problem, law: Law, settings: SamplerSettings) -> C
     """As `calibrate`, and again where the gate failed.
 
     With finer numerics as long as those were too rough and can be made finer: the calibration's problem is
-    then another than was given. Chains can be stuck in a mode that only rough numerics make. Then, if chains
-    are too short, with `MORE` times the draws.
+    then another than was given. Chains can be stuck in a mode that only rough numerics make. Then, as long as
+    chains are too short, with `MORE` times the draws: along a bent ridge of two strengths that stand for each
+    other chains go slowly, and need that twice.
     """
     found = calibrate(problem, law, settings)
     while not found.gate.numerics:
@@ -88,8 +89,11 @@ def calibrate_surely(problem: Problem, law: Law, settings: SamplerSettings) -> C
         if finer is None:
             break
         found = calibrate(finer, law, settings)
-    if not found.gate.passed and found.gate.chains_too_short:
-        more = replace(settings, draws=MORE * settings.draws, tune=MORE * settings.tune)
+    for attempt in range(1, LONGER + 1):
+        if found.gate.passed or not found.gate.chains_too_short:
+            break
+        times = MORE**attempt
+        more = replace(settings, draws=times * settings.draws, tune=times * settings.tune)
         found = calibrate(found.problem, law, more)
     return found
 
