@@ -2,8 +2,8 @@
 
 From ``results/development.json``, after ::
 
-    python benchmarks/development_set.py --each --seed 1700000 --out DIR
-    python benchmarks/diagnosis.py --trials DIR --workers 2 --json benchmarks/results/development.json
+    python benchmarks/development_set.py --each --seed 1900000 --out DIR
+    python benchmarks/diagnosis.py --trials DIR --workers 1 --json benchmarks/results/development.json
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ _HEAD = """# The development set
 
 Written by `python benchmarks/development_page.py` from `results/development.json`. The commands that made it:
 
-    python benchmarks/development_set.py --each --seed 1700000 --out DIR
-    python benchmarks/diagnosis.py --trials DIR --workers 2 --json benchmarks/results/development.json
+    python benchmarks/development_set.py --each --seed 1900000 --out DIR
+    python benchmarks/diagnosis.py --trials DIR --workers 1 --json benchmarks/results/development.json
 
 {n} simulated campaigns, sparse and dense in turn, with each mechanism, each force that is in no list, masked
 ones, two at once, and nothing, all of a signal-to-noise drawn evenly from 2 to 12. What was tuned, was tuned
