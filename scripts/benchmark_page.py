@@ -372,10 +372,29 @@ Adapted nodes go where the others have found the weight to be: few as they are, 
 """
 
 
+def masked_open() -> str:
+    """Masked and open effects of like signal-to-noise."""
+    found = read("masked_open")["summary"]
+    rows = "".join(f"| {span} | {' | '.join(kinds.values())} |\n" for span, kinds in found.items())
+    return f"""
+## Masked and open effects
+
+`python benchmarks/masked_open.py weak`, then `python benchmarks/masked_open.py strong --n 35`: pairs of
+simulated campaigns, one with a masked effect (the calibrated law is right on average at every sensor), one
+with an open one of a listed mechanism; found is where the alarm is raised. Share of masked ones found less
+that of open ones (95 % by bootstrap; asked: within 0.10); in the last two rows as if spread evenly over their
+signal-to-noise, part by part. Nothing was tuned on these.
+
+| signal-to-noise | all | sparse | dense |
+| --- | --- | --- | --- |
+{rows}"""
+
+
 def main() -> None:
     """Write the page."""
     page = HEAD + forward() + logp() + sampling() + calibration()
     page += hierarchical() + hierarchical_calibration() + line_nodes() + unseen_nodes() + diagnosis()
+    page += masked_open()
     (ROOT / "benchmarks" / "README.md").write_text(page, encoding="utf-8")
 
 
