@@ -24,13 +24,13 @@ import cyclopts
 import numpy as np
 from race_again import REPLICAS, base_and_draws
 
-from skred.campaign import read_campaign, write_campaign
+from skred.campaign import Campaign, read_campaign, write_campaign
 from skred.diagnosis.decide import alarmed
 from skred.diagnosis.odds import NOTHING
 from skred.diagnosis.omnibus import omnibus
 from skred.diagnosis.race import race
 from skred.diagnosis.screen import Screen
-from skred.trials.draw import draw_trial
+from skred.trials.draw import Trial, draw_trial
 from skred.work.output import write_json
 
 app = cyclopts.App(help=__doc__)
@@ -43,16 +43,21 @@ KINDS: tuple[Literal["sparse", "dense"], ...] = ("sparse", "dense")
 HIDDEN = ("masked", "listed")
 
 
-def look(number: int, hidden: str, low: float, high: float) -> dict[str, Any]:
-    """One trial of a pair: what was hidden, and what the alarm says."""
+def drawn(number: int, hidden: str) -> tuple[Trial, Campaign]:
+    """One trial of a pair, and its campaign as a diagnosis reads it: files round what they hold."""
+    [(low, high)] = [(low, high) for first, low, high in RANGES.values() if number // 1000 == first // 1000]
     snr = float(np.random.default_rng([SEED, number]).uniform(low, high))
     trial = draw_trial(SEED + number, kind=KINDS[number % 2], hidden=hidden, snr=snr)
-    told = {"hidden": hidden, "kind": KINDS[number % 2], "asked": snr, "snr": trial.truth["snr"]}
-    told |= {"ids": [one["id"] for one in trial.truth["mechanisms"]], "base": trial.truth["base_model"]}
     with tempfile.TemporaryDirectory() as scratch:
-        # As a diagnosis reads it: files round what they hold.
         write_campaign(trial.campaign, Path(scratch) / "campaign")
-        campaign = read_campaign(Path(scratch) / "campaign")
+        return trial, read_campaign(Path(scratch) / "campaign")
+
+
+def look(number: int, hidden: str) -> dict[str, Any]:
+    """What was hidden, and what the alarm says."""
+    trial, campaign = drawn(number, hidden)
+    told = {"hidden": hidden, "kind": KINDS[number % 2], "snr": trial.truth["snr"]}
+    told |= {"ids": [one["id"] for one in trial.truth["mechanisms"]], "base": trial.truth["base_model"]}
     try:
         found = base_and_draws(campaign, trial.truth["base_model"])
         if found is None:
@@ -114,14 +119,14 @@ def main(which: Literal["weak", "strong"], /, *, n: int = 120, workers: int = 2)
         Processes.
     """
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    first, low, high = RANGES[which]
+    first, _, _ = RANGES[which]
     found: dict[str, Any] = (
         json.loads(RESULT.read_text(encoding="utf-8"))["trials"] if RESULT.exists() else {}
     )
     pairs = [(k, hidden) for k in range(first, first + n) for hidden in HIDDEN]
     open_ones = [(k, hidden) for k, hidden in pairs if f"{k:04d} {hidden}" not in found]
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
-        at_work = {pool.submit(look, *one, low, high): one for one in open_ones}
+        at_work = {pool.submit(look, *one): one for one in open_ones}
         for done in as_completed(at_work):
             number, hidden = at_work[done]
             found[f"{number:04d} {hidden}"] = done.result()
