@@ -81,8 +81,8 @@ def test_no_reading_at_all() -> None:
 
 
 def test_a_gate_that_fails_gives_no_name() -> None:
-    """Forty draws are not enough: a verdict all the same, which says why."""
-    settings = SamplerSettings("metropolis", 40, 40, 2, 0)
+    """Twenty draws are not enough, nor sixteen times as many: a verdict all the same, which says why."""
+    settings = SamplerSettings("metropolis", 10, 10, 2, 0)
     found = diagnose(
         hierarchical_problem(small()), load_law("constant"), settings, Effort(replicas=25, max_mechanisms=1)
     )
