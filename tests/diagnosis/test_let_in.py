@@ -60,7 +60,7 @@ def test_a_check_without_doubt_ends_it(run: Any) -> None:
 def test_in_doubt_the_race_has_to_be_sure(run: Any) -> None:
     sure = raced(nothing=0.005, unlisted=0.0, segment_drag=0.995)
     steps, _, left = run([0.15, 0.5], sure)
-    assert [step.entrants[0].best for step in steps] == ["obstacle", "segment_drag"] and left == Left()
+    assert [step.entrant.best for step in steps] == ["obstacle", "segment_drag"] and left == Left()
     unsure = raced(nothing=0.3, unlisted=0.0, segment_drag=0.7)
     steps, _, left = run([0.15], unsure)
     assert len(steps) == 1 and left.race is unsure and not left.reason

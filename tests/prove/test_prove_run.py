@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import distributed
 import pytest
 from prove_cases import PLAN, Alone, fake, silent
 
@@ -133,6 +134,8 @@ def test_no_scheduler(proof: ProofFolder, monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr("skred.prove.crew._PATIENCE_S", 1)
     with pytest.raises(InputError, match="no Dask scheduler"):
         run(proof, Crew(1, "nonsense://x"), silent, silent)
+    with pytest.raises(ValueError, match="No clients"):
+        distributed.default_client()
 
 
 def test_a_dying_worker_is_replaced_and_its_trial_tried_once_more(proof: ProofFolder) -> None:

@@ -169,6 +169,14 @@ def test_honesty_counts_names_where_nothing_listed_is_hidden() -> None:
     assert found["named_over_ceiling"]["value"] == pytest.approx(1.0 / (2 * 0.49))
 
 
+def test_a_tie_with_a_force_in_no_list_holds_such_a_force() -> None:
+    other = truth("unlisted", effect("wave"))
+    tied = named("obstacle", "unlisted")
+    assert pair(other, tied).right_set and not pair(other, tied).right_name
+    assert not pair(other, named("obstacle", "segment_drag")).right_set
+    assert not pair(truth("listed", effect("viscous_drag")), tied).right_set
+
+
 def test_unlisted_effects_get_no_right_name() -> None:
     cubic = truth("unlisted", effect("cubic_drag", nearest="segment_drag"), snr=10.0)
     near = {"s_from_m": 1150.0, "s_to_m": 1230.0}

@@ -186,15 +186,15 @@ def profile_law(problem: HierarchicalProblem, clean: np.ndarray) -> ProfileLaw:
 def _steps(problem, race, names, clean, *, second):
     if not names:
         return ()
-    entrants = tuple(race.heats[0].entrants[name] for name in names)
-    raced = [(entrants, race)]
+    raced = [(names, race)]
     if second:
         again = race_of(problem, {"obstacle": 30.0})
-        raced.append(((again.heats[0].entrants["obstacle"],), again))
+        raced.append((("obstacle",), again))
     added, steps = (), []
-    for let_in, its_race in raced:
-        best = let_in[0].best
-        name = best.mechanism.strength.name
-        added += (SimpleNamespace(name=name, mechanism=best.mechanism, shape=best.shape),)
-        steps.append(Step(let_in, its_race, calibration(problem, added), Omnibus(0.1, clean)))
+    for (name, *tied), its_race in raced:
+        entrant = its_race.heats[0].entrants[name]
+        best = entrant.best
+        strength = best.mechanism.strength.name
+        added += (SimpleNamespace(name=strength, mechanism=best.mechanism, shape=best.shape),)
+        steps.append(Step(entrant, tuple(tied), its_race, calibration(problem, added), Omnibus(0.1, clean)))
     return tuple(steps)

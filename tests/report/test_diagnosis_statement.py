@@ -10,11 +10,13 @@ from diagnosis_report_cases import diagnosis
 
 from skred.diagnosis.decide import Decision
 from skred.diagnosis.diagnose import Left
+from skred.diagnosis.odds import UNLISTED
 from skred.diagnosis.omnibus import Omnibus
 from skred.diagnosis.statement import statement
 from skred.diagnosis.strength import FORM, strength_of
 from skred.diagnosis.verdict import verdict
 from skred.physics.mechanisms.stretches import U_1, U_2
+from skred.report.diagnosis import render_diagnosis
 from skred.report.draws import chains_of
 
 
@@ -74,14 +76,50 @@ def test_a_relief_that_opposes_a_named_drag_is_told() -> None:
     """In the statement and in the equation, with the speeds at which they are equal."""
     found = diagnosis("tie")
     assert "a relief equals it" not in verdict(found)["statement"]
-    entrant = found.steps[0].entrants[0]
+    entrant = found.steps[0].entrant
     curves = tuple(
         replace(one, shape=replace(one.shape, constants=((U_1, 31.0), (U_2, 24.0)))) for one in entrant.curves
     )
-    step = replace(found.steps[0], entrants=(replace(entrant, curves=curves), *found.steps[0].entrants[1:]))
+    step = replace(found.steps[0], entrant=replace(entrant, curves=curves))
     document = verdict(replace(found, steps=(step,)))
     assert "a relief equals it at about the typical speed (31 to 24 m/s)" in document["statement"]
     assert "(U^2 - U_0^2)" in document["equation"] and document["mechanisms"][0]["constants"][U_1] == 31.0
+
+
+def test_physics_and_instruments_tied_are_both_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also a force in no list; neither statement nor page says that it is the instruments."""
+    splits = {
+        "quantity": "front_velocity", "s_from_m": 1700.0, "s_to_m": 1700.0,
+        "splits": ["sensor_bias", "obstacle"],
+    }  # fmt: skip
+    monkeypatch.setattr("skred.diagnosis.verdict.next_sensor", lambda found: splits)
+    found, tied = diagnosis("sensor"), ("obstacle", UNLISTED)
+    step = replace(found.steps[0], tied=tied)
+    alone = verdict(found)
+    found = replace(found, decision=Decision("instrument", ("sensor_bias", *tied)), steps=(step,))
+    document = verdict(found)
+    assert document["indistinguishable"] == document["mechanisms"][0]["tied_with"] == list(tied)
+    bias, dam = "one sensor reads too high or too low", "an obstacle: a dam, a wall, a step"
+    assert alone["statement"].startswith(f"The recordings are off: {bias}")
+    assert document["statement"].startswith(
+        f"Physics is missing, or the recordings are off; in the lead: {bias}"
+    )
+    assert f"cannot tell it from: {dam}, a force not in the list." in document["statement"]
+    assert f"A speed at s = 1700 m would split {bias} and {dam} best." in document["statement"]
+    html = render_diagnosis(found, document | {"settings": {"draws": 1000, "replicas": 50}}, {})
+    assert "Physics is missing, or the recordings are off</strong>" in html
+    assert "from obstacle, a force not in the list." in html and "not the physics" not in html
+
+
+@pytest.mark.parametrize("tied", [("segment_drag",), ("segment_drag", UNLISTED), (UNLISTED,)])
+def test_what_no_further_speed_splits(tied: tuple[str, ...]) -> None:
+    found = diagnosis("tie")
+    step = replace(found.steps[0], tied=tied)
+    decision = Decision("missing_physics", (found.decision.names[0], *tied))
+    document = verdict(replace(found, steps=(step,), decision=decision))
+    assert document["next_sensor"] is None and "cannot tell it from" in document["statement"]
+    drag = "extra drag on a stretch: forest, boulders, roughness: the term is the same."
+    assert (f"No further speed would split off {drag}" in document["statement"]) == ("segment_drag" in tied)
 
 
 def test_a_candidate_that_is_not_excluded_is_told() -> None:
@@ -121,7 +159,7 @@ def test_what_the_form_of_a_term_is_uncertain_by_is_in_the_strength(kind: str) -
     (step,) = found.steps
     mean, sd = strength_of(found.steps, 0)
     draws = chains_of(step.calibration.tree, step.calibration.problem.added[0].name)
-    shapes = step.entrants[0].strength_between_shapes()
+    shapes = step.entrant.strength_between_shapes()
     form = 0.0 if kind == "sensor" else FORM * mean
     assert sd == pytest.approx(float(np.sqrt(draws.std(ddof=1) ** 2 + shapes**2 + form**2)))
 

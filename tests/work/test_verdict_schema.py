@@ -112,6 +112,9 @@ VALID: dict[str, Callable[[], dict[str, Any]]] = {
     "sensor": lambda: named("sensor_bias", "instrument", sensor="LC"),
     "release": lambda: named("release_offset", "instrument"),
     "tie": tie,
+    "tied across groups": lambda: named(
+        "sensor_bias", "instrument", sensor="LC", indistinguishable=["obstacle", "unlisted"]
+    ),
     "two": two,
     "unexplained": unexplained,
     "cannot tell": cannot_tell,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -12,6 +13,10 @@ from skred.physics.mechanisms.spec import Group
 
 HELD = 0.9
 """Share of its group that a tie set holds."""
+TIED_NATS = 2.0
+"""An id of another group is tied with the named one where its log probability is at most so far below: some
+such ties no recordings split (a low dam and a bias of the sensor beside it), and a group leads by less. Which
+group leads decides the verdict, not whether its name stands alone."""
 NOTHING_AT_MOST, E_LIMIT = 0.5, 0.01
 DOUBTFUL = 0.05
 ALARMS = ((LIMIT, NOTHING_AT_MOST), (DOUBTFUL, 2.0 * DOUBTFUL), (1.0, E_LIMIT))
@@ -30,11 +35,17 @@ class Decision:
     verdict : str
         As in the campaign format.
     names : tuple of str
-        Most probable first; one is named, several are tied, none where nothing is.
+        One is named, several are tied, none where nothing is. Those of the leading group come first, each
+        group's most probable first; `unlisted` may be among the tied ones, and never comes first.
     """
 
     verdict: str
     names: tuple[str, ...]
+
+    @property
+    def disputed(self) -> bool:
+        """Whether physics and instruments are tied: either of them may be off."""
+        return len({mechanisms()[name].group for name in self.names if name != UNLISTED}) > 1
 
 
 def alarmed(probability: Mapping[str, float], p_value: float) -> bool:
@@ -76,7 +87,15 @@ def decide(probability: Mapping[str, float], p_value: float, can_tell: bool) -> 
     if leading == UNLISTED:
         return Decision("unexplained", ())
     verdict = "missing_physics" if leading == Group.PHYSICS else "instrument"
-    return Decision(verdict, smallest_set(groups[leading]))
+    names = smallest_set(groups[leading])
+    others = {name: share for group in groups if group != leading for name, share in groups[group].items()}
+    return Decision(verdict, (*names, *_within(others, probability[names[0]])))
+
+
+def _within(shares: Mapping[str, float], leading: float) -> tuple[str, ...]:
+    """Ids whose probability is close to that of the named one, most probable first."""
+    close = [name for name, share in shares.items() if share >= math.exp(-TIED_NATS) * leading]
+    return tuple(sorted(close, key=lambda name: -shares[name]))
 
 
 def smallest_set(shares: Mapping[str, float]) -> tuple[str, ...]:

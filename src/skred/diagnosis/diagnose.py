@@ -69,8 +69,10 @@ class Step:
 
     Attributes
     ----------
-    entrants : tuple of Entrant
-        Tied candidates, most probable first; the first is the one let in.
+    entrant : Entrant
+        The one let in.
+    tied : tuple of str
+        Ids that the recordings cannot tell from it.
     race : Race
         In which it won.
     calibration : Calibration
@@ -79,7 +81,8 @@ class Step:
         The omnibus check of the augmented law.
     """
 
-    entrants: tuple[Entrant, ...]
+    entrant: Entrant
+    tied: tuple[str, ...]
     race: Race
     calibration: Calibration
     check: Omnibus
@@ -301,8 +304,8 @@ def let_in(
     names, chosen = decision.names, list[Curve]()
     for number in range(effort.max_mechanisms):
         heat = raced.leading(names[0])
-        entrants = tuple(heat.entrants[name] for name in names)
-        chosen.append(entrants[0].best)
+        entrant = heat.entrants[names[0]]
+        chosen.append(entrant.best)
         problem = augmented_problem(_plain(heat.base), chosen)
         # Its chains start around the posterior: half the tuning does.
         calibration = calibrate_surely(problem, base.law, replace(settings, tune=settings.tune // 2))
@@ -313,7 +316,7 @@ def let_in(
             break
         clock.stage("check again", "is anything wrong with the augmented law")
         check, next_base = _check_again(heat.base, calibration, problem, chosen, settings, effort)
-        steps.append(Step(entrants, raced, calibration, check))
+        steps.append(Step(entrant, names[1:], raced, calibration, check))
         left = Left()
         if check.p_value > RACE_AGAIN or number + 1 == effort.max_mechanisms:
             break

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from skred.diagnosis.diagnose import Diagnosis
+from skred.diagnosis.diagnose import Diagnosis, Step
 from skred.diagnosis.entrant import Entrant
 from skred.diagnosis.extension import extended
 from skred.diagnosis.identify import with_sensors
@@ -18,15 +18,19 @@ def next_sensor(found: Diagnosis) -> dict[str, Any] | None:
     """A velocity sensor in the words of the campaign format; None where nothing is to be split or seen."""
     if found.table is None:
         return None
-    entrants = found.steps[0].entrants if found.steps else ()
-    rivals = [one for one in entrants[1:] if one.mechanism.same_term_as != entrants[0].mechanism.id]
-    rivals = [one for one in rivals if entrants[0].mechanism.same_term_as != one.mechanism.id]
-    if rivals:
-        place = _splitting(found, entrants[0], rivals[0])
-        return _sensor(place, [entrants[0].mechanism.id, rivals[0].mechanism.id])
+    if found.steps and (rival := _rival(found.steps[0])) is not None:
+        named = found.steps[0].entrant
+        return _sensor(_splitting(found, named, rival), [named.mechanism.id, rival.mechanism.id])
     if found.decision.verdict == "cannot_tell" and found.table.sensor_m is not None:
         return _sensor(found.table.sensor_m, [])
     return None
+
+
+def _rival(step: Step) -> Entrant | None:
+    """The first of those tied that a speed could split off: listed, and another term."""
+    raced = step.race.leading(step.entrant.mechanism.id).entrants
+    rivals = [raced[name] for name in step.tied if name in raced]
+    return next((one for one in rivals if not one.mechanism.is_same_term(step.entrant.mechanism)), None)
 
 
 def _sensor(place: float, splits: list[str]) -> dict[str, Any]:

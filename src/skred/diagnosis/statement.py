@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from skred.diagnosis.decide import NOTHING_AT_MOST
-from skred.diagnosis.diagnose import Diagnosis
+from skred.diagnosis.decide import NOTHING_AT_MOST, Decision
+from skred.diagnosis.diagnose import Diagnosis, Step
 from skred.diagnosis.locate import Location
 from skred.diagnosis.odds import NOTHING, UNLISTED
 from skred.diagnosis.omnibus import Omnibus
@@ -30,7 +30,7 @@ def statement(found: Diagnosis, document: dict[str, Any]) -> str:
 
 
 def _title(name: str) -> str:
-    return mechanisms()[name].title
+    return "a force not in the list" if name == UNLISTED else mechanisms()[name].title
 
 
 def _share(probability: float) -> str:
@@ -50,16 +50,22 @@ def _unit(unit: str) -> str:
     return "" if unit == "1" else f" {unit}"
 
 
+def _what(decision: Decision) -> str:
+    """What is off, before the name that leads."""
+    if decision.disputed:
+        return "Physics is missing, or the recordings are off; in the lead"
+    return "The recordings are off" if decision.verdict == "instrument" else "Physics is missing"
+
+
 def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     name, ties = document["mechanism"], document["indistinguishable"]
     strength, probability = document["strength"], document["probability"]
-    what = "The recordings are off" if found.decision.verdict == "instrument" else "Physics is missing"
     subject = document["covariate"] or document["sensor"]
     standard = document["mechanisms"][0]["standard"]
     by_logarithm = ", by its logarithm" if standard is not None and standard["logarithm"] else ""
     about = f" ({subject}{by_logarithm})" if subject else ""
     sentences = [
-        f"{what}: {_title(name)}{about}{_where(document['location'])}, with a probability of"
+        f"{_what(found.decision)}: {_title(name)}{about}{_where(document['location'])}, with a probability of"
         f" {_share(probability[name])} (nothing: {_share(probability[NOTHING])}; a force not in the list:"
         f" {_share(probability[UNLISTED])}).",
         f"Its {strength['parameter'].replace('_', ' ')} is {strength['mean']:.3g} +- {strength['sd']:.2g}"
@@ -71,7 +77,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     if ties:
         others = ", ".join(_title(other) for other in ties)
         sentences.append(f"These recordings cannot tell it from: {others}.")
-        sentences.append(_split(document))
+        sentences.append(_split(found.steps[0], document))
     sentences.append(_rival(document))
     if len(document["mechanisms"]) > 1:
         second = document["mechanisms"][1]
@@ -121,19 +127,21 @@ def _left(document: dict[str, Any]) -> str:
     if left is None or left["most_probable"] == NOTHING:
         return ""
     name = left["most_probable"]
-    what = "a force not in the list" if name == UNLISTED else _title(name)
     why = f" ({left['reason']})" if left["reason"] else ""
     return (
-        f"Another race, of the augmented law, leans to {what} ({_share(left['probability'])}; nothing more:"
-        f" {_share(left['nothing'])}); it was not let in{why}."
+        f"Another race, of the augmented law, leans to {_title(name)} ({_share(left['probability'])};"
+        f" nothing more: {_share(left['nothing'])}); it was not let in{why}."
     )
 
 
-def _split(document: dict[str, Any]) -> str:
+def _split(step: Step, document: dict[str, Any]) -> str:
     sensor = document["next_sensor"]
-    if sensor is None or not sensor["splits"]:
-        return "No further speed would split them: the terms are the same." if sensor is None else ""
-    return f"A speed at s = {sensor['s_from_m']:.0f} m would split the first two best."
+    if sensor is not None:
+        first, second = sensor["splits"]
+        at = f"A speed at s = {sensor['s_from_m']:.0f} m"
+        return f"{at} would split {_title(first)} and {_title(second)} best."
+    same = ", ".join(_title(name) for name in step.tied if name != UNLISTED)
+    return f"No further speed would split off {same}: the term is the same." if same else ""
 
 
 def _improvement(document: dict[str, Any]) -> str:
@@ -202,10 +210,10 @@ def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
     if probability[NOTHING] >= NOTHING_AT_MOST:
         return ""
     first = max((name for name in probability if name != NOTHING), key=lambda name: probability[name])
-    what = "a force not in the list" if first == UNLISTED else _title(first)
     return (
-        f"Of what could be missing, {what} would be the most probable ({_share(probability[first])}); but to"
-        f" the check {100.0 * found.check.p_value:.0f} % of clean campaigns look as odd, so none is claimed."
+        f"Of what could be missing, {_title(first)} would be the most probable"
+        f" ({_share(probability[first])}); but to the check"
+        f" {100.0 * found.check.p_value:.0f} % of clean campaigns look as odd, so none is claimed."
     )
 
 

@@ -26,7 +26,7 @@ def strength_of(steps: Sequence[Step], number: int) -> tuple[float, float]:
     the standard deviation too, and so is what no race knows of: that a term stands for a force of a somewhat
     other form.
     """
-    calibration, entrant = steps[-1].calibration, steps[number].entrants[0]
+    calibration, entrant = steps[-1].calibration, steps[number].entrant
     problem: Any = calibration.problem
     name = problem.added[number].name
     draws = np.asarray(calibration.tree["posterior"].to_dataset()[name].values)

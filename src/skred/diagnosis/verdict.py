@@ -26,7 +26,7 @@ _NO_LIMIT = 20.0
 
 def verdict(found: Diagnosis) -> dict[str, Any]:
     """The verdict of a diagnosis, as `verdict.json` holds it."""
-    entrant = found.steps[0].entrants[0] if found.steps else None
+    entrant = found.steps[0].entrant if found.steps else None
     names = found.decision.names if found.steps else ()
     document = {
         "format": 1,
@@ -73,7 +73,7 @@ def _strength(found: Diagnosis, number: int) -> dict[str, Any]:
 def _mechanism(found: Diagnosis, number: int) -> dict[str, Any]:
     """One mechanism let in, its strength as the last calibration has it."""
     step = found.steps[number]
-    entrant = step.entrants[0]
+    entrant = step.entrant
     stretch = entrant.stretch()
     shape = entrant.best.shape
     return {
@@ -85,7 +85,7 @@ def _mechanism(found: Diagnosis, number: int) -> dict[str, Any]:
         "standard": _standard(found, shape.covariate),
         "sensor": shape.sensor,
         "constants": dict(shape.constants),
-        "tied_with": [other.mechanism.id for other in step.entrants[1:]],
+        "tied_with": list(step.tied),
         "log_bayes_factor": step.race.log_factors[entrant.mechanism.id],
     }
 
@@ -100,7 +100,7 @@ def _evidence(found: Diagnosis) -> dict[str, float | None]:
     p_value = found.check.p_value if found.check is not None else None
     factor = None
     if found.race is not None and found.steps:
-        factor = found.race.log_factors[found.steps[0].entrants[0].mechanism.id]
+        factor = found.race.log_factors[found.steps[0].entrant.mechanism.id]
     elif found.race is not None:
         factor = found.race.log_odds
     difference, se = None, None

@@ -68,7 +68,7 @@ class Crew:
                 client.submit(work, job, key=f"{job['trial']}-{uuid.uuid4().hex}", pure=False): job
                 for job in jobs
             }
-            for future in dask.as_completed(list(futures)):
+            for future in dask.as_completed(list(futures), loop=client.loop):
                 job = futures.pop(future)
                 try:
                     result = future.result()
@@ -123,8 +123,14 @@ def _local_client(workers: int) -> Iterator[Any]:
 def _client_of(scheduler: str) -> Iterator[Any]:
     """A client of a scheduler that is there already."""
     try:
-        client = _distributed().Client(scheduler, timeout=f"{_PATIENCE_S}s")
-        client.wait_for_workers(1, timeout=_PATIENCE_S)
+        # Not the default of the process: one that finds nobody would stay it, and whatever is written
+        # to a netCDF file afterwards would ask it for a lock.
+        client = _distributed().Client(scheduler, timeout=f"{_PATIENCE_S}s", set_as_default=False)
+        try:
+            client.wait_for_workers(1, timeout=_PATIENCE_S)
+        except TimeoutError:
+            client.close()
+            raise
     except (OSError, TimeoutError, ValueError) as error:
         message = f"--scheduler {scheduler}: no Dask scheduler with a worker answers there"
         raise InputError(message) from error

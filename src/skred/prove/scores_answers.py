@@ -105,8 +105,9 @@ class Pair:
 
     @property
     def right_set(self) -> bool:
-        """Whether one of the names is hidden."""
-        return bool(self.true_ids & set(self.names))
+        """Whether one of the names is hidden; what is in no list is held by `unlisted` as one of a tie."""
+        hidden = self.true_ids | {UNLISTED for one in self.hidden_effects if not one["listed"]}
+        return bool(hidden & set(self.names))
 
     @property
     def right_class(self) -> bool:

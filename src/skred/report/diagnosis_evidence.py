@@ -62,7 +62,7 @@ def check_figure(found: Diagnosis) -> Figure:
 
 
 def _with(found: Diagnosis, number: int) -> str:
-    names = [step.entrants[0].mechanism.id for step in found.steps[: number + 1]]
+    names = [step.entrant.mechanism.id for step in found.steps[: number + 1]]
     return " + ".join([found.law.id, *names])
 
 
@@ -120,7 +120,7 @@ def probabilities_figure(found: Diagnosis, race: Race, number: int) -> Figure:
 def strength_figure(found: Diagnosis, race: Race, number: int) -> Figure:
     """Evidence along the strength of the leading candidate, its posterior, and the prior's part in it."""
     step = found.steps[number] if number < len(found.steps) else None
-    entrant = step.entrants[0] if step is not None else leading(race)
+    entrant = step.entrant if step is not None else leading(race)
     curve, name = entrant.best, entrant.mechanism.id
     what = "let in" if step is not None else "came closest, not let in"
     title = f"{figure_text(short_title(name), 60)} ({what}): evidence along its strength"

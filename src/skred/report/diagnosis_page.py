@@ -9,23 +9,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skred.diagnosis.decide import ALARMS, E_LIMIT, decide
+from skred.diagnosis.decide import ALARMS, E_LIMIT, TIED_NATS, decide
 from skred.diagnosis.held_out import K_LIMIT, paired
+from skred.diagnosis.odds import UNLISTED
 from skred.diagnosis.omnibus import LIMIT
 from skred.diagnosis.unlisted import AMPLITUDES, KINDS, LENGTHS_M, NEAR_M
 from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
+from skred.physics.mechanisms import mechanisms
 from skred.report import diagnosis_rows as rows
 from skred.report import diagnosis_unseen as unseen
 from skred.report import document as doc
 from skred.report.diagnosis_equation import equations, parameter_rows, symbol_rows
 from skred.report.diagnosis_words import (
-    VERDICTS,
     leading_name,
     profile_of,
     races,
     short_title,
     stretch_of,
+    verdict_words,
 )
 from skred.report.html import environment, picture
 from skred.report.labels import unit_text
@@ -70,7 +72,7 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
             sections=sections,
             number={name: place for place, name in enumerate(sections, start=1)},
             figures={name: picture(file) for name, file in figures.items()},
-            verdict=VERDICTS[found.decision.verdict],
+            verdict=verdict_words(found),
             facts=rows.recorded_facts(found),
             sensors=rows.sensor_rows(found),
             told=rows.told_rows(found),
@@ -98,7 +100,7 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
             profile_window=f"{2.0 * NEAR_M:.0f}",
             limits={
                 "p": LIMIT, "doubtful": ALARMS[1][0], "sure": ALARMS[1][1], "e": E_LIMIT, "k": K_LIMIT,
-                "r_hat": R_HAT_LIMIT, "ess": ESS_LIMIT, "practical": PRACTICAL_DIFFERENCE,
+                "tied": TIED_NATS, "r_hat": R_HAT_LIMIT, "ess": ESS_LIMIT, "practical": PRACTICAL_DIFFERENCE,
             },
             too_few=_too_few(found),
             dropped=_dropped(found),
@@ -111,22 +113,17 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
 def _race(found: Diagnosis, number: int, race: Any) -> dict[str, Any]:
     """A race, with the ending of its figures' names."""
     step = found.steps[number] if number < len(found.steps) else None
-    ties = [one.mechanism for one in step.entrants[1:]] if step is not None else []
-    winner = step.entrants[0].mechanism if step is not None else None
-    same = [
-        one.id
-        for one in ties
-        if winner is not None
-        and winner.id in (one.same_term_as,)
-        or one.id == getattr(winner, "same_term_as", "")
-    ]
+    winner = step.entrant.mechanism if step is not None else None
+    ties = step.tied if step is not None else ()
+    listed = [mechanisms()[name] for name in ties if name != UNLISTED]
+    same = [one.id for one in listed if winner is not None and one.is_same_term(winner)]
     return {
         "ending": f"_{number + 1}" if number else "",
         "rows": rows.race_rows(race),
         "errors": rows.error_rows(race),
         "winner": winner,
         "leading": leading_name(race),
-        "ties": [one.id for one in ties],
+        "ties": _in_words(ties),
         "same": same,
     }
 
@@ -149,7 +146,12 @@ def _dropped(found: Diagnosis) -> tuple[str, ...]:
     """What the race would have named, had its own calibration passed the gate."""
     if found.race is None or found.check is None or found.table is None or found.steps:
         return ()
-    return decide(found.race.probability, found.check.p_value, found.table.can_tell).names
+    return _in_words(decide(found.race.probability, found.check.p_value, found.table.can_tell).names)
+
+
+def _in_words(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Ids as they are, but for the way out of the list."""
+    return tuple("a force not in the list" if name == UNLISTED else name for name in names)
 
 
 def _difference(found: Diagnosis) -> dict[str, Any] | None:

@@ -92,7 +92,7 @@ def _marks(axes: Axes, found: Diagnosis) -> None:
         label = f"what is missing: s = {stretch[0]:.0f} to {stretch[1]:.0f} m"
         axes.axvspan(*stretch, color=MISMATCH, alpha=0.18, linewidth=0, label=label, zorder=0)
     for step in found.steps[1:]:
-        second = step.entrants[0].stretch()
+        second = step.entrant.stretch()
         if second is not None:
             label = f"the second: s = {second[0]:.0f} to {second[1]:.0f} m"
             axes.axvspan(*second, color="#E69F00", alpha=0.25, linewidth=0, label=label, zorder=0)

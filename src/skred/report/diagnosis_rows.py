@@ -231,7 +231,7 @@ def trust_rows(found: Diagnosis) -> Rows:
     calibrations = [(found.law.id, found.calibration)]
     names = found.law.id
     for step in found.steps:
-        names += f" + {step.entrants[0].mechanism.id}"
+        names += f" + {step.entrant.mechanism.id}"
         calibrations.append((names, step.calibration))
     held = {0: found.before, len(found.steps): found.after or found.before}
     rows = []

@@ -28,13 +28,20 @@ _KINDS = {
     Group.PHYSICS: "listed physics", Group.INSTRUMENT: "instrument", UNLISTED: "unlisted",
     NOTHING: "nothing",
 }  # fmt: skip
-VERDICTS = {
+_VERDICTS = {
     "missing_physics": "Physics is missing",
     "nothing_missing": "Nothing is missing",
     "instrument": "The recordings are off, not the physics",
     "unexplained": "Something is missing that is not in the list",
     "cannot_tell": "These recordings cannot tell",
 }
+
+
+def verdict_words(found: Diagnosis) -> str:
+    """The verdict in a few words."""
+    if found.decision.disputed:
+        return "Physics is missing, or the recordings are off"
+    return _VERDICTS[found.decision.verdict]
 
 
 def title_of(name: str) -> str:
@@ -117,7 +124,7 @@ def profile_of(found: Diagnosis) -> Location | None:
 def stretch_of(found: Diagnosis) -> tuple[float, float] | None:
     """Where the verdict says that something acts [m]."""
     if found.steps:
-        return found.steps[0].entrants[0].stretch()
+        return found.steps[0].entrant.stretch()
     if found.decision.verdict == "unexplained" and found.location is not None:
         return found.location.stretch_m
     return None
@@ -125,4 +132,4 @@ def stretch_of(found: Diagnosis) -> tuple[float, float] | None:
 
 def blamed_sensors(found: Diagnosis) -> set[str]:
     """Sensors that the verdict blames."""
-    return {step.entrants[0].best.shape.sensor or "" for step in found.steps} - {""}
+    return {step.entrant.best.shape.sensor or "" for step in found.steps} - {""}
