@@ -33,6 +33,11 @@ def _title(name: str) -> str:
     return "a force not in the list" if name == UNLISTED else mechanisms()[name].title
 
 
+def _short(name: str) -> str:
+    """Its title without examples, which have commas of their own."""
+    return _title(name).partition(":")[0]
+
+
 def _share(probability: float) -> str:
     """A probability that is never rounded to certainty."""
     if probability > 0.995:
@@ -75,7 +80,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     if document["covariate"]:
         sentences.append("Associated with, not necessarily caused by.")
     if ties:
-        others = ", ".join(_title(other) for other in ties)
+        others = ", ".join(_short(other) for other in ties)
         sentences.append(f"These recordings cannot tell it from: {others}.")
         sentences.append(_split(found.steps[0], document))
     sentences.append(_rival(document))
@@ -139,8 +144,8 @@ def _split(step: Step, document: dict[str, Any]) -> str:
     if sensor is not None:
         first, second = sensor["splits"]
         at = f"A speed at s = {sensor['s_from_m']:.0f} m"
-        return f"{at} would split {_title(first)} and {_title(second)} best."
-    same = ", ".join(_title(name) for name in step.tied if name != UNLISTED)
+        return f"{at} would split {_short(first)} and {_short(second)} best."
+    same = ", ".join(_short(name) for name in step.tied if name != UNLISTED)
     return f"No further speed would split off {same}: the term is the same." if same else ""
 
 
