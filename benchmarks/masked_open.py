@@ -98,7 +98,7 @@ def shares(found: list[dict[str, Any]], edges: tuple[float, ...]) -> str:
 
 
 def summary(found: list[dict[str, Any]]) -> dict[str, dict[str, str]]:
-    """By signal-to-noise as it was asked for, over all and by kind of recordings."""
+    """By signal-to-noise, over all and by kind of recordings."""
     kinds = {"all": found} | {kind: [one for one in found if one["kind"] == kind] for kind in KINDS}
     spans = {f"{low:g} to {high:g}": (low, high) for low, high in pairwise(EDGES)}
     spans |= {"2 to 5.5, evenly": EDGES[:3], "2 to 12, evenly": EDGES}

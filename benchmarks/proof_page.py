@@ -25,6 +25,7 @@ from proof_record import RECORD, add, answers_of, batches, is_open, ledger_of, s
 from skred.prove.ledger import ledger_sha256
 from skred.prove.plan import KINDS
 from skred.prove.scorecard import DIAGNOSIS, scorecard
+from skred.prove.scores_answers import UNLISTED
 from skred.prove.scores_standards import SNR_BINS
 from skred.work.output import write_text
 
@@ -289,7 +290,8 @@ def _wrong(batches: Sequence[Path]) -> str:
         named = [answer["mechanism"], *answer["indistinguishable"]] if answer.get("mechanism") else []
         alarm = answer["verdict"] in ("missing_physics", "instrument", "unexplained")
         unlisted = truth["hidden"] == "unlisted"
-        right = (set(named) & ids or (unlisted and answer["verdict"] == "unexplained")) if ids else not alarm
+        held = ids | ({UNLISTED} if unlisted else set())
+        right = (set(named) & held or (unlisted and answer["verdict"] == "unexplained")) if ids else not alarm
         if not right or answer["verdict"] in FAILED:
             hidden = " + ".join(sorted(ids)) or truth["nasty"] or "nothing"
             nothing = answer.get("probability", {}).get("nothing")

@@ -24,7 +24,7 @@ from skred.diagnosis.odds import NOTHING, UNLISTED
 from skred.physics.mechanisms import mechanisms
 from skred.prove.scores_answers import Pair
 from skred.prove.scores_intervals import share
-from skred.prove.scores_naming import honesty
+from skred.prove.scores_naming import honesty, naming
 from skred.work.output import write_json
 
 RESULTS = Path(__file__).resolve().parent / "results" / "tie_rules.json"
@@ -62,6 +62,8 @@ def told(pairs: Sequence[Pair], nats: float) -> dict[str, Any]:
     return {
         "nats": nats,
         **honesty(after),
+        "right_set_of_3_around_7": naming(after)["around_7"]["right_set_of_3"],
+        "sets_of_4_and_more": sum(len(pair.names) > 3 for pair in after),
         "no_longer_alone_was_right": share([pair.right_name for pair in no_longer]),
     }
 

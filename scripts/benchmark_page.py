@@ -4,24 +4,18 @@
 ``--json benchmarks/results/NAME.json`` (the commands stand in the page).
 """
 
-import json
-from pathlib import Path
 from statistics import median
 from typing import Any
 
-ROOT = Path(__file__).resolve().parent.parent
-RESULTS = ROOT / "benchmarks" / "results"
+import benchmark_diagnosis
+from benchmark_results import RESULTS, read
+
 HEAD = """# Benchmarks
 
 Written by `python scripts/benchmark_page.py` from `benchmarks/results/`; each section names the command
 that measured it. One machine, two cores (AMD EPYC, 2.6 GHz nominal), other work on the second core while
 sampling; times are the best of several, and ratios are within one run.
 """
-
-
-def read(name: str) -> Any:
-    """Content of a result file."""
-    return json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))
 
 
 def forward() -> str:
@@ -270,145 +264,11 @@ strengths of single avalanches.
 """
 
 
-def diagnosis() -> str:
-    """What a diagnosis and concealed trials cost."""
-    here, slower = read("forward"), read("forward_slower")
-    rows = ""
-    for law in ("coulomb", "pcm", "constant"):
-        seconds = read(f"ryggfonn/{law}")["seconds"]
-        stages = ", ".join(f"{name} {value:.0f}" for name, value in seconds.items() if value >= 0.5)
-        rows += f"| {law} | {sum(seconds.values()):.0f} | {stages} |\n"
-    whole = "".join(
-        f"| {row['campaign']} | {row['base_model']} | {row['events']} events, {row['sensors']} sensors"
-        f" | {row['seconds']:.0f} | {row['verdict']} |\n"
-        for row in read("diagnose_time")
-    )
-    more = [slower[name] / here[name] for name in ("kernel", "pure Python")]
-    proof = read("prove_throughput")
-    n = proof["plan"]["n"]
-    workers = "".join(
-        f"| {run['workers']} | {run['seconds']:.0f} | {run['cpu_seconds_per_trial']:.0f} |\n"
-        for run in proof["runs"]
-    )
-    return f"""
-## A diagnosis, and concealed trials
-
-`python benchmarks/diagnose_time.py --json benchmarks/results/diagnose_time.json`: `skred diagnose` by the
-clock, everything compiled, both cores free, loading packages and writing the report included. Asked: 60 s for
-22 sparse events, 120 s for 15 events with 40 gates.
-
-| campaign | base law | recordings | seconds | verdict |
-| --- | --- | --- | --- | --- |
-{whole}
-Of that the stages, as `python benchmarks/ryggfonn_diagnoses.py` keeps them. All of this
-was measured on another machine with two cores, slower and of a varying speed: at its fastest the kernel
-takes {slower["kernel"]:.2f} us and pure Python {slower["pure Python"]:.0f} us, {more[0]:.1f} and
-{more[1]:.1f} times what they take above
-(`python benchmarks/forward.py --json benchmarks/results/forward_slower.json`).
-
-| base law | seconds | of that |
-| --- | --- | --- |
-{rows}
-`python benchmarks/prove_throughput.py --trials {n} --json benchmarks/results/prove_throughput.json`:
-{n} sparse trials that hide nothing, starting the workers included; on that slower machine.
-
-| workers | seconds | CPU seconds a trial |
-| --- | --- | --- |
-{workers}
-Two workers do {proof["gain"]:.2f} times as much as one (asked: 1.8; the last trial runs alone, and with few
-trials that counts). Asked of a sparse trial: 30 CPU seconds, on what machine is not said; this one takes
-{more[0]:.1f} times as long as the one above. Bytecode was compiled before: where Python is told to
-write none, each trial compiles all that it imports on top.
-
-Development sets (`python benchmarks/development_set.py`, seeds 1000 to 999 999) are what was tuned on, and no
-claim is made from them. [development.md](development.md) has the goals on one that was not tuned on, with
-each mechanism; [the record](../docs/proof.md) has them on sealed trials of the same simulator with other
-seeds, and so other tracks, avalanches and effects.
-"""
-
-
-def line_nodes() -> str:
-    """How far integrals over one strength are off, by rule."""
-    rows = "".join(
-        f"| {law['base_model']} | {row['budget']} | {row['rule']} | {row['nodes']} | {row['median']:.3f}"
-        f" | {row['nine in ten']:.3f} | {row['97 in 100']:.2f} | {row['seconds']:.1f} |\n"
-        for law in read("line_nodes")
-        for row in law["rows"]
-    )
-    n = {law["integrations"] for law in read("line_nodes")}
-    return f"""
-## Integrating one free strength out
-
-`python benchmarks/line_nodes.py --json benchmarks/results/line_nodes.json`: {max(n)} of the integrations of
-Ryggfonn's race under M1 and M3, by trapezoids between nodes on a line and by importance nodes as laws of two
-strengths have them, each against a line with sixteen times the nodes. What a log evidence [nats] is off by,
-less what it is off by at the other strengths of its curve; seconds are of one core, with another one busy.
-
-| base law | budget | rule | nodes of an event | median | nine in ten within | 97 in 100 within | seconds |
-| --- | --- | --- | --- | --- | --- | --- | --- |
-{rows}
-Importance nodes by the thousand, the second route, agree with those that stand for exact.
-"""
-
-
-def unseen_nodes() -> str:
-    """How far scores of avalanches left out are off, by nodes."""
-    rows = "".join(
-        f"| {row['nodes']} | {row['of a draw']} | {row['root mean square']:.3f} | {row['sum']:+.2f}"
-        f" | {format(row['seconds'], '.1f') if 'seconds' in row else '-'} |\n"
-        for row in read("unseen_nodes")
-    )
-    return f"""
-## Scores of avalanches left out
-
-`python benchmarks/unseen_nodes.py --json benchmarks/results/unseen_nodes.json`: Ryggfonn's 22 avalanches
-under PCM with the force profile, each scored by 200 draws of populations and profiles. What log scores [nats]
-are off by with few nodes a draw, and what other draws change.
-
-| nodes | of an avalanche and draw | root mean square of an avalanche | sum of 22 | seconds |
-| --- | --- | --- | --- | --- |
-{rows}
-Adapted nodes go where the others have found the weight to be: few as they are, they are too low in the mean.
-"""
-
-
-def masked_open() -> str:
-    """Masked and open effects of like signal-to-noise."""
-    found = read("masked_open")["summary"]
-    rows = "".join(f"| {span} | {' | '.join(kinds.values())} |\n" for span, kinds in found.items())
-    gained = "".join(
-        f"| {row['hidden']} | {'raised' if row['found'] else 'not'} | {row['trials']}"
-        f" | {row['gained']:.1f} | {row['most']:.1f} | {row['expected']:.1f} |\n"
-        for row in read("masked_limit")["summary"]
-    )
-    return f"""
-## Masked and open effects
-
-`python benchmarks/masked_open.py weak`, then `python benchmarks/masked_open.py strong --n 35`: pairs of
-simulated campaigns, one with a masked effect (the calibrated law is right on average at every sensor), one
-with an open one of a listed mechanism; found is where the alarm is raised. Share of masked ones found less
-that of open ones (95 % by bootstrap; asked: within 0.10); in the last two rows as if spread evenly over their
-signal-to-noise, part by part. Nothing was tuned on these.
-
-| signal-to-noise | all | sparse | dense |
-| --- | --- | --- | --- |
-{rows}
-`python benchmarks/masked_limit.py`: of these the sparse ones of a signal-to-noise of 4 and more that hide
-drag or snow taken up on a stretch (masked ones are opposed by a relief). Log evidence [nats] against nothing
-to one who knows the place, with the best strength, and the best relief of 25: median and largest; and the
-median of half the square of the signal-to-noise. A diagnosis has to look for all three.
-
-| hidden | alarm | trials | gained, median | largest | expected |
-| --- | --- | --- | --- | --- | --- |
-{gained}"""
-
-
 def main() -> None:
     """Write the page."""
     page = HEAD + forward() + logp() + sampling() + calibration()
-    page += hierarchical() + hierarchical_calibration() + line_nodes() + unseen_nodes() + diagnosis()
-    page += masked_open()
-    (ROOT / "benchmarks" / "README.md").write_text(page, encoding="utf-8")
+    page += hierarchical() + hierarchical_calibration() + benchmark_diagnosis.sections()
+    (RESULTS.parent / "README.md").write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

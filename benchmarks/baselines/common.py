@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign
-from skred.diagnosis.decide import smallest_set
+from skred.diagnosis.decide import blamed
 from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, probabilities
 from skred.laws import load_law
 from skred.physics.mechanisms import mechanisms
@@ -151,19 +151,15 @@ def weighed(
 def decided(
     probability: Mapping[str, float], score: float, limit: float, stretches: Mapping[str, Stretch | None]
 ) -> Answer:
-    """Answer from probabilities: the likeliest group, in it the smallest set that holds 0.9."""
-    groups: dict[str, dict[str, float]] = {}
-    for name, share in probability.items():
-        if name != NOTHING:
-            groups.setdefault(group_of(name), {})[name] = share
-    group = max(groups, key=lambda one: sum(groups[one].values()))
-    names = smallest_set(groups[group])
-    stretch = stretches.get(names[0])
+    """Answer from probabilities, by the rule that a diagnosis has where something is off."""
+    names = blamed(probability).names
+    first = names[0] if names else UNLISTED
     if score <= limit:
-        return Answer("nothing_missing", None, (), probability, None, score, names[0])
-    if group == UNLISTED:
+        return Answer("nothing_missing", None, (), probability, None, score, first)
+    stretch = stretches.get(first)
+    if not names:
         return Answer("unexplained", None, (), probability, stretch, score, UNLISTED)
-    return Answer(VERDICT_OF[group], names[0], names[1:], probability, stretch, score, names[0])
+    return Answer(VERDICT_OF[group_of(first)], first, names[1:], probability, stretch, score, first)
 
 
 def nearest(

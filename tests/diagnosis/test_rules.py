@@ -139,7 +139,10 @@ def test_ties_across_groups() -> None:
     assert (found.verdict, found.names) == ("missing_physics", ("segment_drag", "obstacle", "sensor_bias"))
     far = shares(0.05, 0.11, sensor_bias=0.09, segment_drag=0.75)
     assert decide(far, 0.005, True) == Decision("missing_physics", ("segment_drag", "unlisted"))
-    assert not decide(far, 0.005, True).disputed
+    assert not decide(far, 0.005, True).disputed  # both are physics
+    fault = decide(shares(0.05, 0.35, sensor_bias=0.6), 0.005, True)
+    assert fault.names == ("sensor_bias", "unlisted") and fault.disputed
+    assert not decide(shares(0.05, 0.35, sensor_bias=0.6), 0.9, True).disputed
 
 
 def test_no_instrument_in_the_race() -> None:

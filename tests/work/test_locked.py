@@ -56,7 +56,7 @@ def seen(monkeypatch: pytest.MonkeyPatch, problem: HierarchicalProblem) -> Itera
 
     def made_up(problem: Any, law: Any, settings: Any, effort: Any, tell: Any = None) -> Diagnosis:
         campaigns.append(problem.campaign)
-        step: Any = SimpleNamespace(entrants=(entrant,))
+        step: Any = SimpleNamespace(entrant=entrant)
         steps: tuple[Step, ...] = (step,) if len(campaigns) % 2 else ()
         held: Any = object()
         verdict = Decision("instrument" if steps else "nothing_missing", ())

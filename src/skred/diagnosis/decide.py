@@ -1,4 +1,4 @@
-"""How probabilities become a verdict: the rule of the campaign format."""
+"""How probabilities become a verdict: the rule of the campaign format, and ties across groups beside it."""
 
 from __future__ import annotations
 
@@ -44,8 +44,9 @@ class Decision:
 
     @property
     def disputed(self) -> bool:
-        """Whether physics and instruments are tied: either of them may be off."""
-        return len({mechanisms()[name].group for name in self.names if name != UNLISTED}) > 1
+        """Whether physics, in the list or not, and instruments are tied: either may be off."""
+        faults = [name != UNLISTED and mechanisms()[name].group == Group.INSTRUMENT for name in self.names]
+        return any(faults) and not all(faults)
 
 
 def alarmed(probability: Mapping[str, float], p_value: float) -> bool:
@@ -79,6 +80,11 @@ def decide(probability: Mapping[str, float], p_value: float, can_tell: bool) -> 
     if not alarmed(probability, p_value):
         nothing = can_tell and _silent(probability, p_value)
         return Decision("nothing_missing" if nothing else "cannot_tell", ())
+    return blamed(probability)
+
+
+def blamed(probability: Mapping[str, float]) -> Decision:
+    """What is off, if something is: the smallest set of the leading group, and what is tied with its name."""
     groups: dict[str, dict[str, float]] = {UNLISTED: {UNLISTED: probability[UNLISTED]}}
     for name, share in probability.items():
         if name not in (NOTHING, UNLISTED):

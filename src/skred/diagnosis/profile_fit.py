@@ -63,8 +63,9 @@ def fit_profile(base: Base, kind: Kind, near: Start | None = None, again: Prior 
         starts.append(_peak(base, kind, at, near[0], _fit_at(base, kind, at, *near)))
     height = nothing.found.log_evidence
     seen = _Seen(height, at, priors_of(kind, at))
-    waiting, climb, most = _first(kind, starts[-1], seen), _top, _PRIORS_TRIED
-    if again is not None:
+    if again is None:
+        waiting, climb, most = _first(kind, starts[-1], seen), _top, _PRIORS_TRIED
+    else:
         waiting, climb, most = [again], _top_from_one, _PRIORS_AGAIN
     while waiting and len(seen.peaks) < most:
         prior = waiting.pop()

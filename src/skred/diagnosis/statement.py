@@ -80,7 +80,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     if document["covariate"]:
         sentences.append("Associated with, not necessarily caused by.")
     if ties:
-        others = ", ".join(_short(other) for other in ties)
+        others = ", ".join(f"{_short(other)} ({_share(probability[other])})" for other in ties)
         sentences.append(f"These recordings cannot tell it from: {others}.")
         sentences.append(_split(found.steps[0], document))
     sentences.append(_rival(document))

@@ -132,9 +132,7 @@ def _right(pair: Pair) -> str:
         return "false alarm" if pair.alarm else "right"
     if not pair.alarm:
         return "not found"
-    if not pair.is_listed:
-        return "wrong name" if pair.name else "right"
-    if pair.right_name:
+    if pair.right_name or (not pair.is_listed and not pair.name):
         return "right"
     if pair.right_set:
         return "in the set"

@@ -100,7 +100,8 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
             profile_window=f"{2.0 * NEAR_M:.0f}",
             limits={
                 "p": LIMIT, "doubtful": ALARMS[1][0], "sure": ALARMS[1][1], "e": E_LIMIT, "k": K_LIMIT,
-                "tied": TIED_NATS, "r_hat": R_HAT_LIMIT, "ess": ESS_LIMIT, "practical": PRACTICAL_DIFFERENCE,
+                "tied": f"{math.exp(TIED_NATS):.1f}", "r_hat": R_HAT_LIMIT, "ess": ESS_LIMIT,
+                "practical": PRACTICAL_DIFFERENCE,
             },
             too_few=_too_few(found),
             dropped=_dropped(found),
