@@ -182,7 +182,7 @@ def _robust(found: Mapping[str, Found]) -> str:
             f"`{row['id']}` {row['log_bayes_factor']:.1f} at {_where(row['location']) or 'all'}"
             for row in listed
         )
-        said = one["verdict"] + (f": {one['reason']}" if one.get("reason") else "")
+        said = one["verdict"] + _named(one) + (f": {one['reason']}" if one.get("reason") else "")
         share = _share(one["probability"].get("unlisted", 0.0))
         rows.append(f"| {name} | {said} | {_number(one['evidence']['p_value'])} | {what} | {share} |")
     scales = found["pcm"].get("prior_scales", {})
