@@ -61,13 +61,18 @@ def at_its_place(number: int, seen: dict[str, Any]) -> dict[str, Any]:
 
 
 def summary(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Medians of what is gained by what is hidden and whether it was found."""
+    """Medians of what is gained, by what is hidden: all, then by whether it was found."""
     rows = []
-    for hidden, alarm in product(HIDDEN, (True, False)):
-        own = [one for one in found if (one["hidden"], one["alarm"]) == (hidden, alarm) and one["gained"]]
+    for hidden, alarms in product(HIDDEN, ((True, False), (True,), (False,))):
+        own = [one for one in found if one["hidden"] == hidden and one["alarm"] in alarms]
+        own = [one for one in own if one["gained"] is not None]
         if own:
             gained = np.array([one["gained"] for one in own])
-            row = {"hidden": hidden, "found": alarm, "trials": len(own)}
+            row = {
+                "hidden": hidden,
+                "alarm": "any" if len(alarms) > 1 else "raised" if alarms[0] else "not",
+                "trials": len(own),
+            }
             row |= {"gained": float(np.median(gained)), "most": float(gained.max())}
             rows.append(row | {"expected": float(np.median([0.5 * one["snr"] ** 2 for one in own]))})
     return rows
@@ -102,7 +107,9 @@ def main(*, workers: int = 2) -> None:
                 FOUND, {"summary": summary(list(found.values())), "trials": dict(sorted(found.items()))}
             )
             print(at_work[done], done.result(), flush=True)
-    for row in summary(list(found.values())):
+    told = summary(list(found.values()))
+    write_json(FOUND, {"summary": told, "trials": dict(sorted(found.items()))})
+    for row in told:
         print(row)
 
 

@@ -83,10 +83,18 @@ def page(batches: Sequence[Path], run: Found, document: Found, figures: Sequence
     parts += [f"![{name.replace('_', ' ')}](figures/proof-{name}.png)\n" for name in figures]
     parts += ["### Open and masked\n", _masked(run), "### By what was hidden\n", _by_hidden(run)]
     parts += ["### Why bars are missed\n", (RECORD / "missed.md").read_text(encoding="utf-8")]
+    parts += ["## The newest batch\n", _newest(batches)]
     parts += ["## All batches together\n", _IN_ORDER, _by_batch(batches, document), bars_table(document)]
     parts += [_later(batches, document), _by_hidden(document)]
     parts += ["## What it got wrong\n", _wrong(batches), *map(_notes, batches)]
     return "\n".join(parts)
+
+
+def _newest(batches: Sequence[Path]) -> str:
+    """Goals of the batch that was sealed last, by the code of that day."""
+    seed = str(_in_order(batches)[-1]["seed"])
+    bars = bars_table(_scores([RECORD / seed]))
+    return f"Seed {seed}; what is to be said about it stands at the end.\n\n{bars}"
 
 
 def _largest(batches: Sequence[Path]) -> Path:

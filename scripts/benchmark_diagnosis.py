@@ -121,7 +121,7 @@ def masked_open() -> str:
     found = read("masked_open")["summary"]
     rows = "".join(f"| {span} | {' | '.join(kinds.values())} |\n" for span, kinds in found.items())
     gained = "".join(
-        f"| {row['hidden']} | {'raised' if row['found'] else 'not'} | {row['trials']}"
+        f"| {row['hidden']} | {row['alarm']} | {row['trials']}"
         f" | {row['gained']:.1f} | {row['most']:.1f} | {row['expected']:.1f} |\n"
         for row in read("masked_limit")["summary"]
     )
