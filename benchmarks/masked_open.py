@@ -15,7 +15,7 @@ import json
 import os
 import tempfile
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from itertools import pairwise
+from itertools import pairwise, product
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Literal
@@ -105,6 +105,26 @@ def summary(found: list[dict[str, Any]]) -> dict[str, dict[str, str]]:
     return {name: {kind: shares(some, span) for kind, some in kinds.items()} for name, span in spans.items()}
 
 
+def masked_by(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """How many masked effects were found, by what hides them on average: a covariate, or a relief."""
+    rows = []
+    for kind, covariate in product(KINDS, (False, True)):
+        own = [one for one in found if one["hidden"] == "masked" and one["kind"] == kind]
+        own = [one for one in own if (one["ids"][0] == "covariate_friction") == covariate]
+        strong = [one for one in own if one["snr"] >= EDGES[2]]
+        row = {"kind": kind, "by": "a covariate" if covariate else "a relief", "trials": len(own)}
+        row |= {"found": sum(one["alarm"] for one in own), "strong": len(strong)}
+        rows.append(row | {"strong_found": sum(one["alarm"] for one in strong)})
+    return rows
+
+
+def keep(found: dict[str, Any]) -> None:
+    """Write all that is known."""
+    trials = list(found.values())
+    document = {"summary": summary(trials), "masked_by": masked_by(trials)}
+    write_json(RESULT, document | {"trials": dict(sorted(found.items()))})
+
+
 @app.default
 def main(which: Literal["weak", "strong"], /, *, n: int = 120, workers: int = 2) -> None:
     """Look at pairs not looked at yet.
@@ -130,10 +150,9 @@ def main(which: Literal["weak", "strong"], /, *, n: int = 120, workers: int = 2)
         for done in as_completed(at_work):
             number, hidden = at_work[done]
             found[f"{number:04d} {hidden}"] = done.result()
-            write_json(
-                RESULT, {"summary": summary(list(found.values())), "trials": dict(sorted(found.items()))}
-            )
+            keep(found)
             print(number, done.result(), flush=True)
+    keep(found)
     for name, row in summary(list(found.values())).items():
         for kind, told in row.items():
             print(f"{name}, {kind}: {told}")

@@ -120,6 +120,11 @@ def masked_open() -> str:
     """Masked and open effects of like signal-to-noise."""
     found = read("masked_open")["summary"]
     rows = "".join(f"| {span} | {' | '.join(kinds.values())} |\n" for span, kinds in found.items())
+    hidden_by = "".join(
+        f"| {row['by']} | {row['kind']} | {row['found']} of {row['trials']}"
+        f" | {row['strong_found']} of {row['strong']} |\n"
+        for row in read("masked_open")["masked_by"]
+    )
     gained = "".join(
         f"| {row['hidden']} | {row['alarm']} | {row['trials']}"
         f" | {row['gained']:.1f} | {row['most']:.1f} | {row['expected']:.1f} |\n"
@@ -137,6 +142,9 @@ signal-to-noise, part by part. Nothing was tuned on these.
 | signal-to-noise | all | sparse | dense |
 | --- | --- | --- | --- |
 {rows}
+| masked by | recordings | found | found from 5.5 on |
+| --- | --- | --- | --- |
+{hidden_by}
 `python benchmarks/masked_limit.py`: of these the sparse ones of a signal-to-noise of 4 and more that hide
 drag or snow taken up on a stretch (masked ones are opposed by a relief). Log evidence [nats] against nothing
 to one who knows the place, with the best strength, and the best relief of 25: median and largest; and the
