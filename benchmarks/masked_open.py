@@ -35,7 +35,7 @@ from skred.work.output import write_json
 
 app = cyclopts.App(help=__doc__)
 RESULT = Path(__file__).resolve().parent / "results" / "masked_open.json"
-SEED = 1_800_000
+SEED = 2_200_000
 RANGES = {"weak": (0, 2.0, 5.5), "strong": (1000, 5.5, 12.0)}
 """First number of a range's pairs, and where its signal-to-noise is."""
 EDGES = (2.0, 4.0, 5.5, 12.0)
@@ -44,13 +44,18 @@ HIDDEN = ("masked", "listed")
 
 
 def drawn(number: int, hidden: str) -> tuple[Trial, Campaign]:
-    """One trial of a pair, and its campaign as a diagnosis reads it: files round what they hold."""
+    """One trial of a pair, and its campaign."""
     [(low, high)] = [(low, high) for first, low, high in RANGES.values() if number // 1000 == first // 1000]
     snr = float(np.random.default_rng([SEED, number]).uniform(low, high))
     trial = draw_trial(SEED + number, kind=KINDS[number % 2], hidden=hidden, snr=snr)
+    return trial, as_read(trial)
+
+
+def as_read(trial: Trial) -> Campaign:
+    """A trial's campaign as a diagnosis reads it: files round what they hold."""
     with tempfile.TemporaryDirectory() as scratch:
         write_campaign(trial.campaign, Path(scratch) / "campaign")
-        return trial, read_campaign(Path(scratch) / "campaign")
+        return read_campaign(Path(scratch) / "campaign")
 
 
 def look(number: int, hidden: str) -> dict[str, Any]:
@@ -58,18 +63,22 @@ def look(number: int, hidden: str) -> dict[str, Any]:
     trial, campaign = drawn(number, hidden)
     told = {"hidden": hidden, "kind": KINDS[number % 2], "snr": trial.truth["snr"]}
     told |= {"ids": [one["id"] for one in trial.truth["mechanisms"]], "base": trial.truth["base_model"]}
+    return told | alarm_of(campaign, trial.truth["base_model"])
+
+
+def alarm_of(campaign: Campaign, law_id: str) -> dict[str, Any]:
+    """A diagnosis up to its alarm; none where a gate or the numerics fail."""
     try:
-        found = base_and_draws(campaign, trial.truth["base_model"])
+        found = base_and_draws(campaign, law_id)
         if found is None:
-            return told | {"alarm": False, "failed": "gate"}
+            return {"alarm": False, "failed": "gate"}
         base, draws = found
         screen, start = Screen(base.problem, base.law, base.setting), (base.population, base.fit.points)
         p_value = omnibus(screen, base.rows, start, draws, 0, REPLICAS).p_value
         probability = race(base).probability
     except np.linalg.LinAlgError as error:
-        return told | {"alarm": False, "failed": repr(error)}
-    alarm = alarmed(probability, p_value)
-    return told | {"alarm": alarm, "p_value": p_value, "nothing": probability[NOTHING]}
+        return {"alarm": False, "failed": repr(error)}
+    return {"alarm": alarmed(probability, p_value), "p_value": p_value, "nothing": probability[NOTHING]}
 
 
 def shares(found: list[dict[str, Any]], edges: tuple[float, ...]) -> str:

@@ -25,7 +25,7 @@ from skred.physics.law import Law
 from skred.physics.mechanisms import Mechanism, mechanisms
 from skred.physics.mechanisms.coulomb_friction import WITHOUT_CURVATURE
 from skred.physics.mechanisms.spec import Added, Direction, Group, Setting, Shape
-from skred.physics.mechanisms.stretches import OPPOSED_SHARE, U_1, equation_of, is_opposed, shares
+from skred.physics.mechanisms.stretches import OPPOSED_SHARE, U_1, ends_of, equation_of, is_opposed, shares
 from skred.physics.terrain import Terrain
 
 ALL = mechanisms()
@@ -224,7 +224,7 @@ def test_what_is_opposed_does_not_show_in_a_typical_front(name: str, settings: l
         assert abs(change[0]) < 0.02 and faster > 5 * abs(change[0]) and slower > 5 * abs(change[0])
 
 
-def test_opposed_shapes_share_a_quarter(settings: list[Setting]) -> None:
+def test_opposed_shapes_have_a_share_of_their_own(settings: list[Setting]) -> None:
     """As the opposed kinds of the unlisted force do; without any, or with nothing else, all are alike."""
     shapes = added_to(ALL["segment_drag"]).shapes(settings[1])
     opposed = np.array([is_opposed(shape) for shape in shapes])
@@ -235,6 +235,23 @@ def test_opposed_shapes_share_a_quarter(settings: list[Setting]) -> None:
         chosen = [shape for shape, one in zip(shapes, some_of, strict=True) if one]
         np.testing.assert_allclose(shares(chosen), 1.0 / len(chosen))
     assert not any(is_opposed(shape) for shape in added_to(ALL["segment_friction"]).shapes(settings[1]))
+
+
+def test_opposed_stretches_begin_above_what_is_recorded_and_plain_ones_do_not(
+    settings: list[Setting],
+) -> None:
+    """By up to their length, and where fronts move; every place of the recorded part has both."""
+    setting = replace(settings[1], recorded_m=(600.0, 1100.0))
+    shapes = added_to(ALL["segment_drag"]).shapes(setting)
+    assert len(set(shapes)) == len(shapes)
+    for length, above in ((200.0, [400.0, 466.7, 533.3]), (500.0, [100.0, 266.7, 433.3])):
+        own = [one for one in shapes if ends_of(one)[1] - ends_of(one)[0] == pytest.approx(length)]
+        opposed = [ends_of(one)[0] for one in own if is_opposed(one)]
+        plain = [ends_of(one)[0] for one in own if not is_opposed(one)]
+        assert min(plain) == 600.0 and sorted(start for start in opposed if start >= 600.0) == plain
+        np.testing.assert_allclose(sorted(start for start in opposed if start < 600.0), above, atol=0.1)
+    shallow = replace(setting, recorded_m=(100.0, 1100.0))
+    assert min(ends_of(one)[0] for one in added_to(ALL["segment_drag"]).shapes(shallow)) >= 0.0
 
 
 def test_parts_of_an_opposed_stretch_keep_its_relief_or_vary_it(settings: list[Setting]) -> None:

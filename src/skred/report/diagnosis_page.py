@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skred.diagnosis.decide import ALARMS, E_LIMIT, TIED_NATS, decide
+from skred.diagnosis.decide import NOTHING_ALONE, TIED_NATS, decide
 from skred.diagnosis.held_out import K_LIMIT, paired
 from skred.diagnosis.odds import UNLISTED
 from skred.diagnosis.omnibus import LIMIT
@@ -99,9 +99,8 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
             profile_lengths=[f"{length:.0f}" for length in LENGTHS_M],
             profile_window=f"{2.0 * NEAR_M:.0f}",
             limits={
-                "p": LIMIT, "doubtful": ALARMS[1][0], "sure": ALARMS[1][1], "e": E_LIMIT, "k": K_LIMIT,
-                "tied": f"{math.exp(TIED_NATS):.1f}", "r_hat": R_HAT_LIMIT, "ess": ESS_LIMIT,
-                "practical": PRACTICAL_DIFFERENCE,
+                "p": LIMIT, "alone": NOTHING_ALONE, "k": K_LIMIT, "tied": f"{math.exp(TIED_NATS):.1f}",
+                "r_hat": R_HAT_LIMIT, "ess": ESS_LIMIT, "practical": PRACTICAL_DIFFERENCE,
             },
             too_few=_too_few(found),
             dropped=_dropped(found),

@@ -24,10 +24,10 @@ STRETCHES_M = (75.0, 200.0, 500.0)
 _STEP_IN_LENGTHS = 0.4
 U_1, U_2 = "U_1 [m s-1]", "U_2 [m s-1]"
 """Front speeds at both ends of a stretch at which a relief on it equals the drag; U_0^2 is linear between."""
-OPPOSED_SHARE = 0.25
+OPPOSED_SHARE = 0.3
 """Prior probability, among the shapes of a force, that it is opposed.
 
-About what opposed stretches have where all stretches are equally probable, a fifth to a quarter.
+About what opposed stretches have where all stretches are equally probable.
 """
 OPPOSED_SCALES = 3.0
 """Prior scale of a drag that is opposed, in that of one that is not.
@@ -99,22 +99,43 @@ def _relief(setting: Setting, shape: Shape) -> FloatArray:
 def stretches(setting: Setting) -> tuple[Shape, ...]:
     """Stretches of several lengths, overlapping, over the recorded part of the track."""
     first, last = setting.recorded_m
-    shapes = []
-    for length in STRETCHES_M:
-        if length > 1.2 * (last - first):
-            continue
-        n = max(int(np.ceil(max(last - first - length, 0.0) / (_STEP_IN_LENGTHS * length))), 1)
-        for start in np.linspace(first, max(last - length, first), n + 1):
-            shapes.append(Shape(float(start), float(min(start + length, setting.terrain.length_m))))
-    return tuple(shapes)
+    return tuple(shape for length in _lengths(setting) for shape in _row(setting, length, first, last))
 
 
 def stretches_of_drag(setting: Setting) -> tuple[Shape, ...]:
-    """The stretches, and the longer ones once more, opposed: on a short one that does too little."""
+    """The stretches, and the longer ones once more, opposed: on a short one that does too little.
+
+    Opposed ones begin above the recorded part too, by up to their length: fronts come out of one with
+    speeds more alike than they had before, the first sensor reads that, and no base strength does the same.
+    """
     plain = stretches(setting)
-    wide = [one for one in plain if ends_of(one)[1] - ends_of(one)[0] > _OPPOSED_FROM_M]
+    wide = [one for one in (*plain, *_from_above(setting)) if np.diff(ends_of(one)) > _OPPOSED_FROM_M]
     opposed = [_opposed(setting, one) for one in wide]
     return (*plain, *(one for one in opposed if one is not None))
+
+
+def _lengths(setting: Setting) -> list[float]:
+    """Lengths of the stretches that the recorded part has room for [m]."""
+    first, last = setting.recorded_m
+    return [length for length in STRETCHES_M if length <= 1.2 * (last - first)]
+
+
+def _row(setting: Setting, length: float, first: float, last: float) -> list[Shape]:
+    """Stretches of one length, overlapping, from one place to another, or one if it is longer than that."""
+    n = int(np.ceil(max(last - first - length, 0.0) / (_STEP_IN_LENGTHS * length)))
+    starts = np.linspace(first, max(last - length, first), n + 1)
+    return [Shape(float(start), float(min(start + length, setting.terrain.length_m))) for start in starts]
+
+
+def _from_above(setting: Setting) -> list[Shape]:
+    """Stretches that begin above the recorded part and end in it or where it begins."""
+    first, _ = setting.recorded_m
+    shapes = [
+        shape
+        for length in _lengths(setting)
+        for shape in _row(setting, length, first - length, first + length)
+    ]
+    return [one for one in shapes if 0.0 <= ends_of(one)[0] < first]
 
 
 def _opposed(setting: Setting, shape: Shape, relief: float = 1.0) -> Shape | None:
