@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -75,6 +75,7 @@ class Base:
     fit: Fit
     directions: tuple[Direction, ...] = ()
     strengths: FloatArray = field(default_factory=lambda: np.empty(0))
+    _nothing: dict[Budget, Fit] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def log_scale(self) -> FloatArray:
@@ -85,6 +86,13 @@ class Base:
     def population(self) -> Population:
         """The most probable population."""
         return self.fit.found.population(len(self.law.mechanisms))
+
+    def with_nothing(self, budget: Budget) -> Fit:
+        """Refitted with nothing added, as `curve_at` does with something: the same for all mechanisms."""
+        if budget not in self._nothing:
+            extension = extended(self.problem, self.law, self.directions)
+            self._nothing[budget] = _refit_from(self, extension, np.empty(0), budget)[0]
+        return self._nothing[budget]
 
 
 def refit(
@@ -206,6 +214,15 @@ class Curve:
         """The fit at the strength closest to one."""
         return self.fits[int(np.abs(self.strengths - strength).argmin())]
 
+    def joined(self, other: Curve) -> Curve:
+        """With another curve's strengths, of the same mechanism, shape and budget."""
+        strengths, numbers = np.unique(np.concatenate([self.strengths, other.strengths]), return_index=True)
+        heights = np.concatenate([self.log_evidence, other.log_evidence])[numbers]
+        fits = [*self.fits, *other.fits]
+        return replace(
+            self, strengths=strengths, log_evidence=heights, fits=tuple(fits[number] for number in numbers)
+        )
+
     def fine(self, scale: float | None = None) -> tuple[FloatArray, FloatArray]:
         """Strengths on a fine grid, and the log posterior density there, not normalised."""
         added = self.mechanism.added
@@ -300,17 +317,33 @@ def curve_at(
     assert added is not None
     direction = added.direction(base.setting, shape)
     extension = extended(base.problem, base.law, (*base.directions, direction))
+    strengths = np.sort(strengths[np.abs(strengths) > 1e-3 * added.scale_of(shape)])
+    place = int(np.searchsorted(strengths, 0.0))
     # Strength 0 like all others, so that what is left of integration errors is the same there.
-    strengths = np.sort(np.append(strengths[np.abs(strengths) > 1e-3 * added.scale_of(shape)], 0.0))
-    given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
-    start = (base.population, base.fit.points)
-    fits = None if near is None else [near.nearest(strength) for strength in strengths]
-    first = None if budget.linear or near is not None else FIRST
-    n_rounds = 1 if near is not None else _ROUNDS
-    found = refit(extension, base.rows, given, start, base.log_scale, budget, first, n_rounds, fits)
+    if near is None:
+        found = _refit_from(base, extension, strengths, budget)
+        found.insert(place, base.with_nothing(budget))
+        strengths = np.insert(strengths, place, 0.0)
+    else:
+        strengths = np.insert(strengths, place, 0.0)
+        fits = [near.nearest(strength) for strength in strengths]
+        found = _refit_from(base, extension, strengths, budget, fits)
     heights = np.array([fit.found.log_evidence for fit in found])
     heights = np.nan_to_num(heights - heights[strengths == 0.0], nan=-1e3, neginf=-1e3)
     return Curve(mechanism, shape, direction, strengths, heights, tuple(found), budget.linear)
+
+
+def _refit_from(
+    base: Base, extension: Extension, strengths: FloatArray, budget: Budget, fits: list[Fit] | None = None
+) -> list[Fit]:
+    """Fits at strengths of the extension's last direction, or without it; begun at fits or at the base's."""
+    given = base.strengths[None, :]
+    if len(strengths):
+        given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
+    start = (base.population, base.fit.points)
+    first = None if budget.linear or fits is not None else FIRST
+    n_rounds = _ROUNDS if fits is None else 1
+    return refit(extension, base.rows, given, start, base.log_scale, budget, first, n_rounds, fits)
 
 
 def fit_base(

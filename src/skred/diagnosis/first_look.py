@@ -11,8 +11,10 @@ from skred.diagnosis.event_nodes import FRONTS, ROUGH, Budget
 from skred.diagnosis.extension import extended
 from skred.physics.mechanisms.spec import Mechanism, Shape
 
-_GRID = (0.2, 0.6, 1.2, 2.2, 3.5)
-"""Strengths at first, in scales of the prior."""
+_GRID, _STRONGER = (0.2, 0.6, 1.2), (2.2, 3.5)
+"""Strengths at first, in scales of the prior; and those beyond, where the last of them is not hopeless."""
+_HOPELESS = 12.0
+"""Nats behind the best."""
 _OUTSIDE = 2.2
 """A strength beyond the one that the linear model finds, relative to it, where no other is."""
 _PROMISED = 0.3
@@ -52,13 +54,24 @@ def curve(
     """
     added = mechanism.added
     assert added is not None
-    grid = added.scale_of(shape) * np.array(_GRID)
-    strengths = np.concatenate([-grid[::-1], grid]) if added.either_sign else grid
+    scale = added.scale_of(shape)
+    signs = np.array([-1.0, 1.0] if added.either_sign else [1.0])
+    strengths = np.multiply.outer(signs, scale * np.array(_GRID)).ravel()
     if linear is not None and (added.either_sign or linear > 0.0):
-        more = [linear] if abs(linear) * _OUTSIDE > grid[0] else [linear, _OUTSIDE * linear]
+        more = [linear] if abs(linear) * _OUTSIDE > scale * _GRID[0] else [linear, _OUTSIDE * linear]
         strengths = np.append(strengths, more)
     found = curve_at(base, mechanism, shape, strengths, budget)
+    signs = signs[[_may_be_stronger(found, sign) for sign in signs]]
+    if len(signs):
+        stronger = np.multiply.outer(signs, scale * np.array(_STRONGER)).ravel()
+        found = found.joined(curve_at(base, mechanism, shape, stronger, budget))
     return _by_fronts(base, found) if found.rough else found
+
+
+def _may_be_stronger(found: Curve, sign: float) -> bool:
+    """Whether the strongest looked at so far, of a sign, is not hopeless."""
+    strongest = int(np.argmax(sign * found.strengths))
+    return bool(found.log_evidence[strongest] > found.log_evidence.max() - _HOPELESS)
 
 
 def _by_fronts(base: Base, rough: Curve) -> Curve:

@@ -23,8 +23,9 @@ from skred.physics.mechanisms.stretches import shares
 
 _WITHIN, _AT_MOST, _TURNS = 3.0, 2, 3
 """Places of a mechanism that are looked at again: within so many nats of its best, so many, so many times."""
-_HOPELESS = 20.0
-"""Nats behind the best of all at which a place is not looked at again. Its parts may have ten nats more."""
+_HOPELESS = 15.0
+"""Nats behind the best of all, in parts, at which a place is not looked at again. Its own parts may have ten
+nats more."""
 _SPLIT_FROM = 1.0
 """Nats in favour of a place from which it is split: parts of a place without evidence have hardly any."""
 _HOLDS_MOST, _LEVELS = 0.5, 4
@@ -78,15 +79,18 @@ def second_look(
 ) -> dict[str, Entrant]:
     """Entrants whose leading places are computed with fronts and then split; rough curves for the others.
 
-    Once a place is looked at it may fall behind others that then lead, and are looked at in their turn.
+    The leading mechanism comes first: others have to keep up with what its parts have. Once a place is looked
+    at it may fall behind others that then lead, and are looked at in their turn.
     """
     places: dict[int, Place] = {}
+    first = max(curves, key=lambda one: one.log_bayes_factor).mechanism.id
 
     def look(near: Curve) -> Place:
         return Place((curve_near(base, near.mechanism, near.shape, near, budget),))
 
-    for _ in range(_TURNS):
+    for turn in range(1 + _TURNS):
         todo = [k for k in leading(curves, places) if k not in places]
+        todo = [k for k in todo if turn > 0 or curves[k].mechanism.id == first]
         if not todo:
             break
         places.update(zip(todo, pool.map(look, [curves[k] for k in todo]), strict=True))

@@ -97,7 +97,9 @@ def looked_for(mechanism: Mechanism) -> str:
     else:
         where = "all avalanches alike"
     if any(is_opposed(shape) for shape in shapes):
-        where += "; the longer ones also, and from above it, with a relief that equals it at the typical speed,"
+        where += (
+            "; the longer ones also, and from above it, with a relief that equals it at the typical speed,"
+        )
         where += f" the prior of its strength {OPPOSED_SCALES:g} times as wide"
     plain = [shape for shape in shapes if not is_opposed(shape)]
     names = dict.fromkeys(name for shape in plain for name, _ in shape.constants)
