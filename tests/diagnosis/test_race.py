@@ -13,11 +13,12 @@ from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
 
 from skred.diagnosis import race
 from skred.diagnosis import second_look as looking
-from skred.diagnosis.curves import Base, Curve, curve_at, curve_near
+from skred.diagnosis.curves import Base, Curve, curve_at, curve_near, refit
 from skred.diagnosis.entrant import Entrant
-from skred.diagnosis.event_nodes import FINE, FRONTS, ROUGH
+from skred.diagnosis.event_nodes import FINE, FIRST, FRONTS, ROUGH
+from skred.diagnosis.extension import extended
 from skred.diagnosis.first_look import curve, first_look
-from skred.diagnosis.race import _corrections, _first_looks, _that_count, with_errors
+from skred.diagnosis.race import _corrections, _first_looks, _that_count, _that_may_count, with_errors
 from skred.diagnosis.screen import Screen, candidates
 from skred.diagnosis.second_look import Place, entrants_of, leading
 from skred.physics.mechanisms import mechanisms
@@ -122,8 +123,46 @@ def test_what_is_far_behind_is_not_looked_at_again() -> None:
     curves = [made(name, 100.0 * k, one) for name, row in heights.items() for k, one in enumerate(row)]
     assert _that_count(dict(enumerate(curves))) == [0, 2, 3, 4, 5]
     # A second look at what is hopeless against the best of all would change nothing that is said.
+    assert leading(curves, {}) == [0]
+    curves[0] = made("segment_drag", 0.0, 26.5)
     assert leading(curves, {}) == [0, 3, 5]
-    assert leading([made("segment_drag", 300.0, 45.0), *curves], {}) == [0]
+    assert leading(curves, {0: Place((made("segment_drag", 0.0, 28.5),))}) == [0, 5]
+
+
+def test_the_leader_is_parted_before_others_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What falls hopelessly behind the leader's parts is left as it is; what keeps up is not."""
+    at_first = [
+        made("segment_drag", 0.0, 20.0),
+        made("obstacle", 100.0, 10.0),
+        made("sensor_bias", 200.0, 12.0),
+    ]
+    looked: list[str] = []
+
+    def curve_near(base: Any, mechanism: Any, shape: Any, near: Curve, first: Any) -> Curve:
+        looked.append(mechanism.id)
+        return made(mechanism.id, shape.s_from_m, 26.0 if mechanism.id == "segment_drag" else 13.0)
+
+    monkeypatch.setattr(looking, "curve_near", curve_near)
+    monkeypatch.setattr(looking, "_parts", lambda *of: [])
+    with ThreadPoolExecutor(1) as pool:
+        base: Any = SimpleNamespace()
+        found = looking.second_look(base, at_first, ROUGH, pool)
+    assert looked == ["segment_drag", "sensor_bias"]
+    assert found["obstacle"].curves == (at_first[1],)
+
+
+def test_mechanisms_that_an_error_model_far_behind_cannot_bring_back() -> None:
+    """Twice what they have under the other one and five nats more, less what it is behind, are too few."""
+    curves = [made("segment_drag", 0.0, 12.0), made("obstacle", 0.0, 4.0), made("sensor_bias", 0.0, -1.0)]
+    curves.append(made("obstacle", 100.0, -3.0))
+    best, low, none, worst = (one.log_bayes_factor for one in curves)
+    assert _that_may_count(curves, 0.0) == [curves[0], curves[1], curves[3]]
+    assert 2.0 * low + 5.0 > best and none + 5.0 < best
+    assert _that_may_count(curves, 2.0 * low + 5.0 - best + 0.01) == [curves[0]]
+    assert _that_may_count(curves, best + 5.01) == []
+    # With nothing that leads they have to keep up with nothing.
+    assert _that_may_count(curves[2:3], none + 4.99) == curves[2:3]
+    assert _that_may_count(curves[2:3], none + 5.01) == []
 
 
 def test_under_another_error_model_each_mechanism_is_looked_at_until_the_rest_is_far_behind(
@@ -249,6 +288,38 @@ def test_other_error_models_start_from_any() -> None:
     assert replace(again, fit=there.fit).problem.error_model.id == "robust"
     # Two routes: nodes around modes, and the law's likelihood surfaces.
     assert there.fit.found.log_evidence == pytest.approx(base.fit.found.log_evidence, abs=0.3)
+
+
+def test_a_first_look_leaves_out_only_strengths_that_are_hopeless() -> None:
+    """The same evidence as on the whole grid, without those that have none and have the more the weaker."""
+    base, spared = sparse_base(), 0
+    local = [one for one in candidates(base.setting) if one.mechanism.id in ("segment_friction", "obstacle")]
+    for job in local[::9]:
+        added = job.mechanism.added
+        assert added is not None
+        grid = added.scale_of(job.shape) * np.array([0.2, 0.6, 1.2, 2.2, 3.5])
+        grid = np.append(-grid[::-1], grid) if added.either_sign else grid
+        whole = curve_at(base, job.mechanism, job.shape, grid, FRONTS)
+        found = curve(base, job.mechanism, job.shape, FRONTS)
+        assert found.log_bayes_factor == pytest.approx(whole.log_bayes_factor, abs=0.01)
+        assert set(found.strengths) <= set(whole.strengths)
+        spared += len(whole.strengths) - len(found.strengths)
+    assert spared > 0
+
+
+def test_nothing_is_the_same_whatever_is_not_added() -> None:
+    """At strength 0 of a mechanism, refitted with those of its other strengths or by itself."""
+    base = sparse_base()
+    for job in (candidates(base.setting)[k] for k in (0, 20, -1)):
+        extension = extended(base.problem, base.law, (*base.directions, job.direction))
+        start = (base.population, base.fit.points)
+        for budget, first in ((ROUGH, None), (FRONTS, FIRST)):
+            (zero,) = refit(extension, base.rows, np.zeros((1, 1)), start, base.log_scale, budget, first)
+            found = base.with_nothing(budget)
+            assert found.found.log_evidence == pytest.approx(zero.found.log_evidence, abs=1e-6)
+            assert base.with_nothing(budget) is found
+    # Another base, under another error model say, has its own.
+    assert replace(base).with_nothing(ROUGH) is not base.with_nothing(ROUGH)
 
 
 def test_a_first_look_sees_strengths_far_below_the_grid() -> None:

@@ -1,7 +1,8 @@
 """The race: nothing, every listed mechanism, every instrument fault and the unlisted force, refitted each.
 
-Two error models run: the robust one, and the one that the base law alone prefers if that is another, so that
-odd events, heavy tails and correlated errors stay error models and do not become findings.
+Two error models run: the one that the base law alone prefers and, if that is another, the robust one, so that
+odd events, heavy tails and correlated errors stay error models and do not become findings. Where the robust
+one is so far behind that no candidate can bring it back it does not run.
 
 Curves are computed in threads. scipy's `logsumexp` asks there for JAX, which ArviZ loads only when asked, and
 two threads that ask at once find half of it; NumPy's does not.
@@ -43,6 +44,9 @@ _CHECKED, _DRAWS = 5, 500
 """Leading mechanisms whose best curve is looked at with many more nodes."""
 _FAR_BEHIND = 10.0
 """Nats behind its mechanism's best at which a place is not looked at under another error model."""
+_OTHER_ERRORS = 5.0
+"""Nats that a candidate may have more under the less probable of two error models, beside as many again as it
+has under the other. Where it has less than that it is not looked at there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +125,7 @@ class Race:
                 + heat.log_factors[name]
             )
 
-        return max(self.heats, key=height)
+        return max((heat for heat in self.heats if name in heat.log_factors), key=height)
 
 
 def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
@@ -140,17 +144,16 @@ def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
     preferred = max(height, key=lambda name: height[name])
     chosen = [DEFAULT_ERRORS]
     if height[preferred] > height[DEFAULT_ERRORS] + _PREFERRED_BY:
-        chosen.append(preferred)
-    heats: list[Heat] = []
-    for number, name in enumerate(chosen):
-
-        def told(done: int, of: int, number: int = number) -> None:
-            tell(done + number * of, of * len(chosen))
-
-        heats.append(_heat(name, bases[name], told, heats[0] if heats else None))
+        chosen.insert(0, preferred)
+    heats = [_heat(chosen[0], bases[chosen[0]], tell)]
+    for name in chosen[1:]:
+        before = _that_may_count(heats[0].first_look, height[preferred] - height[name])
+        if before:
+            heats.append(_heat(name, bases[name], tell, before))
     # The evidence of an error model without a heat counts for nothing and everything alike.
     raced = [entrant.mechanism for entrant in heats[0].entrants.values()]
-    return Race(tuple(heats), prior_odds(raced), {name: heights[name] for name in chosen})
+    evidence = {heat.error_model: heights[heat.error_model] for heat in heats}
+    return Race(tuple(heats), prior_odds(raced), evidence)
 
 
 def with_errors(base: Base, error_model: str) -> Base:
@@ -165,11 +168,11 @@ def with_errors(base: Base, error_model: str) -> Base:
     return replace(base, problem=problem, rows=rows, fit=fit)
 
 
-def _heat(error_model: str, base: Base, tell: Tell, before: Heat | None) -> Heat:
-    """The race under one error model; `before` under another one."""
+def _heat(error_model: str, base: Base, tell: Tell, before: Sequence[Curve] = ()) -> Heat:
+    """The race under one error model; of the mechanisms `before`, if there are first looks by another one."""
     budget = first_look(base)
     with ThreadPoolExecutor(threads()) as pool:
-        curves = _first_looks(base, budget, pool, tell, () if before is None else before.first_look)
+        curves = _first_looks(base, budget, pool, tell, before)
         entrants = second_look(base, curves, budget, pool)
         # Together, so that no thread waits for the longest profile.
         fitted = [pool.submit(_profile, base, kind, entrants) for kind in KINDS]
@@ -189,11 +192,12 @@ def _first_looks(
     base: Base, budget: Budget, pool: ThreadPoolExecutor, tell: Tell, before: Sequence[Curve]
 ) -> list[Curve]:
     """A rough curve for each candidate; those `before`, by another error model, where they cannot count."""
-    todo, curves, looked = candidates(base.setting, ties=False), dict(enumerate(before)), set[int]()
+    todo = [(one.mechanism, one.shape) for one in before or candidates(base.setting, ties=False)]
+    curves, looked = dict(enumerate(before)), set[int]()
     linear = _linear_strengths(base)
 
     def look(number: int) -> Curve:
-        mechanism, shape = todo[number].mechanism, todo[number].shape
+        mechanism, shape = todo[number]
         return curve(base, mechanism, shape, budget, linear.get((mechanism.id, shape)))
 
     while jobs := sorted(set(_that_count(curves) if curves else range(len(todo))) - looked):
@@ -202,6 +206,15 @@ def _first_looks(
             curves[number] = one
             tell(len(todo) - len(jobs) + done, len(todo))
     return [curves[number] for number in range(len(todo))]
+
+
+def _that_may_count(before: Sequence[Curve], behind: float) -> list[Curve]:
+    """Of first looks those of mechanisms that may count by an error model so many nats behind."""
+    heights = np.array([one.log_bayes_factor for one in before])
+    may_have = heights + np.maximum(heights, 0.0) + _OTHER_ERRORS - behind
+    best = max(float(heights.max()), 0.0)
+    names = {one.mechanism.id for one, most in zip(before, may_have, strict=True) if most > best}
+    return [one for one in before if one.mechanism.id in names]
 
 
 def _linear_strengths(base: Base) -> dict[tuple[str, Shape], float]:
