@@ -126,7 +126,7 @@ def test_what_is_far_behind_is_not_looked_at_again() -> None:
     assert leading(curves, {}) == [0]
     curves[0] = made("segment_drag", 0.0, 26.5)
     assert leading(curves, {}) == [0, 3, 5]
-    assert leading(curves, {0: Place((made("segment_drag", 0.0, 28.5),))}) == [0, 5]
+    assert leading(curves, {0: Place((made("segment_drag", 0.0, 28.0),))}) == [0, 5]
 
 
 def test_the_leader_is_parted_before_others_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -301,7 +301,7 @@ def test_a_first_look_leaves_out_only_strengths_that_are_hopeless() -> None:
         grid = np.append(-grid[::-1], grid) if added.either_sign else grid
         whole = curve_at(base, job.mechanism, job.shape, grid, FRONTS)
         found = curve(base, job.mechanism, job.shape, FRONTS)
-        assert found.log_bayes_factor == pytest.approx(whole.log_bayes_factor, abs=0.01)
+        assert found.log_bayes_factor == pytest.approx(whole.log_bayes_factor, abs=0.05)
         assert set(found.strengths) <= set(whole.strengths)
         spared += len(whole.strengths) - len(found.strengths)
     assert spared > 0
