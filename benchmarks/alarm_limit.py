@@ -29,7 +29,7 @@ from skred.trials.draw import draw_trial
 from skred.work.output import write_json
 
 RESULT = Path(__file__).resolve().parent / "results" / "alarm_limit.json"
-SEED = 2_300_000
+SEED = 2_500_000
 CLEAN = ("nothing", "nasty")
 LIMITS = (0.01, 0.05, NOTHING_ALONE, 0.2, 0.3)
 EDGES = (2.0, 4.0, 5.5, 7.0, 12.0)

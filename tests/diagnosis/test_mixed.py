@@ -35,6 +35,8 @@ def random_inputs(n: int, n_groups: int, seed: int) -> tuple[Modes, Rows, Popula
         rng.standard_normal((n_rows, N_COLUMNS, N_DIRECTIONS)),
         slope,
         curvature,
+        # Less than all of it: what is left is positive.
+        np.sqrt(curvature) * rng.uniform(0.2, 0.9, curvature.shape) / np.sqrt(N_COLUMNS),
     )
     empty = np.zeros((n_rows, 0))
     readings = EventReadings(empty, empty > 0, empty, *[np.zeros(0)] * 3, *[np.zeros(n_rows)] * 2, 8.0)
@@ -55,10 +57,12 @@ def dense(
         seen = modes.curvature[row] > 0.0
         jacobian = modes.by_points[row, seen]
         deviation = modes.points[row] - np.append(population.mean[group], 0.0)
-        residuals.append(modes.slope[row, seen] / modes.curvature[row, seen] + jacobian @ deviation)
+        shared = modes.shared[row, seen]
+        covariance = np.linalg.inv(np.diag(modes.curvature[row, seen]) - np.outer(shared, shared))
+        residuals.append(covariance @ modes.slope[row, seen] + jacobian @ deviation)
         by_mean.append(jacobian[:, :n])
         added.append(modes.by_strengths[row, seen])
-        blocks.append(np.diag(1.0 / modes.curvature[row, seen]) + jacobian @ own @ jacobian.T)
+        blocks.append(covariance + jacobian @ own @ jacobian.T)
     mean, x = np.vstack(by_mean), np.vstack(added)
     cover = mean @ np.diag(prior.sd**2) @ mean.T
     start = 0
@@ -85,6 +89,7 @@ def test_efficient_scores_are_generalised_least_squares(n: int, n_groups: int) -
         assert_allclose(found.information[group], information, rtol=1e-9, atol=1e-10)
         own = rows.group == group
         raw = np.einsum("rij,ri->j", modes.by_strengths[own] ** 2, modes.curvature[own])
+        raw -= np.sum(np.einsum("rij,ri->rj", modes.by_strengths[own], modes.shared[own]) ** 2, axis=0)
         assert_allclose(found.raw[group], raw)
         assert np.all(np.diag(information) <= raw)
     assert_allclose(found.z, found.score / np.sqrt(found.own))

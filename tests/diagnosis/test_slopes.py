@@ -10,7 +10,7 @@ from skred.diagnosis.slopes import reading_slopes
 from skred.inference.error_model import ERROR_MODELS, EventReadings
 from skred.inference.reading_density import log_likelihoods
 
-MODELS = ["normal", "robust", "student", "scaled"]
+MODELS = ["normal", "robust", "student", "scaled", "correlated"]
 INF = np.inf
 
 
@@ -57,7 +57,7 @@ def test_slopes_are_derivatives(model: str, stated: float) -> None:
     values = predictions[:, :3] + sizes * sd
     values[rng.random((n, 3)) < 0.15] = np.nan
     readings, errors = readings_of(values, stated, reached=1000.0, not_reached=1200.0), ERROR_MODELS[model]
-    slope, curvature = reading_slopes(np.arange(n), predictions, readings, errors.errors)
+    slope, curvature, _ = reading_slopes(np.arange(n), predictions, readings, errors.errors)
     numeric = differences(predictions, readings, errors.errors)
     inside = np.abs(np.clip(predictions[:, 3], 1000.0, 1200.0) - predictions[:, 3]) < 6.0 * 8.0
     assert_allclose(slope[:, :3], numeric[:, :3], rtol=2e-4, atol=2e-5)
@@ -71,7 +71,7 @@ def test_rows_choose_their_readings() -> None:
     readings, errors = readings_of(values), ERROR_MODELS["robust"].errors
     rows = np.array([1, 0, 1])
     predictions = np.array([[18.0, 13.0, 880.0, 880.0], [22.0, 28.0, 905.0, 905.0], [9.0, 3.0, 1.0, 1.0]])
-    slope, curvature = reading_slopes(rows, predictions, readings, errors)
+    slope, curvature, _ = reading_slopes(rows, predictions, readings, errors)
     for i, row in enumerate(rows):
         one = readings._replace(
             **{
@@ -99,7 +99,7 @@ def test_stop(z: float, reached: float, not_reached: float) -> None:
     def height(place: float) -> float:
         return float(log_likelihoods(at, np.array([[0.0, 0.0, 0.0, place]]), readings, errors)[0])
 
-    slope, curvature = reading_slopes(at, np.array([[0.0, 0.0, 0.0, stop]]), readings, errors)
+    slope, curvature, _ = reading_slopes(at, np.array([[0.0, 0.0, 0.0, stop]]), readings, errors)
     first = (height(stop + 0.01) - height(stop - 0.01)) / 0.02
     second = (height(stop + 0.2) - 2.0 * height(stop) + height(stop - 0.2)) / 0.04
     assert_allclose(slope[0, 3], first, rtol=3e-3, atol=1e-6)
@@ -107,18 +107,32 @@ def test_stop(z: float, reached: float, not_reached: float) -> None:
     assert_allclose(curvature[0, 3], -second, rtol=0.04, atol=2e-5)
 
 
-@pytest.mark.parametrize("model", ["normal"])
-def test_curvature_is_the_expected_square_of_the_slope(model: str) -> None:
+@pytest.mark.parametrize("model", ["normal", "correlated"])
+def test_information_is_the_expected_square_of_the_slopes(model: str) -> None:
     """Fisher's information two ways, its standard deviation moving with the prediction."""
-    nodes, weights = np.polynomial.hermite_e.hermegauss(41)
+    errors = ERROR_MODELS[model].errors
     prediction = np.array([20.0, 12.0, 900.0, 900.0])
     sd = np.hypot(np.array([0.1, 0.06, 0.0]) * prediction[:3], np.array([0.5, 0.3, 7.0]))
-    values = prediction[:3] + nodes[:, None] * sd
-    slope, curvature = reading_slopes(
-        np.arange(41), np.tile(prediction, (41, 1)), readings_of(values), ERROR_MODELS[model].errors
+    nodes, weights = np.polynomial.hermite_e.hermegauss(21)
+    normal = np.stack(np.meshgrid(nodes, nodes, nodes), axis=-1).reshape(-1, 3)
+    weight = np.stack(np.meshgrid(weights, weights, weights), axis=-1).reshape(-1, 3).prod(axis=1)
+    correlation = np.eye(3)
+    correlation[0, 1] = correlation[1, 0] = errors.common
+    values = prediction[:3] + normal @ np.linalg.cholesky(correlation).T * sd
+    rows, predictions = np.arange(len(values)), np.tile(prediction, (len(values), 1))
+    slope, curvature, shared = (
+        found[:, :3] for found in reading_slopes(rows, predictions, readings_of(values), errors)
     )
-    expected = (weights / weights.sum()) @ slope[:, :3] ** 2
-    assert_allclose(curvature[:, :3], np.tile(expected, (41, 1)), rtol=1e-9)
+    information = np.diag(curvature[0]) - np.outer(shared[0], shared[0])
+    fisher = np.einsum("n,ni,nj->ij", weight / weight.sum(), slope, slope)
+    if model == "normal":
+        assert_allclose(information, fisher, rtol=1e-9, atol=1e-12)
+    # With errors in common the standard deviations' own share is left as if each error were by itself.
+    own = np.array([0.1, 0.06, 0.0]) ** 2 * prediction[:3] / sd**2
+    of_means = information - np.diag(2.0 * own**2)
+    exact = np.linalg.inv(correlation) / np.outer(sd, sd)
+    assert_allclose(of_means, exact, rtol=1e-9, atol=1e-12)
+    assert_allclose(information, fisher, atol=0.05 * fisher.max())
 
 
 def test_an_outlier_pulls_less() -> None:

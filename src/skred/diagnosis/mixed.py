@@ -100,8 +100,8 @@ def efficient_scores(modes: Modes, rows: Rows, population: Population, prior: Me
     cover = np.linalg.inv(information + precision)
     deviation = deviations(modes.points, rows, population)
     # Weighted residuals about the population's mean.
-    pull = modes.slope + modes.curvature * np.einsum("rij,rj->ri", modes.by_points, deviation)
-    weighted = modes.curvature[:, :, None] * modes.by_strengths
+    pull = modes.slope + modes.weighed(modes.by_points @ deviation[:, :, None])[:, :, 0]
+    weighted = modes.weighed(modes.by_strengths)
     mixed = np.einsum("rij,rik->rjk", modes.by_points, weighted, optimize=True)
     at_points = np.einsum("rij,ri->rj", modes.by_points, pull)
     score = np.einsum("rij,ri->rj", modes.by_strengths, pull)

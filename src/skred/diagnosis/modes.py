@@ -94,6 +94,8 @@ class Modes(NamedTuple):
     by_strengths : (n_rows, n_columns, n_directions) array
     slope, curvature : (n_rows, n_columns) arrays
         Of the log likelihood by the predictions.
+    shared : (n_rows, n_columns) array
+        What an error common to a row's velocities takes from the curvature: its product with itself.
     """
 
     points: FloatArray
@@ -103,24 +105,32 @@ class Modes(NamedTuple):
     by_strengths: FloatArray
     slope: FloatArray
     curvature: FloatArray
+    shared: FloatArray
 
     @property
     def information(self) -> FloatArray:
         """Of the readings about the points, (n_rows, n_base + 1, n_base + 1)."""
-        result: FloatArray = self.by_points.transpose(0, 2, 1) @ (self.curvature[:, :, None] * self.by_points)
+        result: FloatArray = self.by_points.transpose(0, 2, 1) @ self.weighed(self.by_points)
         return result
+
+    def weighed(self, changes: FloatArray) -> FloatArray:
+        """Changes of the predictions, (n_rows, n_columns, n), times the readings' information."""
+        weighed: FloatArray = self.curvature[:, :, None] * changes
+        if self.shared.any():
+            weighed -= self.shared[:, :, None] * (self.shared[:, None, :] @ changes)
+        return weighed
 
 
 def look_around(extension: Extension, rows: Rows, points: FloatArray, strengths: FloatArray) -> Modes:
     """Tangents and slopes at some points; strengths are (n_directions,) or (n_rows, n_directions)."""
     predictions, by_points, by_strengths = extension.tangents(rows.event, points, strengths)
     at = np.arange(len(points))
-    slope, curvature = reading_slopes(at, predictions, rows.readings, rows.errors)
+    slope, curvature, shared = reading_slopes(at, predictions, rows.readings, rows.errors)
     # Where friction falls with speed a front can be at the very edge of stopping: a slope without end.
     steepest = np.sqrt(curvature) * np.abs(by_points).max(axis=2)
     limited = 1.0 / np.maximum(steepest / _STEEPEST, 1.0)
     by_points, by_strengths = by_points * limited[:, :, None], by_strengths * limited[:, :, None]
-    return Modes(points, points, predictions, by_points, by_strengths, slope, curvature)
+    return Modes(points, points, predictions, by_points, by_strengths, slope, curvature, shared)
 
 
 def log_joint(

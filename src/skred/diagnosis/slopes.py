@@ -1,7 +1,7 @@
 """How the log likelihood of each reading changes with its prediction: slope and curvature, in numba.
 
 The curvature is that of Gauss and Newton: a reading counts with its precision, an outlying one with
-less. An error common to an event's velocities is not seen here.
+less. What an error common to an event's velocities takes from that is the product of a vector with itself.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from skred.diagnosis.compiled import compiled
-from skred.inference.reading_density import OUTLIER_FACTOR
+from skred.inference.reading_density import OUTLIER_FACTOR, reading_sd
 
 _SQRT_2 = math.sqrt(2.0)
 _SQRT_2PI = math.sqrt(2.0 * math.pi)
@@ -39,6 +39,31 @@ def _stop_slopes(stop, reached, not_reached, place_sd):  # type: ignore[no-untyp
 
 
 @compiled()
+def _common_slopes(row, prediction, readings, common, slope, curvature, shared):  # type: ignore[no-untyped-def]
+    """Fill slope, curvature and what is shared of a row whose velocities have an error in common."""
+    n_velocities, total = 0, 0.0
+    n_columns = prediction.size
+    for j in range(n_columns - 1):
+        if readings.observed[row, j] and readings.is_velocity[j]:
+            n_velocities += 1
+            sd = reading_sd(row, j, prediction[j], readings)
+            total += (readings.values[row, j] - prediction[j]) / sd / (1.0 - common)
+    taken = common / (1.0 + common * n_velocities / (1.0 - common))
+    for j in range(n_columns - 1):
+        if not readings.observed[row, j]:
+            continue
+        sd = reading_sd(row, j, prediction[j], readings)
+        z = (readings.values[row, j] - prediction[j]) / sd
+        own, part = (1.0 - common, 1.0) if readings.is_velocity[j] else (1.0, 0.0)
+        d_log_sd = 0.0
+        if readings.stated_sd[row, j] <= 0.0:  # the standard deviation is the prediction's own
+            d_log_sd = readings.relative_sd[j] ** 2 * prediction[j] / sd**2
+        slope[j] = (z - part * taken * total) / own * (1.0 / sd + z * d_log_sd) - d_log_sd
+        curvature[j] = 1.0 / (own * sd**2) + 2.0 * d_log_sd**2
+        shared[j] = part * math.sqrt(taken) / (own * sd)
+
+
+@compiled()
 def reading_slopes(rows, predictions, readings, errors):  # type: ignore[no-untyped-def]
     """Slope and curvature of the log likelihood by each prediction.
 
@@ -53,16 +78,27 @@ def reading_slopes(rows, predictions, readings, errors):  # type: ignore[no-unty
 
     Returns
     -------
-    slope, curvature : (n, n_sensors + 1) arrays
+    slope, curvature, shared : (n, n_sensors + 1) arrays
+        The information of a row's readings is the diagonal matrix of the curvatures less the product of
+        what is shared with itself.
     """
     n, n_columns = predictions.shape
     slope, curvature = np.zeros((n, n_columns)), np.zeros((n, n_columns))
+    shared = np.zeros((n, n_columns))
     n_cases = errors.weights.size
     log_case = np.empty(n_cases)
     sd, residual = np.empty(n_columns), np.empty(n_columns)
     wide_square = OUTLIER_FACTOR * OUTLIER_FACTOR
     for i in range(n):
         row = rows[i]
+        at_stop, bend = _stop_slopes(
+            predictions[i, n_columns - 1], readings.reached[row], readings.not_reached[row], readings.place_sd
+        )
+        slope[i, n_columns - 1], curvature[i, n_columns - 1] = at_stop, bend
+        if errors.common > 0.0:
+            one = slope[i], curvature[i], shared[i]
+            _common_slopes(row, predictions[i], readings, errors.common, *one)
+            continue
         log_case[:] = np.log(errors.weights)
         for j in range(n_columns - 1):
             if not readings.observed[row, j]:
@@ -104,8 +140,4 @@ def reading_slopes(rows, predictions, readings, errors):  # type: ignore[no-unty
                 d_log_sd = readings.relative_sd[j] ** 2 * predictions[i, j] / sd[j] ** 2
                 slope[i, j] += d_log_sd * (precision * residual[j] ** 2 - 1.0)
                 curvature[i, j] += 2.0 * d_log_sd * d_log_sd
-        at_stop, bend = _stop_slopes(
-            predictions[i, n_columns - 1], readings.reached[row], readings.not_reached[row], readings.place_sd
-        )
-        slope[i, n_columns - 1], curvature[i, n_columns - 1] = at_stop, bend
-    return slope, curvature
+    return slope, curvature, shared
