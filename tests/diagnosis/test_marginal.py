@@ -9,6 +9,7 @@ import pytest
 from diagnosis_cases import dense_base, ryggfonn_base, sparse_base
 from numpy.testing import assert_allclose
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 import skred.diagnosis.event_nodes as event_nodes_module
 from skred.diagnosis.curves import Base
@@ -26,6 +27,7 @@ from skred.diagnosis.marginal import (
 )
 from skred.diagnosis.modes import Population, event_modes
 from skred.inference.population import population_factor
+from skred.inference.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 from skred.inference.surface import Nodes
 
 FloatArray = NDArray[np.float64]
@@ -182,3 +184,17 @@ def test_prior_is_normalised(n: int) -> None:
     psi = np.array([values[i] for (values, _), i in zip(axes, chosen, strict=True)])
     product = at_centre + sum(ratio[i] for (_, ratio), i in zip(axes, chosen, strict=True))
     assert _log_prior(psi, n, log_scale) == pytest.approx(product, rel=1e-9)
+
+
+def test_no_population_is_narrower_than_nodes_can_tell() -> None:
+    """Twenty events with the same nodes, 0.02 apart: a population on one of them would promise 80 nats."""
+    line = np.arange(-25, 26) * 0.02
+    weights = np.log(0.02) + norm.logpdf(line, 0.0, 0.1)
+    nodes = Nodes(len(line) * np.arange(21), np.tile(line, 20)[None], np.tile(weights, 20))
+    scale = np.zeros(1)
+    start = np.array([0.0, np.log(0.004)])
+    found = evidence(nodes, scale, start, 40)
+    assert found.psi[1] > np.log(SPREAD_MEDIAN) - 6.0 * SPREAD_LOG_SD
+    usual = evidence(nodes, scale, np.array([0.0, np.log(0.1)]), 40)
+    assert usual.psi[1] > np.log(0.02)
+    assert found.log_evidence < usual.log_evidence + 5.0
