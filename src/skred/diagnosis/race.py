@@ -27,6 +27,7 @@ from skred.diagnosis.marginal import evidence, importance_evidence
 from skred.diagnosis.modes import campaign_rows, event_modes
 from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, stated
 from skred.diagnosis.profile_fit import as_profile, fit_profile
+from skred.diagnosis.restarts import better_modes
 from skred.diagnosis.screen import Screen, candidates
 from skred.diagnosis.second_look import second_look
 from skred.diagnosis.unlisted import KINDS, Kind, Profile, alike, log_evidence_of
@@ -165,6 +166,11 @@ def with_errors(base: Base, error_model: str) -> Base:
     rows = campaign_rows(extension)
     start = (base.population, base.fit.points)
     fit = refit(extension, rows, base.strengths[None, :], start, base.log_scale, FINE, USUAL, 3)[0]
+    population = fit.found.population(len(base.law.mechanisms))
+    points = better_modes(extension, rows, fit.points, base.strengths, population)
+    if not np.array_equal(points, fit.points):
+        start = (population, points)
+        fit = refit(extension, rows, base.strengths[None, :], start, base.log_scale, FINE, USUAL, 3)[0]
     return replace(base, problem=problem, rows=rows, fit=fit)
 
 
