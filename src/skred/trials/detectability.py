@@ -11,7 +11,7 @@ the population, and in a second round about the posterior that the first round f
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -39,6 +39,8 @@ FIRST_ROUND = ((0.15, 1.0), (0.15, 2.5), (0.2, 1.2))
 SECOND_ROUND = ((0.3, 1.2), (0.2, 2.0))
 """The same about the mean and covariance that the first round found."""
 POPULATION_STEPS = 40
+_FREE = 0.2
+"""Events that what is expected of a population's spread is worth where recordings alone are to tell it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,3 +228,35 @@ def detectability(
     true_fit = fit(setting, target, hidden, theta, n_nodes)
     base_fit = fit(setting, target, None, theta if start is None else start, n_nodes)
     return Detectability(float(np.sqrt(max(base_fit.deviance - true_fit.deviance, 0.0))), base_fit)
+
+
+def over_noise(
+    setting: Setting, theta: FloatArray, hidden: Hidden, rng: np.random.Generator, n: int
+) -> FloatArray:
+    """Twice the log likelihood ratio of what is hidden, for readings with errors, (n,).
+
+    Their mean is the square of the signal-to-noise without two shortcuts of `detectability`, which do little
+    where an effect moves readings and much where it makes fronts more alike: there errors hide that, and
+    exact readings have none; and a population may be as narrow as recordings have it, where what is
+    expected of its spread would keep the base law from that.
+
+    Parameters
+    ----------
+    setting : Setting
+        The recordings' design.
+    theta : (n_events, n_latent) array
+        The events' true latent parameters.
+    hidden : Hidden
+        What is hidden.
+    rng : numpy.random.Generator
+        Where errors come from.
+    n : int
+        How many sets of readings.
+    """
+    exact, free = target_of(setting, theta, hidden), replace(setting, prior_events=_FREE)
+    gained = np.empty(n)
+    for k in range(n):
+        target = replace(exact, values=exact.values + exact.sd * rng.standard_normal(exact.sd.shape))
+        with_it, without = (fit(free, target, known, theta) for known in (hidden, None))
+        gained[k] = without.deviance - with_it.deviance
+    return gained

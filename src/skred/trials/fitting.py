@@ -26,7 +26,7 @@ INNER_STEPS = 15
 PRIOR_MEAN_SD = 1.0
 """Of the population's mean log about the log of what is usual."""
 PRIOR_SPREAD, PRIOR_EVENTS = 0.13, 2.0
-"""The spread that is expected, and the number of events that this expectation is worth."""
+"""The spread that is expected, and the number of events that this expectation is usually worth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +45,8 @@ class Setting:
         False where the reading is missing.
     usual : (n_parameters,) array
         Base parameters about which the population is expected.
+    prior_events : float
+        The number of events that what is expected of the population's spread is worth.
     """
 
     ground: Ground
@@ -56,6 +58,7 @@ class Setting:
     absolute_sd: FloatArray
     recorded: NDArray[np.bool_]
     usual: FloatArray
+    prior_events: float = PRIOR_EVENTS
 
     @property
     def n_parameters(self) -> int:
@@ -184,7 +187,8 @@ def updated(
     centre = np.linalg.solve(n * precision + prior, precision @ means[:, :k].sum(axis=0) + prior @ usual)
     away = means[:, :k] - centre
     scatter = np.sum(away[:, :, None] * away[:, None, :] + covariances[:, :k, :k], axis=0)
-    covariance = (scatter + PRIOR_EVENTS * PRIOR_SPREAD**2 * np.eye(k)) / (n + PRIOR_EVENTS)
+    worth = setting.prior_events
+    covariance = (scatter + worth * PRIOR_SPREAD**2 * np.eye(k)) / (n + worth)
     mean, full = population.mean.copy(), population.precision.copy()
     mean[:k], full[:k, :k] = centre, np.linalg.inv(covariance)
     return Population(mean, full)
@@ -196,7 +200,8 @@ def penalty(setting: Setting, population: Population) -> float:
     precision = population.precision[:k, :k]
     off = (population.mean[:k] - np.log(setting.usual)) / PRIOR_MEAN_SD
     log_det = -np.linalg.slogdet(precision)[1]
-    return float(off @ off + PRIOR_EVENTS * (log_det + PRIOR_SPREAD**2 * np.trace(precision)))
+    spread = log_det + PRIOR_SPREAD**2 * np.trace(precision)
+    return float(off @ off + setting.prior_events * spread)
 
 
 def _maximise(
