@@ -7,8 +7,8 @@ batches of concealed trials have few; ``strong`` draws it from 5.5 to 12. Each g
 its alarm. Shares go by the signal-to-noise that came out, measured as it is defined: over readings with
 errors, the population refitted with hardly any prior (`skred.trials.detectability.over_noise`). What the
 simulator sets it by, exact readings and a prior worth two events, is twice as much for some masked effects on
-sparse recordings, and right to a tenth for open ones. Kept trial by trial in ``results/masked_open.json``; the
-same command goes on with a run that was ended. Nothing was tuned on them.
+sparse recordings, and right to a tenth for open ones. Kept trial by trial in ``results/masked_open.json``;
+the same command goes on with a run that was ended. Nothing was tuned on them.
 """
 
 from __future__ import annotations
