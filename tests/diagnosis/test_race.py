@@ -123,10 +123,12 @@ def test_what_is_far_behind_is_not_looked_at_again() -> None:
     curves = [made(name, 100.0 * k, one) for name, row in heights.items() for k, one in enumerate(row)]
     assert _that_count(dict(enumerate(curves))) == [0, 2, 3, 4, 5]
     # A second look at what is hopeless against the best of all would change nothing that is said.
-    assert leading(curves, {}) == [0]
-    curves[0] = made("segment_drag", 0.0, 26.5)
     assert leading(curves, {}) == [0, 3, 5]
-    assert leading(curves, {0: Place((made("segment_drag", 0.0, 28.0),))}) == [0, 5]
+    assert leading(curves, {0: Place((made("segment_drag", 0.0, 33.0),))}) == [0, 5]
+    assert leading([made("segment_drag", 300.0, 45.0), *curves], {}) == [0]
+    # Parts of what has much may have much more.
+    strong = [made("viscous_drag", 0.0, 91.0), made("segment_drag", 0.0, 71.0), made("obstacle", 0.0, 50.0)]
+    assert leading(strong, {}) == [0, 1]
 
 
 def test_the_leader_is_parted_before_others_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -140,7 +142,7 @@ def test_the_leader_is_parted_before_others_are_looked_at(monkeypatch: pytest.Mo
 
     def curve_near(base: Any, mechanism: Any, shape: Any, near: Curve, first: Any) -> Curve:
         looked.append(mechanism.id)
-        return made(mechanism.id, shape.s_from_m, 26.0 if mechanism.id == "segment_drag" else 13.0)
+        return made(mechanism.id, shape.s_from_m, 31.0 if mechanism.id == "segment_drag" else 13.0)
 
     monkeypatch.setattr(looking, "curve_near", curve_near)
     monkeypatch.setattr(looking, "_parts", lambda *of: [])
