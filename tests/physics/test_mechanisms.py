@@ -250,6 +250,11 @@ def test_opposed_stretches_begin_above_what_is_recorded_and_plain_ones_do_not(
         plain = [ends_of(one)[0] for one in own if not is_opposed(one)]
         assert min(plain) == 600.0 and sorted(start for start in opposed if start >= 600.0) == plain
         np.testing.assert_allclose(sorted(start for start in opposed if start < 600.0), above, atol=0.1)
+    for first in (600.1, 600.2, 600.3):
+        near = added_to(ALL["segment_drag"]).shapes(replace(setting, recorded_m=(first, 1100.0)))
+        assert (
+            len({(is_opposed(one), *np.round(ends_of(one), 3)) for one in near}) == len(near) == len(shapes)
+        )
     shallow = replace(setting, recorded_m=(100.0, 1100.0))
     assert min(ends_of(one)[0] for one in added_to(ALL["segment_drag"]).shapes(shallow)) >= 0.0
 

@@ -321,7 +321,7 @@ def curve_at(
     place = int(np.searchsorted(strengths, 0.0))
     # Strength 0 like all others, so that what is left of integration errors is the same there.
     if near is None:
-        found = _refit_from(base, extension, strengths, budget)
+        found = _refit_from(base, extension, strengths, budget) if len(strengths) else []
         found.insert(place, base.with_nothing(budget))
         strengths = np.insert(strengths, place, 0.0)
     else:

@@ -12,7 +12,8 @@ from skred.diagnosis.extension import extended
 from skred.physics.mechanisms.spec import Mechanism, Shape
 
 _GRID, _STRONGER = (0.2, 0.6, 1.2), (2.2, 3.5)
-"""Strengths at first, in scales of the prior; and those beyond, where the last of them is not hopeless."""
+"""Strengths at first, in scales of the prior; and those beyond, where one from the last of these on is not
+hopeless."""
 _HOPELESS = 12.0
 """Nats behind the best."""
 _OUTSIDE = 2.2
@@ -61,17 +62,17 @@ def curve(
         more = [linear] if abs(linear) * _OUTSIDE > scale * _GRID[0] else [linear, _OUTSIDE * linear]
         strengths = np.append(strengths, more)
     found = curve_at(base, mechanism, shape, strengths, budget)
-    signs = signs[[_may_be_stronger(found, sign) for sign in signs]]
+    signs = signs[[_may_be_stronger(found, sign, scale * _GRID[-1]) for sign in signs]]
     if len(signs):
         stronger = np.multiply.outer(signs, scale * np.array(_STRONGER)).ravel()
         found = found.joined(curve_at(base, mechanism, shape, stronger, budget))
     return _by_fronts(base, found) if found.rough else found
 
 
-def _may_be_stronger(found: Curve, sign: float) -> bool:
-    """Whether the strongest looked at so far, of a sign, is not hopeless."""
-    strongest = int(np.argmax(sign * found.strengths))
-    return bool(found.log_evidence[strongest] > found.log_evidence.max() - _HOPELESS)
+def _may_be_stronger(found: Curve, sign: float, least: float) -> bool:
+    """Whether a strength of some size or more, of a sign, is not hopeless."""
+    strong = sign * found.strengths > 0.999 * least
+    return bool(found.log_evidence[strong].max() > found.log_evidence.max() - _HOPELESS)
 
 
 def _by_fronts(base: Base, rough: Curve) -> Curve:

@@ -29,9 +29,9 @@ _NEGLIGIBLE = -25.0
 """Log share of an event's integral below which a node does not count for slopes."""
 _STEP = 2e-3
 _DEGREES, _RESAMPLED_FROM = 5.0, 8
-_NARROWEST = 6.0
-"""Standard deviations of its prior by which the log of a spread may be below its median: 0.0036. Narrower
-populations are between the nodes, whose sums then promise what is not there, a hundred nats and more."""
+_NARROWEST = _LOG_MEDIAN - 6.0 * _LOG_SD
+"""Least log of a spread, six standard deviations of its prior below the median: 0.0036. Narrower populations
+are between the nodes, whose sums then promise what is not there, a hundred nats and more."""
 
 
 @compiled()
@@ -81,7 +81,7 @@ def _log_prior(psi, n, log_scale):  # type: ignore[no-untyped-def]
 @compiled()
 def _log_target(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-untyped-def]
     for i in range(n):
-        if psi[n + i] < _LOG_MEDIAN - _NARROWEST * _LOG_SD:
+        if psi[n + i] < _NARROWEST:
             return -np.inf
     means = _means(psi, n, first.size - 1)
     density = integrated_log_density(means, _factor(psi, n), first, points, log_weights)
@@ -200,8 +200,18 @@ def _slopes(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-u
 
 
 @compiled()
+def _allowed(psi, n):  # type: ignore[no-untyped-def]
+    """The nearest coordinates whose spreads are not too narrow."""
+    allowed = psi.copy()
+    for i in range(n, 2 * n):
+        allowed[i] = max(psi[i], _NARROWEST)
+    return allowed
+
+
+@compiled()
 def _climb(psi, n, log_scale, first, points, log_weights, n_steps):  # type: ignore[no-untyped-def]
     """Newton's method with halved steps: the top, its height, and minus the Hessian there."""
+    psi = _allowed(psi, n)
     best, gradient, hessian = _slopes(psi, n, log_scale, first, points, log_weights)
     for _ in range(n_steps):
         values, axes = np.linalg.eigh(hessian)
@@ -212,14 +222,15 @@ def _climb(psi, n, log_scale, first, points, log_weights, n_steps):  # type: ign
             step /= largest
         gained = -1.0
         for _ in range(8):
-            new = _log_target(psi + step, n, log_scale, first, points, log_weights)
+            step = _allowed(psi + step, n) - psi
+            new = _log_target(_allowed(psi + step, n), n, log_scale, first, points, log_weights)
             gained = new - best
             if gained >= -1e-9:
                 break
             step *= 0.4
         if gained < -1e-9:
             break
-        psi = psi + step
+        psi = _allowed(psi + step, n)
         best, gradient, hessian = _slopes(psi, n, log_scale, first, points, log_weights)
         if gained < 1e-3:
             break

@@ -28,8 +28,8 @@ def next_sensor(found: Diagnosis) -> dict[str, Any] | None:
 
 def _rival(step: Step) -> Entrant | None:
     """The first of those tied that a speed could split off: listed, and another term."""
-    raced = step.race.leading(step.entrant.mechanism.id).entrants
-    rivals = [raced[name] for name in step.tied if name in raced]
+    raced = {name for heat in step.race.heats for name in heat.entrants}
+    rivals = [step.race.leading(name).entrants[name] for name in step.tied if name in raced]
     return next((one for one in rivals if not one.mechanism.is_same_term(step.entrant.mechanism)), None)
 
 

@@ -47,7 +47,8 @@ _FAR_BEHIND = 10.0
 """Nats behind its mechanism's best at which a place is not looked at under another error model."""
 _OTHER_ERRORS = 5.0
 """Nats that a candidate may have more under the less probable of two error models, beside as many again as it
-has under the other. Where it has less than that it is not looked at there."""
+has under the other. Where a model is farther behind than that, mechanisms to which these are too few are not
+raced under it, and count for nothing there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +62,8 @@ class Heat:
     entrants : mapping of str to Entrant
     profiles : list of Profile
     first_look : list of Curve
-        A rough one for each candidate; that under another error model where it cannot count.
+        A rough one for each candidate of the mechanisms raced; that under another error model where it
+        cannot count.
     """
 
     error_model: str
@@ -137,7 +139,7 @@ def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
     base : Base
         Under any error model.
     tell : callable
-        Told how many curves are done, and of how many.
+        Told how many first looks are done, and of how many, under each error model.
     """
     bases = {name: with_errors(base, name) for name in ERROR_SHARES}
     heights = {name: one.fit.found.log_evidence for name, one in bases.items()}
@@ -148,7 +150,9 @@ def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
         chosen.insert(0, preferred)
     heats = [_heat(chosen[0], bases[chosen[0]], tell)]
     for name in chosen[1:]:
-        before = _that_may_count(heats[0].first_look, height[preferred] - height[name])
+        before, behind = heats[0].first_look, height[preferred] - height[name]
+        if behind > _OTHER_ERRORS:
+            before = _that_may_count(before, behind)
         if before:
             heats.append(_heat(name, bases[name], tell, before))
     # The evidence of an error model without a heat counts for nothing and everything alike.

@@ -21,7 +21,7 @@ _GAINED = 1.0
 def better_modes(
     extension: Extension, rows: Rows, points: FloatArray, strengths: FloatArray, population: Population
 ) -> FloatArray:
-    """Each event's mode, or a higher one that a climb from its most probable node leads to.
+    """Each event's mode, or a higher one that a climb from the node with most of its integral leads to.
 
     Parameters
     ----------

@@ -22,7 +22,8 @@ from skred.physics.mechanisms.spec import Shape
 from skred.physics.mechanisms.stretches import shares
 
 _WITHIN, _AT_MOST, _TURNS = 3.0, 2, 3
-"""Places of a mechanism that are looked at again: within so many nats of its best, so many, so many times."""
+"""Places of a mechanism that are looked at again: within so many nats of its best, so many, so many times
+after the leader's."""
 _MORE, _MORE_OF_OWN = 20.0, 0.6
 """Nats that the parts of a place may have more than it, or share of its own if that is more: a place that
 does not come up to the best of all even so is not looked at again. Drag between the dam and the sensor above

@@ -146,6 +146,8 @@ class _WithoutDensity:
         self._model = model
 
     def __getattr__(self, name: str) -> Any:
+        if name == "_model":  # not there yet: while it is unpickled
+            raise AttributeError(name)
         return getattr(self._model, name)
 
     def logp(self) -> Any:

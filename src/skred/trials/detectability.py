@@ -233,7 +233,7 @@ def detectability(
 def over_noise(
     setting: Setting, theta: FloatArray, hidden: Hidden, rng: np.random.Generator, n: int
 ) -> FloatArray:
-    """Twice the log likelihood ratio of what is hidden, for readings with errors, (n,).
+    """Differences of the deviances without and with what is hidden, for readings with errors, (n,).
 
     Their mean is the square of the signal-to-noise without two shortcuts of `detectability`, which do little
     where an effect moves readings and much where it makes fronts more alike: there errors hide that, and

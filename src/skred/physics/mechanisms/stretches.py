@@ -135,7 +135,8 @@ def _from_above(setting: Setting) -> list[Shape]:
         for length in _lengths(setting)
         for shape in _row(setting, length, first - length, first + length)
     ]
-    return [one for one in shapes if 0.0 <= ends_of(one)[0] < first]
+    # The last of a row begins where the recorded part does, but for rounding: it is among the others.
+    return [one for one in shapes if 0.0 <= ends_of(one)[0] < first - 1.0]
 
 
 def _opposed(setting: Setting, shape: Shape, relief: float = 1.0) -> Shape | None:
