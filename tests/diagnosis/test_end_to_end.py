@@ -12,9 +12,10 @@ from diagnosis_cases import first_events, trial, with_sensors
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skred.campaign import Campaign, Status
-from skred.diagnosis.diagnose import Diagnosis, Effort, diagnose, reference_of
+from skred.diagnosis.diagnose import Diagnosis, Effort, diagnose
 from skred.diagnosis.held_out import HeldOut, errors, paired
 from skred.diagnosis.predictive import Predicted
+from skred.diagnosis.reference import Reference
 from skred.diagnosis.verdict import verdict
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical import hierarchical_problem
@@ -156,7 +157,7 @@ def test_before_and_after_stand_under_one_error_model(biased: Diagnosis, name: s
     under: Any = replace(step.calibration.problem, error_model=base.error_model)
     under = replace(under, base=replace(under.base, problem=base))
     step = replace(step, calibration=replace(step.calibration, problem=under))
-    found, cannot = reference_of(calibration, step)
+    found, cannot = Reference(calibration).on(base)
     problem: Any = found.problem
     assert found.gate.passed and cannot == ""
     assert problem.error_model.id == name
@@ -165,7 +166,7 @@ def test_before_and_after_stand_under_one_error_model(biased: Diagnosis, name: s
     if name != "robust":
         # Fewer than the 400 effective draws the gate asks for, even sixteen times as many from four chains.
         few = replace(calibration, settings=replace(calibration.settings, draws=5, tune=5))
-        found, cannot = reference_of(few, step)
+        found, cannot = Reference(few).on(base)
         assert found is few and f"under {name} errors failed" in cannot
 
 

@@ -13,7 +13,8 @@ from skred.diagnosis.decide import Decision
 from skred.diagnosis.diagnose import Effort, Left, let_in
 from skred.inference.sampling import SamplerSettings
 
-BASE: Any = SimpleNamespace(law=SimpleNamespace(id="pcm"))
+BASE: Any = SimpleNamespace(law=SimpleNamespace(id="pcm"), problem=None)
+REFERENCES: Any = SimpleNamespace(begin=lambda problem: None)
 
 
 def raced(**shares: float) -> Any:
@@ -47,7 +48,7 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Any:
             raced(nothing=0.0, unlisted=0.0, obstacle=1.0),
             Decision("missing_physics", ("obstacle",)),
         )
-        return let_in(BASE, first, named, SamplerSettings(), Effort(), Clock(lambda line: None))
+        return let_in(BASE, first, named, REFERENCES, SamplerSettings(), Effort(), Clock(lambda line: None))
 
     return once
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 from typing import Any
 
+import cloudpickle
 import numpy as np
 import pytest
 import xarray as xr
@@ -27,6 +29,11 @@ def test_enough_the_first_time() -> None:
     given, settings = problem(), SamplerSettings(draws=600, tune=400, seed=1)
     found = calibrate_surely(given, LAW, settings)
     assert found.gate.passed and found.settings == settings and found.problem is given
+    # To another process, and back from there, without what is compiled.
+    copied = pickle.loads(cloudpickle.dumps(found))
+    assert {"model", "step"} <= vars(found).keys() and not {"model", "step"} & vars(copied).keys()
+    assert copied.tree["posterior"].to_dataset().equals(found.tree["posterior"].to_dataset())
+    assert copied.model.initial_point().keys() == found.model.initial_point().keys()
 
 
 def test_coarser_surfaces_cost_less_and_are_nearly_as_good() -> None:

@@ -23,6 +23,7 @@ from skred.diagnosis.odds import UNLISTED
 from skred.diagnosis.omnibus import Omnibus, omnibus
 from skred.diagnosis.profile_law import ProfileLaw, profile_law
 from skred.diagnosis.race import Race, race
+from skred.diagnosis.reference import Reference
 from skred.diagnosis.screen import Screen
 from skred.inference.hierarchical import COARSER, HierarchicalProblem
 from skred.inference.population import population_of
@@ -212,11 +213,12 @@ def _steps(
     decision = decide(raced.probability, check.p_value, table.can_tell)
     location = _location(raced, decision) if alarmed(raced.probability, check.p_value) else None
     steps, reference, cannot, left = tuple[Step, ...](), calibration, "", Left()
+    references = Reference(calibration)
     if decision.names:
         clock.stage("augment", f"{law.id} + {decision.names[0]}: calibrating the augmented law")
-        steps, cannot, left = let_in(base, raced, decision, settings, effort, clock)
+        steps, cannot, left = let_in(base, raced, decision, references, settings, effort, clock)
     if steps:
-        reference, cannot = reference_of(calibration, steps[-1])
+        reference, cannot = references.on(_base_of(steps[-1]))
         steps = steps if not cannot else ()
     if cannot:
         decision = Decision("cannot_tell", ())
@@ -254,20 +256,11 @@ def _problem_of(calibration: Calibration) -> HierarchicalProblem:
     return problem
 
 
-def reference_of(calibration: Calibration, step: Step) -> tuple[Calibration, str]:
-    """The base law calibrated under a step's error model, or as it is and why, if that cannot be trusted."""
-    problem, own = step.calibration.problem, _problem_of(calibration)
+def _base_of(step: Step) -> HierarchicalProblem:
+    """What a step's law was calibrated on, without what was let in."""
+    problem = step.calibration.problem
     assert isinstance(problem, AugmentedProblem)
-    if problem.error_model.id == own.error_model.id:
-        return calibration, ""
-    again = calibrate_surely(problem.base.problem, calibration.law, calibration.settings)
-    problems = "; ".join(again.gate.problems)
-    if again.gate.passed:
-        return again, ""
-    return (
-        calibration,
-        f"the gate of {calibration.law.id} under {problem.error_model.id} errors failed: {problems}",
-    )
+    return problem.base.problem
 
 
 def population_draws(calibration: Calibration, n: int, seed: int) -> tuple[FloatArray, FloatArray]:
@@ -293,7 +286,13 @@ def _nothing_added(calibration: Calibration) -> FloatArray:
 
 
 def let_in(
-    base: Base, raced: Race, decision: Decision, settings: SamplerSettings, effort: Effort, clock: Clock
+    base: Base,
+    raced: Race,
+    decision: Decision,
+    references: Reference,
+    settings: SamplerSettings,
+    effort: Effort,
+    clock: Clock,
 ) -> tuple[tuple[Step, ...], str, Left]:
     """Let the winner in, check again, and a second one only if it earns it given the first.
 
@@ -306,6 +305,7 @@ def let_in(
         heat = raced.leading(names[0])
         entrant = heat.entrants[names[0]]
         chosen.append(entrant.best)
+        references.begin(heat.base.problem)
         problem = augmented_problem(_plain(heat.base), chosen)
         # Its chains start around the posterior: half the tuning does.
         calibration = calibrate_surely(problem, base.law, replace(settings, tune=settings.tune // 2))

@@ -4,8 +4,8 @@ Two error models run: the one that the base law alone prefers and, if that is an
 odd events, heavy tails and correlated errors stay error models and do not become findings. Where the robust
 one is so far behind that no candidate can bring it back it does not run.
 
-Curves are computed in threads. scipy's `logsumexp` asks there for JAX, which ArviZ loads only when asked, and
-two threads that ask at once find half of it; NumPy's does not.
+Curves are computed in threads and by helpers. scipy's `logsumexp` asks there for JAX, which ArviZ loads only
+when asked, and two threads that ask at once find half of it; NumPy's does not.
 """
 
 from __future__ import annotations
@@ -31,10 +31,11 @@ from skred.diagnosis.restarts import better_modes
 from skred.diagnosis.screen import Screen, candidates
 from skred.diagnosis.second_look import second_look
 from skred.diagnosis.unlisted import KINDS, Kind, Profile, alike, log_evidence_of
+from skred.helpers import crew
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Shape
-from skred.threads import threads
+from skred.threads import side_by_side
 
 FloatArray = NDArray[np.float64]
 Tell = Callable[[int, int], None]
@@ -44,7 +45,8 @@ _PREFERRED_BY = 1.0
 _CHECKED, _DRAWS = 5, 500
 """Leading mechanisms whose best curve is looked at with many more nodes."""
 _FAR_BEHIND = 10.0
-"""Nats behind its mechanism's best at which a place is not looked at under another error model."""
+"""Nats behind its mechanism's best at which a place is not looked at under another error model, and behind
+the best of all at which a mechanism's curve is not looked at with more nodes: it counts for nothing."""
 _OTHER_ERRORS = 5.0
 """Nats that a candidate may have more under the less probable of two error models, beside as many again as it
 has under the other. Where a model is farther behind than that, mechanisms to which these are too few are not
@@ -141,7 +143,8 @@ def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
     tell : callable
         Told how many first looks are done, and of how many, under each error model.
     """
-    bases = {name: with_errors(base, name) for name in ERROR_SHARES}
+    fitted = side_by_side(lambda name: with_errors(base, name), list(ERROR_SHARES))
+    bases = dict(zip(ERROR_SHARES, fitted, strict=True))
     heights = {name: one.fit.found.log_evidence for name, one in bases.items()}
     height = {name: math.log(ERROR_SHARES[name]) + heights[name] for name in bases}
     preferred = max(height, key=lambda name: height[name])
@@ -181,7 +184,8 @@ def with_errors(base: Base, error_model: str) -> Base:
 def _heat(error_model: str, base: Base, tell: Tell, before: Sequence[Curve] = ()) -> Heat:
     """The race under one error model; of the mechanisms `before`, if there are first looks by another one."""
     budget = first_look(base)
-    with ThreadPoolExecutor(threads()) as pool:
+    base.with_nothing(budget)  # before anyone else does it once more
+    with crew() as pool:
         curves = _first_looks(base, budget, pool, tell, before)
         entrants = second_look(base, curves, budget, pool)
         # Together, so that no thread waits for the longest profile.
@@ -260,8 +264,10 @@ def _corrections(
 
     Of those whose best curve was computed with fronts: what is wrong with a rough one is its own.
     """
-    leading = sorted(entrants, key=lambda name: -entrants[name].log_bayes_factor)[:_CHECKED]
-    leading = [name for name in leading if not entrants[name].best.rough]
+    height = {name: entrant.log_bayes_factor for name, entrant in entrants.items()}
+    least = max(height.values()) - _FAR_BEHIND
+    leading = sorted((name for name in height if height[name] > least), key=lambda name: -height[name])
+    leading = [name for name in leading[:_CHECKED] if not entrants[name].best.rough]
     plain = extended(base.problem, base.law, base.directions)
     nothing = pool.submit(_finely, base, plain, base.strengths, base.fit)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -33,9 +34,6 @@ class Calibration:
     ----------
     law, problem, settings :
         What was asked for.
-    model : pymc.Model
-    step : JointMetropolis
-        Compiled for this model, its event terms weightable.
     tree : DataTree
         See `skred.inference.results.assemble`.
     gate : Gate
@@ -44,10 +42,22 @@ class Calibration:
     law: Law
     problem: Problem
     settings: SamplerSettings
-    model: pm.Model
-    step: JointMetropolis
     tree: xr.DataTree
     gate: Gate
+
+    @cached_property
+    def model(self) -> pm.Model:
+        """The law's model of the problem."""
+        return self.law.build(self.problem)
+
+    @cached_property
+    def step(self) -> JointMetropolis:
+        """Compiled for the model, its event terms weightable."""
+        return JointMetropolis(model=self.model, pointwise="recordings")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what is compiled: it is compiled anew where it is asked for."""
+        return {name: value for name, value in vars(self).items() if name not in ("model", "step")}
 
     def entry(self) -> dict[str, Any]:
         """The calibration as plain data: gate, parameters and mean response, with units."""
@@ -72,7 +82,9 @@ def calibrate(
     gate = check_gate(posterior, [parameter.name for parameter in problem.parameters(law)])
     gate = gate.with_numerical_problems(problem.numerical_problems(law, posterior["posterior"].to_dataset()))
     tree = assemble(problem, law, posterior, prior, gate, settings)
-    return Calibration(law, problem, settings, model, step, tree, gate)
+    found = Calibration(law, problem, settings, tree, gate)
+    vars(found).update(model=model, step=step)  # there already: not to be compiled again
+    return found
 
 
 def calibrate_surely(problem: Problem, law: Law, settings: SamplerSettings) -> Calibration:

@@ -8,6 +8,7 @@ from typing import Any
 
 from skred.diagnosis.diagnose import Effort, diagnose
 from skred.diagnosis.verdict import verdict
+from skred.helpers import helpers
 from skred.inference.hierarchical import HierarchicalProblem
 from skred.inference.results import save
 from skred.inference.sampling import SamplerSettings
@@ -45,7 +46,8 @@ def diagnose_to(
         problem, locked = set_aside(problem, lock, settings.seed)
     if folds:
         folds_of(problem, folds, settings.seed)  # refused now rather than after the diagnosis
-    found = diagnose(problem, law, settings, effort, tell)
+    with helpers("skred.diagnosis.diagnose"):
+        found = diagnose(problem, law, settings, effort, tell)
     document = verdict(found) | {"settings": settings.as_dict() | {"replicas": effort.replicas}}
     write_json(folder / "verdict.json", document)
     if locked is not None:
