@@ -19,18 +19,19 @@ from pathlib import Path
 from typing import Any
 
 import cyclopts
+from commit import commit
 from masked_open import KINDS, alarm_of, as_read
 from proof_record import diagnosed, opened_batches
 
 from skred.diagnosis.decide import NOTHING_ALONE
 from skred.diagnosis.odds import NOTHING
+from skred.prove.plan import NULLS
 from skred.prove.scores_answers import Pair
 from skred.trials.draw import draw_trial
 from skred.work.output import write_json
 
 RESULT = Path(__file__).resolve().parent / "results" / "alarm_limit.json"
-SEED = 2_500_000
-CLEAN = ("nothing", "nasty")
+SEED = 2_700_000
 LIMITS = (0.01, 0.05, NOTHING_ALONE, 0.2, 0.3)
 EDGES = (2.0, 4.0, 5.5, 7.0, 12.0)
 app = cyclopts.App(help=__doc__)
@@ -38,9 +39,10 @@ app = cyclopts.App(help=__doc__)
 
 def look(number: int) -> dict[str, Any]:
     """What the alarm says of a campaign with nothing hidden."""
-    hidden, kind = CLEAN[number // 2 % 2], KINDS[number % 2]
+    hidden, kind = NULLS[number // 2 % 2], KINDS[number % 2]
     trial = draw_trial(SEED + number, kind=kind, hidden=hidden)
-    return {"hidden": hidden, "kind": kind} | alarm_of(as_read(trial), trial.truth["base_model"])
+    told = {"commit": commit(), "hidden": hidden, "kind": kind}
+    return told | alarm_of(as_read(trial), trial.truth["base_model"])
 
 
 def opened(pairs: Sequence[Pair]) -> dict[str, Any]:
@@ -63,16 +65,16 @@ def opened(pairs: Sequence[Pair]) -> dict[str, Any]:
 def drawn_after(found: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Alarms of campaigns with nothing hidden, and how near the others came."""
     rows = {}
-    for hidden in CLEAN:
+    for hidden in NULLS:
         own = [one for one in found if one["hidden"] == hidden]
         rows[hidden] = {"alarms": sum(one["alarm"] for one in own), "of": len(own)}
     return rows | {"least": sorted(one["nothing"] for one in found if "nothing" in one)[:5]}
 
 
-def keep(found: dict[str, Any]) -> dict[str, Any]:
-    """Write all that is known."""
-    pairs = [pair for batch in opened_batches() for pair in diagnosed(batch)]
-    document = {"opened": opened(pairs), "drawn_after": drawn_after(list(found.values()))}
+def keep(found: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
+    """Write all that is known; `before` is what opened trials say."""
+    document = {"opened": before, "drawn_after": drawn_after(list(found.values()))}
+    document |= {"seed": SEED, "commits": sorted({one["commit"] for one in found.values()})}
     write_json(RESULT, document | {"trials": dict(sorted(found.items()))})
     return document
 
@@ -92,13 +94,14 @@ def main(*, n: int = 80, workers: int = 2) -> None:
     found: dict[str, Any] = (
         json.loads(RESULT.read_text(encoding="utf-8"))["trials"] if RESULT.exists() else {}
     )
+    before = opened([pair for batch in opened_batches() for pair in diagnosed(batch)])
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         at_work = {pool.submit(look, k): f"{k:04d}" for k in range(n) if f"{k:04d}" not in found}
         for done in as_completed(at_work):
             found[at_work[done]] = done.result()
-            keep(found)
+            keep(found, before)
             print(at_work[done], done.result(), flush=True)
-    told = keep(found)
+    told = keep(found, before)
     for row in told["opened"]["limits"]:
         print(row)
     print({key: told["opened"][key] for key in ("clean", "least")}, told["drawn_after"])

@@ -28,6 +28,7 @@ from typing import Any, Literal
 
 import cyclopts
 import numpy as np
+from commit import commit
 from race_again import REPLICAS, base_and_draws
 
 from skred.campaign import Campaign, read_campaign, write_campaign
@@ -84,10 +85,10 @@ def as_read(trial: Trial) -> Campaign:
         return read_campaign(Path(scratch) / "campaign")
 
 
-def look(number: int) -> dict[str, dict[str, Any]]:
+def look(number: int) -> dict[str, Any]:
     """What the alarm says of a masked effect, and of the open ones beside it."""
     trial = drawn(number)
-    found = {"masked": looked_at(trial, number)}
+    found: dict[str, Any] = {"commit": commit(), "masked": looked_at(trial, number)}
     for which in OPEN:
         beside = drawn_beside(number, trial, which, found["masked"]["snr"])
         found[which] = looked_at(beside, number)
@@ -194,7 +195,8 @@ def keep(found: dict[str, Any]) -> dict[str, Any]:
     trials = list(found.values())
     document: dict[str, Any] = {"summary": {which: summary(trials, which) for which in OPEN}}
     document |= {"masked_by": masked_by(trials), "over_exact": over_exact(trials)}
-    write_json(RESULT, document | {"seed": SEED, "trials": dict(sorted(found.items()))})
+    document |= {"seed": SEED, "commits": sorted({one["commit"] for one in trials})}
+    write_json(RESULT, document | {"trials": dict(sorted(found.items()))})
     return document
 
 

@@ -31,7 +31,7 @@ _STEP = 2e-3
 _DEGREES, _RESAMPLED_FROM = 5.0, 8
 _NARROWEST = _LOG_MEDIAN - 6.0 * _LOG_SD
 """Least log of a spread, six standard deviations of its prior below the median: 0.0036. Narrower populations
-are between the nodes, whose sums then promise what is not there, a hundred nats and more."""
+are between the nodes, whose sums then promise what is not there, tens of nats."""
 
 
 @compiled()

@@ -27,7 +27,7 @@ after the leader's."""
 _MORE, _MORE_OF_OWN = 20.0, 0.6
 """Nats that the parts of a place may have more than it, or share of its own if that is more: a place that
 does not come up to the best of all even so is not looked at again. Drag between the dam and the sensor above
-it has 71 nats as a place and 112 in parts, under M1 at Ryggfonn."""
+it has 71 nats at a first look and 112 in parts, under M1 at Ryggfonn."""
 _SPLIT_FROM = 1.0
 """Nats in favour of a place from which it is split: parts of a place without evidence have hardly any."""
 _HOLDS_MOST, _LEVELS = 0.5, 4

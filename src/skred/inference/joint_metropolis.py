@@ -137,10 +137,7 @@ def _chain_for(density: types.FunctionType, data: types.BaseTuple) -> Callable[.
 
 
 class _WithoutDensity:
-    """A model for PyMC's own step, which compiles a density for moves that are not made here.
-
-    With the model's own that takes as long as half of its draws.
-    """
+    """A model for PyMC's own step, which would compile a density for moves that are not made here."""
 
     def __init__(self, model: pm.Model) -> None:
         self._model = model

@@ -242,12 +242,8 @@ def over_noise(
 
     Parameters
     ----------
-    setting : Setting
-        The recordings' design.
-    theta : (n_events, n_latent) array
-        The events' true latent parameters.
-    hidden : Hidden
-        What is hidden.
+    setting, theta, hidden :
+        As `detectability`.
     rng : numpy.random.Generator
         Where errors come from.
     n : int
