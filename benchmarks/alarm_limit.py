@@ -73,7 +73,7 @@ def drawn_after(found: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 def keep(found: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
     """Write all that is known; `before` is what opened trials say."""
-    document = {"opened": before, "drawn_after": drawn_after(list(found.values()))}
+    document: dict[str, Any] = {"opened": before, "drawn_after": drawn_after(list(found.values()))}
     document |= {"seed": SEED, "commits": sorted({one["commit"] for one in found.values()})}
     write_json(RESULT, document | {"trials": dict(sorted(found.items()))})
     return document

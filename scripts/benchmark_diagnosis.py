@@ -141,8 +141,8 @@ def masked_open() -> str:
 ## Masked and open effects
 
 `python benchmarks/masked_open.py weak --n {weak}` and `python benchmarks/masked_open.py strong --n {strong}`
-(seeds from {found["seed"]}, code {", ".join(found["commits"])}): simulated campaigns with a masked effect (the
-calibrated law is right on average at every sensor), and beside each two with an open effect of the
+(seeds from {found["seed"]}, code {", ".join(found["commits"])}): simulated campaigns with a masked effect
+(the calibrated law is right on average at every sensor), and beside each two with an open effect of the
 signal-to-noise that the masked one turned out to have: one of any listed mechanism, and one of the same, of
 the same base law and a track of the same family. Every masked effect has a place or a covariate to be looked
 for; half of the open ones of any mechanism act everywhere alike, and are found at less. Found is where the
