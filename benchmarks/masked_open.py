@@ -5,9 +5,8 @@ calibrated law is right on average at every sensor), sparse and dense in turn, a
 signal-to-noise from 2 to 5.5, where batches of concealed trials have few; ``strong`` asks for 5.5 to 12. To
 each come two campaigns of the signal-to-noise that the masked one turned out to have: one with an open effect
 of any listed mechanism, and one with an open effect of the same mechanism, on a track of the same family and
-with the same base law. The first says what masked effects are found less by, the second how much of that is
-masking: every masked effect has a place or a covariate to be looked for, and half of the open ones have none.
-Each goes through a diagnosis up to its alarm.
+with the same base law. The first says what masked effects are found less by, the second what of that is not
+the kind of mechanism. Each goes through a diagnosis up to its alarm.
 
 Signal-to-noise is measured as it is defined: over readings with errors, the population refitted with hardly
 any prior (`skred.trials.detectability.over_noise`). What the simulator sets it by, exact readings and a prior
@@ -49,6 +48,15 @@ RANGES = {"weak": (0, 2.0, 5.5), "strong": (1000, 5.5, 12.0)}
 EDGES = (2.0, 4.0, 5.5, 12.0)
 KINDS: tuple[Literal["sparse", "dense"], ...] = ("sparse", "dense")
 OPEN = {"any": "an open effect of any listed mechanism", "same": "an open effect of the same mechanism"}
+EVERYWHERE = (
+    "coulomb_friction",
+    "centrifugal",
+    "turbulent_drag",
+    "viscous_drag",
+    "constant_retardation",
+    "velocity_weakening",
+)
+"""Mechanisms without a place or a covariate to be looked for."""
 READINGS = 8
 """Sets of readings over which a signal-to-noise is measured."""
 SPARSE_MORE = 1.3
@@ -178,6 +186,16 @@ def masked_by(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return rows
 
 
+def weak_open(found: list[dict[str, Any]]) -> dict[str, list[int]]:
+    """Of open effects of any mechanism below the last range: found and how many, by what is looked for."""
+    weak = [one["any"] for one in found if EDGES[0] <= one["any"]["snr"] < EDGES[2]]
+    counts = {}
+    for name, everywhere in (("alike everywhere", True), ("a place or a covariate", False)):
+        own = [one["alarm"] for one in weak if (one["ids"][0] in EVERYWHERE) == everywhere]
+        counts[name] = [sum(own), len(own)]
+    return counts
+
+
 def over_exact(found: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Signal-to-noise as defined over what the simulator set it by: quantiles."""
     rows = []
@@ -194,7 +212,8 @@ def keep(found: dict[str, Any]) -> dict[str, Any]:
     """Write all that is known."""
     trials = list(found.values())
     document: dict[str, Any] = {"summary": {which: summary(trials, which) for which in OPEN}}
-    document |= {"masked_by": masked_by(trials), "over_exact": over_exact(trials)}
+    document |= {"masked_by": masked_by(trials), "weak_open": weak_open(trials)}
+    document |= {"over_exact": over_exact(trials)}
     document |= {"seed": SEED, "commits": sorted({one["commit"] for one in trials})}
     write_json(RESULT, document | {"trials": dict(sorted(found.items()))})
     return document
