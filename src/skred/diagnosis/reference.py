@@ -24,7 +24,7 @@ class Reference:
 
     def begin(self, problem: HierarchicalProblem) -> None:
         """Have the base law calibrated on a problem that will probably be asked for."""
-        if not self._is_own(problem):
+        if not self._is_own(problem) and problem.error_model.id not in self._begun:
             self._begun[problem.error_model.id] = self._asked(problem)
 
     def on(self, problem: HierarchicalProblem) -> tuple[Calibration, str]:

@@ -48,13 +48,13 @@ def diagnose_to(
         folds_of(problem, folds, settings.seed)  # refused now rather than after the diagnosis
     with helpers("skred.diagnosis.diagnose"):
         found = diagnose(problem, law, settings, effort, tell)
-    document = verdict(found) | {"settings": settings.as_dict() | {"replicas": effort.replicas}}
-    write_json(folder / "verdict.json", document)
-    if locked is not None:
-        tell(f"opening {lock} locked avalanches")
-        document["locked"] = open_locked(found, locked, settings.seed)
-    if folds:
-        document["outer_folds"] = outer_folds(problem, law, settings, effort, folds, tell)
+        document = verdict(found) | {"settings": settings.as_dict() | {"replicas": effort.replicas}}
+        write_json(folder / "verdict.json", document)
+        if locked is not None:
+            tell(f"opening {lock} locked avalanches")
+            document["locked"] = open_locked(found, locked, settings.seed)
+        if folds:
+            document["outer_folds"] = outer_folds(problem, law, settings, effort, folds, tell)
     if lock or folds:
         write_json(folder / "verdict.json", document)
     if found.calibration is not None:
