@@ -212,7 +212,7 @@ def alarm_limit() -> str:
     return f"""
 ## The alarm of the race alone
 
-`python benchmarks/alarm_limit.py --n 40` (ended after {len(found["trials"])}): the alarm is raised where the
+`python benchmarks/alarm_limit.py --n {len(found["trials"])}`: the alarm is raised where the
 probability of nothing is below a limit. From the answers of the opened batches of concealed trials, by
 signal-to-noise: clean campaigns below a limit, and hidden effects that either raised an alarm then or are
 below it. The limit of 0.1 was taken from this; it was 0.01.
