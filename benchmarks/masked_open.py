@@ -60,8 +60,8 @@ EVERYWHERE = (
 READINGS = 8
 """Sets of readings over which a signal-to-noise is measured."""
 SPARSE_MORE = 1.3
-"""What is asked of the simulator over what is wanted, for masked effects on sparse recordings: in the median
-what it sets is too much by that."""
+"""What is asked of the simulator over what is wanted, for masked effects on sparse recordings: about what it
+set too much in the median of the set before."""
 LEAST = 1.0
 """Least signal-to-noise that is asked for."""
 

@@ -34,7 +34,7 @@ def helpers(*modules: str) -> Iterator[None]:
     modules : str
         Names of what the helpers are to import as they start.
     """
-    n = min(threads() - 1, _MOST)
+    n = _wanted()
     if n < 1 or _there:
         yield
         return
@@ -49,6 +49,10 @@ def helpers(*modules: str) -> Iterator[None]:
     finally:
         _there.clear()
         executor.shutdown(wait=True, kill_workers=True)
+
+
+def _wanted() -> int:
+    return min(threads() - 1, _MOST)
 
 
 def _prepare(modules: tuple[str, ...]) -> None:
@@ -96,7 +100,7 @@ def crew() -> ThreadPoolExecutor:
     def take() -> None:
         _seat.number = next(seats)
 
-    return _Crew(1 + min(threads() - 1, _MOST), initializer=take)
+    return _Crew(1 + _wanted(), initializer=take)
 
 
 class _Crew(ThreadPoolExecutor):
