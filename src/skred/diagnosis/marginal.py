@@ -220,17 +220,16 @@ def _climb(psi, n, log_scale, first, points, log_weights, n_steps):  # type: ign
         largest = np.abs(step).max()
         if largest > 1.0:
             step /= largest
-        gained = -1.0
+        gained, there = -1.0, psi
         for _ in range(8):
-            step = _allowed(psi + step, n) - psi
-            new = _log_target(_allowed(psi + step, n), n, log_scale, first, points, log_weights)
-            gained = new - best
+            there = _allowed(psi + step, n)
+            gained = _log_target(there, n, log_scale, first, points, log_weights) - best
             if gained >= -1e-9:
                 break
-            step *= 0.4
+            step = 0.4 * (there - psi)
         if gained < -1e-9:
             break
-        psi = _allowed(psi + step, n)
+        psi = there
         best, gradient, hessian = _slopes(psi, n, log_scale, first, points, log_weights)
         if gained < 1e-3:
             break
