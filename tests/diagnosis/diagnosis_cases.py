@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from skred.campaign import Campaign, find_campaign, read_campaign
+from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.campaign.parts import of_events
 from skred.diagnosis.curves import Base, fit_base
 from skred.diagnosis.extension import extended
@@ -18,6 +18,7 @@ from skred.diagnosis.screen import Screen
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical import hierarchical_problem
 from skred.laws import load_law
+from skred.physics.mechanisms.spec import Direction
 from skred.trials.draw import draw_trial
 
 Kind = Literal["sparse", "dense"]
@@ -75,3 +76,27 @@ def sparse_base() -> Base:
 def dense_base() -> Base:
     """Clean, eight avalanches, dry friction and drag."""
     return base_of(first_events(trial(1003, "dense", "nothing", "pcm").campaign, 8), "pcm")
+
+
+def few_dense_base() -> Base:
+    """Eight clean avalanches past sixteen gates, constant retardation."""
+    campaign = first_events(trial(1003, "dense", "nothing", "constant").campaign, 8)
+    gates = [*range(0, campaign.n_sensors - 1, 2), campaign.n_sensors - 1]
+    return base_of(with_sensors(campaign, gates), "constant")
+
+
+def recorded(base: Base, direction: Direction) -> Base:
+    """The same avalanches with another term in, read with the stated errors."""
+    extension, problem = extended(base.problem, base.law, [direction]), base.problem
+    n, campaign = len(base.rows.event), base.problem.campaign
+    fronts = extension.predict(np.arange(n), base.fit.points, np.array([1.0]))[:, :-1]
+    readings = problem.readings
+    sd = np.hypot(readings.relative_sd * fronts, readings.absolute_sd)
+    noisy = fronts + sd * np.random.default_rng(1).standard_normal(fronts.shape)
+    stops = fronts[:, [-1]]
+    ends = np.array([-np.inf if s.is_runout else s.s_to_m for s in campaign.sensors], dtype=float)
+    came = stops > ends
+    status = np.where(came, Status.OBSERVED, Status.NOT_REACHED)
+    values = np.where(came, np.maximum(noisy, 0.0), np.nan)
+    made = replace(campaign, values=values, status=status, stated_sd=np.full(values.shape, np.nan))
+    return base_of(made, base.law.id)

@@ -13,12 +13,13 @@ from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
 
 from skred.diagnosis import race
 from skred.diagnosis import second_look as looking
+from skred.diagnosis.corrections import corrected
 from skred.diagnosis.curves import Base, Curve, curve_at, curve_near, refit
 from skred.diagnosis.entrant import Entrant
 from skred.diagnosis.event_nodes import FINE, FIRST, FRONTS, ROUGH, USUAL
 from skred.diagnosis.extension import extended
 from skred.diagnosis.first_look import curve, first_look
-from skred.diagnosis.race import _corrections, _first_looks, _that_count, _that_may_count, with_errors
+from skred.diagnosis.race import _first_looks, _that_count, _that_may_count, with_errors
 from skred.diagnosis.screen import Screen, candidates
 from skred.diagnosis.second_look import Place, entrants_of, leading
 from skred.physics.mechanisms import mechanisms
@@ -79,12 +80,14 @@ def test_only_what_fronts_computed_is_corrected(base: Base) -> None:
     assert rough.rough and not fronts.rough
     with ThreadPoolExecutor(1) as pool:
         found = [
-            _corrections(base, {"turbulent_drag": Entrant(job.mechanism, (one,), np.zeros(1))}, pool)
-            for one in (rough, fronts)
+            corrected(base, {"turbulent_drag": Entrant(job.mechanism, (one,), np.zeros(1))}, [], pool, best)
+            for one, best in ((rough, 0.0), (fronts, 0.0), (fronts, fronts.log_bayes_factor + 7.0))
         ]
-    assert found[0] == {}
-    correction, disagreement = found[1]["turbulent_drag"]
-    assert 0.0 < abs(correction) < 0.5 and abs(disagreement) < 0.5
+    looked = [entrants["turbulent_drag"] for entrants, _ in found]
+    assert [one.disagreement is None for one in looked] == [True, False, True]
+    assert looked[0].correction == looked[2].correction == 0.0
+    assert looked[1].disagreement is not None
+    assert 0.0 < abs(looked[1].correction) < 0.5 and abs(looked[1].disagreement) < 0.5
 
 
 def test_fronts_are_looked_at_where_readings_are_far_off() -> None:

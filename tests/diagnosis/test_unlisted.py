@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_cases import base_of, first_events, trial, with_sensors
+from diagnosis_cases import base_of, few_dense_base, recorded
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal, norm
 
-from skred.campaign import Status, find_campaign, read_campaign
+from skred.campaign import find_campaign, read_campaign
 from skred.diagnosis.curves import Base
 from skred.diagnosis.event_nodes import USUAL
 from skred.diagnosis.extension import extended
@@ -32,38 +32,18 @@ from skred.diagnosis.unlisted import (
 )
 from skred.physics.columns import Column
 from skred.physics.mechanisms import mechanisms
-from skred.physics.mechanisms.spec import Direction, Shape
+from skred.physics.mechanisms.spec import Shape
 
 
 @pytest.fixture(scope="module")
 def base() -> Base:
-    """Eight clean avalanches past sixteen gates, constant retardation."""
-    campaign = first_events(trial(1003, "dense", "nothing", "constant").campaign, 8)
-    gates = [*range(0, campaign.n_sensors - 1, 2), campaign.n_sensors - 1]
-    return base_of(with_sensors(campaign, gates), "constant")
+    return few_dense_base()
 
 
 def planted(base: Base, kind: int, centre: float, size: float) -> Base:
     """The same avalanches with a force on 200 m."""
     at = np.array([centre - 100.0, centre - 50.0, centre + 50.0, centre + 100.0])
     return recorded(base, combined(base.setting, KINDS[kind], at, size * np.array([0.0, 1.0, 1.0, 0.0])))
-
-
-def recorded(base: Base, direction: Direction) -> Base:
-    """The same avalanches with another term in, read with the stated errors."""
-    extension, problem = extended(base.problem, base.law, [direction]), base.problem
-    n, campaign = len(base.rows.event), base.problem.campaign
-    fronts = extension.predict(np.arange(n), base.fit.points, np.array([1.0]))[:, :-1]
-    readings = problem.readings
-    sd = np.hypot(readings.relative_sd * fronts, readings.absolute_sd)
-    noisy = fronts + sd * np.random.default_rng(1).standard_normal(fronts.shape)
-    stops = fronts[:, [-1]]
-    ends = np.array([-np.inf if s.is_runout else s.s_to_m for s in campaign.sensors], dtype=float)
-    came = stops > ends
-    status = np.where(came, Status.OBSERVED, Status.NOT_REACHED)
-    values = np.where(came, np.maximum(noisy, 0.0), np.nan)
-    made = replace(campaign, values=values, status=status, stated_sd=np.full(values.shape, np.nan))
-    return base_of(made, base.law.id)
 
 
 def test_hats_sum_to_one_inside(base: Base) -> None:

@@ -17,7 +17,18 @@ from skred.diagnosis.curves import Base, Curve, Fit, refit
 from skred.diagnosis.extension import extended
 from skred.diagnosis.mixed import efficient_scores, mean_prior
 from skred.diagnosis.modes import Population, look_around
-from skred.diagnosis.unlisted import NEAR_M, Kind, Prior, Profile, combined, entering, hats, knots, priors_of
+from skred.diagnosis.unlisted import (
+    NEAR_M,
+    Hill,
+    Kind,
+    Prior,
+    Profile,
+    combined,
+    hats,
+    knot_by_knot,
+    knots,
+    priors_of,
+)
 
 FloatArray = NDArray[np.float64]
 Start = tuple[FloatArray, tuple[Population, FloatArray]]
@@ -27,6 +38,8 @@ lead then."""
 _ROUNDS, _SURE, _NO_FORCE = 6, 1.0, -0.5
 _SHARES = (1.0, 0.4, 0.15, 0.05)
 _SETTLED = 0.05
+_HILLS_WITHIN = 4.0
+"""Nats behind the most probable prior from which on none is worth to be sampled under."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +88,8 @@ def fit_profile(base: Base, kind: Kind, near: Start | None = None, again: Prior 
     peak = seen.peaks[prior]
     cover = np.linalg.inv(peak.information + np.linalg.inv(prior.cover(at)))
     gain = peak.fit.found.log_evidence - height
-    return Profile(kind, prior, at, peak.values, 0.5 * (cover + cover.T), seen.log_factor, gain, peak.fit)
+    factor, cover = seen.log_factor, 0.5 * (cover + cover.T)
+    return Profile(kind, prior, at, peak.values, cover, factor, gain, peak.fit, seen.hills)
 
 
 class _Promise(NamedTuple):
@@ -89,11 +103,16 @@ class _Promise(NamedTuple):
         Of those values.
     freedom : float
         Price of their freedom.
+    values : (n_knots,) array
+    covariance : (n_knots, n_knots) array
+        Of what is left of their freedom.
     """
 
     gain: float
     price: float
     freedom: float
+    values: FloatArray
+    covariance: FloatArray
 
     def log_factor(self, most: float = math.inf) -> float:
         """Log Bayes factor if no values gain more than the most; at least that of no force at all."""
@@ -124,13 +143,18 @@ class _Seen:
 
     def factor(self, prior: Prior, most: float = math.inf) -> float:
         """Log Bayes factor and log prior probability of a prior, as far as is known."""
-        promises, share = self.promises[prior], self.shares[prior]
+        most = math.inf if prior in self.peaks else most
+        return self.promise(prior, most).log_factor(most) + self.shares[prior]
+
+    def promise(self, prior: Prior, most: float = math.inf) -> _Promise:
+        """What counts of what peaks say of a prior."""
+        promises = self.promises[prior]
         if prior in promises:
-            return promises[prior].log_factor() + share
+            return promises[prior]
         near = [one for climbed, one in promises.items() if climbed.centre_m == prior.centre_m]
         if near:
-            return min(one.log_factor(most) for one in near) + share
-        return max(one.log_factor(most) for one in promises.values()) + share
+            return min(near, key=lambda one: one.log_factor(most))
+        return max(promises.values(), key=lambda one: one.log_factor(most))
 
     @property
     def open(self) -> list[Prior]:
@@ -147,16 +171,34 @@ class _Seen:
     @property
     def log_factor(self) -> float:
         """Log Bayes factor over all priors."""
+        return float(np.logaddexp.reduce([self.factor(prior, self._most) for prior in self.shares]))
+
+    @property
+    def hills(self) -> tuple[Hill, ...]:
+        """Where values may be, under each prior that is not far behind the most probable one."""
+        factors = {prior: self.factor(prior, self._most) for prior in self.shares}
+        least = max(factors.values()) - _HILLS_WITHIN
+        return tuple(
+            Hill(promise.values, promise.covariance, factors[prior])
+            for prior, promise in ((one, self.promise(one, self._most)) for one in factors)
+            if factors[prior] > least
+        )
+
+    @property
+    def _most(self) -> float:
+        """The most that any values computed have gained."""
         most = max(peak.fit.found.log_evidence - self.height for peak in self.peaks.values())
-        return float(np.logaddexp.reduce([self.factor(prior, max(most, 0.0)) for prior in self.shares]))
+        return max(most, 0.0)
 
 
 def _promise(peak: _Peak, height: float, cover: FloatArray) -> _Promise:
     """What a peak, perhaps one under another prior, says of a prior of this covariance."""
     precision = np.linalg.inv(cover)
-    step = np.linalg.solve(peak.information + precision, peak.score - precision @ peak.values)
+    left = np.linalg.inv(peak.information + precision)
+    step = left @ (peak.score - precision @ peak.values)
     gain = peak.fit.found.log_evidence - height + peak.score @ step - 0.5 * step @ peak.information @ step
-    return _Promise(float(gain), _price(peak.values + step, precision), _freedom(peak, cover))
+    values, price = peak.values + step, _price(peak.values + step, precision)
+    return _Promise(float(gain), price, _freedom(peak, cover), values, 0.5 * (left + left.T))
 
 
 def _highest(peaks: Sequence[_Peak], cover: FloatArray) -> _Peak:
@@ -265,9 +307,7 @@ def _fit_at(
 
 def _peak(base: Base, kind: Kind, at: FloatArray, values: FloatArray, fit: Fit) -> _Peak:
     """With efficient score and information of the knots' values at what they are."""
-    basis = hats(base.setting.terrain, at)
-    directions = [entering(base.setting, kind, row) for row in basis]
-    wide = extended(base.problem, base.law, [*base.directions, *directions])
+    wide = knot_by_knot(base, kind, at)
     population, points = _start(base, fit)
     around = look_around(wide, base.rows, points, np.concatenate([base.strengths, values]))
     found = efficient_scores(around, base.rows, population, mean_prior(base.law))

@@ -28,7 +28,7 @@ from skred.diagnosis.predictive import Predicted, predict_event
 from skred.diagnosis.profile_fit import fit_profile
 from skred.diagnosis.race import Heat
 from skred.diagnosis.screen import Screen
-from skred.diagnosis.unlisted import Profile, combined, entering, hats, most_probable
+from skred.diagnosis.unlisted import Profile, combined, knot_by_knot, most_probable
 from skred.diagnosis.unseen import log_densities
 from skred.physics.mechanisms.spec import Direction
 from skred.threads import side_by_side
@@ -148,9 +148,7 @@ def _plain(base: Base, rng: np.random.Generator) -> tuple[Extension, Draws]:
 
 def _with(base: Base, profile: Profile, rng: np.random.Generator) -> tuple[Extension, Draws]:
     """The law with a profile fitted to the base's events, each knot a strength; draws by those events."""
-    basis = hats(base.setting.terrain, profile.knots_m)
-    added = [entering(base.setting, profile.kind, row) for row in basis]
-    wide = extended(base.problem, base.law, [*base.directions, *added])
+    wide = knot_by_knot(base, profile.kind, profile.knots_m)
     own = np.tile(base.strengths, (_DRAWS, 1))
     values = rng.multivariate_normal(profile.mean, profile.covariance, _DRAWS)
     directions, middle = _let_in(base, profile)

@@ -14,17 +14,18 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.curves import Base, Curve, Fit, refit
+from skred.diagnosis.corrections import corrected
+from skred.diagnosis.curves import Base, Curve, refit
 from skred.diagnosis.entrant import Entrant
-from skred.diagnosis.event_nodes import FINE, USUAL, Budget, event_nodes
-from skred.diagnosis.extension import Extension, extended
+from skred.diagnosis.event_nodes import FINE, USUAL, Budget
+from skred.diagnosis.extension import extended
 from skred.diagnosis.first_look import curve, first_look
-from skred.diagnosis.marginal import evidence, importance_evidence
-from skred.diagnosis.modes import campaign_rows, event_modes
+from skred.diagnosis.modes import campaign_rows
 from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, stated
 from skred.diagnosis.profile_fit import as_profile, fit_profile
 from skred.diagnosis.restarts import better_modes
@@ -42,11 +43,9 @@ Tell = Callable[[int, int], None]
 ERROR_SHARES = {"robust": 0.55, "student": 0.15, "correlated": 0.15, "scaled": 0.15}
 """Prior probability of each error model in the race."""
 _PREFERRED_BY = 1.0
-_CHECKED, _DRAWS = 5, 500
-"""Leading mechanisms whose best curve is looked at with many more nodes."""
 _FAR_BEHIND = 10.0
-"""Nats behind its mechanism's best at which a place is not looked at under another error model, and behind
-the best of all at which a mechanism's curve is not looked at with more nodes: it counts for nothing."""
+"""Nats behind its mechanism's best at which a place is not looked at under another error model: it counts for
+nothing."""
 _OTHER_ERRORS = 5.0
 """Nats that a candidate may have more under the less probable of two error models, beside as many again as it
 has under the other. Where a model is farther behind than that, mechanisms to which these are too few are not
@@ -157,7 +156,8 @@ def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
         if behind > _OTHER_ERRORS:
             before = _that_may_count(before, behind)
         if before:
-            heats.append(_heat(name, bases[name], tell, before))
+            best = max(heats[0].log_factors.values()) + behind
+            heats.append(_heat(name, bases[name], tell, before, best))
     # The evidence of an error model without a heat counts for nothing and everything alike.
     raced = [entrant.mechanism for entrant in heats[0].entrants.values()]
     evidence = {heat.error_model: heights[heat.error_model] for heat in heats}
@@ -181,19 +181,25 @@ def with_errors(base: Base, error_model: str) -> Base:
     return replace(base, problem=problem, rows=rows, fit=fit)
 
 
-def _heat(error_model: str, base: Base, tell: Tell, before: Sequence[Curve] = ()) -> Heat:
-    """The race under one error model; of the mechanisms `before`, if there are first looks by another one."""
+def _heat(
+    error_model: str, base: Base, tell: Tell, before: Sequence[Curve] = (), best: float = -math.inf
+) -> Heat:
+    """The race under one error model.
+
+    Parameters
+    ----------
+    before : sequence of Curve, optional
+        First looks by another one, at the mechanisms that are raced.
+    best : float, optional
+        The most that a candidate has under that, in nats above nothing under this one.
+    """
     budget = first_look(base)
     base.with_nothing(budget)  # before anyone else does it once more
     with crew() as pool:
         curves = _first_looks(base, budget, pool, tell, before)
         entrants = second_look(base, curves, budget, pool)
-        # Together, so that no thread waits for the longest profile.
-        fitted = [pool.submit(_profile, base, kind, entrants) for kind in KINDS]
-        corrections = _corrections(base, entrants, pool)
-        profiles = [one.result() for one in fitted]
-    for name, (correction, disagreement) in corrections.items():
-        entrants[name] = replace(entrants[name], correction=correction, disagreement=disagreement)
+        profiles = list(pool.map(partial(_profile, base, entrants=entrants), KINDS))
+        entrants, profiles = corrected(base, entrants, profiles, pool, best)
     for mechanism in mechanisms().values():
         other = entrants.get(mechanism.same_term_as)
         if other is not None and mechanism.added is not None and mechanism.added.joins(base.setting.base):
@@ -255,43 +261,3 @@ def _profile(base: Base, kind: Kind, entrants: dict[str, Entrant]) -> Profile:
     if not near:
         return fit_profile(base, kind)
     return fit_profile(base, kind, as_profile(base, kind, max(near, key=lambda one: one.log_bayes_factor)))
-
-
-def _corrections(
-    base: Base, entrants: dict[str, Entrant], pool: ThreadPoolExecutor
-) -> dict[str, tuple[float, float]]:
-    """Correction and disagreement of the leading mechanisms, at the top of their best curves.
-
-    Of those whose best curve was computed with fronts: what is wrong with a rough one is its own.
-    """
-    height = {name: entrant.log_bayes_factor for name, entrant in entrants.items()}
-    least = max(height.values()) - _FAR_BEHIND
-    leading = sorted((name for name in height if height[name] > least), key=lambda name: -height[name])
-    leading = [name for name in leading[:_CHECKED] if not entrants[name].best.rough]
-    plain = extended(base.problem, base.law, base.directions)
-    nothing = pool.submit(_finely, base, plain, base.strengths, base.fit)
-
-    def look(name: str) -> tuple[float, float]:
-        best = entrants[name].best
-        top = int(np.argmax(best.log_evidence))
-        extension = extended(base.problem, base.law, (*base.directions, best.direction))
-        return _finely(base, extension, np.append(base.strengths, best.strengths[top]), best.fits[top])
-
-    found, without = list(pool.map(look, leading)), nothing.result()
-    tops = [float(entrants[name].best.log_evidence.max()) for name in leading]
-    return {
-        name: (sampled - without[1] - top, (sampled - laplace) - (without[1] - without[0]))
-        for name, top, (laplace, sampled) in zip(leading, tops, found, strict=True)
-    }
-
-
-def _finely(base: Base, extension: Extension, strengths: FloatArray, fit: Fit) -> tuple[float, float]:
-    """Log evidence with many nodes, from where a fit is: by Laplace's formula, by importance sampling."""
-    start = (fit.found.population(len(base.law.mechanisms)), fit.points)
-    fits = refit(extension, base.rows, strengths[None, :], start, base.log_scale, FINE, n_rounds=2)
-    population = fits[0].found.population(len(base.law.mechanisms))
-    modes = event_modes(extension, base.rows, fits[0].points, strengths, population)
-    nodes = event_nodes(extension, base.rows, strengths, population, modes, FINE, base.population).nodes
-    found = evidence(nodes, base.log_scale, fits[0].found.psi)
-    sampled, _ = importance_evidence(nodes, base.log_scale, found, _DRAWS, seed=0)
-    return found.log_evidence, sampled

@@ -14,11 +14,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.curves import Curve, Fit
+from skred.diagnosis.curves import Base, Curve, Fit
+from skred.diagnosis.extension import Extension, extended
 from skred.physics.columns import Column
 from skred.physics.mechanisms.spec import Direction, Setting
 from skred.physics.mechanisms.stretches import OPPOSED_SCALES, OPPOSED_SHARE, is_opposed
@@ -96,6 +98,22 @@ NEAR_M, _CENTRES_M = 120.0, 150.0
 MOST_KNOTS, _LEAST_STEP_M = 32, 30.0
 
 
+class Hill(NamedTuple):
+    """Roughly what is known of a profile's values under one prior.
+
+    Attributes
+    ----------
+    mean : (n,) array
+    covariance : (n, n) array
+    log_factor : float
+        Log Bayes factor and log prior probability of the prior.
+    """
+
+    mean: FloatArray
+    covariance: FloatArray
+    log_factor: float
+
+
 @dataclass(frozen=True, eq=False)
 class Profile:
     """A fitted profile of one kind.
@@ -116,6 +134,8 @@ class Profile:
         Gain in log evidence at the mean itself, before the price of its freedom.
     fit : Fit
         Population and events with the mean in.
+    hills : tuple of Hill
+        Where values are to be looked for: one for each prior that may count.
     """
 
     kind: Kind
@@ -126,6 +146,7 @@ class Profile:
     log_bayes_factor: float
     gain: float
     fit: Fit
+    hills: tuple[Hill, ...] = ()
 
 
 def priors_of(kind: Kind, at: FloatArray) -> dict[Prior, float]:
@@ -154,6 +175,12 @@ def hats(terrain: Terrain, at: FloatArray) -> FloatArray:
     inside = (middle >= at[0]) & (middle <= at[-1])
     rows = [np.interp(middle, at, unit) * inside for unit in np.eye(len(at))]
     return np.array(rows)
+
+
+def knot_by_knot(base: Base, kind: Kind, at: FloatArray) -> Extension:
+    """The base law with the profile's value at each knot as a strength."""
+    added = [entering(base.setting, kind, row) for row in hats(base.setting.terrain, at)]
+    return extended(base.problem, base.law, [*base.directions, *added])
 
 
 def combined(setting: Setting, kind: Kind, at: FloatArray, values: FloatArray) -> Direction:

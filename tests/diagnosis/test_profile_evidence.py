@@ -1,0 +1,74 @@
+"""The unlisted force's evidence by sampling: against integrals that are known, and Laplace's formula."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnosis_cases import few_dense_base, recorded
+from scipy.stats import multivariate_normal
+
+from skred.diagnosis import profile_evidence
+from skred.diagnosis.curves import Base
+from skred.diagnosis.profile_evidence import sampled_log_factor
+from skred.diagnosis.profile_fit import fit_profile
+from skred.diagnosis.unlisted import KINDS, Hill, Prior, Profile, combined
+
+FloatArray = np.ndarray[Any, np.dtype[np.float64]]
+N = 12
+
+
+@pytest.fixture(scope="module")
+def base() -> Base:
+    return few_dense_base()
+
+
+def on_two_hills(base: Base, monkeypatch: pytest.MonkeyPatch) -> tuple[Profile, float, list[int]]:
+    """A profile of which the fit knows one hill too narrow and off its top, and the other one too low."""
+    rng = np.random.default_rng(3)
+    factor = rng.standard_normal((N, N)) / np.sqrt(N) + 0.5 * np.eye(N)
+    cover, tops, logs = factor @ factor.T, np.array([np.zeros(N), np.full(N, 4.0)]), np.array([20.0, 19.0])
+    calls: list[int] = []
+
+    def heights(base: Base, profile: Profile, values: FloatArray) -> FloatArray:
+        calls.append(len(values))
+        parts = [
+            log + multivariate_normal(top, cover).logpdf(values) for log, top in zip(logs, tops, strict=True)
+        ]
+        return np.asarray(np.logaddexp.reduce(parts, axis=0))
+
+    monkeypatch.setattr(profile_evidence, "_heights", heights)
+    hills = (Hill(tops[0] + 0.5 * factor[:, 0], 0.8 * cover, 20.0), Hill(tops[1], cover, 15.0))
+    at = np.linspace(300.0, 900.0, N)
+    profile = Profile(KINDS[0], Prior(1.0, 80.0), at, tops[0], cover, 0.0, 0.0, base.fit, hills)
+    return profile, float(np.logaddexp.reduce(logs)), calls
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_known_integral(base: Base, monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
+    profile, exact, calls = on_two_hills(base, monkeypatch)
+    assert sampled_log_factor(base, profile, seed=seed) == pytest.approx(exact, abs=0.25)
+    assert len(calls) == 4
+    # Without the second hill half a nat of what there is would be missed, and is.
+    alone = replace(profile, hills=profile.hills[:1])
+    assert sampled_log_factor(base, alone, seed=seed) == pytest.approx(20.0, abs=0.25)
+
+
+def test_what_is_far_behind_is_not_sampled_on(base: Base, monkeypatch: pytest.MonkeyPatch) -> None:
+    profile, _, calls = on_two_hills(base, monkeypatch)
+    sampled_log_factor(base, profile, least=30.0)
+    assert len(calls) == 2
+
+
+@pytest.mark.parametrize("kind", [0, 1])
+def test_laplace_where_gates_are_dense(base: Base, kind: int) -> None:
+    """Readings are nearly linear in a weak force there, and both routes agree."""
+    at = np.array([700.0, 750.0, 850.0, 900.0])
+    force = combined(base.setting, KINDS[kind], at, (0.6, 1e-3)[kind] * np.array([0.0, 1.0, 1.0, 0.0]))
+    changed = recorded(base, force)
+    found = fit_profile(changed, KINDS[kind])
+    assert found.log_bayes_factor > 2.0 and len(found.hills) > 1
+    sampled = [sampled_log_factor(changed, found, seed=seed) for seed in range(2)]
+    assert sampled == pytest.approx([found.log_bayes_factor] * 2, abs=1.0)
