@@ -178,10 +178,11 @@ class _Seen:
         """Where values may be, under each prior that is not far behind the most probable one."""
         factors = {prior: self.factor(prior, self._most) for prior in self.shares}
         least = max(factors.values()) - _HILLS_WITHIN
+        chosen = {prior: self.promise(prior, self._most) for prior in factors if factors[prior] > least}
         return tuple(
-            Hill(promise.values, promise.covariance, factors[prior])
-            for prior, promise in ((one, self.promise(one, self._most)) for one in factors)
-            if factors[prior] > least
+            # What no force at all is better than is not where values are: around none, then.
+            Hill(one.values if one.gain > one.price else 0.0 * one.values, one.covariance, factors[prior])
+            for prior, one in chosen.items()
         )
 
     @property
