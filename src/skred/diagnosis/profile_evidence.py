@@ -27,8 +27,6 @@ _WIDER, _DEGREES = 1.1, 7
 """Width of the proposals in that of Laplace's approximation, and their degrees of freedom."""
 _EVENED = 0.5
 """Power of the hills' Bayes factors in how many draws each one has: what is known of them is rough."""
-_SHRUNK = 2.0
-"""As how many effective draws the place of a hill counts that it had before."""
 
 
 class _Proposal(NamedTuple):
@@ -67,7 +65,8 @@ class _Proposal(NamedTuple):
         shares = weights * np.exp(log_densities - np.logaddexp.reduce(log_densities, axis=0))
         total = shares.sum(axis=1)
         effective = total**2 / np.maximum(np.sum(shares**2, axis=1), 1e-300)
-        trust = effective / (_SHRUNK + effective)
+        # A mean of fewer effective draws than knots would be farther off than the hill's own.
+        trust = effective / (self.means.shape[1] + effective)
         found = (shares @ values) / np.maximum(total, 1e-300)[:, None]
         means = self.means + trust[:, None] * (found - self.means)
         return _Proposal(np.log(0.5 * np.exp(self.log_weights) + 0.5 * total), means, self.covariances)
