@@ -98,3 +98,20 @@ def make_contributions(columns, profiles, weakening_speed):  # type: ignore[no-u
     for column in columns:
         speed_terms |= column == _LINEAR or column == _WEAKENING
     return Contributions(columns, profiles, weakening_speed, speed_terms)
+
+
+@compiled()
+def spans_of(profiles):  # type: ignore[no-untyped-def]
+    """First cell in which each profile is not 0, and the one after the last, (n_strengths, 2) integers.
+
+    A force given knot by knot has many profiles, of which two at most act in a cell.
+    """
+    spans = np.zeros((profiles.shape[0], 2), dtype=np.int64)
+    for k in range(profiles.shape[0]):
+        first, end = 0, profiles.shape[1]
+        while first < end and profiles[k, first] == 0.0:
+            first += 1
+        while end > first and profiles[k, end - 1] == 0.0:
+            end -= 1
+        spans[k, 0], spans[k, 1] = first, end
+    return spans

@@ -10,7 +10,7 @@ import numpy as np
 
 from skred.physics.columns import Column
 from skred.physics.compiled import compiled
-from skred.physics.inputs import cell_of
+from skred.physics.inputs import cell_of, spans_of
 from skred.physics.march import fill_increments, fill_steps, fill_table, march, march_tangents
 from skred.physics.march_abreast import ABREAST, march_abreast, room
 from skred.physics.reading import read, read_tangents
@@ -37,6 +37,7 @@ def _simulate(strengths, releases, path, law, sensors, readings, jacobian):  # t
     u_c, speed_terms = law.weakening_speed, law.speed_terms
     n_cells, n_tangents = ground.shape[1], jacobian.shape[2]
     scaled, cells = scale_ground(edge, ground), _cells_of(sensors, edge)
+    spans = spans_of(profiles)
     table = np.zeros((_N_COLUMNS, n_cells))
     keep, gain, v = np.empty(n_cells), np.empty(n_cells), np.empty(n_cells + 1)
     own, work, rows, runouts, lasts, firsts = room(columns.size, n_cells if speed_terms else 0)
@@ -49,7 +50,7 @@ def _simulate(strengths, releases, path, law, sensors, readings, jacobian):  # t
     d_time, d_runout = np.zeros(n_tangents), np.zeros(n_tangents)
     for run in range(releases.size):
         release = releases[run]
-        fill_table(run, strengths, columns, profiles, table)
+        fill_table(run, strengths, columns, profiles, spans, table)
         halvings = 0
         if not speed_terms or n_tangents > 0:
             halvings = fill_steps(scaled, table, keep, gain)
@@ -132,6 +133,7 @@ def front_speeds(strengths, releases, path, law):  # type: ignore[no-untyped-def
     edge, ground, barriers, limits = path.edge, path.ground, path.barriers, path.limits
     columns, profiles, n_cells = law.columns, law.profiles, ground.shape[1]
     scaled, table = scale_ground(edge, ground), np.zeros((_N_COLUMNS, n_cells))
+    spans = spans_of(profiles)
     keep, gain = np.empty(n_cells), np.empty(n_cells)
     own, work, rows, runouts, lasts, firsts = room(columns.size, n_cells if law.speed_terms else 0)
     v = np.empty((releases.size, n_cells + 1))
@@ -145,7 +147,7 @@ def front_speeds(strengths, releases, path, law):  # type: ignore[no-untyped-def
                 )  # fmt: skip
             v[run] = rows[place]
         else:
-            fill_table(run, strengths, columns, profiles, table)
+            fill_table(run, strengths, columns, profiles, spans, table)
             fill_steps(scaled, table, keep, gain)
             march(releases[run], edge, ground, barriers, limits, table, keep, gain, v[run])
     return np.sqrt(v)

@@ -40,18 +40,21 @@ _ONE, _TWO = np.uint64(1), np.uint64(2)
 
 
 @compiled(fastmath=_FAST)
-def fill_table(run, strengths, columns, profiles, table):  # type: ignore[no-untyped-def]
+def fill_table(run, strengths, columns, profiles, spans, table):  # type: ignore[no-untyped-def]
     """Sum of strength times profile in the columns that are used; the others must be zero."""
     for k in range(columns.size):
         strength, column = strengths[run, k], columns[k]
+        first, end = np.uint64(spans[k, 0]), np.uint64(spans[k, 1])
         first_of_column = True
         for earlier in range(k):
             first_of_column &= columns[earlier] != column
         if first_of_column:
-            for i in range(table.shape[1]):
+            table[column, :first] = 0.0
+            table[column, end:] = 0.0
+            for i in range(first, end):
                 table[column, i] = strength * profiles[k, i]
         else:
-            for i in range(table.shape[1]):
+            for i in range(first, end):
                 table[column, i] += strength * profiles[k, i]
 
 
