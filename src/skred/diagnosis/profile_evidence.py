@@ -19,7 +19,7 @@ from skred.diagnosis.event_nodes import USUAL
 from skred.diagnosis.unlisted import Profile, knot_by_knot, priors_of
 
 FloatArray = NDArray[np.float64]
-_FEWEST, _MOST, _DRAWS = 2, 4, 64
+_FEWEST, _MOST, _DRAWS = 2, 6, 64
 """Turns of sampling, and draws of each: right to half a nat with four turns, to a third with six."""
 _AT_ONCE = 32
 """Draws fitted together."""
