@@ -13,7 +13,15 @@ _TIE_HEAD = """| recordings | tied within | single names right | tie sets that h
 
 def sections() -> str:
     """All of them."""
-    return line_nodes() + unseen_nodes() + diagnosis() + masked_open() + alarm_limit() + tie_rules()
+    return (
+        line_nodes()
+        + unseen_nodes()
+        + free_force_draws()
+        + diagnosis()
+        + masked_open()
+        + alarm_limit()
+        + tie_rules()
+    )
 
 
 def diagnosis() -> str:
@@ -258,3 +266,26 @@ def _tie_row(part: str, row: dict[str, Any]) -> str:
     cells += [str(row["sets_of_4_and_more"]), f"{row['named_over_ceiling']['value']:.2f}"]
     lost = row["no_longer_alone_was_right"]
     return f"| {' | '.join([*cells, f'{lost["hits"]} of {lost["n"]}'])} |\n"
+
+
+def free_force_draws() -> str:
+    """Both routes to the evidence of a force that is in no list."""
+    found = read("free_force_draws")
+    rows = "".join(_force_row(row) for row in found["rows"])
+    return f"""
+## The evidence of a force in no list
+
+`python benchmarks/free_force_draws.py --json benchmarks/results/free_force_draws.json` (code
+{found["commit"]}): log Bayes factors of what is missing at Ryggfonn against nothing, by the way the force goes
+with speed. By Laplace's formula over its 32 values, and by importance sampling of them, with as many draws as
+a race takes and with 1024; one number a seed.
+
+| base law | errors | force | Laplace | as in a race | 1024 draws | best listed | CPU seconds, as in a race |
+| --- | --- | --- | --- | --- | --- | --- | --- |
+{rows}"""
+
+
+def _force_row(row: dict[str, Any]) -> str:
+    few, many = (", ".join(f"{value:.1f}" for value in row[key]) for key in ("usual", "many"))
+    cells = [row["base_model"], row["errors"], row["force"], f"{row['laplace']:.1f}", few, many]
+    return f"| {' | '.join([*cells, f'{row["best_listed"]:.1f}', f'{row["cpu_seconds"]:.1f}'])} |\n"

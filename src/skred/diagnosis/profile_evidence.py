@@ -75,18 +75,22 @@ class _Proposal(NamedTuple):
         return multivariate_t(self.means[k], _WIDER**2 * self.covariances[k], _DEGREES)
 
 
-def sampled_log_factor(base: Base, profile: Profile, least: float = -math.inf, seed: int = 0) -> float:
+def sampled_log_factor(
+    base: Base, profile: Profile, least: float = -math.inf, seed: int = 0, turns: int = _MOST
+) -> float:
     """Log Bayes factor of a kind of profile over all its priors, by importance sampling of its values.
 
     Parameters
     ----------
     least : float
         Where it is less than this after the first turns, further ones are not worth it.
+    turns : int
+        Of sampling, at most.
     """
     rng = np.random.default_rng([seed, 61])
     proposals, values, heights = [_on_hills(profile)], np.empty((0, len(profile.mean))), np.empty(0)
     factor = math.inf
-    while len(proposals) <= _FEWEST or (len(proposals) <= _MOST and factor > least):
+    while len(proposals) <= _FEWEST or (len(proposals) <= turns and factor > least):
         drawn = proposals[-1].drawn(_DRAWS, rng)
         values, heights = np.concatenate([values, drawn]), np.append(heights, _heights(base, profile, drawn))
         # All draws are weighed by the mixture of all proposals.

@@ -198,7 +198,7 @@ def _heat(
     with crew() as pool:
         curves = _first_looks(base, budget, pool, tell, before)
         entrants = second_look(base, curves, budget, pool)
-        profiles = list(pool.map(partial(_profile, base, entrants=entrants), KINDS))
+        profiles = list(pool.map(partial(free_force, base, entrants=entrants), KINDS))
         entrants, profiles = corrected(base, entrants, profiles, pool, best)
     for mechanism in mechanisms().values():
         other = entrants.get(mechanism.same_term_as)
@@ -255,7 +255,7 @@ def _that_count(curves: Mapping[int, Curve]) -> list[int]:
     ]
 
 
-def _profile(base: Base, kind: Kind, entrants: dict[str, Entrant]) -> Profile:
+def free_force(base: Base, kind: Kind, entrants: Mapping[str, Entrant]) -> Profile:
     """The unlisted force of one kind: from no force, and from the best listed one that enters alike."""
     near = [one for entrant in entrants.values() for one in entrant.curves if alike(kind, one)]
     if not near:
