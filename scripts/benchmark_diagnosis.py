@@ -276,9 +276,9 @@ def free_force_draws() -> str:
 ## The evidence of a force in no list
 
 `python benchmarks/free_force_draws.py --json benchmarks/results/free_force_draws.json` (code
-{found["commit"]}): log Bayes factors of what is missing at Ryggfonn against nothing, by the way the force goes
-with speed. By Laplace's formula over its 32 values, and by importance sampling of them, with as many draws as
-a race takes and with 1024; one number a seed.
+{found["commit"]}): log Bayes factors of what is missing at Ryggfonn against nothing, by the way the force
+goes with speed. By Laplace's formula over its 32 values, and by importance sampling of them, with as many
+draws as a race takes and with 1024; one number a seed.
 
 | base law | errors | force | Laplace | as in a race | 1024 draws | best listed | CPU seconds, as in a race |
 | --- | --- | --- | --- | --- | --- | --- | --- |
