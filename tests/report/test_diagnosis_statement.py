@@ -138,6 +138,17 @@ def test_a_candidate_that_is_not_excluded_is_told() -> None:
     assert "Not excluded" not in statement(found, far)
 
 
+def test_a_listed_candidate_beside_a_force_in_no_list_is_told() -> None:
+    found = diagnosis("unexplained")
+    document = verdict(found)
+    nil = dict.fromkeys(document["probability"], 0.0)
+    near = document | {"probability": nil | {"unlisted": 0.79, "segment_friction": 0.19}}
+    said = statement(found, near)
+    assert "that most probably no listed mechanism accounts for" in said and "(19 %)" in said
+    far = statement(found, document | {"probability": nil | {"unlisted": 0.96, "segment_friction": 0.04}})
+    assert "that no listed mechanism accounts for" in far and "Not excluded" not in far
+
+
 def test_the_force_profile_let_in_is_told() -> None:
     """What avalanches left out gain by it, its equation and its numbers; nothing is named."""
     found = diagnosis("unexplained")

@@ -171,12 +171,14 @@ def _improvement(document: dict[str, Any]) -> str:
 
 def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     assert found.check is not None
+    rival = _rival(document)
     return [
-        f"Something is missing{_where(document['location'])} that no listed mechanism accounts for"
-        f" (p = {found.check.p_value:.2g}; probability of nothing"
+        f"Something is missing{_where(document['location'])} that {'most probably ' if rival else ''}no"
+        f" listed mechanism accounts for (p = {found.check.p_value:.2g}; probability of nothing"
         f" {_share(document['probability'][NOTHING])}).",
         _unlisted_way(found.location),
         _closest(found),
+        rival,
         "The force profile is the answer: see where it stands out and how much work it does.",
         _improvement(document),
         _still_fired(found.profile.check) if found.profile is not None else "",
