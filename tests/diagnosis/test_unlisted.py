@@ -110,7 +110,7 @@ def made_profile(base: Base, kind: int) -> Profile:
     mean = np.sin(at / 90.0)
     cover = factor @ factor.T + 0.02 * np.eye(len(at))
     prior = Prior(KINDS[kind].amplitude, 80.0)
-    return Profile(KINDS[kind], prior, at, mean, cover, 0.0, 0.0, base.fit)
+    return Profile(KINDS[kind], prior, at, mean, cover, 0.0, 0.0, base.fit, ())
 
 
 def test_work_is_the_integral_of_the_force(base: Base) -> None:

@@ -247,18 +247,36 @@ def test_profiles_of_one_column_add_up() -> None:
     # Each of the two is 0 on a quarter of the track, where the table is not filled with it.
     ramp = np.clip(np.linspace(-0.5, 1.5, terrain.n_cells), 0.0, 1.0)
     law = make_contributions(np.array([3, 2, 3]), np.array([ramp, ramp, 1 - ramp]), WEAKENING_SPEED)
-    strengths, sensors = np.array([[0.3, 2e-3, 0.2]]), sensor_table([(1650.0, 1650.0), None])
-    readings, jacobian = simulate_with_jacobian(strengths, np.zeros(1), path_of(terrain), law, sensors)
+    # Two runs: the second must not find what the first left in the table.
+    strengths, sensors = (
+        np.array([[0.3, 2e-3, 0.2], [0.25, 0.0, 0.22]]),
+        sensor_table([(1650.0, 1650.0), None]),
+    )
+    readings, jacobian = simulate_with_jacobian(strengths, np.zeros(2), path_of(terrain), law, sensors)
 
-    def reference(step: np.ndarray) -> np.ndarray:
-        a, d, b = strengths[0] + step
+    def reference(run: int, step: np.ndarray) -> np.ndarray:
+        a, d, b = strengths[run] + step
         table = np.zeros((5, terrain.n_cells), dtype=complex)
         table[Column.QUADRATIC], table[Column.FRICTION] = d * ramp, a * ramp + b * (1 - ramp)
         return read_front(terrain, table, 0.0, [("point", 1650.0, 1650.0), ("runout", 0.0, 0.0)])
 
-    assert_allclose(readings[0], reference(np.zeros(3)).real, rtol=1e-11)
-    derivatives = np.array([reference(row).imag for row in np.eye(3) * 1e-40j]).T / 1e-40
-    assert_allclose(jacobian[0, :, :3], derivatives, rtol=1e-9)
+    for run in range(2):
+        assert_allclose(readings[run], reference(run, np.zeros(3)).real, rtol=1e-11)
+        derivatives = np.array([reference(run, row).imag for row in np.eye(3) * 1e-40j]).T / 1e-40
+        assert_allclose(jacobian[run, :, :3], derivatives, rtol=1e-9)
+
+
+def test_a_profile_that_is_nil_everywhere_changes_nothing() -> None:
+    terrain = TERRAINS["ryggfonn"]
+    one, nil = np.ones(terrain.n_cells), np.zeros(terrain.n_cells)
+    sensors = sensor_table([(1650.0, 1650.0), None])
+
+    def readings(*profiles: np.ndarray) -> np.ndarray:
+        law = make_contributions(np.full(len(profiles), 3), np.array(profiles), WEAKENING_SPEED)
+        strengths = np.tile(np.linspace(0.4, 0.5, 3)[:, None], len(profiles))
+        return simulate(strengths, np.zeros(3), path_of(terrain), law, sensors)
+
+    assert_allclose(readings(nil, one, nil), readings(one), rtol=0.0)
 
 
 @pytest.mark.parametrize("name", TERRAINS)

@@ -11,7 +11,7 @@ from diagnosis_report_cases import diagnosis
 
 from skred.diagnosis.decide import Decision
 from skred.diagnosis.diagnose import Left
-from skred.diagnosis.odds import UNLISTED
+from skred.diagnosis.odds import NOTHING, UNLISTED
 from skred.diagnosis.omnibus import Omnibus
 from skred.diagnosis.statement import statement
 from skred.diagnosis.strength import FORM, strength_of
@@ -68,7 +68,7 @@ def test_whom_an_unlisted_force_brakes(sign: float, said: str) -> None:
     found = diagnosis("unexplained")
     assert found.location is not None
     plain = verdict(found)["statement"]
-    assert "On average there is nothing" not in plain and "comes closest: log Bayes factor" in plain
+    assert "On average there is nothing" not in plain and "comes closest (" in plain
     location = replace(found.location, opposed=True, mean=sign * found.location.mean)
     assert said in verdict(replace(found, location=location))["statement"]
 
@@ -138,15 +138,20 @@ def test_a_candidate_that_is_not_excluded_is_told() -> None:
     assert "Not excluded" not in statement(found, far)
 
 
-def test_a_listed_candidate_beside_a_force_in_no_list_is_told() -> None:
+def test_how_sure_a_force_in_no_list_is() -> None:
     found = diagnosis("unexplained")
-    document = verdict(found)
+    assert found.race is not None
+    document, factors = verdict(found), found.race.log_factors
+    listed = [name for name in factors if name not in (NOTHING, UNLISTED)]
+    closest = max(listed, key=lambda name: factors[name])
     nil = dict.fromkeys(document["probability"], 0.0)
-    near = document | {"probability": nil | {"unlisted": 0.79, "segment_friction": 0.19}}
-    said = statement(found, near)
-    assert "that most probably no listed mechanism accounts for" in said and "(19 %)" in said
-    far = statement(found, document | {"probability": nil | {"unlisted": 0.96, "segment_friction": 0.04}})
-    assert "that no listed mechanism accounts for" in far and "Not excluded" not in far
+
+    def said(unlisted: float, listed: float) -> str:
+        return statement(found, document | {"probability": nil | {UNLISTED: unlisted, closest: listed}})
+
+    assert "that most probably no listed mechanism accounts for" in said(0.79, 0.19)
+    assert "a force not in the list: 79 %" in said(0.79, 0.19) and "comes closest (19 %)" in said(0.79, 0.19)
+    assert "that no listed mechanism accounts for" in said(0.96, 0.04)
 
 
 def test_the_force_profile_let_in_is_told() -> None:

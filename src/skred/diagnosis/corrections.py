@@ -22,7 +22,10 @@ FloatArray = NDArray[np.float64]
 _CHECKED, _DRAWS = 5, 500
 """Mechanisms looked at, at most, and populations drawn for each."""
 _BEHIND = 6.0
-"""Nats behind the best of all at which nothing is looked at: it counts for a four hundredth."""
+"""Nats behind the best of all at which nothing is looked at: it counts for a ninetieth, as stated
+(`odds.POWER`), and a look changes what a mechanism has by a nat or so."""
+_TOO_LOW = 4.0
+"""Nats by which Laplace's formula, or the first draws, may be below what a force has."""
 
 
 def corrected(
@@ -47,9 +50,13 @@ def corrected(
     least = max(best, *height.values(), *force) - _BEHIND
     leading = sorted((name for name in height if height[name] > least), key=lambda name: -height[name])
     leading = [name for name in leading[:_CHECKED] if not entrants[name].best.rough]
-    # The longest first; a force that is less probable than none is not worth it.
-    chosen = [k for k, factor in enumerate(force) if factor > max(least, 0.0)]
-    sampled = {k: pool.submit(sampled_log_factor, base, profiles[k], least) for k in chosen}
+    # The longest first. A force that is less probable than none would raise no alarm with some nats more.
+    floor = max(least - _TOO_LOW, 0.0)
+    sampled = {
+        k: pool.submit(sampled_log_factor, base, profiles[k], floor)
+        for k, factor in enumerate(force)
+        if factor > floor
+    }
     looked = {name: pool.submit(_at_top, base, entrants[name]) for name in leading}
     plain = extended(base.problem, base.law, base.directions)
     nothing = pool.submit(_finely, base, plain, base.strengths, base.fit) if leading else None

@@ -8,7 +8,7 @@ have three nats less than its due, and a listed mechanism its place.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,13 @@ from scipy.stats import multivariate_normal, multivariate_t
 
 from skred.diagnosis.curves import Base, refit
 from skred.diagnosis.event_nodes import USUAL
-from skred.diagnosis.unlisted import Profile, knot_by_knot, priors_of
+from skred.diagnosis.unlisted import KINDS, Profile, knot_by_knot, priors_of
 
 FloatArray = NDArray[np.float64]
 _FEWEST, _MOST, _DRAWS = 2, 6, 64
-"""Turns of sampling, and draws of each: right to half a nat with four turns, to a third with six."""
+"""Turns of sampling, and draws of each."""
+_ENOUGH = 40.0
+"""Effective draws that are enough: right to a sixth of a nat."""
 _AT_ONCE = 32
 """Draws fitted together."""
 _WIDER, _DEGREES = 1.1, 7
@@ -37,23 +39,32 @@ class _Proposal(NamedTuple):
     log_weights : (n_hills,) array
     means : (n_hills, n_knots) array
     covariances : (n_hills, n_knots, n_knots) array
+    centred : list of frozen distributions
+        Each hill's, around 0.
     """
 
     log_weights: FloatArray
     means: FloatArray
     covariances: FloatArray
+    centred: list[Any]
 
     def drawn(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Values of the profile, (n, n_knots); of each hill as many as its weight says."""
         steps = (np.arange(n) + rng.random()) / n
         hills = np.searchsorted(np.cumsum(np.exp(self.log_weights)), steps).clip(max=len(self.means) - 1)
-        counts = np.bincount(hills, minlength=len(self.means))
-        parts = [self._hill(k).rvs(count, rng) for k, count in enumerate(counts) if count]
-        return np.concatenate([part.reshape(-1, self.means.shape[1]) for part in parts])
+        counts = np.bincount(hills, minlength=len(self.means)).tolist()
+        return np.concatenate([self._of_hill(k, count, rng) for k, count in enumerate(counts) if count])
+
+    def _of_hill(self, k: int, n: int, rng: np.random.Generator) -> FloatArray:
+        # Not by scipy's own draws: singular vectors turn with the last digit, Cholesky's factor does not.
+        zero = np.zeros(self.means.shape[1])
+        normal = rng.multivariate_normal(zero, self.covariances[k], n, method="cholesky")
+        return self.means[k] + normal / np.sqrt(rng.chisquare(_DEGREES, n) / _DEGREES)[:, None]
 
     def log_densities(self, values: FloatArray) -> FloatArray:
         """Of each hill with its weight, (n_hills, n)."""
-        found = [self._hill(k).logpdf(values).reshape(-1) for k in range(len(self.means))]
+        pairs = zip(self.centred, self.means, strict=True)
+        found = [one.logpdf(values - mean).reshape(-1) for one, mean in pairs]
         return np.array(found) + self.log_weights[:, None]
 
     def adapted(self, values: FloatArray, weights: FloatArray) -> _Proposal:
@@ -69,10 +80,7 @@ class _Proposal(NamedTuple):
         trust = effective / (self.means.shape[1] + effective)
         found = (shares @ values) / np.maximum(total, 1e-300)[:, None]
         means = self.means + trust[:, None] * (found - self.means)
-        return _Proposal(np.log(0.5 * np.exp(self.log_weights) + 0.5 * total), means, self.covariances)
-
-    def _hill(self, k: int):  # type: ignore[no-untyped-def]
-        return multivariate_t(self.means[k], _WIDER**2 * self.covariances[k], _DEGREES)
+        return self._replace(log_weights=np.log(0.5 * np.exp(self.log_weights) + 0.5 * total), means=means)
 
 
 def sampled_log_factor(
@@ -87,27 +95,31 @@ def sampled_log_factor(
     turns : int
         Of sampling, at most.
     """
-    rng = np.random.default_rng([seed, 61])
+    rng = np.random.default_rng([seed, 61, KINDS.index(profile.kind)])
     proposals, values, heights = [_on_hills(profile)], np.empty((0, len(profile.mean))), np.empty(0)
-    factor = math.inf
-    while len(proposals) <= _FEWEST or (len(proposals) <= turns and factor > least):
+    while True:
         drawn = proposals[-1].drawn(_DRAWS, rng)
         values, heights = np.concatenate([values, drawn]), np.append(heights, _heights(base, profile, drawn))
         # All draws are weighed by the mixture of all proposals.
         densities = [np.logaddexp.reduce(one.log_densities(values), axis=0) for one in proposals]
         log_weights = heights - np.logaddexp.reduce(densities, axis=0) + math.log(len(proposals))
         total = float(np.logaddexp.reduce(log_weights))
-        factor = total - math.log(len(values))
-        proposals.append(proposals[-1].adapted(values, np.exp(log_weights - total)))
-    return factor
+        if total == -math.inf:  # no draw has fronts that tell anything
+            return profile.log_bayes_factor
+        factor, weights = total - math.log(len(values)), np.exp(log_weights - total)
+        enough = factor < least or 1.0 / np.sum(weights**2) > _ENOUGH
+        if (enough and len(proposals) >= _FEWEST) or len(proposals) >= turns:
+            return factor
+        proposals.append(proposals[-1].adapted(values, weights))
 
 
 def _on_hills(profile: Profile) -> _Proposal:
     """Where the fit says that values are."""
     evened = _EVENED * np.array([hill.log_factor for hill in profile.hills])
     means = np.array([hill.mean for hill in profile.hills])
-    covariances = np.array([hill.covariance for hill in profile.hills])
-    return _Proposal(evened - np.logaddexp.reduce(evened), means, covariances)
+    covariances = _WIDER**2 * np.array([hill.covariance for hill in profile.hills])
+    centred = [multivariate_t(shape=one, df=_DEGREES) for one in covariances]
+    return _Proposal(evened - np.logaddexp.reduce(evened), means, covariances, centred)
 
 
 def _heights(base: Base, profile: Profile, values: FloatArray) -> FloatArray:
@@ -127,4 +139,5 @@ def _heights(base: Base, profile: Profile, values: FloatArray) -> FloatArray:
         share + multivariate_normal(cov=prior.cover(profile.knots_m)).logpdf(values).reshape(-1)
         for prior, share in priors
     ]
-    return np.nan_to_num(np.array(found) - nothing + np.logaddexp.reduce(parts, axis=0), nan=-np.inf)
+    heights = np.array(found) - nothing + np.logaddexp.reduce(parts, axis=0)
+    return np.where(np.isfinite(heights), heights, -np.inf)

@@ -116,7 +116,15 @@ class _Promise(NamedTuple):
 
     def log_factor(self, most: float = math.inf) -> float:
         """Log Bayes factor if no values gain more than the most; at least that of no force at all."""
-        return max(min(self.gain, most) - self.price, 0.0) - self.freedom
+        return max(self._above_none(most), 0.0) - self.freedom
+
+    def hill(self, most: float, log_factor: float) -> Hill:
+        """Where values are; around none where no force at all is better."""
+        mean = self.values if self._above_none(most) > 0.0 else np.zeros_like(self.values)
+        return Hill(mean, self.covariance, log_factor)
+
+    def _above_none(self, most: float) -> float:
+        return min(self.gain, most) - self.price
 
 
 class _Seen:
@@ -143,7 +151,7 @@ class _Seen:
 
     def factor(self, prior: Prior, most: float = math.inf) -> float:
         """Log Bayes factor and log prior probability of a prior, as far as is known."""
-        most = math.inf if prior in self.peaks else most
+        most = self._counted(prior, most)
         return self.promise(prior, most).log_factor(most) + self.shares[prior]
 
     def promise(self, prior: Prior, most: float = math.inf) -> _Promise:
@@ -178,12 +186,15 @@ class _Seen:
         """Where values may be, under each prior that is not far behind the most probable one."""
         factors = {prior: self.factor(prior, self._most) for prior in self.shares}
         least = max(factors.values()) - _HILLS_WITHIN
-        chosen = {prior: self.promise(prior, self._most) for prior in factors if factors[prior] > least}
+        chosen = {prior: factor for prior, factor in factors.items() if factor > least}
         return tuple(
-            # What no force at all is better than is not where values are: around none, then.
-            Hill(one.values if one.gain > one.price else 0.0 * one.values, one.covariance, factors[prior])
-            for prior, one in chosen.items()
+            self.promise(prior, self._most).hill(self._counted(prior, self._most), factor)
+            for prior, factor in chosen.items()
         )
+
+    def _counted(self, prior: Prior, most: float) -> float:
+        """The most that values under a prior may gain: what was climbed to needs no limit."""
+        return math.inf if prior in self.peaks else most
 
     @property
     def _most(self) -> float:

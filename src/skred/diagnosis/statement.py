@@ -171,14 +171,14 @@ def _improvement(document: dict[str, Any]) -> str:
 
 def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     assert found.check is not None
-    rival = _rival(document)
+    probability = document["probability"]
+    doubt = 1.0 - probability[NOTHING] - probability[UNLISTED] >= _RIVAL
     return [
-        f"Something is missing{_where(document['location'])} that {'most probably ' if rival else ''}no"
-        f" listed mechanism accounts for (p = {found.check.p_value:.2g}; probability of nothing"
-        f" {_share(document['probability'][NOTHING])}).",
+        f"Something is missing{_where(document['location'])} that {'most probably ' if doubt else ''}no"
+        f" listed mechanism accounts for (a force not in the list: {_share(probability[UNLISTED])}; nothing:"
+        f" {_share(probability[NOTHING])}; p = {found.check.p_value:.2g}).",
         _unlisted_way(found.location),
-        _closest(found),
-        rival,
+        _closest(found, document),
         "The force profile is the answer: see where it stands out and how much work it does.",
         _improvement(document),
         _still_fired(found.profile.check) if found.profile is not None else "",
@@ -198,15 +198,16 @@ def _unlisted_way(location: Location | None) -> str:
     )
 
 
-def _closest(found: Diagnosis) -> str:
+def _closest(found: Diagnosis, document: dict[str, Any]) -> str:
     """The listed candidate of the highest evidence, beside the unlisted force."""
     assert found.race is not None
     factors = found.race.log_factors
     listed = {name: value for name, value in factors.items() if name not in (NOTHING, UNLISTED)}
     name = max(listed, key=lambda one: listed[one])
     return (
-        f"Of what is listed, {_title(name)} comes closest: log Bayes factor {listed[name]:.1f} against"
-        f" nothing, where a force not in the list has {factors[UNLISTED]:.1f}."
+        f"Of what is listed, {_title(name)} comes closest ({_share(document['probability'][name])}): log"
+        f" Bayes factor {listed[name]:.1f} against nothing, where a force not in the list has"
+        f" {factors[UNLISTED]:.1f}."
     )
 
 

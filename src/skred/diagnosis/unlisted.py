@@ -146,7 +146,7 @@ class Profile:
     log_bayes_factor: float
     gain: float
     fit: Fit
-    hills: tuple[Hill, ...] = ()
+    hills: tuple[Hill, ...]
 
 
 def priors_of(kind: Kind, at: FloatArray) -> dict[Prior, float]:
