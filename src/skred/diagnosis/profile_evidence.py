@@ -16,13 +16,16 @@ from scipy.stats import multivariate_normal, multivariate_t
 
 from skred.diagnosis.curves import Base, refit
 from skred.diagnosis.event_nodes import USUAL
-from skred.diagnosis.unlisted import KINDS, Profile, knot_by_knot, priors_of
+from skred.diagnosis.profile_fit import hill_at
+from skred.diagnosis.unlisted import KINDS, Hill, Profile, knot_by_knot, priors_of
 
 FloatArray = NDArray[np.float64]
 _FEWEST, _MOST, _DRAWS = 2, 6, 64
 """Turns of sampling, and draws of each."""
 _ENOUGH = 40.0
 """Effective draws that are enough: right to a sixth of a nat."""
+_ODD, _NEW_SHARE = 0.1, 0.3
+"""Share of all weight on one draw from which on a hill is looked for there, and of draws on it."""
 _AT_ONCE = 32
 """Draws fitted together."""
 _WIDER, _DEGREES = 1.1, 7
@@ -82,6 +85,16 @@ class _Proposal(NamedTuple):
         means = self.means + trust[:, None] * (found - self.means)
         return self._replace(log_weights=np.log(0.5 * np.exp(self.log_weights) + 0.5 * total), means=means)
 
+    def joined_by(self, hill: Hill) -> _Proposal:
+        """With one hill more, and a share of the draws on it."""
+        covariance = _WIDER**2 * hill.covariance
+        return _Proposal(
+            np.append(self.log_weights + math.log1p(-_NEW_SHARE), math.log(_NEW_SHARE)),
+            np.vstack([self.means, hill.mean]),
+            np.concatenate([self.covariances, covariance[None]]),
+            [*self.centred, multivariate_t(shape=covariance, df=_DEGREES)],
+        )
+
 
 def sampled_log_factor(
     base: Base, profile: Profile, least: float = -math.inf, seed: int = 0, turns: int = _MOST
@@ -106,11 +119,25 @@ def sampled_log_factor(
         total = float(np.logaddexp.reduce(log_weights))
         if total == -math.inf:  # no draw has fronts that tell anything
             return profile.log_bayes_factor
-        factor, weights = total - math.log(len(values)), np.exp(log_weights - total)
+        factor, weights = _mean(log_weights), np.exp(log_weights - total)
         enough = factor < least or 1.0 / np.sum(weights**2) > _ENOUGH
         if (enough and len(proposals) >= _FEWEST) or len(proposals) >= turns:
             return factor
-        proposals.append(proposals[-1].adapted(values, weights))
+        proposal = proposals[-1].adapted(values, weights)
+        if weights.max() > _ODD:
+            # Where fronts stop there are more hills than climbs find: so do Raftery and Bao, 2010,
+            # doi 10.1111/j.1541-0420.2010.01399.x.
+            proposal = proposal.joined_by(hill_at(base, profile, values[np.argmax(weights)]))
+        proposals.append(proposal)
+
+
+def _mean(log_weights: FloatArray) -> float:
+    """Log of the weights' mean, no weight larger than this times the root of their number.
+
+    A single draw on a spike does not decide then: Ionides, 2008, doi 10.1198/106186008X320456.
+    """
+    most = float(np.logaddexp.reduce(log_weights)) - 0.5 * math.log(len(log_weights))
+    return float(np.logaddexp.reduce(np.minimum(log_weights, most))) - math.log(len(log_weights))
 
 
 def _on_hills(profile: Profile) -> _Proposal:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import multivariate_normal
 
 from skred.diagnosis.curves import Base, Curve, Fit, refit
 from skred.diagnosis.extension import extended
@@ -90,6 +91,20 @@ def fit_profile(base: Base, kind: Kind, near: Start | None = None, again: Prior 
     gain = peak.fit.found.log_evidence - height
     factor, cover = seen.log_factor, 0.5 * (cover + cover.T)
     return Profile(kind, prior, at, peak.values, cover, factor, gain, peak.fit, seen.hills)
+
+
+def hill_at(base: Base, profile: Profile, values: FloatArray) -> Hill:
+    """The hill that values are on: climbed under the prior that suits them best."""
+    kind, at = profile.kind, profile.knots_m
+    shares = priors_of(kind, at)
+    prior = max(
+        shares,
+        key=lambda one: shares[one] + float(multivariate_normal(cov=one.cover(at)).logpdf(values)),
+    )
+    fit = _fit_at(base, kind, at, values, _start(base, profile.fit))
+    seen = _Seen(profile.fit.found.log_evidence - profile.gain, at, {prior: shares[prior]})
+    seen.add(prior, _climb(base, kind, at, _peak(base, kind, at, values, fit), prior.cover(at)))
+    return seen.hills[0]
 
 
 class _Promise(NamedTuple):
