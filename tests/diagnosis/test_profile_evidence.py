@@ -139,6 +139,6 @@ def test_which_forces_are_sampled(base: Base, monkeypatch: pytest.MonkeyPatch) -
             _, again = corrections.corrected(base, {}, profiles, pool, best)
         return [one.log_bayes_factor for one in again]
 
-    assert factors([19.0, 11.0, 9.0], 20.0) == [22.0, 14.0, 9.0]
-    assert asked == [(19.0, 10.0), (11.0, 10.0)]
+    assert factors([19.0, 13.0, 11.0], 20.0) == [22.0, 16.0, 11.0]
+    assert asked == [(19.0, 16.0), (13.0, 16.0)]
     assert factors([1.0, -1.0], -np.inf) == [4.0, -1.0] and asked == [(1.0, 0.0)]

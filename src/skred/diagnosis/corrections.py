@@ -24,8 +24,9 @@ _CHECKED, _DRAWS = 5, 500
 _BEHIND = 6.0
 """Nats behind the best of all at which nothing is looked at: it counts for a ninetieth, as stated
 (`odds.POWER`), and a look changes what a mechanism has by a nat or so."""
-_TOO_LOW = 4.0
-"""Nats by which Laplace's formula, or the first draws, may be below what a force has."""
+_COUNTS, _TOO_LOW = 4.0, 4.0
+"""Nats behind the best at which what a force has need not be known better than its first draws tell: two nats
+more there change no log odds by more than a tenth. Nats by which Laplace's formula may be below what it has."""
 
 
 def corrected(
@@ -47,15 +48,16 @@ def corrected(
     """
     height = {name: entrant.log_bayes_factor for name, entrant in entrants.items()}
     force = [one.log_bayes_factor for one in profiles]
-    least = max(best, *height.values(), *force) - _BEHIND
-    leading = sorted((name for name in height if height[name] > least), key=lambda name: -height[name])
+    most = max(best, *height.values(), *force)
+    leading = sorted(
+        (name for name in height if height[name] > most - _BEHIND), key=lambda name: -height[name]
+    )
     leading = [name for name in leading[:_CHECKED] if not entrants[name].best.rough]
     # The longest first. A force that is less probable than none would raise no alarm with some nats more.
-    floor = max(least - _TOO_LOW, 0.0)
     sampled = {
-        k: pool.submit(sampled_log_factor, base, profiles[k], floor)
+        k: pool.submit(sampled_log_factor, base, profiles[k], max(most - _COUNTS, 0.0))
         for k, factor in enumerate(force)
-        if factor > floor
+        if factor > max(most - _COUNTS - _TOO_LOW, 0.0)
     }
     looked = {name: pool.submit(_at_top, base, entrants[name]) for name in leading}
     plain = extended(base.problem, base.law, base.directions)

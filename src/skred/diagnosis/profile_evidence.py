@@ -22,8 +22,8 @@ from skred.diagnosis.unlisted import KINDS, Hill, Profile, knot_by_knot, priors_
 FloatArray = NDArray[np.float64]
 _FEWEST, _MOST, _DRAWS = 2, 6, 64
 """Turns of sampling, and draws of each."""
-_ENOUGH = 40.0
-"""Effective draws that are enough: right to a sixth of a nat."""
+_ENOUGH = 25.0
+"""Effective draws that are enough: right to a fifth of a nat."""
 _ODD, _NEW_SHARE = 0.1, 0.3
 """Share of all weight on one draw from which on a hill is looked for there, and of draws on it."""
 _AT_ONCE = 32
