@@ -16,6 +16,7 @@ from typing import Annotated, Any, NamedTuple
 
 import cyclopts
 import ryggfonn_page
+from ryggfonn_groups import groups_figure, retardations
 
 from skred.work.output import write_json, write_text
 
@@ -82,6 +83,7 @@ def diagnose_case(case: Case, replicas: int) -> dict[str, Any]:
     from skred.inference.hierarchical import hierarchical_problem
     from skred.laws import load_law
     from skred.report.diagnosis import save_diagnosis_figures
+    from skred.report.style import write_png
 
     problem = hierarchical_problem(campaign_of(case), error_model=case.errors, smoothing_m=case.smoothing_m)
     settings = DIAGNOSIS_SAMPLING.settings("hierarchical")
@@ -98,6 +100,9 @@ def diagnose_case(case: Case, replicas: int) -> dict[str, Any]:
             for name in SHOWN:
                 if name in figures:
                     shutil.copy(figures[name], FIGURES / f"ryggfonn-{case.name}-{name}.png")
+    if case.name == "pcm" and found.race is not None:
+        document["retardations"] = retardations(found)
+        write_png(groups_figure(document["retardations"]), FIGURES / "ryggfonn-groups.png")
     return document
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from ryggfonn_groups import words
+
 Found = Mapping[str, Any]
 DAM_CROWN_M, DAM_HEIGHT_M = 1940.0, 15.0
 _NEAR_M = 60.0
@@ -28,7 +30,14 @@ def page(found: Mapping[str, Found]) -> str:
         ("constant", "Base M3, constant retardation"),
     ):
         parts.append(_base(title, found[name]))
-    parts += [_growing(found), _dam(found), _between(found), _robust(found), _left(found)]
+    parts += [
+        _growing(found),
+        _dam(found),
+        _between(found),
+        words(found["pcm"].get("retardations", [])),
+        _robust(found),
+        _left(found),
+    ]
     return "\n".join(parts)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from diagnosis_cases import dense_base, ryggfonn_base, sparse_base
+from diagnosis_cases import base_of, dense_base, ryggfonn_base, sparse_base, trial
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import minimize
 from scipy.stats import kstest
@@ -57,6 +57,27 @@ def test_modes_are_stationary_and_highest(which: str) -> None:
             first = np.append(population.mean[0] + shift * sd, 0.0)
             other = minimize(loss, first, method="Nelder-Mead", options={"maxfev": 160, "fatol": 1e-3})
             assert -other.fun < height[row] + 0.02, (row, shift)
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "strength"), [("turbulent_drag", 1.5e-3), ("constant_retardation", 0.8)]
+)
+def test_fronts_that_something_added_stops_too_early_are_found_again(mechanism: str, strength: float) -> None:
+    """Against a fine grid: readings beyond a stop have no slope, and rows were 75 and 169 nats too low."""
+    base = base_of(trial(1001, "sparse", "nothing", "coulomb").campaign, "coulomb", "correlated")
+    added = mechanisms()[mechanism].added
+    assert added is not None
+    direction = added.direction(base.setting, added.shapes(base.setting)[0])
+    extension, given = extended(base.problem, base.law, (direction,)), np.array([strength])
+    population = Population(base.population.mean - 0.2, 4.0 * base.population.covariance)
+    found = event_modes(extension, base.rows, base.fit.points, given, population, n_steps=6).points
+    height = log_joint(extension, base.rows, found, given[None, :].repeat(len(found), axis=0), population)
+    grid = np.linspace(-1.2, 0.3, 3001)
+    for row in range(len(found)):
+        points = base.fit.points[row] + np.column_stack([grid, np.zeros_like(grid)])
+        rows = base.rows.take(np.full(len(grid), row))
+        along = log_joint(extension, rows, points, given[None, :].repeat(len(grid), axis=0), population)
+        assert height[row] > along.max() - 0.5, row
 
 
 @pytest.mark.xfail(

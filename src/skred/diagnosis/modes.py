@@ -14,9 +14,15 @@ from skred.inference.reading_density import log_likelihoods
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 _LARGEST_STEP = 1.0
 _STARTING_DAMPING = 1e-3
 _SETTLED = 1e-2
+_LOST, _GAINED = 20.0, 1.0
+"""Nats less than at best that the readings of a lost row have, and that another place must have more."""
+_ASIDE = np.multiply.outer((-1.0, 1.0), (0.01, 0.03, 0.08, 0.2, 0.5, 1.0)).ravel()
+"""Where to look for lost rows: changes of the logarithm of the first strength, from what moves a stop by ten
+metres to what the largest step of a climb is."""
 _STEEPEST = 1e4
 """Largest change of a reading, in standard deviations, per unit of an event's log strength."""
 
@@ -154,13 +160,39 @@ def event_modes(
     population: Population,
     n_steps: int = 12,
 ) -> Modes:
-    """Most probable points by damped Gauss-Newton steps; a step that makes a row worse is not taken."""
-    points = start.copy()
+    """Most probable points by damped Gauss-Newton steps; a step that makes a row worse is not taken.
+
+    Rows that are far from their readings then, as where a front stops before a sensor that the recorded one
+    passed and no slope leads it on, climb once more from the best of some places along the first strength,
+    where one is better.
+    """
+    given = np.broadcast_to(strengths, (len(start), len(extension.directions)))
+    points, found = start.copy(), list[FloatArray]()
+    _climb(extension, rows, points, given, population, n_steps, np.arange(len(start)), found)
+    lost = _lost(rows, found[2])
+    if len(lost):
+        points[lost], gained = _aside(extension, rows.take(lost), points[lost], given[lost], population)
+        _climb(extension, rows, points, given, population, n_steps, lost[gained], found)
+    # Tangents are those before each row's last, small step; the points are after it.
+    return Modes(points, *found[1:])
+
+
+def _climb(
+    extension: Extension,
+    rows: Rows,
+    points: FloatArray,
+    given: FloatArray,
+    population: Population,
+    n_steps: int,
+    active: IntArray,
+    found: list[FloatArray],
+) -> None:
+    """Move the points of the active rows uphill, and keep what is found around them."""
+    if len(active) == 0:
+        return
     precision = population.precision
-    given = np.broadcast_to(strengths, (len(points), len(extension.directions)))
-    best = log_joint(extension, rows, points, given, population)
-    damping = np.full(len(points), _STARTING_DAMPING)
-    active, found = np.arange(len(points)), list[FloatArray]()
+    best, damping = np.empty(len(points)), np.full(len(points), _STARTING_DAMPING)
+    best[active] = log_joint(extension, rows.take(active), points[active], given[active], population)
     for _ in range(n_steps):
         part = rows.take(active)
         around = look_around(extension, part, points[active], given[active])
@@ -185,8 +217,32 @@ def event_modes(
         active = active[~better | (gained > _SETTLED)]
         if len(active) == 0:
             break
-    # Tangents are those before each row's last, small step; the points are after it.
-    return Modes(points, *found[1:])
+
+
+def _lost(rows: Rows, predictions: FloatArray) -> IntArray:
+    """Rows whose readings would be much likelier if they were what is predicted."""
+    at = np.arange(len(predictions))
+    met = predictions.copy()
+    met[:, :-1] = np.where(rows.readings.observed, rows.readings.values, predictions[:, :-1])
+    heights = [log_likelihoods(at, one, rows.readings, rows.errors) for one in (predictions, met)]
+    return np.flatnonzero(heights[1] > heights[0] + _LOST)
+
+
+def _aside(
+    extension: Extension, rows: Rows, points: FloatArray, given: FloatArray, population: Population
+) -> tuple[FloatArray, BoolArray]:
+    """The best of each row's point and some places on either side of it, and whether it is one of those."""
+    n_rows, n_places = len(points), len(_ASIDE)
+    around = np.repeat(points, n_places, axis=0)
+    around[:, 0] += np.tile(_ASIDE, n_rows)
+    which = np.repeat(np.arange(n_rows), n_places)
+    heights = log_joint(extension, rows.take(which), around, given[which], population).reshape(
+        n_rows, n_places
+    )
+    before = log_joint(extension, rows, points, given, population)
+    gained = heights.max(axis=1) > before + _GAINED
+    best = around.reshape(n_rows, n_places, -1)[np.arange(n_rows), heights.argmax(axis=1)]
+    return np.where(gained[:, None], best, points), gained
 
 
 def _store(found: list[FloatArray], active: IntArray, around: Modes) -> None:
