@@ -2,7 +2,7 @@
 
 From ``results/development.json``, after ::
 
-    python benchmarks/development_set.py --each --seed 3000000 --out DIR
+    python benchmarks/development_set.py --each --seed 3100000 --out DIR
     python benchmarks/diagnosis.py --trials DIR --workers 1 --json benchmarks/results/development.json
 """
 
@@ -23,7 +23,7 @@ _HEAD = """# The development set
 
 Written by `python benchmarks/development_page.py` from `results/development.json`. The commands that made it:
 
-    python benchmarks/development_set.py --each --seed 3000000 --out DIR
+    python benchmarks/development_set.py --each --seed 3100000 --out DIR
     python benchmarks/diagnosis.py --trials DIR --workers 1 --json benchmarks/results/development.json
 
 {n} simulated campaigns, sparse and dense in turn, with each mechanism, each force that is in no list, masked
