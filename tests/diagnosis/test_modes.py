@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from scipy.stats import kstest
 
 from skred.campaign import Status
-from skred.diagnosis.curves import Base
+from skred.diagnosis.curves import Base, repeated
 from skred.diagnosis.extension import Extension, extended
 from skred.diagnosis.modes import Population, Rows, event_modes, log_joint, look_around, take_rows
 from skred.diagnosis.replicas import replicas
@@ -78,6 +78,17 @@ def test_fronts_that_something_added_stops_too_early_are_found_again(mechanism: 
         rows = base.rows.take(np.full(len(grid), row))
         along = log_joint(extension, rows, points, given[None, :].repeat(len(grid), axis=0), population)
         assert height[row] > along.max() - 0.5, row
+    # Beside another group, of another population, as alone.
+    other = Population(population.mean + 0.3, population.covariance)
+    together = event_modes(
+        extension,
+        repeated(base.rows, 2),
+        np.tile(base.fit.points, (2, 1)),
+        given,
+        other.with_more(population),
+        6,
+    )
+    assert_allclose(together.points[len(found) :], found, rtol=1e-9)
 
 
 @pytest.mark.xfail(

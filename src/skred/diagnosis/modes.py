@@ -167,32 +167,30 @@ def event_modes(
     where one is better.
     """
     given = np.broadcast_to(strengths, (len(start), len(extension.directions)))
-    points, found = start.copy(), list[FloatArray]()
-    _climb(extension, rows, points, given, population, n_steps, np.arange(len(start)), found)
-    lost = _lost(rows, found[2])
+    found = _climbed(extension, rows, start, given, population, n_steps)
+    lost = _lost(rows, found.predictions)
     if len(lost):
-        points[lost], gained = _aside(extension, rows.take(lost), points[lost], given[lost], population)
-        _climb(extension, rows, points, given, population, n_steps, lost[gained], found)
-    # Tangents are those before each row's last, small step; the points are after it.
-    return Modes(points, *found[1:])
+        points, gained = _aside(extension, rows.take(lost), found.points[lost], given[lost], population)
+        moved = lost[gained]
+        again = _climbed(extension, rows.take(moved), points[gained], given[moved], population, n_steps)
+        for whole, part in zip(found, again, strict=True):
+            whole[moved] = part
+    return found
 
 
-def _climb(
+def _climbed(
     extension: Extension,
     rows: Rows,
-    points: FloatArray,
+    start: FloatArray,
     given: FloatArray,
     population: Population,
     n_steps: int,
-    active: IntArray,
-    found: list[FloatArray],
-) -> None:
-    """Move the points of the active rows uphill, and keep what is found around them."""
-    if len(active) == 0:
-        return
-    precision = population.precision
-    best, damping = np.empty(len(points)), np.full(len(points), _STARTING_DAMPING)
-    best[active] = log_joint(extension, rows.take(active), points[active], given[active], population)
+) -> Modes:
+    """Where damped Gauss-Newton steps from one place lead."""
+    points, precision = start.copy(), population.precision
+    best = log_joint(extension, rows, points, given, population)
+    damping = np.full(len(points), _STARTING_DAMPING)
+    active, found = np.arange(len(points)), list[FloatArray]()
     for _ in range(n_steps):
         part = rows.take(active)
         around = look_around(extension, part, points[active], given[active])
@@ -217,15 +215,19 @@ def _climb(
         active = active[~better | (gained > _SETTLED)]
         if len(active) == 0:
             break
+    # Tangents are those before each row's last, small step; the points are after it.
+    return Modes(points, *found[1:])
 
 
 def _lost(rows: Rows, predictions: FloatArray) -> IntArray:
-    """Rows whose readings would be much likelier if they were what is predicted."""
-    at = np.arange(len(predictions))
+    """Rows whose readings would be much likelier if they, and the range of the stop, were as predicted."""
+    readings, at = rows.readings, np.arange(len(predictions))
     met = predictions.copy()
-    met[:, :-1] = np.where(rows.readings.observed, rows.readings.values, predictions[:, :-1])
-    heights = [log_likelihoods(at, one, rows.readings, rows.errors) for one in (predictions, met)]
-    return np.flatnonzero(heights[1] > heights[0] + _LOST)
+    met[:, :-1] = np.where(readings.observed, readings.values, predictions[:, :-1])
+    met[:, -1] = np.clip(predictions[:, -1], readings.reached, readings.not_reached)
+    heights = [log_likelihoods(at, one, readings, rows.errors) for one in (predictions, met)]
+    # Half a nat a reading is what noise alone takes.
+    return np.flatnonzero(heights[1] > heights[0] + _LOST + 0.5 * readings.observed.sum(axis=1))
 
 
 def _aside(

@@ -97,7 +97,12 @@ class _Proposal(NamedTuple):
 
 
 def sampled_log_factor(
-    base: Base, profile: Profile, least: float = -math.inf, seed: int = 0, turns: int = _MOST
+    base: Base,
+    profile: Profile,
+    least: float = -math.inf,
+    seed: int = 0,
+    turns: int = _MOST,
+    enough: float = _ENOUGH,
 ) -> float:
     """Log Bayes factor of a kind of profile over all its priors, by importance sampling of its values.
 
@@ -107,6 +112,8 @@ def sampled_log_factor(
         Where it is less than this after the first turns, further ones are not worth it.
     turns : int
         Of sampling, at most.
+    enough : float
+        Effective draws from which on there is none further.
     """
     rng = np.random.default_rng([seed, 61, KINDS.index(profile.kind)])
     proposals, values, heights = [_on_hills(profile)], np.empty((0, len(profile.mean))), np.empty(0)
@@ -120,8 +127,8 @@ def sampled_log_factor(
         if total == -math.inf:  # no draw has fronts that tell anything
             return profile.log_bayes_factor
         factor, weights = _mean(log_weights), np.exp(log_weights - total)
-        enough = factor < least or 1.0 / np.sum(weights**2) > _ENOUGH
-        if (enough and len(proposals) >= _FEWEST) or len(proposals) >= turns:
+        ended = factor < least or 1.0 / np.sum(weights**2) > enough
+        if (ended and len(proposals) >= _FEWEST) or len(proposals) >= turns:
             return factor
         proposal = proposals[-1].adapted(values, weights)
         if weights.max() > _ODD:

@@ -101,10 +101,11 @@ def hill_at(base: Base, profile: Profile, values: FloatArray) -> Hill:
         shares,
         key=lambda one: shares[one] + float(multivariate_normal(cov=one.cover(at)).logpdf(values)),
     )
+    cover = prior.cover(at)
     fit = _fit_at(base, kind, at, values, _start(base, profile.fit))
-    seen = _Seen(profile.fit.found.log_evidence - profile.gain, at, {prior: shares[prior]})
-    seen.add(prior, _climb(base, kind, at, _peak(base, kind, at, values, fit), prior.cover(at)))
-    return seen.hills[0]
+    peak = _climb(base, kind, at, _peak(base, kind, at, values, fit), cover)
+    left = np.linalg.inv(peak.information + np.linalg.inv(cover))
+    return Hill(peak.values, 0.5 * (left + left.T), 0.0)
 
 
 class _Promise(NamedTuple):

@@ -176,7 +176,7 @@ def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     return [
         f"Something is missing{_where(document['location'])} that {'most probably ' if doubt else ''}no"
         f" listed mechanism accounts for (a force not in the list: {_share(probability[UNLISTED])}; nothing:"
-        f" {_share(probability[NOTHING])}; p = {found.check.p_value:.2g}).",
+        f" {_share(probability[NOTHING])}; check: p = {found.check.p_value:.2g}).",
         _unlisted_way(found.location),
         _closest(found, document),
         "The force profile is the answer: see where it stands out and how much work it does.",
