@@ -112,7 +112,7 @@ def words(rows: Sequence[dict[str, Any]]) -> str:
     six, others = (own for _, own in _parts(rows))
     gap = {key: _mean(six, key) - _mean(others, key) for key in ("recorded", "base", "with_force")}
     kept = 100.0 * gap["with_force"] / gap["recorded"]
-    alike = {key: _correlation(rows, key) for key in ("base", "with_force")}
+    alike, among = ([_correlation(own, key) for key in ("base", "with_force")] for own in (rows, others))
     return f"""### The two groups
 
 The data's README tells of six avalanches that retard more between LC and CD. Mean retardation there, by the
@@ -123,7 +123,8 @@ recorded speeds and by each avalanche's most probable front under M2, without an
 {table}
 The six retard by {gap["recorded"]:.1f} m/s² more as recorded, by {gap["base"]:.1f} under M2 with friction and
 drag of their own, and by {gap["with_force"]:.1f} with the force, {kept:.0f} % of what was recorded.
-Correlation with what was recorded, over all {len(rows)}: {alike["base"]:.2f} and {alike["with_force"]:.2f}.
+Correlation with what was recorded, without and with it: {alike[0]:.2f} and {alike[1]:.2f} over all
+{len(rows)}, {among[0]:.2f} and {among[1]:.2f} among the others alone.
 (Where no speed was left at CD, what is recorded is the least that it can have been.)
 {_told(kept)}
 
