@@ -1,5 +1,6 @@
 """Sections of benchmarks/README.md about the diagnosis."""
 
+from statistics import fmean
 from typing import Any
 
 from benchmark_results import read
@@ -9,6 +10,9 @@ _TIE_HEAD = """| recordings | tied within | single names right | tie sets that h
  | right sets of at most 3 | sets of 4 and more | single over ceiling | no longer single: were right |
 | --- | --- | --- | --- | --- | --- | --- | --- |
 """
+
+_NEAR = 0.6
+"""Nats from what many draws say that few draws mostly keep within."""
 
 
 def sections() -> str:
@@ -272,13 +276,19 @@ def free_force_draws() -> str:
     """Both routes to the evidence of a force that is in no list."""
     found = read("free_force_draws")
     rows = "".join(_force_row(row) for row in found["rows"])
+    due = [fmean(row["many"]) for row in found["rows"]]
+    few = [one - own for row, own in zip(found["rows"], due, strict=True) for one in row["usual"]]
+    laplace = [row["laplace"] - own for row, own in zip(found["rows"], due, strict=True)]
+    near = sum(abs(one) <= _NEAR for one in few)
     return f"""
 ## The evidence of a force in no list
 
 `python benchmarks/free_force_draws.py --json benchmarks/results/free_force_draws.json` (code
 {found["commit"]}): log Bayes factors of what is missing at Ryggfonn against nothing, by the way the force
 goes with speed. By Laplace's formula over its 32 values, and by importance sampling of them, with as many
-draws as a race takes and with 1024; one number a seed.
+draws as a race takes and with 1024; one number a seed. Of the {len(few)} numbers with few draws {near} are
+within {_NEAR} nats of the mean of those with 1024, from {min(few):+.1f} to {max(few):+.1f} and {fmean(few):+.1f}
+in the mean; by Laplace's formula from {min(laplace):+.1f} to {max(laplace):+.1f}.
 
 | base law | errors | force | Laplace | as in a race | 1024 draws | best listed | CPU seconds, as in a race |
 | --- | --- | --- | --- | --- | --- | --- | --- |
