@@ -287,8 +287,8 @@ def free_force_draws() -> str:
 {found["commit"]}): log Bayes factors of what is missing at Ryggfonn against nothing, by the way the force
 goes with speed. By Laplace's formula over its 32 values, and by importance sampling of them, with as many
 draws as a race takes and with 1024; one number a seed. Of the {len(few)} numbers with few draws {near} are
-within {_NEAR} nats of the mean of those with 1024, from {min(few):+.1f} to {max(few):+.1f} and {fmean(few):+.1f}
-in the mean; by Laplace's formula from {min(laplace):+.1f} to {max(laplace):+.1f}.
+within {_NEAR} nats of the mean of those with 1024, from {min(few):+.1f} to {max(few):+.1f} and
+{fmean(few):+.1f} in the mean; by Laplace's formula from {min(laplace):+.1f} to {max(laplace):+.1f}.
 
 | base law | errors | force | Laplace | as in a race | 1024 draws | best listed | CPU seconds, as in a race |
 | --- | --- | --- | --- | --- | --- | --- | --- |
