@@ -2,7 +2,7 @@
 
 Where fronts stop near sensors, a climb ends on what is left of integration errors, next to the top and not at
 it, and the hill is not as curved as the readings' tangents say. By Laplace's formula alone the free force can
-have three nats less than its due, and a listed mechanism its place.
+have four nats less than its due, and a listed mechanism its place.
 """
 
 from __future__ import annotations
