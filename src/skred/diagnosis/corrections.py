@@ -26,7 +26,7 @@ _BEHIND = 6.0
 (`odds.POWER`), and a look changes what a mechanism has by a nat or so."""
 _COUNTS, _TOO_LOW = 4.0, 4.0
 """Nats behind the best at which what a force has need not be known better than its first draws tell: two nats
-more there change no log odds by more than a tenth. Nats that it may have more than by Laplace's formula."""
+more there are a tenth of a nat for all together. Nats that it may have more than by Laplace's formula."""
 
 
 def corrected(

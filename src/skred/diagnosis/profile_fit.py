@@ -94,7 +94,7 @@ def fit_profile(base: Base, kind: Kind, near: Start | None = None, again: Prior 
 
 
 def hill_at(base: Base, profile: Profile, values: FloatArray) -> Hill:
-    """The hill that values are on: climbed under the prior that suits them best."""
+    """The hill that values are on, climbed under the prior that suits them best; its log factor is 0."""
     kind, at = profile.kind, profile.knots_m
     shares = priors_of(kind, at)
     prior = max(
