@@ -11,6 +11,8 @@ import math
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -29,7 +31,7 @@ LAWS = ("voellmy", "pcm")
 SEEDS, MANY_SEEDS, MANY_TURNS = range(1, 5), range(101, 103), 16
 
 
-def both_ways(law: str, heat: Heat) -> Iterator[dict[str, Any]]:
+def both_ways(law: str, heat: Heat, pool: Executor) -> Iterator[dict[str, Any]]:
     """Each kind of force that Laplace's formula gives more evidence than none."""
     listed = max(entrant.log_bayes_factor for entrant in heat.entrants.values())
     for kind in KINDS:
@@ -37,10 +39,10 @@ def both_ways(law: str, heat: Heat) -> Iterator[dict[str, Any]]:
         if profile.log_bayes_factor <= 0.0:
             continue
         started = time.process_time()
-        usual = [sampled_log_factor(heat.base, profile, seed=seed) for seed in SEEDS]
+        usual = [sampled_log_factor(heat.base, profile, pool, seed=seed) for seed in SEEDS]
         seconds = (time.process_time() - started) / len(SEEDS)
         many = [
-            sampled_log_factor(heat.base, profile, seed=seed, turns=MANY_TURNS, enough=math.inf)
+            sampled_log_factor(heat.base, profile, pool, seed=seed, turns=MANY_TURNS, enough=math.inf)
             for seed in MANY_SEEDS
         ]
         yield {
@@ -65,8 +67,8 @@ def main(
         base = base_on(read_campaign(find_campaign("ryggfonn")), law)
         if base is None:
             sys.exit(f"{law}: the gate of the base law failed")
-        for heat in race(base).heats:
-            for row in both_ways(law, heat):
+        with ThreadPoolExecutor(1) as pool:
+            for row in chain.from_iterable(both_ways(law, heat, pool) for heat in race(base).heats):
                 print(row, flush=True)
                 rows.append(row)
     if out is not None:

@@ -237,22 +237,26 @@ def diagnose(
     output: Output = OUTPUT,
 ) -> int:
     """Say what physics a law leaves out, where and how surely, model it, and show what that improves."""
-    from skred.laws import load_law
+    from skred.helpers import helpers
 
-    law = load_law(base_model)
-    problem = hierarchical_of(campaign_of(campaign), errors, smoothing)
-    folder = output.folder("diagnose")
+    recorded = campaign_of(campaign)
+    with helpers("skred.diagnosis.diagnose"):  # they load packages while this process loads its own
+        from skred.laws import load_law
 
-    from skred.diagnosis.diagnose import QUICK_REPLICAS, Effort
-    from skred.report.diagnosis import diagnosis_table
-    from skred.work.diagnose import diagnose_to
+        law = load_law(base_model)
+        problem = hierarchical_of(recorded, errors, smoothing)
+        folder = output.folder("diagnose")
 
-    replicas = QUICK_REPLICAS if quick else Effort.replicas
-    effort = Effort(replicas, max_mechanisms or MAX_MECHANISMS[quick], exact_loo)
-    settings = replace(DIAGNOSIS_SAMPLING, seed=seed).settings("hierarchical")
-    document = diagnose_to(
-        problem, law, settings, effort, folder, output.tell, lock=lock or 0, folds=outer_folds or 0
-    )
+        from skred.diagnosis.diagnose import QUICK_REPLICAS, Effort
+        from skred.report.diagnosis import diagnosis_table
+        from skred.work.diagnose import diagnose_to
+
+        replicas = QUICK_REPLICAS if quick else Effort.replicas
+        effort = Effort(replicas, max_mechanisms or MAX_MECHANISMS[quick], exact_loo)
+        settings = replace(DIAGNOSIS_SAMPLING, seed=seed).settings("hierarchical")
+        document = diagnose_to(
+            problem, law, settings, effort, folder, output.tell, lock=lock or 0, folds=outer_folds or 0
+        )
     output.show(document, diagnosis_table, [], folder)  # the statement is in the table
     return DONE if document["reason"] is None else GATE_FAILED
 

@@ -18,14 +18,14 @@ from scipy.special import log_ndtr, logsumexp
 from scipy.stats import multivariate_normal, norm
 from scipy.stats import t as student_t
 
-from skred.inference.error_model import ERROR_MODELS, EventReadings
+from skred.inference.error_model import ERROR_MODELS, Errors, EventReadings
 from skred.inference.event_density import (
     draw_nodes,
     integrated_log_density,
     integrated_log_density_pullback,
 )
 from skred.inference.integrated_op import IntegratedLogDensity, IntegratedLogDensityPullback
-from skred.inference.reading_density import assess, log_likelihood, log_likelihood_bound, log_likelihoods
+from skred.inference.reading_density import assess, log_likelihood_bounds, log_likelihoods
 
 # The readings given a front, written down again.
 
@@ -156,6 +156,18 @@ def cases() -> dict[str, tuple[np.ndarray, EventReadings]]:
 
 
 CASES = cases()
+
+
+def log_likelihood(event: int, prediction: np.ndarray, readings: EventReadings, errors: Errors) -> float:
+    """Of one run alone."""
+    return float(log_likelihoods(np.array([event]), prediction[None], readings, errors)[0])
+
+
+def log_likelihood_bound(
+    event: int, low: np.ndarray, high: np.ndarray, readings: EventReadings, errors: Errors
+) -> float:
+    """Of one box alone."""
+    return float(log_likelihood_bounds(np.array([event]), low[None], high[None], readings, errors)[0])
 
 
 @pytest.mark.parametrize("case", CASES)

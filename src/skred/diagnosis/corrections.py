@@ -16,7 +16,7 @@ from skred.diagnosis.extension import Extension, extended
 from skred.diagnosis.marginal import evidence, importance_evidence
 from skred.diagnosis.modes import event_modes
 from skred.diagnosis.profile_evidence import sampled_log_factor
-from skred.diagnosis.unlisted import Profile
+from skred.diagnosis.unlisted import KINDS, Profile
 
 FloatArray = NDArray[np.float64]
 _CHECKED, _DRAWS = 5, 500
@@ -53,12 +53,23 @@ def corrected(
         (name for name in height if height[name] > most - _BEHIND), key=lambda name: -height[name]
     )
     leading = [name for name in leading[:_CHECKED] if not entrants[name].best.rough]
-    # The longest first. A force that is less probable than none would raise no alarm with some nats more.
-    sampled = {
-        k: pool.submit(sampled_log_factor, base, profiles[k], max(most - _COUNTS, 0.0))
-        for k, factor in enumerate(force)
-        if factor > max(most - _COUNTS - _TOO_LOW, 0.0)
-    }
+    # A force that is less probable than none would raise no alarm with some nats more.
+    worth = [k for k, factor in enumerate(force) if factor > max(most - _COUNTS - _TOO_LOW, 0.0)]
+    with ThreadPoolExecutor(len(KINDS)) as waiting:  # for the pool's jobs, which all of them share
+        sampled = {
+            k: waiting.submit(sampled_log_factor, base, profiles[k], pool, max(most - _COUNTS, 0.0))
+            for k in worth
+        }
+        found = _looked_at(base, entrants, leading, pool)
+        factors = {k: one.result() for k, one in sampled.items()}
+    again = [replace(one, log_bayes_factor=factors.get(k, force[k])) for k, one in enumerate(profiles)]
+    return found, again
+
+
+def _looked_at(
+    base: Base, entrants: Mapping[str, Entrant], leading: Sequence[str], pool: ThreadPoolExecutor
+) -> dict[str, Entrant]:
+    """All mechanisms, those that lead with many more nodes at the top of their best curve."""
     looked = {name: pool.submit(_at_top, base, entrants[name]) for name in leading}
     plain = extended(base.problem, base.law, base.directions)
     nothing = pool.submit(_finely, base, plain, base.strengths, base.fit) if leading else None
@@ -69,9 +80,7 @@ def corrected(
         correction = fine - without[1] - float(entrants[name].best.log_evidence.max())
         disagreement = (fine - laplace) - (without[1] - without[0])
         found[name] = replace(entrants[name], correction=correction, disagreement=disagreement)
-    factors = {k: one.result() for k, one in sampled.items()}
-    again = [replace(one, log_bayes_factor=factors.get(k, force[k])) for k, one in enumerate(profiles)]
-    return found, again
+    return found
 
 
 def _at_top(base: Base, entrant: Entrant) -> tuple[float, float]:

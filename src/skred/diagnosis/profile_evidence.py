@@ -8,6 +8,8 @@ have four nats less than its due, and a listed mechanism its place.
 from __future__ import annotations
 
 import math
+from concurrent.futures import Executor
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -99,6 +101,7 @@ class _Proposal(NamedTuple):
 def sampled_log_factor(
     base: Base,
     profile: Profile,
+    pool: Executor,
     least: float = -math.inf,
     seed: int = 0,
     turns: int = _MOST,
@@ -108,6 +111,8 @@ def sampled_log_factor(
 
     Parameters
     ----------
+    pool : Executor
+        For the fits, some draws at once. This itself must not be a job of the pool: it waits for those.
     least : float
         Where it is less than this after the first turns, further ones are not worth it.
     turns : int
@@ -119,7 +124,8 @@ def sampled_log_factor(
     proposals, values, heights = [_on_hills(profile)], np.empty((0, len(profile.mean))), np.empty(0)
     while True:
         drawn = proposals[-1].drawn(_DRAWS, rng)
-        values, heights = np.concatenate([values, drawn]), np.append(heights, _heights(base, profile, drawn))
+        values = np.concatenate([values, drawn])
+        heights = np.append(heights, _heights(base, profile, drawn, pool))
         # All draws are weighed by the mixture of all proposals.
         densities = [np.logaddexp.reduce(one.log_densities(values), axis=0) for one in proposals]
         log_weights = heights - np.logaddexp.reduce(densities, axis=0) + math.log(len(proposals))
@@ -134,7 +140,8 @@ def sampled_log_factor(
         if weights.max() > _ODD:
             # Where fronts stop there are more hills than climbs find: so do Raftery and Bao, 2010,
             # doi 10.1111/j.1541-0420.2010.01399.x.
-            proposal = proposal.joined_by(hill_at(base, profile, values[np.argmax(weights)]))
+            odd = values[np.argmax(weights)]
+            proposal = proposal.joined_by(pool.submit(hill_at, base, profile, odd).result())
         proposals.append(proposal)
 
 
@@ -156,22 +163,25 @@ def _on_hills(profile: Profile) -> _Proposal:
     return _Proposal(evened - np.logaddexp.reduce(evened), means, covariances, centred)
 
 
-def _heights(base: Base, profile: Profile, values: FloatArray) -> FloatArray:
+def _heights(base: Base, profile: Profile, values: FloatArray, pool: Executor) -> FloatArray:
     """Gain in log evidence at values of the profile, (n, n_knots), and their log prior density."""
-    extension = knot_by_knot(base, profile.kind, profile.knots_m)
-    start = profile.fit.found.population(len(base.law.mechanisms)), profile.fit.points
-    found: list[float] = []
-    for first in range(0, len(values), _AT_ONCE):
-        own = values[first : first + _AT_ONCE]
-        given = np.column_stack([np.tile(base.strengths, (len(own), 1)), own])
-        # With as many nodes and rounds as the peak and nothing: what is left of integration errors is alike.
-        fits = refit(extension, base.rows, given, start, base.log_scale, USUAL, n_rounds=1)
-        found += [fit.found.log_evidence for fit in fits]
+    parts = [values[first : first + _AT_ONCE] for first in range(0, len(values), _AT_ONCE)]
+    found = np.concatenate(list(pool.map(partial(_log_evidence, base, profile), parts)))
     nothing = profile.fit.found.log_evidence - profile.gain
     priors = priors_of(profile.kind, profile.knots_m).items()
-    parts = [
+    densities = [
         share + multivariate_normal(cov=prior.cover(profile.knots_m)).logpdf(values).reshape(-1)
         for prior, share in priors
     ]
-    heights = np.array(found) - nothing + np.logaddexp.reduce(parts, axis=0)
+    heights = found - nothing + np.logaddexp.reduce(densities, axis=0)
     return np.where(np.isfinite(heights), heights, -np.inf)
+
+
+def _log_evidence(base: Base, profile: Profile, values: FloatArray) -> FloatArray:
+    """At values of the profile, (n, n_knots)."""
+    extension = knot_by_knot(base, profile.kind, profile.knots_m)
+    start = profile.fit.found.population(len(base.law.mechanisms)), profile.fit.points
+    given = np.column_stack([np.tile(base.strengths, (len(values), 1)), values])
+    # With as many nodes and rounds as the peak and nothing: what is left of integration errors is alike.
+    fits = refit(extension, base.rows, given, start, base.log_scale, USUAL, n_rounds=1)
+    return np.array([fit.found.log_evidence for fit in fits])

@@ -11,7 +11,15 @@ import math
 import numpy as np
 
 from skred.diagnosis.compiled import compiled
-from skred.inference.reading_density import OUTLIER_FACTOR, reading_sd
+from skred.inference.reading_density import (
+    OBSERVED,
+    OUTLIER_FACTOR,
+    RELATIVE,
+    VALUE,
+    VELOCITY,
+    reading_sd,
+    tabled,
+)
 
 _SQRT_2 = math.sqrt(2.0)
 _SQRT_2PI = math.sqrt(2.0 * math.pi)
@@ -39,28 +47,27 @@ def _stop_slopes(stop, reached, not_reached, place_sd):  # type: ignore[no-untyp
 
 
 @compiled()
-def _common_slopes(row, prediction, readings, common, slope, curvature, shared):  # type: ignore[no-untyped-def]
-    """Fill slope, curvature and what is shared of a row whose velocities have an error in common."""
+def _common_slopes(table, row, predictions, i, common, slope, curvature, shared):  # type: ignore[no-untyped-def]
+    """Fill slope, curvature and what is shared of a run whose velocities have an error in common."""
     n_velocities, total = 0, 0.0
-    n_columns = prediction.size
-    for j in range(n_columns - 1):
-        if readings.observed[row, j] and readings.is_velocity[j]:
+    n_sensors = table.shape[1]
+    for j in range(n_sensors):
+        if table[row, j, OBSERVED] > 0.0 and table[row, j, VELOCITY] > 0.0:
             n_velocities += 1
-            sd = reading_sd(row, j, prediction[j], readings)
-            total += (readings.values[row, j] - prediction[j]) / sd / (1.0 - common)
+            sd = reading_sd(table, row, j, predictions[i, j])
+            total += (table[row, j, VALUE] - predictions[i, j]) / sd / (1.0 - common)
     taken = common / (1.0 + common * n_velocities / (1.0 - common))
-    for j in range(n_columns - 1):
-        if not readings.observed[row, j]:
+    for j in range(n_sensors):
+        if table[row, j, OBSERVED] == 0.0:
             continue
-        sd = reading_sd(row, j, prediction[j], readings)
-        z = (readings.values[row, j] - prediction[j]) / sd
-        own, part = (1.0 - common, 1.0) if readings.is_velocity[j] else (1.0, 0.0)
-        d_log_sd = 0.0
-        if readings.stated_sd[row, j] <= 0.0:  # the standard deviation is the prediction's own
-            d_log_sd = readings.relative_sd[j] ** 2 * prediction[j] / sd**2
-        slope[j] = (z - part * taken * total) / own * (1.0 / sd + z * d_log_sd) - d_log_sd
-        curvature[j] = 1.0 / (own * sd**2) + 2.0 * d_log_sd**2
-        shared[j] = part * math.sqrt(taken) / (own * sd)
+        sd = reading_sd(table, row, j, predictions[i, j])
+        z = (table[row, j, VALUE] - predictions[i, j]) / sd
+        own, part = (1.0 - common, 1.0) if table[row, j, VELOCITY] > 0.0 else (1.0, 0.0)
+        # 0 where the standard deviation is stated, and not the prediction's own.
+        d_log_sd = table[row, j, RELATIVE] ** 2 * predictions[i, j] / sd**2
+        slope[i, j] = (z - part * taken * total) / own * (1.0 / sd + z * d_log_sd) - d_log_sd
+        curvature[i, j] = 1.0 / (own * sd**2) + 2.0 * d_log_sd**2
+        shared[i, j] = part * math.sqrt(taken) / (own * sd)
 
 
 @compiled()
@@ -85,59 +92,59 @@ def reading_slopes(rows, predictions, readings, errors):  # type: ignore[no-unty
     n, n_columns = predictions.shape
     slope, curvature = np.zeros((n, n_columns)), np.zeros((n, n_columns))
     shared = np.zeros((n, n_columns))
-    n_cases = errors.weights.size
-    log_case = np.empty(n_cases)
+    # Unpacked once, see `tabled`.
+    table, place_sd = tabled(readings), readings.place_sd
+    reached, not_reached = readings.reached, readings.not_reached
+    scales, shares, degrees, common = errors.scales, errors.shares, errors.degrees, errors.common
+    log_weights, log_scales = errors.log_weights, errors.log_scales
+    n_cases = log_weights.size
+    log_case, weights = np.empty(n_cases), np.empty(n_cases)
     sd, residual = np.empty(n_columns), np.empty(n_columns)
     wide_square = OUTLIER_FACTOR * OUTLIER_FACTOR
     for i in range(n):
         row = rows[i]
-        at_stop, bend = _stop_slopes(
-            predictions[i, n_columns - 1], readings.reached[row], readings.not_reached[row], readings.place_sd
-        )
+        stop = predictions[i, n_columns - 1]
+        at_stop, bend = _stop_slopes(stop, reached[row], not_reached[row], place_sd)
         slope[i, n_columns - 1], curvature[i, n_columns - 1] = at_stop, bend
-        if errors.common > 0.0:
-            one = slope[i], curvature[i], shared[i]
-            _common_slopes(row, predictions[i], readings, errors.common, *one)
+        if common > 0.0:
+            _common_slopes(table, row, predictions, i, common, slope, curvature, shared)
             continue
-        log_case[:] = np.log(errors.weights)
+        log_case[:] = log_weights
         for j in range(n_columns - 1):
-            if not readings.observed[row, j]:
+            if table[row, j, OBSERVED] == 0.0:
                 continue
-            p = predictions[i, j]
-            sd[j] = readings.stated_sd[row, j]
-            if sd[j] <= 0.0:
-                sd[j] = math.hypot(readings.relative_sd[j] * p, readings.absolute_sd[j])
-            residual[j] = readings.values[row, j] - p
+            sd[j] = reading_sd(table, row, j, predictions[i, j])
+            residual[j] = table[row, j, VALUE] - predictions[i, j]
             for case in range(n_cases):
-                square = (residual[j] / (sd[j] * errors.scales[case])) ** 2
-                share = errors.shares[case]
-                log_case[case] -= math.log(errors.scales[case])
-                if errors.degrees > 0.0:
-                    log_case[case] -= 0.5 * (errors.degrees + 1.0) * math.log1p(square / errors.degrees)
+                square = (residual[j] / (sd[j] * scales[case])) ** 2
+                share = shares[case]
+                log_case[case] -= log_scales[case]
+                if degrees > 0.0:
+                    log_case[case] -= 0.5 * (degrees + 1.0) * math.log1p(square / degrees)
                 else:
                     usual = (1.0 - share) * math.exp(-0.5 * square)
                     outlying = share / OUTLIER_FACTOR * math.exp(-0.5 * square / wide_square)
                     log_case[case] += math.log(max(usual + outlying, 1e-300))
-        weights = np.exp(log_case - log_case.max())
-        weights /= weights.sum()
+        most, total = log_case.max(), 0.0
+        for case in range(n_cases):
+            weights[case] = math.exp(log_case[case] - most)
+            total += weights[case]
         for j in range(n_columns - 1):
-            if not readings.observed[row, j]:
+            if table[row, j, OBSERVED] == 0.0:
                 continue
             precision = 0.0
             for case in range(n_cases):
-                own = 1.0 / (sd[j] * errors.scales[case]) ** 2
+                own = 1.0 / (sd[j] * scales[case]) ** 2
                 square = residual[j] * residual[j] * own
-                if errors.degrees > 0.0:
-                    own *= (errors.degrees + 1.0) / (errors.degrees + square)
-                elif errors.shares[case] > 0.0:
-                    odds = errors.shares[case] / (OUTLIER_FACTOR * (1.0 - errors.shares[case]))
+                if degrees > 0.0:
+                    own *= (degrees + 1.0) / (degrees + square)
+                elif shares[case] > 0.0:
+                    odds = shares[case] / (OUTLIER_FACTOR * (1.0 - shares[case]))
                     odds *= math.exp(min(0.5 * square * (1.0 - 1.0 / wide_square), 600.0))
                     own *= (1.0 + odds / wide_square) / (1.0 + odds)
-                precision += weights[case] * own
-            slope[i, j] = precision * residual[j]
-            curvature[i, j] = precision
-            if readings.stated_sd[row, j] <= 0.0:  # the standard deviation is the prediction's own
-                d_log_sd = readings.relative_sd[j] ** 2 * predictions[i, j] / sd[j] ** 2
-                slope[i, j] += d_log_sd * (precision * residual[j] ** 2 - 1.0)
-                curvature[i, j] += 2.0 * d_log_sd * d_log_sd
+                precision += weights[case] / total * own
+            # 0 where the standard deviation is stated, and not the prediction's own.
+            d_log_sd = table[row, j, RELATIVE] ** 2 * predictions[i, j] / sd[j] ** 2
+            slope[i, j] = precision * residual[j] + d_log_sd * (precision * residual[j] ** 2 - 1.0)
+            curvature[i, j] = precision + 2.0 * d_log_sd * d_log_sd
     return slope, curvature, shared

@@ -16,14 +16,49 @@ _LEAST = 1e-300
 _TINY, _SMALL = 1e-30, 1e-200
 """Densities below the first are taken by their logarithm; products below the second are put away."""
 _COMMON_STEPS, _COMMON_STEP = 28, 0.5
+OBSERVED, VELOCITY, VALUE, RELATIVE, ABSOLUTE = range(5)
+"""What is known of a reading, as `tabled` has it: two flags, and its error's parts."""
+_WEIGHT, _SCALE, _SHARE, _LOG_WEIGHT, _LOG_SCALE = range(5)
+"""A case of the mixture, as `_cases_of` has it."""
 
 
 @compiled()
-def reading_sd(event, sensor, prediction, readings):  # type: ignore[no-untyped-def]
-    """Standard deviation of a reading [m/s or m]: its own, else from the prediction."""
-    if readings.stated_sd[event, sensor] > 0.0:
-        return readings.stated_sd[event, sensor]
-    return math.hypot(readings.relative_sd[sensor] * prediction, readings.absolute_sd[sensor])
+def tabled(readings):  # type: ignore[no-untyped-def]
+    """All readings in one array, (n_events, n_sensors, 5).
+
+    Reading an array out of a tuple counts a reference up and down; done for each reading of each front that
+    takes three times as long as the density itself.
+    """
+    values, observed, stated_sd = readings.values, readings.observed, readings.stated_sd
+    relative_sd, absolute_sd = readings.relative_sd, readings.absolute_sd
+    is_velocity = readings.is_velocity
+    n_events, n_sensors = values.shape
+    table = np.zeros((n_events, n_sensors, 5))
+    for event in range(n_events):
+        for j in range(n_sensors):
+            stated = stated_sd[event, j] > 0.0
+            table[event, j, OBSERVED] = 1.0 if observed[event, j] else 0.0
+            table[event, j, VELOCITY] = 1.0 if is_velocity[j] else 0.0
+            table[event, j, VALUE] = values[event, j]
+            table[event, j, RELATIVE] = 0.0 if stated else relative_sd[j]
+            table[event, j, ABSOLUTE] = stated_sd[event, j] if stated else absolute_sd[j]
+    return table
+
+
+@compiled()
+def _cases_of(errors):  # type: ignore[no-untyped-def]
+    """All cases of the mixture in one array, (n_cases, 5)."""
+    cases = np.empty((errors.weights.size, 5))
+    cases[:, _WEIGHT], cases[:, _SCALE], cases[:, _SHARE] = errors.weights, errors.scales, errors.shares
+    cases[:, _LOG_WEIGHT], cases[:, _LOG_SCALE] = errors.log_weights, errors.log_scales
+    return cases
+
+
+@compiled()
+def reading_sd(table, event, j, prediction):  # type: ignore[no-untyped-def]
+    """Standard deviation of a reading [m/s or m]."""
+    relative, absolute = table[event, j, RELATIVE] * prediction, table[event, j, ABSOLUTE]
+    return math.sqrt(relative * relative + absolute * absolute)
 
 
 @compiled()
@@ -39,37 +74,35 @@ def _log_stop(stop, reached, not_reached, place_sd):  # type: ignore[no-untyped-
 
 
 @compiled()
-def _unshifted(value, shift, event, sensor, readings):  # type: ignore[no-untyped-def]
+def _unshifted(table, event, j, shift):  # type: ignore[no-untyped-def]
     """The prediction whose reading, `shift` standard deviations higher, is the value.
 
     The standard deviation is the prediction's own, which makes it the root of a quadratic equation.
     """
-    stated = readings.stated_sd[event, sensor]
-    if stated > 0.0:
-        return value - shift * stated
-    absolute, relative = shift * readings.absolute_sd[sensor], shift * readings.relative_sd[sensor]
+    value = table[event, j, VALUE]
+    absolute, relative = shift * table[event, j, ABSOLUTE], shift * table[event, j, RELATIVE]
     inside = absolute * absolute * (1.0 - relative * relative) + relative * relative * value * value
     root = math.copysign(math.sqrt(max(inside, 0.0)), shift)
     below = value + root
     if abs(below) > 1e-9 * abs(value) + 1e-12:
         return (value * value - absolute * absolute) / below
-    return value - shift * reading_sd(event, sensor, value, readings)
+    return value - shift * reading_sd(table, event, j, value)
 
 
 @compiled()
-def _nearest(event, sensor, low, high, shift, readings):  # type: ignore[no-untyped-def]
+def _nearest(table, event, j, low, high, shift):  # type: ignore[no-untyped-def]
     """The residual of smallest size, and its standard deviation, for predictions between two values.
 
     `shift` is an error common to the velocities, in standard deviations of theirs.
     """
-    value = readings.values[event, sensor]
-    if shift == 0.0 or not readings.is_velocity[sensor]:
+    value = table[event, j, VALUE]
+    if shift == 0.0 or table[event, j, VELOCITY] == 0.0:
         shift = 0.0
         nearest = value
     else:
-        nearest = _unshifted(value, shift, event, sensor, readings)
+        nearest = _unshifted(table, event, j, shift)
     prediction = min(max(nearest, low), high)
-    sd = reading_sd(event, sensor, prediction, readings)
+    sd = reading_sd(table, event, j, prediction)
     return value - prediction - shift * sd, sd
 
 
@@ -82,13 +115,13 @@ def _put_away(product, total):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _log_student(event, low, high, readings, errors, case):  # type: ignore[no-untyped-def]
+def _log_student(table, event, low, high, run, scale, degrees):  # type: ignore[no-untyped-def]
     """Log likelihood of the observed readings under Student's t, in one case of the mixture."""
-    degrees, scale, n = errors.degrees, errors.scales[case], 0
+    n = 0
     product_sd, product_tail, total_sd, total_tail = 1.0, 1.0, 0.0, 0.0
-    for j in range(readings.values.shape[1]):
-        if readings.observed[event, j]:
-            residual, sd = _nearest(event, j, low[j], high[j], 0.0, readings)
+    for j in range(table.shape[1]):
+        if table[event, j, OBSERVED] > 0.0:
+            residual, sd = _nearest(table, event, j, low[run, j], high[run, j], 0.0)
             wide = sd * scale
             product_sd, total_sd = _put_away(product_sd * wide, total_sd)
             tail = 1.0 + (residual / wide) ** 2 / degrees
@@ -117,24 +150,20 @@ def _multiplied(product, total, usual, outlying, square, share):  # type: ignore
 
 
 @compiled()
-def _log_two_cases(event, low, high, readings, errors, a, b):  # type: ignore[no-untyped-def]
+def _log_two_cases(table, event, low, high, run, cases, a, b):  # type: ignore[no-untyped-def]
     """Log likelihood of the observed readings in two cases of the mixture, of the same scale or not.
 
     One logarithm for many readings, and exponentials that the cases share: this is what most of the time of a
     calibration goes into.
     """
-    scale_a, scale_b, share_a, share_b = (
-        errors.scales[a],
-        errors.scales[b],
-        errors.shares[a],
-        errors.shares[b],
-    )
+    scale_a, scale_b = cases[a, _SCALE], cases[b, _SCALE]
+    share_a, share_b = cases[a, _SHARE], cases[b, _SHARE]
     product_a, product_b, product_sd = 1.0, 1.0, 1.0
     total_a, total_b, total_sd, n = 0.0, 0.0, 0.0, 0
-    for j in range(readings.values.shape[1]):
-        if not readings.observed[event, j]:
+    for j in range(table.shape[1]):
+        if table[event, j, OBSERVED] == 0.0:
             continue
-        residual, sd = _nearest(event, j, low[j], high[j], 0.0, readings)
+        residual, sd = _nearest(table, event, j, low[run, j], high[run, j], 0.0)
         n += 1
         product_sd, total_sd = _put_away(product_sd * sd, total_sd)
         square = (residual / (sd * scale_a)) ** 2
@@ -147,18 +176,18 @@ def _log_two_cases(event, low, high, readings, errors, a, b):  # type: ignore[no
             outlying = math.exp(-0.5 * square / (OUTLIER_FACTOR * OUTLIER_FACTOR))
         product_b, total_b = _multiplied(product_b, total_b, usual, outlying, square, share_b)
     common = total_sd + math.log(product_sd) + n * _LOG_SQRT_2PI
-    log_a = total_a + math.log(product_a) - n * errors.log_scales[a] - common
-    log_b = total_b + math.log(product_b) - n * errors.log_scales[b] - common
+    log_a = total_a + math.log(product_a) - n * cases[a, _LOG_SCALE] - common
+    log_b = total_b + math.log(product_b) - n * cases[b, _LOG_SCALE] - common
     return log_a, log_b
 
 
 @compiled()
-def _normal_sums(event, low, high, readings):  # type: ignore[no-untyped-def]
+def _normal_sums(table, event, low, high, run):  # type: ignore[no-untyped-def]
     """Of the observed readings: squares in standard deviations, minus the log constants, and how many."""
     squares, product_sd, total_sd, n = 0.0, 1.0, 0.0, 0
-    for j in range(readings.values.shape[1]):
-        if readings.observed[event, j]:
-            residual, sd = _nearest(event, j, low[j], high[j], 0.0, readings)
+    for j in range(table.shape[1]):
+        if table[event, j, OBSERVED] > 0.0:
+            residual, sd = _nearest(table, event, j, low[run, j], high[run, j], 0.0)
             squares += (residual / sd) ** 2
             product_sd, total_sd = _put_away(product_sd * sd, total_sd)
             n += 1
@@ -166,27 +195,27 @@ def _normal_sums(event, low, high, readings):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _log_independent(event, low, high, readings, errors):  # type: ignore[no-untyped-def]
+def _log_independent(table, event, low, high, run, cases, degrees):  # type: ignore[no-untyped-def]
     """Log likelihood of the observed readings, independent within each case of the mixture."""
-    n_cases, outliers = errors.weights.size, False
+    n_cases, outliers = cases.shape[0], False
     for case in range(n_cases):
-        outliers |= errors.shares[case] > 0.0
+        outliers |= cases[case, _SHARE] > 0.0
     squares, constants, n = 0.0, 0.0, 0
-    if not outliers and errors.degrees == 0.0:
-        squares, constants, n = _normal_sums(event, low, high, readings)
+    if not outliers and degrees == 0.0:
+        squares, constants, n = _normal_sums(table, event, low, high, run)
     most, total, second = -np.inf, 0.0, 0.0
     for case in range(n_cases):
-        if errors.degrees > 0.0:
-            term = _log_student(event, low, high, readings, errors, case)
+        scale = cases[case, _SCALE]
+        if degrees > 0.0:
+            term = _log_student(table, event, low, high, run, scale, degrees)
         elif not outliers:
-            scale = errors.scales[case]
-            term = -0.5 * squares / (scale * scale) - n * errors.log_scales[case] - constants
+            term = -0.5 * squares / (scale * scale) - n * cases[case, _LOG_SCALE] - constants
         elif case % 2 == 0:
             other = min(case + 1, n_cases - 1)
-            term, second = _log_two_cases(event, low, high, readings, errors, case, other)
+            term, second = _log_two_cases(table, event, low, high, run, cases, case, other)
         else:
             term = second
-        term += errors.log_weights[case]
+        term += cases[case, _LOG_WEIGHT]
         if term > most:
             total = total * math.exp(most - term) + 1.0
             most = term
@@ -196,22 +225,22 @@ def _log_independent(event, low, high, readings, errors):  # type: ignore[no-unt
 
 
 @compiled()
-def _log_correlated(event, prediction, readings, common):  # type: ignore[no-untyped-def]
+def _log_correlated(table, event, predictions, run, common):  # type: ignore[no-untyped-def]
     """Log likelihood of the observed readings with an error common to the velocities."""
     n_velocities, n, squares, total = 0, 0, 0.0, 0.0
     product_sd, total_sd = 1.0, 0.0
-    for j in range(readings.values.shape[1]):
-        if not readings.observed[event, j]:
+    for j in range(table.shape[1]):
+        if table[event, j, OBSERVED] == 0.0:
             continue
-        sd = reading_sd(event, j, prediction[j], readings)
-        z = (readings.values[event, j] - prediction[j]) / sd
-        own = 1.0 - common if readings.is_velocity[j] else 1.0
+        sd = reading_sd(table, event, j, predictions[run, j])
+        z = (table[event, j, VALUE] - predictions[run, j]) / sd
+        left = 1.0 - common if table[event, j, VELOCITY] > 0.0 else 1.0
         product_sd, total_sd = _put_away(product_sd * sd, total_sd)
-        squares += z * z / own
+        squares += z * z / left
         n += 1
-        if readings.is_velocity[j]:
+        if table[event, j, VELOCITY] > 0.0:
             n_velocities += 1
-            total += z / own
+            total += z / left
     log_sd = total_sd + math.log(product_sd) + 0.5 * n_velocities * math.log(1.0 - common)
     inflation = 1.0 + common * n_velocities / (1.0 - common)
     squares -= common * total * total / inflation
@@ -219,62 +248,66 @@ def _log_correlated(event, prediction, readings, common):  # type: ignore[no-unt
 
 
 @compiled()
-def _bound_correlated(event, low, high, readings, common):  # type: ignore[no-untyped-def]
+def _bound_correlated(table, event, low, high, run, common):  # type: ignore[no-untyped-def]
     """Largest log likelihood for predictions between two values, over a grid of the common error."""
     most = -np.inf
     for step in range(-_COMMON_STEPS, _COMMON_STEPS + 1):
         c = step * _COMMON_STEP
         term = -0.5 * c * c
-        for j in range(readings.values.shape[1]):
-            if readings.observed[event, j]:
-                own = 1.0 - common if readings.is_velocity[j] else 1.0
-                residual, sd = _nearest(event, j, low[j], high[j], math.sqrt(common) * c, readings)
-                wide = sd * math.sqrt(own)
+        for j in range(table.shape[1]):
+            if table[event, j, OBSERVED] > 0.0:
+                left = 1.0 - common if table[event, j, VELOCITY] > 0.0 else 1.0
+                residual, sd = _nearest(table, event, j, low[run, j], high[run, j], math.sqrt(common) * c)
+                wide = sd * math.sqrt(left)
                 term -= 0.5 * (residual / wide) ** 2 + math.log(wide) + _LOG_SQRT_2PI
         most = max(most, term)
     return most
 
 
 @compiled()
-def log_likelihood(event, prediction, readings, errors):  # type: ignore[no-untyped-def]
-    """Log likelihood of an event's readings given what its front does.
+def log_likelihoods(events, predictions, readings, errors):  # type: ignore[no-untyped-def]
+    """Log likelihood of each event's readings given what its fronts do, (n,).
 
     Parameters
     ----------
-    event : int
-    prediction : (n_sensors + 1,) array
-        Readings of the front [m/s or m], spans up to the stop, and last its runout [m].
+    events : (n,) integer array
+    predictions : (n, n_sensors + 1) array
+        Readings of the fronts [m/s or m], spans up to the stop, and last their runouts [m].
     readings : EventReadings
     errors : Errors
     """
-    stop = prediction[prediction.size - 1]
-    at_stop = _log_stop(stop, readings.reached[event], readings.not_reached[event], readings.place_sd)
-    if errors.common > 0.0:
-        return at_stop + _log_correlated(event, prediction, readings, errors.common)
-    return at_stop + _log_independent(event, prediction, prediction, readings, errors)
-
-
-@compiled()
-def log_likelihood_bound(event, low, high, readings, errors):  # type: ignore[no-untyped-def]
-    """Upper bound of `log_likelihood` over all predictions between two, each by itself."""
-    last = low.size - 1
-    reached, not_reached = readings.reached[event], readings.not_reached[event]
-    best = 0.5 * (reached + not_reached)
-    if reached == -np.inf and not_reached == np.inf:
-        best = low[last]
-    stop = min(max(best, low[last]), high[last])
-    at_stop = _log_stop(stop, reached, not_reached, readings.place_sd)
-    if errors.common > 0.0:
-        return at_stop + _bound_correlated(event, low, high, readings, errors.common)
-    return at_stop + _log_independent(event, low, high, readings, errors)
-
-
-@compiled()
-def log_likelihoods(events, predictions, readings, errors):  # type: ignore[no-untyped-def]
-    """Log likelihood of each event for each of its runs, (n,) and (n, n_sensors + 1) to (n,)."""
     result = np.empty(events.size)
-    for i in range(events.size):
-        result[i] = log_likelihood(events[i], predictions[i], readings, errors)
+    table, cases, degrees, common = tabled(readings), _cases_of(errors), errors.degrees, errors.common
+    reached, not_reached, place_sd = readings.reached, readings.not_reached, readings.place_sd
+    for run in range(events.size):
+        event = events[run]
+        stop = predictions[run, predictions.shape[1] - 1]
+        if common > 0.0:
+            found = _log_correlated(table, event, predictions, run, common)
+        else:
+            found = _log_independent(table, event, predictions, predictions, run, cases, degrees)
+        result[run] = found + _log_stop(stop, reached[event], not_reached[event], place_sd)
+    return result
+
+
+@compiled()
+def log_likelihood_bounds(events, low, high, readings, errors):  # type: ignore[no-untyped-def]
+    """Upper bounds of `log_likelihoods` over all predictions between two, each by itself."""
+    result = np.empty(events.size)
+    table, cases, degrees, common = tabled(readings), _cases_of(errors), errors.degrees, errors.common
+    reached, not_reached, place_sd = readings.reached, readings.not_reached, readings.place_sd
+    last = low.shape[1] - 1
+    for run in range(events.size):
+        event = events[run]
+        best = 0.5 * (reached[event] + not_reached[event])
+        if reached[event] == -np.inf and not_reached[event] == np.inf:
+            best = low[run, last]
+        stop = min(max(best, low[run, last]), high[run, last])
+        if common > 0.0:
+            found = _bound_correlated(table, event, low, high, run, common)
+        else:
+            found = _log_independent(table, event, low, high, run, cases, degrees)
+        result[run] = found + _log_stop(stop, reached[event], not_reached[event], place_sd)
     return result
 
 
@@ -288,26 +321,26 @@ def assess(events, predictions, readings, errors, envelope, change, bound, top, 
     `predictions` is (n_boxes, n_corners, n_sensors + 1); bit j of a corner's number is its side on axis j.
     """
     n_boxes, n_corners, n_columns = predictions.shape
-    low, high, sd = np.empty(n_columns), np.empty(n_columns), np.empty(n_columns)
-    corners = np.empty(n_corners)
+    low, high = np.empty((n_boxes, n_columns)), np.empty((n_boxes, n_columns))
+    for box in range(n_boxes):
+        for j in range(n_columns):
+            low[box, j], high[box, j] = predictions[box, :, j].min(), predictions[box, :, j].max()
+    bound[:] = envelope[:, 0] + log_likelihood_bounds(events, low, high, readings, errors)
+    every = predictions.reshape(n_boxes * n_corners, n_columns)
+    at_corners = log_likelihoods(np.repeat(events, n_corners), every, readings, errors)
+    table, place_sd = tabled(readings), readings.place_sd
+    reached, not_reached = readings.reached, readings.not_reached
+    sd, corners = np.empty(n_columns), np.empty(n_corners)
     for box in range(n_boxes):
         event = events[box]
-        uses_stop = readings.reached[event] > -np.inf or readings.not_reached[event] < np.inf
-        for j in range(n_columns):
-            least, most = predictions[box, 0, j], predictions[box, 0, j]
-            for corner in range(1, n_corners):
-                least = min(least, predictions[box, corner, j])
-                most = max(most, predictions[box, corner, j])
-            low[j], high[j], sd[j] = least, most, np.inf
-            if j == n_columns - 1:
-                if uses_stop:
-                    sd[j] = readings.place_sd
-            elif readings.observed[event, j]:
-                sd[j] = reading_sd(event, j, min(max(readings.values[event, j], least), most), readings)
-        bound[box] = envelope[box, 0] + log_likelihood_bound(event, low, high, readings, errors)
-        for corner in range(n_corners):
-            corners[corner] = log_likelihood(event, predictions[box, corner], readings, errors)
-            corners[corner] += envelope[box, 1 + corner]
+        uses_stop = reached[event] > -np.inf or not_reached[event] < np.inf
+        sd[:] = np.inf
+        for j in range(n_columns - 1):
+            if table[event, j, OBSERVED] > 0.0:
+                _, sd[j] = _nearest(table, event, j, low[box, j], high[box, j], 0.0)
+        if uses_stop:
+            sd[n_columns - 1] = place_sd
+        corners[:] = at_corners[box * n_corners : (box + 1) * n_corners] + envelope[box, 1:]
         top[box] = corners.max()
         mean[box] = top[box] + math.log(np.exp(corners - top[box]).mean())
         for axis in range(change.shape[1]):

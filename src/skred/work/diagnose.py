@@ -6,9 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from skred.diagnosis.diagnose import Effort, diagnose
+import xarray as xr
+
+from skred.diagnosis.diagnose import Diagnosis, Effort, diagnose
 from skred.diagnosis.verdict import verdict
-from skred.helpers import helpers
+from skred.helpers import meanwhile
 from skred.inference.hierarchical import HierarchicalProblem
 from skred.inference.results import save
 from skred.inference.sampling import SamplerSettings
@@ -46,24 +48,32 @@ def diagnose_to(
         problem, locked = set_aside(problem, lock, settings.seed)
     if folds:
         folds_of(problem, folds, settings.seed)  # refused now rather than after the diagnosis
-    with helpers("skred.diagnosis.diagnose"):
-        found = diagnose(problem, law, settings, effort, tell)
-        document = verdict(found) | {"settings": settings.as_dict() | {"replicas": effort.replicas}}
-        write_json(folder / "verdict.json", document)
-        if locked is not None:
-            tell(f"opening {lock} locked avalanches")
-            document["locked"] = open_locked(found, locked, settings.seed)
-        if folds:
-            document["outer_folds"] = outer_folds(problem, law, settings, effort, folds, tell)
+    found = diagnose(problem, law, settings, effort, tell)
+    document = verdict(found) | {"settings": settings.as_dict() | {"replicas": effort.replicas}}
+    write_json(folder / "verdict.json", document)
+    if locked is not None:
+        tell(f"opening {lock} locked avalanches")
+        document["locked"] = open_locked(found, locked, settings.seed)
+    if folds:
+        document["outer_folds"] = outer_folds(problem, law, settings, effort, folds, tell)
     if lock or folds:
         write_json(folder / "verdict.json", document)
-    if found.calibration is not None:
-        save(found.calibration.tree, folder / "base.nc")
-    if found.reference is not None and found.reference is not found.calibration:
-        save(found.reference.tree, folder / "base_same_errors.nc")
-    if found.steps:
-        save(found.steps[-1].calibration.tree, folder / "augmented.nc")
     tell("writing the report")
-    figures = save_diagnosis_figures(found, folder)
-    write_text(folder / "report.html", render_diagnosis(found, document, figures))
+    saved = [meanwhile(save, tree, folder / name) for name, tree in _draws_of(found).items()]
+    try:
+        figures = save_diagnosis_figures(found, folder)
+        write_text(folder / "report.html", render_diagnosis(found, document, figures))
+    finally:
+        for wait in saved:
+            wait()
     return document
+
+
+def _draws_of(found: Diagnosis) -> dict[str, xr.DataTree]:
+    """Every calibration of a diagnosis, by the name of its file."""
+    kept = {"base.nc": found.calibration}
+    if found.reference is not found.calibration:
+        kept["base_same_errors.nc"] = found.reference
+    if found.steps:
+        kept["augmented.nc"] = found.steps[-1].calibration
+    return {name: one.tree for name, one in kept.items() if one is not None}
