@@ -175,7 +175,8 @@ simulator sets.
 Sets before, by earlier code; trials of the first two showed what is mended since: effects that begin
 above the first sensor, the limit of the next section, and populations narrower than nodes. First of 5.5 to
 12, then evenly; open ones are of any listed mechanism and of the signal-to-noise that the masked ones were
-asked for. The first two go by what the simulator set; the second was ended early, after {seen} looks.
+asked for, in the last set of what they turned out to have. The first two go by what the simulator set; the
+second was ended early, after {seen} looks.
 
 | code | seeds from | all | sparse | dense |
 | --- | --- | --- | --- | --- |

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 
     from skred.diagnosis.diagnose import Diagnosis
 
-__all__ = ["diagnosis_table", "render_diagnosis", "save_diagnosis_figures"]
+__all__ = ["FIGURES", "diagnosis_table", "render_diagnosis", "save_diagnosis_figures"]
+_OF_RACES = ("probabilities", "strength", "places")
+FIGURES = ("check", "where", *_OF_RACES, *(f"{name}_2" for name in _OF_RACES), "left_out", "scores")
+"""Names of all figures that there may be."""
 
 
 def save_diagnosis_figures(found: Diagnosis, folder: Path) -> dict[str, Path]:
@@ -35,8 +38,7 @@ def save_diagnosis_figures(found: Diagnosis, folder: Path) -> dict[str, Path]:
     Returns
     -------
     dict of str to Path
-        Those that apply of: check, where, probabilities, strength, places, left_out, scores; of a second
-        race also probabilities_2, strength_2 and places_2.
+        Those of `FIGURES` that apply; with _2 those of a second race.
     """
     makers: dict[str, Callable[[], Figure]] = {}
     if found.check is not None:

@@ -19,6 +19,8 @@ from skred.work.output import write_json, write_text
 from skred.work.unseen_diagnoses import folds_of, open_locked, outer_folds, set_aside
 
 Tell = Callable[[str], None]
+DRAWS = ("base.nc", "base_same_errors.nc", "augmented.nc")
+"""Of the base law, of it under the errors of what was let in, and of the law with that."""
 
 
 def diagnose_to(
@@ -41,7 +43,7 @@ def diagnose_to(
     folds : int
         Parts of the others without which the whole diagnosis is repeated, one by one; 0 for none.
     """
-    from skred.report.diagnosis import render_diagnosis, save_diagnosis_figures
+    from skred.report.diagnosis import FIGURES, render_diagnosis, save_diagnosis_figures
 
     locked = None
     if lock:
@@ -50,6 +52,8 @@ def diagnose_to(
         folds_of(problem, folds, settings.seed)  # refused now rather than after the diagnosis
     found = diagnose(problem, law, settings, effort, tell)
     document = verdict(found) | {"settings": settings.as_dict() | {"replicas": effort.replicas}}
+    for name in ("report.html", *DRAWS, *(f"{figure}.png" for figure in FIGURES)):
+        (folder / name).unlink(missing_ok=True)  # another diagnosis's, which this one may not write
     write_json(folder / "verdict.json", document)
     if locked is not None:
         tell(f"opening {lock} locked avalanches")
@@ -70,10 +74,8 @@ def diagnose_to(
 
 
 def _draws_of(found: Diagnosis) -> dict[str, xr.DataTree]:
-    """Every calibration of a diagnosis, by the name of its file."""
-    kept = {"base.nc": found.calibration}
-    if found.reference is not found.calibration:
-        kept["base_same_errors.nc"] = found.reference
-    if found.steps:
-        kept["augmented.nc"] = found.steps[-1].calibration
-    return {name: one.tree for name, one in kept.items() if one is not None}
+    """Draws of every calibration of a diagnosis, by the name of their file."""
+    reference = found.reference if found.reference is not found.calibration else None
+    augmented = found.steps[-1].calibration if found.steps else None
+    kept = zip(DRAWS, (found.calibration, reference, augmented), strict=True)
+    return {name: one.tree for name, one in kept if one is not None}
