@@ -39,6 +39,8 @@ class Case(NamedTuple):
     spans: bool = False
     sensors_m: tuple[float, float] = (0.0, 0.0)
     """How far downstream of where they are taken to be the sensors LC and CD are put."""
+    folds: int = 0
+    """Parts of the avalanches without which the diagnosis is repeated; each one is then refitted without."""
 
 
 CASES = (
@@ -54,6 +56,7 @@ CASES = (
     Case("pcm-sensors-down", "pcm", sensors_m=(40.0, 20.0)),
     Case("pcm-sensors-closer", "pcm", sensors_m=(40.0, -20.0)),
     Case("pcm-with-dam", "pcm", campaign="ryggfonn-with-dam"),
+    *(Case(f"{law}{ryggfonn_page.UNSEEN}", law, folds=5) for law in ryggfonn_page.LAWS),
 )
 
 
@@ -84,11 +87,15 @@ def diagnose_case(case: Case, replicas: int) -> dict[str, Any]:
     from skred.laws import load_law
     from skred.report.diagnosis import save_diagnosis_figures
     from skred.report.style import write_png
+    from skred.work.unseen_diagnoses import outer_folds
 
     problem = hierarchical_problem(campaign_of(case), error_model=case.errors, smoothing_m=case.smoothing_m)
     settings = DIAGNOSIS_SAMPLING.settings("hierarchical")
-    found = diagnose(problem, load_law(case.base_model), settings, Effort(replicas=replicas), print)
+    law, effort = load_law(case.base_model), Effort(replicas=replicas, exact_loo=case.folds > 0)
+    found = diagnose(problem, law, settings, effort, print)
     document = verdict(found) | {"case": case._asdict()}
+    if case.folds:
+        document["outer_folds"] = outer_folds(problem, law, settings, effort, case.folds, print)
     if found.race is not None:
         document["prior_scales"] = {
             name: {str(factor): _best_factor(found.race, name, factor) for factor in PRIOR_FACTORS}

@@ -10,6 +10,13 @@ from ryggfonn_groups import words
 Found = Mapping[str, Any]
 DAM_CROWN_M, DAM_HEIGHT_M = 1940.0, 15.0
 _NEAR_M = 60.0
+LAWS = {
+    "coulomb": "Base M1, dry friction",
+    "pcm": "Base M2, PCM",
+    "constant": "Base M3, constant retardation",
+}
+UNSEEN = "-unseen"
+"""What the names of those cases end in that repeat the diagnosis without some avalanches."""
 _HEAD = """# Ryggfonn: what the block models leave out
 
 Written by `python benchmarks/ryggfonn_diagnoses.py` from `benchmarks/results/ryggfonn/`; every figure below
@@ -23,13 +30,7 @@ winner leads in.
 
 def page(found: Mapping[str, Found]) -> str:
     """The whole page."""
-    parts = [_HEAD]
-    for name, title in (
-        ("coulomb", "Base M1, dry friction"),
-        ("pcm", "Base M2, PCM"),
-        ("constant", "Base M3, constant retardation"),
-    ):
-        parts.append(_base(title, found[name]))
+    parts = [_HEAD, *(_base(title, found[name]) for name, title in LAWS.items())]
     parts += [
         _growing(found),
         _dam(found),
@@ -37,6 +38,7 @@ def page(found: Mapping[str, Found]) -> str:
         words(found["pcm"].get("retardations", [])),
         _robust(found),
         _left(found),
+        _unseen(found),
     ]
     return "\n".join(parts)
 
@@ -125,7 +127,7 @@ def _between(found: Mapping[str, Found]) -> str:
     rows = "".join(
         f"| {name} | {row['s_from_m']:.0f}-{row['s_to_m']:.0f} | {found[name]['missing_work_of']} |"
         f" {row['mean']:.0f} ± {row['sd']:.0f} |\n"
-        for name in ("coulomb", "pcm", "constant")
+        for name in LAWS
         for row in found[name].get("missing_work", [])
     )
     stretch = _candidate(found["pcm"], "segment_friction")
@@ -184,7 +186,7 @@ def _robust(found: Mapping[str, Found]) -> str:
     """The sensitivity runs side by side."""
     rows = []
     for name, one in found.items():
-        if one["base_model"] != "pcm":
+        if one["base_model"] != "pcm" or name.endswith(UNSEEN):
             continue
         listed = sorted(one.get("candidates", []), key=lambda row: -row["log_bayes_factor"])[:2]
         what = "; ".join(
@@ -215,7 +217,7 @@ Priors half, once and twice as wide, log Bayes factor of the best shape: {priors
 
 def _left(found: Mapping[str, Found]) -> str:
     lines = []
-    for name in ("coulomb", "pcm", "constant"):
+    for name in LAWS:
         one = found[name]
         if not one["mechanisms"] and not one.get("profile"):
             lines.append(f"- `{name}`: nothing was let in ({one['verdict']}).")
@@ -231,3 +233,48 @@ def _left(found: Mapping[str, Found]) -> str:
             f" {runout}."
         )
     return "## What is left when it is in\n\n" + "\n".join(lines) + "\n"
+
+
+def _unseen(found: Mapping[str, Found]) -> str:
+    """What the gain is on avalanches that did not choose what was let in."""
+    rows, folds = [], []
+    for name in LAWS:
+        usual, exact = found[name]["evidence"], found[name + UNSEEN]["evidence"]
+        outer = found[name + UNSEEN]["outer_folds"]
+        gains = " | ".join(_gain(one) for one in (usual, exact, outer))
+        rows.append(f"| `{name}` | {_let_in(found[name])} | {gains} |")
+        for number, one in enumerate(outer["folds"], start=1):
+            names = " and ".join(f"`{mechanism}`" for mechanism in one["mechanisms"]) or "nothing"
+            without = ", ".join(one["events"])
+            folds.append(
+                f"| `{name}` | {number}: {without} | {one['verdict']} | {names} | {one['elpd_diff']:+.1f} |"
+            )
+    k = found["pcm" + UNSEEN]["outer_folds"]["k"]
+    return f"""## On avalanches that did not choose it
+
+What was let in was chosen by the avalanches that then judge it. So the whole diagnosis, its naming
+included, is repeated without each of {k} parts of them, which judge what it let in (`--outer-folds {k}`).
+Before that, each avalanche alone: left out by importance sampling, refitted where that is unreliable; and, as
+a check, by a refit without each one (`--exact-loo`; a force profile is fitted anew without each in any case).
+Gains in log score, with twice their standard error:
+
+| base | let in by all | left out one by one | refitted without each | whole diagnosis without it |
+| --- | --- | --- | --- | --- |
+{chr(10).join(rows)}
+
+Fold by fold:
+
+| base | fold: avalanches left out | verdict without them | let in | gain on them |
+| --- | --- | --- | --- | --- |
+{chr(10).join(folds)}
+"""
+
+
+def _let_in(one: Found) -> str:
+    names = " and ".join(f"`{row['id']}`" for row in one["mechanisms"])
+    return names or ("the force profile" if one.get("profile") else "nothing")
+
+
+def _gain(one: Found) -> str:
+    value, error = one["elpd_diff"], one["elpd_se"]
+    return "-" if value is None else f"{value:+.1f} ({2.0 * error:.1f})"
