@@ -234,9 +234,10 @@ def main(which: Literal["weak", "strong"], /, *, n: int = 40, workers: int = 2) 
     """
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     first, _, _ = RANGES[which]
-    found: dict[str, Any] = (
-        json.loads(RESULT.read_text(encoding="utf-8"))["trials"] if RESULT.exists() else {}
-    )
+    before = json.loads(RESULT.read_text(encoding="utf-8")) if RESULT.exists() else {}
+    if before and before["seed"] != SEED:
+        raise SystemExit(f"{RESULT} holds seeds from {before['seed']}, not {SEED}: put it elsewhere first")
+    found: dict[str, Any] = before.get("trials", {})
     todo = [k for k in range(first, first + n) if f"{k:04d}" not in found]
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         at_work = {pool.submit(look, k): k for k in todo}

@@ -244,7 +244,7 @@ def _unseen(found: Mapping[str, Found]) -> str:
         gains = " | ".join(_gain(one) for one in (usual, exact, outer))
         rows.append(f"| `{name}` | {_let_in(found[name])} | {gains} |")
         for number, one in enumerate(outer["folds"], start=1):
-            names = " and ".join(f"`{mechanism}`" for mechanism in one["mechanisms"]) or "nothing"
+            names = " and ".join(_named_in_fold(mechanism) for mechanism in one["mechanisms"]) or "nothing"
             without = ", ".join(one["events"])
             folds.append(
                 f"| `{name}` | {number}: {without} | {one['verdict']} | {names} | {one['elpd_diff']:+.1f} |"
@@ -268,6 +268,10 @@ Fold by fold:
 | --- | --- | --- | --- | --- |
 {chr(10).join(folds)}
 """
+
+
+def _named_in_fold(mechanism: str) -> str:
+    return "the force profile" if mechanism == "unlisted" else f"`{mechanism}`"
 
 
 def _let_in(one: Found) -> str:

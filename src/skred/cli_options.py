@@ -111,7 +111,14 @@ Out = Annotated[
         help="Folder for the results: new, empty, or with --force; by default a fresh one in skred-out."
     ),
 ]
-Force = Annotated[bool, Parameter(name="--force", negative="", help="Use a folder that holds files.")]
+Force = Annotated[
+    bool,
+    Parameter(
+        name="--force",
+        negative="",
+        help="Use a folder that holds files, and replace or remove those that the command writes.",
+    ),
+]
 Quiet = Annotated[bool, Parameter(name="--quiet", negative="", help="Write nothing but errors.")]
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Write the result as JSON to stdout.")]
 

@@ -188,6 +188,7 @@ def test_which_forces_are_sampled(
     asked: list[tuple[float, float]] = []
 
     def sampled(base: Base, profile: Profile, pool: Executor, least: float) -> float:
+        pool.submit(int).result(timeout=10)  # its one thread must be free for what is waited for
         asked.append((profile.log_bayes_factor, least))
         return profile.log_bayes_factor + 3.0
 

@@ -193,6 +193,7 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch) -> Diagnosed:
     """Diagnoses made up instead of computed; what they were asked for is kept."""
     import skred.work.diagnose as module
 
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")  # no helpers: they would start for nothing
     asked: list[dict[str, Any]] = []
 
     def with_reason(reason: str | None) -> list[dict[str, Any]]:

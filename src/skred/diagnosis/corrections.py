@@ -55,7 +55,8 @@ def corrected(
     leading = [name for name in leading[:_CHECKED] if not entrants[name].best.rough]
     # A force that is less probable than none would raise no alarm with some nats more.
     worth = [k for k, factor in enumerate(force) if factor > max(most - _COUNTS - _TOO_LOW, 0.0)]
-    with ThreadPoolExecutor(len(KINDS)) as waiting:  # for the pool's jobs, which all of them share
+    # Each waits for jobs of the pool, and takes none of its threads for that.
+    with ThreadPoolExecutor(len(KINDS)) as waiting:
         sampled = {
             k: waiting.submit(sampled_log_factor, base, profiles[k], pool, max(most - _COUNTS, 0.0))
             for k in worth

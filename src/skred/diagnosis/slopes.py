@@ -129,6 +129,7 @@ def reading_slopes(rows, predictions, readings, errors):  # type: ignore[no-unty
         for case in range(n_cases):
             weights[case] = math.exp(log_case[case] - most)
             total += weights[case]
+        weights /= total
         for j in range(n_columns - 1):
             if table[row, j, OBSERVED] == 0.0:
                 continue
@@ -142,7 +143,7 @@ def reading_slopes(rows, predictions, readings, errors):  # type: ignore[no-unty
                     odds = shares[case] / (OUTLIER_FACTOR * (1.0 - shares[case]))
                     odds *= math.exp(min(0.5 * square * (1.0 - 1.0 / wide_square), 600.0))
                     own *= (1.0 + odds / wide_square) / (1.0 + odds)
-                precision += weights[case] / total * own
+                precision += weights[case] * own
             # 0 where the standard deviation is stated, and not the prediction's own.
             d_log_sd = table[row, j, RELATIVE] ** 2 * predictions[i, j] / sd[j] ** 2
             slope[i, j] = precision * residual[j] + d_log_sd * (precision * residual[j] ** 2 - 1.0)

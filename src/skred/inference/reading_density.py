@@ -18,7 +18,7 @@ _TINY, _SMALL = 1e-30, 1e-200
 _COMMON_STEPS, _COMMON_STEP = 28, 0.5
 OBSERVED, VELOCITY, VALUE, RELATIVE, ABSOLUTE = range(5)
 """What is known of a reading, as `tabled` has it: two flags, and its error's parts."""
-_WEIGHT, _SCALE, _SHARE, _LOG_WEIGHT, _LOG_SCALE = range(5)
+_SCALE, _SHARE, _LOG_WEIGHT, _LOG_SCALE = range(4)
 """A case of the mixture, as `_cases_of` has it."""
 
 
@@ -47,9 +47,9 @@ def tabled(readings):  # type: ignore[no-untyped-def]
 
 @compiled()
 def _cases_of(errors):  # type: ignore[no-untyped-def]
-    """All cases of the mixture in one array, (n_cases, 5)."""
-    cases = np.empty((errors.weights.size, 5))
-    cases[:, _WEIGHT], cases[:, _SCALE], cases[:, _SHARE] = errors.weights, errors.scales, errors.shares
+    """All cases of the mixture in one array, (n_cases, 4)."""
+    cases = np.empty((errors.weights.size, 4))
+    cases[:, _SCALE], cases[:, _SHARE] = errors.scales, errors.shares
     cases[:, _LOG_WEIGHT], cases[:, _LOG_SCALE] = errors.log_weights, errors.log_scales
     return cases
 
@@ -81,6 +81,8 @@ def _unshifted(table, event, j, shift):  # type: ignore[no-untyped-def]
     """
     value = table[event, j, VALUE]
     absolute, relative = shift * table[event, j, ABSOLUTE], shift * table[event, j, RELATIVE]
+    if relative == 0.0:
+        return value - absolute
     inside = absolute * absolute * (1.0 - relative * relative) + relative * relative * value * value
     root = math.copysign(math.sqrt(max(inside, 0.0)), shift)
     below = value + root
@@ -234,13 +236,13 @@ def _log_correlated(table, event, predictions, run, common):  # type: ignore[no-
             continue
         sd = reading_sd(table, event, j, predictions[run, j])
         z = (table[event, j, VALUE] - predictions[run, j]) / sd
-        left = 1.0 - common if table[event, j, VELOCITY] > 0.0 else 1.0
+        own = 1.0 - common if table[event, j, VELOCITY] > 0.0 else 1.0
         product_sd, total_sd = _put_away(product_sd * sd, total_sd)
-        squares += z * z / left
+        squares += z * z / own
         n += 1
         if table[event, j, VELOCITY] > 0.0:
             n_velocities += 1
-            total += z / left
+            total += z / own
     log_sd = total_sd + math.log(product_sd) + 0.5 * n_velocities * math.log(1.0 - common)
     inflation = 1.0 + common * n_velocities / (1.0 - common)
     squares -= common * total * total / inflation
@@ -256,9 +258,9 @@ def _bound_correlated(table, event, low, high, run, common):  # type: ignore[no-
         term = -0.5 * c * c
         for j in range(table.shape[1]):
             if table[event, j, OBSERVED] > 0.0:
-                left = 1.0 - common if table[event, j, VELOCITY] > 0.0 else 1.0
+                own = 1.0 - common if table[event, j, VELOCITY] > 0.0 else 1.0
                 residual, sd = _nearest(table, event, j, low[run, j], high[run, j], math.sqrt(common) * c)
-                wide = sd * math.sqrt(left)
+                wide = sd * math.sqrt(own)
                 term -= 0.5 * (residual / wide) ** 2 + math.log(wide) + _LOG_SQRT_2PI
         most = max(most, term)
     return most

@@ -1,8 +1,9 @@
-"""A diagnosis with its files: verdict.json, report.html, base.nc, augmented.nc and figures."""
+"""A diagnosis with its files: verdict.json, report.html, draws as netCDF, and figures."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -52,8 +53,9 @@ def diagnose_to(
         folds_of(problem, folds, settings.seed)  # refused now rather than after the diagnosis
     found = diagnose(problem, law, settings, effort, tell)
     document = verdict(found) | {"settings": settings.as_dict() | {"replicas": effort.replicas}}
-    for name in ("report.html", *DRAWS, *(f"{figure}.png" for figure in FIGURES)):
-        (folder / name).unlink(missing_ok=True)  # another diagnosis's, which this one may not write
+    # Not all of these are written each time: an earlier diagnosis's would be taken for this one's.
+    for name in ("verdict.json", "report.html", *DRAWS, *(f"{figure}.png" for figure in FIGURES)):
+        (folder / name).unlink(missing_ok=True)
     write_json(folder / "verdict.json", document)
     if locked is not None:
         tell(f"opening {lock} locked avalanches")
@@ -63,19 +65,19 @@ def diagnose_to(
     if lock or folds:
         write_json(folder / "verdict.json", document)
     tell("writing the report")
-    saved = [meanwhile(save, tree, folder / name) for name, tree in _draws_of(found).items()]
-    try:
+    with ExitStack() as draws:  # written whatever becomes of the figures, and of each other
+        for name, tree in _draws_of(found).items():
+            draws.callback(meanwhile(save, tree, folder / name))
         figures = save_diagnosis_figures(found, folder)
         write_text(folder / "report.html", render_diagnosis(found, document, figures))
-    finally:
-        for wait in saved:
-            wait()
     return document
 
 
 def _draws_of(found: Diagnosis) -> dict[str, xr.DataTree]:
     """Draws of every calibration of a diagnosis, by the name of their file."""
-    reference = found.reference if found.reference is not found.calibration else None
-    augmented = found.steps[-1].calibration if found.steps else None
-    kept = zip(DRAWS, (found.calibration, reference, augmented), strict=True)
-    return {name: one.tree for name, one in kept if one is not None}
+    kept = {
+        "base.nc": found.calibration,
+        "base_same_errors.nc": found.reference if found.reference is not found.calibration else None,
+        "augmented.nc": found.steps[-1].calibration if found.steps else None,
+    }
+    return {name: one.tree for name, one in kept.items() if one is not None}

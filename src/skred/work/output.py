@@ -26,7 +26,7 @@ def output_folder(out: Path | None, command: str, *, force: bool) -> Path:
     command : str
         Part of the new folder's name.
     force : bool
-        Take a folder that holds files; those of the same name are replaced.
+        Take a folder that holds files; those that the command may write are replaced or removed.
 
     Raises
     ------
