@@ -42,7 +42,7 @@ from skred.work.output import write_json
 
 app = cyclopts.App(help=__doc__)
 RESULT = Path(__file__).resolve().parent / "results" / "masked_open.json"
-SEED = 2_800_000
+SEED = 2_900_000
 RANGES = {"weak": (0, 2.0, 5.5), "strong": (1000, 5.5, 12.0)}
 """First number of a range's campaigns, and where the signal-to-noise asked for is."""
 EDGES = (2.0, 4.0, 5.5, 12.0)

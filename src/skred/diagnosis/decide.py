@@ -17,11 +17,11 @@ TIED_NATS = 2.0
 """An id of another group is tied with the named one where its log probability is at most so far below: some
 such ties no recordings split (a low dam and a bias of the sensor beside it), and a group leads by less. Which
 group leads decides the verdict, not whether its name stands alone."""
-NOTHING_AT_MOST, NOTHING_ALONE = 0.5, 0.1
+NOTHING_AT_MOST, NOTHING_ALONE = 0.5, 0.15
 ALARMS = ((LIMIT, NOTHING_AT_MOST), (1.0, NOTHING_ALONE))
 """The alarm is raised where, for any of these, the check's p-value is at most the first and the probability
 of nothing below the second: the check, unless the race denies it; the race alone. By the evidence alone a
-clean campaign falls below the latter with at most a ninth of probability (Markov's inequality for a Bayes
+clean campaign falls below the latter with at most a sixth of probability (Markov's inequality for a Bayes
 factor); it is far rarer (``benchmarks/alarm_limit.py``)."""
 
 
