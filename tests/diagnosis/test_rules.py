@@ -152,10 +152,10 @@ def test_no_instrument_in_the_race() -> None:
 
 
 def test_the_race_alone_and_the_check_alone() -> None:
-    """A race that leaves nothing less than 10 % is an alarm; a check that fires against it is none."""
-    sure = shares(0.09, 0.01, obstacle=0.9)
+    """A race that leaves nothing less than 15 % is an alarm; a check that fires against it is none."""
+    sure = shares(0.14, 0.01, obstacle=0.85)
     assert decide(sure, p_value=0.9, can_tell=True).names == ("obstacle",)
-    assert decide(shares(0.11, 0.0, obstacle=0.89), 0.011, True).verdict == "cannot_tell"
+    assert decide(shares(0.16, 0.0, obstacle=0.84), 0.011, True).verdict == "cannot_tell"
     assert decide(shares(0.51, 0.0, obstacle=0.49), 0.005, True).verdict == "cannot_tell"
     assert decide(shares(0.49, 0.0, obstacle=0.51), 0.005, True).names == ("obstacle",)
 
