@@ -1,6 +1,6 @@
 """Masked and open effects in the linear model: how much less often masked ones can be found at all.
 
-``python benchmarks/masked_ceiling.py [--n 24] [--workers 2]``. On n campaigns as those of `masked_open`,
+``python benchmarks/masked_ceiling.py [--n 16] [--workers 2]``. On n campaigns as those of `masked_open`,
 sparse and dense in turn, effects are hidden in the linear model itself: candidates of the diagnosis, with
 their own shapes, so that nothing is lost by templates, by curved likelihoods or by numerics, and of exactly
 the signal-to-noise that was drawn. The alarm is raised by the odds of anything against nothing, which the
@@ -128,7 +128,7 @@ def summary(found: Sequence[dict[str, Any]]) -> dict[str, dict[str, str]]:
 
 
 @app.default
-def main(*, n: int = 24, workers: int = 2) -> None:
+def main(*, n: int = 16, workers: int = 2) -> None:
     """Compute.
 
     Parameters
