@@ -74,18 +74,23 @@ def _evenly() -> FloatArray:
 
 def _alarms(
     screen: Screen, information: FloatArray, allowed: Callable[[Candidate], bool], rng: np.random.Generator
-) -> list[bool]:
-    """Whether effects of one arm raise the alarm, one for each signal-to-noise."""
+) -> list[bool | None]:
+    """Whether effects of one arm raise the alarm, by signal-to-noise; None where none can have that."""
     values, axes = np.linalg.eigh(information)
     root = axes * np.sqrt(np.maximum(values, 0.0))
     scores = rng.standard_normal((DRAWS, len(information))) @ root.T
+    reached = np.zeros(DRAWS, dtype=bool)
     for k, snr in enumerate(_evenly()):
         direction = _one_of(screen, information, allowed, float(snr), rng)
+        if direction is None:
+            continue
+        reached[k] = True
         scores[k] += information[:, direction] * snr / math.sqrt(information[direction, direction])
     every = np.broadcast_to(information, (DRAWS, *information.shape))
     raw = np.broadcast_to(np.diag(information), (DRAWS, len(information)))
     log_odds = screen.statistic(Scores(scores, every, raw))
-    return (log_odds > math.log(1.0 / NOTHING_ALONE - 1.0)).tolist()
+    alarm = (log_odds > math.log(1.0 / NOTHING_ALONE - 1.0)).tolist()
+    return [one if there else None for one, there in zip(alarm, reached, strict=True)]
 
 
 def _one_of(
@@ -94,8 +99,8 @@ def _one_of(
     allowed: Callable[[Candidate], bool],
     snr: float,
     rng: np.random.Generator,
-) -> int:
-    """Direction of a candidate that a strength within reason gives the signal-to-noise; of any mechanism."""
+) -> int | None:
+    """Direction of a candidate, of any mechanism, that a strength within reason gives the signal-to-noise."""
     by_mechanism: dict[str, list[int]] = {}
     for one, direction in zip(screen.candidates, screen.order, strict=True):
         added = one.mechanism.added
@@ -103,7 +108,14 @@ def _one_of(
         most = STRONGEST * added.scale_of(one.shape) * math.sqrt(max(information[direction, direction], 0.0))
         if allowed(one) and most > snr:
             by_mechanism.setdefault(one.mechanism.id, []).append(int(direction))
+    if not by_mechanism:
+        return None
     return int(rng.choice(by_mechanism[str(rng.choice(sorted(by_mechanism)))]))
+
+
+def _share(alarms: Sequence[bool | None], inside: NDArray[np.bool_]) -> float:
+    seen = [alarm for alarm, here in zip(alarms, inside, strict=True) if here and alarm is not None]
+    return float(np.mean(seen)) if seen else math.nan
 
 
 def summary(found: Sequence[dict[str, Any]]) -> dict[str, dict[str, str]]:
@@ -113,12 +125,11 @@ def summary(found: Sequence[dict[str, Any]]) -> dict[str, dict[str, str]]:
     for low, high in spans:
         snr = np.array(found[0]["snr"])
         inside = (snr >= low) & (snr < high)
-        shares = {
-            arm: np.array([np.mean(np.array(one["alarms"][arm])[inside]) for one in found]) for arm in ARMS
-        }
-        row = {arm: f"{share.mean():.2f}" for arm, share in shares.items()}
+        shares = {arm: np.array([_share(one["alarms"][arm], inside) for one in found]) for arm in ARMS}
+        row = {arm: f"{np.nanmean(share):.2f}" for arm, share in shares.items()}
         for arm in ("any", "same"):
             less = shares["masked"] - shares[arm]
+            less = less[np.isfinite(less)]
             error = 1.96 * less.std(ddof=1) / math.sqrt(len(less))
             row[f"less than {arm}"] = (
                 f"{less.mean():+.2f} ({less.mean() - error:.2f} to {less.mean() + error:.2f})"
