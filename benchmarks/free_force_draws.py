@@ -12,7 +12,6 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
-from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -68,9 +67,10 @@ def main(
         if base is None:
             sys.exit(f"{law}: the gate of the base law failed")
         with ThreadPoolExecutor(1) as pool:
-            for row in chain.from_iterable(both_ways(law, heat, pool) for heat in race(base).heats):
-                print(row, flush=True)
-                rows.append(row)
+            for heat in race(base).heats:
+                for row in both_ways(law, heat, pool):
+                    print(row, flush=True)
+                    rows.append(row)
     if out is not None:
         write_json(out, {"commit": commit(), "rows": rows})
 

@@ -27,7 +27,7 @@ def tabled(readings):  # type: ignore[no-untyped-def]
     """All readings in one array, (n_events, n_sensors, 5).
 
     Reading an array out of a tuple counts a reference up and down; done for each reading of each front that
-    takes three times as long as the density itself.
+    took about as long as the density itself.
     """
     values, observed, stated_sd = readings.values, readings.observed, readings.stated_sd
     relative_sd, absolute_sd = readings.relative_sd, readings.absolute_sd
