@@ -15,8 +15,8 @@ from typing import Any
 from development_set import EACH
 from proof_page import bars_table, found_of, named_of
 
-from skred.trials.unlisted import UNLISTED
-from skred.work.output import write_text
+from skred.output import write_text
+from skred.simulator.unlisted import UNLISTED
 
 HERE = Path(__file__).resolve().parent
 _HEAD = """# The development set

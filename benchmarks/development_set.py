@@ -25,9 +25,9 @@ import cyclopts
 from rich.console import Console
 
 from skred.campaign import write_campaign
-from skred.trials.draw import draw_trial
-from skred.trials.listed import LISTED
-from skred.trials.unlisted import UNLISTED
+from skred.simulator.draw import draw_trial
+from skred.simulator.listed import LISTED
+from skred.simulator.unlisted import UNLISTED
 
 app = cyclopts.App(help=__doc__)
 KINDS: tuple[Literal["sparse", "dense"], ...] = ("sparse", "dense")
@@ -87,7 +87,7 @@ def main(
     kind
         What is recorded: few speeds of many avalanches, many of few, or each in turn.
     hidden
-        What is hidden: a class or an id, see `skred.trials.draw`; by default drawn.
+        What is hidden: a class or an id, see `skred.simulator.draw`; by default drawn.
     each
         Each class and id in turn.
     snr

@@ -19,7 +19,7 @@ from typing import Annotated, Any
 import cyclopts
 
 from skred.campaign import find_campaign, read_campaign, write_campaign
-from skred.trials.draw import draw_trial
+from skred.simulator.draw import draw_trial
 
 app = cyclopts.App(help=__doc__)
 LAWS = ("coulomb", "pcm", "constant", "voellmy")

@@ -19,8 +19,8 @@ from typing import Annotated, Any
 
 import cyclopts
 
+from skred.output import write_json
 from skred.prove.scorecard import DIAGNOSIS, scorecard
-from skred.work.output import write_json
 
 
 def _settings(replicas: int) -> dict[str, Any]:

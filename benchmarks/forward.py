@@ -25,10 +25,10 @@ sys.path.insert(0, str(Path(__file__).parent))
 from forward_peers import numba_peer, python_peer
 
 from skred.campaign import find_campaign, read_campaign
-from skred.physics.columns import Column
 from skred.physics.geometry import contributions_of, path_of, sensor_table
-from skred.physics.inputs import Contributions
-from skred.physics.kernel import simulate, simulate_with_jacobian
+from skred.physics.kernel.columns import Column
+from skred.physics.kernel.fronts import simulate, simulate_with_jacobian
+from skred.physics.kernel.inputs import Contributions
 from skred.physics.mechanisms import mechanisms
 from skred.physics.reference import read_front
 from skred.physics.terrain import Terrain, build_terrain

@@ -35,12 +35,12 @@ from sbc import SECOND_TRY
 
 from skred.campaign import find_campaign, read_campaign
 from skred.inference.gate import check_gate
-from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
+from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
 from skred.inference.joint_metropolis import JointMetropolis
 from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior
-from skred.laws import load_law
+from skred.physics.laws import load_law
 from skred.physics.law import Law
-from skred.work.output import plain, write_text
+from skred.output import plain, write_text
 
 Row = dict[str, Any]
 

@@ -33,14 +33,14 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from skred.errors import InputError
-from skred.inference.event_draws import recorded_avalanches
 from skred.inference.gate import check_gate
-from skred.inference.hierarchical import HierarchicalProblem
+from skred.inference.hierarchical.event_draws import recorded_avalanches
+from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.joint_metropolis import JointMetropolis
 from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior
-from skred.laws import load_law
+from skred.output import plain
 from skred.physics.law import Law
-from skred.work.output import plain
+from skred.physics.laws import load_law
 
 FloatArray = NDArray[np.float64]
 Kind = Literal["sparse", "dense"]

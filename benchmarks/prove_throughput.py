@@ -17,9 +17,9 @@ from typing import Annotated, Any, Literal
 
 import cyclopts
 
-from skred.prove.crew import Crew
 from skred.prove.folder import ProofFolder
 from skred.prove.plan import Plan, random_seed
+from skred.prove.pool import Crew
 from skred.prove.run import run
 from skred.prove.seal import seal
 

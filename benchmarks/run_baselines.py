@@ -27,7 +27,7 @@ from typing import Annotated, Any
 import cyclopts
 from baselines import BASELINES, baseline
 
-from skred.work.output import write_json
+from skred.output import write_json
 
 
 def answer_one(name: str, trial: Path, out: Path) -> dict[str, Any]:

@@ -42,7 +42,7 @@ from models.pcm import LAW
 from peers.common import PARAMETERS, Drawn
 from skred.campaign import find_campaign, read_campaign
 from skred.inference.problem import PooledProblem, pooled_problem
-from skred.work.output import write_text
+from skred.output import write_text
 
 Run = dict[str, Any]
 """One finished (sampler, seed): its figures, or its error."""

@@ -36,14 +36,14 @@ from scipy.stats import binom, chisquare
 
 from skred.campaign import Status, find_campaign, read_campaign
 from skred.errors import InputError
-from skred.inference.density import PooledArrays
 from skred.inference.gate import check_gate
 from skred.inference.joint_metropolis import JointMetropolis
+from skred.inference.pooled.density import PooledArrays
 from skred.inference.problem import PooledProblem, pooled_problem
 from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior
-from skred.laws import load_law
+from skred.output import plain, write_text
 from skred.physics.law import Law
-from skred.work.output import plain, write_text
+from skred.physics.laws import load_law
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

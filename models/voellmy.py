@@ -8,7 +8,7 @@ Run it: ``python -m models.voellmy``.
 
 from typing import Any
 
-from skred.physics.columns import GRAVITY
+from skred.physics.kernel.columns import GRAVITY
 from skred.physics.law import Law, Parameter, parameter_of
 from skred.physics.mechanisms import coulomb_friction, turbulent_drag
 
@@ -57,6 +57,6 @@ LAW = Law(
 )
 
 if __name__ == "__main__":
-    from skred.cli import run_model
+    from skred.cli.main import run_model
 
     run_model("voellmy")

@@ -165,7 +165,7 @@ alike everywhere were found, {_counted(found["weak_open"]["a place or a covariat
 where the alarm is raised; then the share of masked ones found less that of open ones (95 % by bootstrap;
 asked: within 0.10), in the last two rows as if spread evenly over their signal-to-noise, part by part.
 Nothing was tuned on these. Signal-to-noise is measured over readings with errors
-(`skred.trials.detectability.over_noise`).
+(`skred.simulator.detectability.over_noise`).
 {tables}
 {_masked_by(found)}
 Signal-to-noise over what the simulator sets it by, from exact readings and a prior of the spread: one in ten

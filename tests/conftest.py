@@ -35,7 +35,7 @@ def two_releases(problem: Any) -> Any:
 @pytest.fixture(scope="session")
 def model_of(problem: Any) -> Callable[[str], Any]:
     """A law's model on Ryggfonn, built once."""
-    from skred.laws import load_law
+    from skred.physics.laws import load_law
 
     return cache(lambda law_id: load_law(law_id).build(problem))
 
@@ -43,9 +43,9 @@ def model_of(problem: Any) -> Callable[[str], Any]:
 @pytest.fixture(scope="session")
 def calibration(problem: Any) -> Any:
     """M2 as `python -m models.pcm` calibrates it."""
+    from skred.inference.calibrate import calibrate
     from skred.inference.sampling import SamplerSettings
-    from skred.laws import load_law
-    from skred.work.calibrate import calibrate
+    from skred.physics.laws import load_law
 
     return calibrate(problem, load_law("pcm"), SamplerSettings(draws=1000, tune=500, chains=4, seed=1))
 
@@ -105,7 +105,7 @@ UPPER = {"pcm": [0.6, 0.012], "coulomb": [1.5], "constant": [12.0]}
 
 @pytest.fixture(scope="session")
 def quadrature_of(problem: Any) -> Callable[[str], Quadrature]:
-    from skred.laws import load_law
+    from skred.physics.laws import load_law
 
     def of(law_id: str) -> Quadrature:
         return quadrature(problem, load_law(law_id), UPPER[law_id], 400 if law_id == "pcm" else 20_000)

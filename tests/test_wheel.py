@@ -54,7 +54,7 @@ def test_templates_travel_along(installed: Path) -> None:
 
 
 def test_laws_are_registered(installed: Path) -> None:
-    code = "from skred.laws import *; print(*[load_law(law).id for law in law_ids()])"
+    code = "from skred.physics.laws import *; print(*[load_law(law).id for law in law_ids()])"
     assert run(installed, "-c", code).split() == ["constant", "coulomb", "pcm", "voellmy"]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from skred.campaign import Campaign
-from skred.diagnosis.odds import prior_odds
+from skred.diagnosis.evidence.prior_odds import prior_odds
 
 from .common import Answer, possible
 

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign
-from skred.diagnosis.decide import blamed
-from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds, probabilities
-from skred.laws import load_law
+from skred.diagnosis.compare.decision import blamed
+from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds, probabilities
+from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group, Mechanism
 

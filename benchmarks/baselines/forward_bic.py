@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign
-from skred.diagnosis.extension import extended
-from skred.diagnosis.mixed import MeanPrior, fit_population, mean_prior
-from skred.diagnosis.modes import Population, Rows, log_joint, look_around, take_rows
-from skred.diagnosis.screen import Candidate
-from skred.inference.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
+from skred.diagnosis.detect.score_test import Candidate
+from skred.diagnosis.evidence.conditional_map import Population, Rows, log_joint, look_around, take_rows
+from skred.diagnosis.evidence.extension import extended
+from skred.diagnosis.evidence.linear_mixed_model import MeanPrior, fit_population, mean_prior
+from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 
 from .common import Answer, Stretch, is_dense, weighed
 from .quick_fit import QuickFit, quick_fit, stretch_of

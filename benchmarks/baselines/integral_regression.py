@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from skred.campaign import Campaign
-from skred.diagnosis.extension import setting_of
-from skred.diagnosis.screen import Candidate, candidates
-from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
-from skred.laws import load_law
-from skred.physics.columns import GRAVITY
+from skred.diagnosis.detect.score_test import Candidate, candidates
+from skred.diagnosis.evidence.extension import setting_of
+from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
+from skred.physics.kernel.columns import GRAVITY
 from skred.physics.law import Law
+from skred.physics.laws import load_law
 from skred.physics.mechanisms.spec import Direction, Setting
 
 from .common import Answer, Stretch, is_dense, weighed

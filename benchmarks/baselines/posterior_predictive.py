@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign
-from skred.diagnosis.replicas import replicas
+from skred.diagnosis.check.bootstrap_campaigns import replicas
 
 from .common import Answer, nearest
 from .quick_fit import QuickFit, quick_fit, stretch_of

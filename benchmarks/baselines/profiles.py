@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Status
-from skred.inference.hierarchical import HierarchicalProblem
-from skred.physics.columns import GRAVITY, Column
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.physics.kernel.columns import GRAVITY, Column
 from skred.physics.law import Law
 from skred.physics.terrain import Terrain
 

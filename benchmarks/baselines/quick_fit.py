@@ -8,13 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign
-from skred.diagnosis.extension import setting_of
-from skred.diagnosis.mixed import Scores, fit_population, mean_prior, starting_population
-from skred.diagnosis.modes import Modes, Population, Rows, campaign_rows, event_modes
-from skred.diagnosis.screen import Screen
-from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
-from skred.laws import load_law
+from skred.diagnosis.detect.score_test import Screen
+from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, campaign_rows, event_modes
+from skred.diagnosis.evidence.extension import setting_of
+from skred.diagnosis.evidence.linear_mixed_model import (
+    Scores,
+    fit_population,
+    mean_prior,
+    starting_population,
+)
+from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
 from skred.physics.law import Law
+from skred.physics.laws import load_law
 from skred.physics.mechanisms.spec import Shape
 
 from .common import Stretch

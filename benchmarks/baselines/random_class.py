@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from skred.campaign import Campaign
-from skred.diagnosis.extension import setting_of
-from skred.diagnosis.odds import NOTHING, UNLISTED, prior_odds
-from skred.inference.hierarchical import hierarchical_problem
-from skred.laws import load_law
+from skred.diagnosis.evidence.extension import setting_of
+from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds
+from skred.inference.hierarchical.problem import hierarchical_problem
+from skred.physics.laws import load_law
 
 from .common import VERDICT_OF, Answer, group_of, possible
 

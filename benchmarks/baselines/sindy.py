@@ -20,13 +20,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_smoothing_spline
 
 from skred.campaign import Campaign
-from skred.diagnosis.extension import setting_of
-from skred.diagnosis.odds import NOTHING, prior_odds
-from skred.diagnosis.screen import Candidate, candidates
-from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
-from skred.laws import load_law
-from skred.physics.columns import GRAVITY
+from skred.diagnosis.detect.score_test import Candidate, candidates
+from skred.diagnosis.evidence.extension import setting_of
+from skred.diagnosis.evidence.prior_odds import NOTHING, prior_odds
+from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
+from skred.physics.kernel.columns import GRAVITY
 from skred.physics.law import Law
+from skred.physics.laws import load_law
 from skred.physics.mechanisms.spec import Direction
 
 from .common import Answer, Stretch, decided, is_dense, possible, with_ties

@@ -13,12 +13,12 @@ from typing import Any
 import emcee
 import numpy as np
 from numba import njit
+from peers.common import PARAMETERS, Drawn, FloatArray, cpu_seconds, near_the_mode
 
 from models.pcm import LAW
-from peers.common import PARAMETERS, Drawn, FloatArray, cpu_seconds, near_the_mode
-from skred.inference.density import pooled_log_density
+from skred.inference.pooled.density import pooled_log_density
 from skred.inference.problem import PooledProblem
-from skred.physics.kernel import simulate
+from skred.physics.kernel.fronts import simulate
 
 WALKERS = 128
 """Enough that the compiled code, not emcee's own bookkeeping, takes the time."""

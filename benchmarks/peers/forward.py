@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.inference.problem import PooledProblem
-from skred.physics.columns import GRAVITY
-from skred.physics.inputs import RUNOUT
+from skred.physics.kernel.columns import GRAVITY
+from skred.physics.kernel.inputs import RUNOUT
 
 FloatArray = NDArray[np.float64]
 _NEVER = 1e30

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.inference.hierarchical import HierarchicalProblem
-from skred.inference.reading_density import log_likelihoods
-from skred.physics.kernel import simulate
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.hierarchical.reading_density import log_likelihoods
+from skred.physics.kernel.fronts import simulate
 from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from peers import pymc_run
 from peers.common import Drawn
+
 from skred.inference.joint_metropolis import JointMetropolis
 from skred.inference.problem import PooledProblem
 

@@ -18,9 +18,9 @@ import pytensor.tensor as pt
 import xarray as xr
 from numpy.typing import NDArray
 
-from skred.inference.hierarchical import HierarchicalProblem
-from skred.inference.op import front_readings
-from skred.inference.population import population_variables
+from skred.inference.hierarchical.population import population_variables
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.pooled.forward_op import front_readings
 from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
@@ -86,7 +86,7 @@ def log_likelihood(problem: HierarchicalProblem, mechanisms: Any, logs: Any) -> 
 
 
 def _log_stop(stop: Any, readings: Any) -> Any:
-    """As `skred.inference.reading_density` has it; infinities are kept out of the gradients."""
+    """As `skred.inference.hierarchical.reading_density` has it; infinities are kept out of the gradients."""
     far = 1e6
 
     def below(place: FloatArray) -> Any:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import nutpie
+from peers.common import Drawn, cpu_seconds, draws_of, near_the_mode
 
 from models.pcm import LAW
-from peers.common import Drawn, cpu_seconds, draws_of, near_the_mode
 from skred.inference.problem import PooledProblem
 
 CHAINS = 4

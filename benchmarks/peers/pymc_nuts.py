@@ -6,6 +6,7 @@ from typing import Any
 
 from peers import pymc_run
 from peers.common import Drawn, near_the_mode
+
 from skred.inference.problem import PooledProblem
 
 

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from typing import Any
 
 import pymc as pm
+from peers.common import Drawn, cpu_seconds, draws_of
 
 from models.pcm import LAW
-from peers.common import Drawn, cpu_seconds, draws_of
 from skred.inference.problem import PooledProblem
 
 CHAINS = 4

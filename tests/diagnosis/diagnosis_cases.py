@@ -10,16 +10,16 @@ import numpy as np
 
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.campaign.parts import of_events
-from skred.diagnosis.curves import Base, fit_base
-from skred.diagnosis.extension import extended
-from skred.diagnosis.mixed import fit_population, mean_prior, starting_population
-from skred.diagnosis.modes import campaign_rows
-from skred.diagnosis.screen import Screen
+from skred.diagnosis.detect.score_test import Screen
+from skred.diagnosis.evidence.coefficient import Base, fit_base
+from skred.diagnosis.evidence.conditional_map import campaign_rows
+from skred.diagnosis.evidence.extension import extended
+from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
 from skred.inference.error_model import ERROR_MODELS
-from skred.inference.hierarchical import hierarchical_problem
-from skred.laws import load_law
+from skred.inference.hierarchical.problem import hierarchical_problem
+from skred.physics.laws import load_law
 from skred.physics.mechanisms.spec import Direction
-from skred.trials.draw import draw_trial
+from skred.simulator.draw import draw_trial
 
 Kind = Literal["sparse", "dense"]
 

@@ -16,24 +16,24 @@ from scipy.special import logsumexp
 from scipy.stats import halfnorm, lognorm, norm
 
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
-from skred.diagnosis.augmented import AugmentedProblem, augmented_problem
-from skred.diagnosis.curves import Base, Curve, curve_near, fit_base, repeated
-from skred.diagnosis.event_nodes import ROUGH
-from skred.diagnosis.extension import extended
-from skred.diagnosis.first_look import curve
-from skred.diagnosis.mixed import fit_population, mean_prior, starting_population
-from skred.diagnosis.modes import Population, campaign_rows, log_joint
-from skred.diagnosis.strength_grid import finer, locate
-from skred.diagnosis.tables import highest
-from skred.diagnosis.tabulated_op import TabulatedLogDensity, tabulated_log_density
-from skred.inference.event_density import integrated_log_density
-from skred.inference.hierarchical import hierarchical_problem
-from skred.inference.reading_density import log_likelihoods
-from skred.inference.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
+from skred.diagnosis.augment.augmented import AugmentedProblem, augmented_problem
+from skred.diagnosis.augment.coefficient_grid import finer, locate
+from skred.diagnosis.augment.tables import highest
+from skred.diagnosis.augment.tabulated_op import TabulatedLogDensity, tabulated_log_density
+from skred.diagnosis.compare.screening import curve
+from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near, fit_base, repeated
+from skred.diagnosis.evidence.conditional_map import Population, campaign_rows, log_joint
+from skred.diagnosis.evidence.event_quadrature import ROUGH
+from skred.diagnosis.evidence.extension import extended
+from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
+from skred.inference.calibrate import calibrate
+from skred.inference.hierarchical.event_density import integrated_log_density
+from skred.inference.hierarchical.problem import hierarchical_problem
+from skred.inference.hierarchical.reading_density import log_likelihoods
+from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 from skred.inference.sampling import SamplerSettings
-from skred.laws import load_law
+from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
-from skred.work.calibrate import calibrate
 
 CAMPAIGN = read_campaign(find_campaign("ryggfonn"))
 DRAWS = {
@@ -341,7 +341,8 @@ def test_a_table_in_the_lower_mode_is_lifted_by_its_neighbours(
         np.concatenate([one.mean for one in ones]), np.concatenate([one.covariance for one in ones])
     )
     monkeypatch.setattr(
-        "skred.diagnosis.tables.event_modes", lambda _, rows, start, *__, **___: SimpleNamespace(points=start)
+        "skred.diagnosis.augment.tables.event_modes",
+        lambda _, rows, start, *__, **___: SimpleNamespace(points=start),
     )
     spoiled = points.copy()
     spoiled[3, :, 0] += 2.0  # friction seven times

@@ -12,19 +12,19 @@ from diagnosis_cases import base_of, first_events, trial, with_sensors
 from numpy.testing import assert_allclose
 
 from skred.campaign import Campaign, CampaignError, Sensor, Status, write_campaign
-from skred.diagnosis.curves import Base
-from skred.diagnosis.decide import decide
+from skred.diagnosis.compare.comparison import race
+from skred.diagnosis.compare.decision import decide
+from skred.diagnosis.compare.location import locate
+from skred.diagnosis.detect.detectability import told
+from skred.diagnosis.detect.score_test import Screen
 from skred.diagnosis.diagnose import Effort, diagnose
-from skred.diagnosis.extension import setting_of
-from skred.diagnosis.identify import told
-from skred.diagnosis.locate import locate
-from skred.diagnosis.odds import UNLISTED
-from skred.diagnosis.race import race
-from skred.diagnosis.screen import Screen
-from skred.diagnosis.verdict import verdict
-from skred.inference.hierarchical import hierarchical_problem
+from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.evidence.extension import setting_of
+from skred.diagnosis.evidence.prior_odds import UNLISTED
+from skred.diagnosis.verdict.document import verdict
+from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.inference.sampling import SamplerSettings
-from skred.laws import load_law
+from skred.physics.laws import load_law
 
 
 def small(n_events: int = 8) -> Campaign:

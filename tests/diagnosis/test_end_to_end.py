@@ -12,16 +12,16 @@ from diagnosis_cases import first_events, trial, with_sensors
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skred.campaign import Campaign, Status
+from skred.diagnosis.augment.reference import Reference
 from skred.diagnosis.diagnose import Diagnosis, Effort, diagnose
-from skred.diagnosis.held_out import HeldOut, errors, paired
-from skred.diagnosis.predictive import Predicted
-from skred.diagnosis.reference import Reference
-from skred.diagnosis.verdict import verdict
+from skred.diagnosis.evidence.predictive import Predicted
+from skred.diagnosis.predict.held_out import HeldOut, errors, paired
+from skred.diagnosis.verdict.document import verdict
 from skred.inference.error_model import ERROR_MODELS
-from skred.inference.hierarchical import hierarchical_problem
+from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.inference.leave_one_out import exact_leave_one_out
 from skred.inference.sampling import SamplerSettings
-from skred.laws import load_law
+from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 
 KEYS = {

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from skred.diagnosis.held_out import _smoothed
+from skred.diagnosis.predict.held_out import _smoothed
 
 
 @pytest.mark.parametrize("far", [0.0, 2.5])

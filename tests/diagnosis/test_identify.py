@@ -9,13 +9,13 @@ import pytest
 from diagnosis_cases import base_of, first_events, screen_of, trial, with_sensors
 
 from skred.campaign.parts import of_events
-from skred.diagnosis.curves import Base
-from skred.diagnosis.extension import extended
-from skred.diagnosis.identify import LIMIT_Z, Told, extra_sensors, mean_power, told
-from skred.diagnosis.mixed import efficient_scores, fit_population, mean_prior
-from skred.diagnosis.modes import Population, campaign_rows, look_around
-from skred.diagnosis.replicas import replicas
-from skred.diagnosis.screen import Candidate, Screen, candidates
+from skred.diagnosis.check.bootstrap_campaigns import replicas
+from skred.diagnosis.detect.detectability import LIMIT_Z, Told, extra_sensors, mean_power, told
+from skred.diagnosis.detect.score_test import Candidate, Screen, candidates
+from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.evidence.conditional_map import Population, campaign_rows, look_around
+from skred.diagnosis.evidence.extension import extended
+from skred.diagnosis.evidence.linear_mixed_model import efficient_scores, fit_population, mean_prior
 from skred.inference.error_model import ERROR_MODELS
 
 NONE = np.zeros(0)

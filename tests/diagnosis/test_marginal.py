@@ -11,11 +11,12 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-import skred.diagnosis.event_nodes as event_nodes_module
-from skred.diagnosis.curves import Base
-from skred.diagnosis.event_nodes import FINE, USUAL, Budget, event_nodes
-from skred.diagnosis.extension import extended
-from skred.diagnosis.marginal import (
+import skred.diagnosis.evidence.event_quadrature as event_nodes_module
+from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.evidence.conditional_map import Population, event_modes
+from skred.diagnosis.evidence.event_quadrature import FINE, USUAL, Budget, event_nodes
+from skred.diagnosis.evidence.extension import extended
+from skred.diagnosis.evidence.marginal import (
     _factor,
     _log_correlation_constant,
     _log_prior,
@@ -25,10 +26,9 @@ from skred.diagnosis.marginal import (
     evidence,
     importance_evidence,
 )
-from skred.diagnosis.modes import Population, event_modes
-from skred.inference.population import population_factor
-from skred.inference.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
-from skred.inference.surface import Nodes
+from skred.inference.hierarchical.population import population_factor
+from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
+from skred.inference.hierarchical.surface import Nodes
 
 FloatArray = NDArray[np.float64]
 NONE = np.zeros(0)
@@ -113,7 +113,7 @@ def test_laplace_agrees_with_importance_sampling(which: str) -> None:
 
 def test_evidence_on_a_grid() -> None:
     """Mean and spread of Ryggfonn's constant retardation summed on a grid, not climbed."""
-    from skred.diagnosis.marginal import _log_targets
+    from skred.diagnosis.evidence.marginal import _log_targets
 
     base = ryggfonn_base("constant")
     nodes, found = nodes_of(base, USUAL), base.fit.found

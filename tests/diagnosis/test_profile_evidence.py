@@ -14,11 +14,12 @@ import pytest
 from diagnosis_cases import few_dense_base, recorded
 from scipy.stats import multivariate_normal
 
-from skred.diagnosis import corrections, profile_evidence
-from skred.diagnosis.curves import Base
-from skred.diagnosis.profile_evidence import sampled_log_factor
-from skred.diagnosis.profile_fit import fit_profile, hill_at
-from skred.diagnosis.unlisted import KINDS, Hill, Prior, Profile, combined, knots, priors_of
+from skred.diagnosis.compare import recomputed as corrections
+from skred.diagnosis.discrepancy import sampled_evidence as profile_evidence
+from skred.diagnosis.discrepancy.fit import fit_profile, hill_at
+from skred.diagnosis.discrepancy.profile import KINDS, Hill, Prior, Profile, combined, knots, priors_of
+from skred.diagnosis.discrepancy.sampled_evidence import sampled_log_factor
+from skred.diagnosis.evidence.coefficient import Base
 
 FloatArray = np.ndarray[Any, np.dtype[np.float64]]
 N = 12

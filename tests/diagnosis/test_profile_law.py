@@ -11,19 +11,19 @@ import pytest
 from diagnosis_cases import base_of, first_events, trial, with_sensors
 from numpy.testing import assert_array_equal
 
-from skred.diagnosis.curves import Base
+from skred.diagnosis.compare.comparison import Heat, Race
 from skred.diagnosis.diagnose import Diagnosis, Effort, _before
-from skred.diagnosis.extension import extended, setting_of
-from skred.diagnosis.gain import predictors_of, promised_gain
-from skred.diagnosis.predictor_document import as_dict, from_dict
-from skred.diagnosis.profile_fit import fit_profile
-from skred.diagnosis.profile_law import ProfileLaw, _left_out, profile_law
-from skred.diagnosis.race import Heat, Race
-from skred.diagnosis.unlisted import KINDS, combined, knots
-from skred.diagnosis.unseen import ProfileTerm, log_scores
+from skred.diagnosis.discrepancy.fit import fit_profile
+from skred.diagnosis.discrepancy.profile import KINDS, combined, knots
+from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.evidence.extension import extended, setting_of
+from skred.diagnosis.predict.gain import predictors_of, promised_gain
+from skred.diagnosis.predict.predictor_document import as_dict, from_dict
+from skred.diagnosis.predict.profile_law import ProfileLaw, _left_out, profile_law
+from skred.diagnosis.predict.unseen import ProfileTerm, log_scores
 from skred.errors import InputError
+from skred.inference.calibrate import calibrate
 from skred.inference.sampling import SamplerSettings
-from skred.work.calibrate import calibrate
 
 
 def law_of(base: Base) -> ProfileLaw:

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from skred.diagnosis.decide import Decision, decide, smallest_set
-from skred.diagnosis.odds import POWER, prior_odds, probabilities, stated
-from skred.diagnosis.omnibus import LIMIT, Omnibus
+from skred.diagnosis.check.bootstrap_test import LIMIT, Omnibus
+from skred.diagnosis.compare.decision import Decision, decide, smallest_set
+from skred.diagnosis.evidence.prior_odds import POWER, prior_odds, probabilities, stated
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group
 

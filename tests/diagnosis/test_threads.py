@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from diagnosis_cases import screen_of, sparse_base
 
-from skred.diagnosis.curves import curve_near
-from skred.diagnosis.event_nodes import ROUGH
-from skred.diagnosis.extension import extended
-from skred.diagnosis.first_look import curve
-from skred.diagnosis.omnibus import omnibus
-from skred.diagnosis.strength_grid import locate
-from skred.diagnosis.tables import BUDGETS, build_tables
+from skred.diagnosis.augment.coefficient_grid import locate
+from skred.diagnosis.augment.tables import BUDGETS, build_tables
+from skred.diagnosis.check.bootstrap_test import omnibus
+from skred.diagnosis.compare.screening import curve
+from skred.diagnosis.evidence.coefficient import curve_near
+from skred.diagnosis.evidence.event_quadrature import ROUGH
+from skred.diagnosis.evidence.extension import extended
+from skred.parallel.threads import in_parts, side_by_side, threads
 from skred.physics.mechanisms import mechanisms
-from skred.threads import in_parts, side_by_side, threads
 
 
 @pytest.mark.parametrize(("said", "n"), [("3", 3), ("1", 1), ("0", None), ("many", None), ("", None)])

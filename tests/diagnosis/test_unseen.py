@@ -16,13 +16,13 @@ from scipy.stats import norm
 
 from skred.campaign import Campaign, Status
 from skred.campaign.parts import of_events
-from skred.diagnosis.augmented import augmented_problem
-from skred.diagnosis.covariates import Standard
-from skred.diagnosis.curves import curve_at, fit_base
+from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.diagnose import population_draws, typical
-from skred.diagnosis.gain import realised_gain
-from skred.diagnosis.predictor_document import as_dict, from_dict
-from skred.diagnosis.unseen import (
+from skred.diagnosis.evidence.coefficient import curve_at, fit_base
+from skred.diagnosis.evidence.covariates import Standard
+from skred.diagnosis.predict.gain import realised_gain
+from skred.diagnosis.predict.predictor_document import as_dict, from_dict
+from skred.diagnosis.predict.unseen import (
     Predictor,
     Term,
     extension_of,
@@ -32,15 +32,15 @@ from skred.diagnosis.unseen import (
     unseen,
 )
 from skred.errors import InputError
-from skred.inference.hierarchical import hierarchical_problem
-from skred.inference.reading_density import log_likelihoods
+from skred.inference.calibrate import Calibration, calibrate
+from skred.inference.hierarchical.problem import hierarchical_problem
+from skred.inference.hierarchical.reading_density import log_likelihoods
 from skred.inference.sampling import SamplerSettings
-from skred.laws import load_law
-from skred.physics.columns import Column
+from skred.physics.kernel.columns import Column
+from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Shape
 from skred.physics.mechanisms.stretches import U_1, U_2
-from skred.work.calibrate import Calibration, calibrate
 
 GATE, FACTOR = 2, 1.3
 SETTINGS = SamplerSettings("metropolis", 1000, 500, 4, 0)

@@ -11,15 +11,15 @@ import pytest
 from numpy.testing import assert_allclose
 from pytensor.gradient import verify_grad
 
-from skred.inference.density import (
+from skred.inference.pooled.density import (
     MAX_NOT_REACHED,
     PooledArrays,
     pooled_arrays,
     pooled_log_density,
     pooled_log_density_pullback,
 )
-from skred.inference.density_op import PooledLogDensity
-from skred.inference.recordings_covariance import observed_log_likelihood
+from skred.inference.pooled.density_op import PooledLogDensity
+from skred.inference.pooled.recordings_covariance import observed_log_likelihood
 
 N_SENSORS = 6
 SD = np.array([9.0, 12.0, 11.0, 10.0, 8.0, 120.0])

@@ -19,13 +19,13 @@ from scipy.stats import multivariate_normal, norm
 from scipy.stats import t as student_t
 
 from skred.inference.error_model import ERROR_MODELS, Errors, EventReadings
-from skred.inference.event_density import (
+from skred.inference.hierarchical.event_density import (
     draw_nodes,
     integrated_log_density,
     integrated_log_density_pullback,
 )
-from skred.inference.integrated_op import IntegratedLogDensity, IntegratedLogDensityPullback
-from skred.inference.reading_density import assess, log_likelihood_bounds, log_likelihoods
+from skred.inference.hierarchical.integrated_op import IntegratedLogDensity, IntegratedLogDensityPullback
+from skred.inference.hierarchical.reading_density import assess, log_likelihood_bounds, log_likelihoods
 
 # The readings given a front, written down again.
 

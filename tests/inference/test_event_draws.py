@@ -10,15 +10,15 @@ import pytest
 from scipy.stats import kstest, norm, truncnorm
 
 from skred.inference.error_model import ERROR_MODELS
-from skred.inference.event_draws import (
+from skred.inference.hierarchical.event_draws import (
     fronts_of,
     new_avalanches,
     read_with_errors,
     recorded_avalanches,
 )
-from skred.inference.hierarchical import HierarchicalProblem
-from skred.inference.population import population_of
-from skred.laws import load_law
+from skred.inference.hierarchical.population import population_of
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.physics.laws import load_law
 
 N = 3000
 PCM = load_law("pcm")
@@ -68,13 +68,13 @@ def test_releases_are_cut_off_where_the_track_begins(hierarchical: HierarchicalP
 
 def test_recorded_avalanches_are_those_of_importance_sampling(hierarchical: HierarchicalProblem) -> None:
     """Means against new avalanches weighted by their likelihood: another route to the same posterior."""
-    from skred.inference.reading_density import log_likelihoods
+    from skred.inference.hierarchical.reading_density import log_likelihoods
 
     rng = np.random.default_rng(3)
     drawn = recorded_avalanches(hierarchical, PCM, samples(), rng)
     proposed = new_avalanches(hierarchical, PCM, samples(60_000), rng)
     fronts = hierarchical.fronts(PCM.mechanisms)
-    from skred.physics.kernel import simulate
+    from skred.physics.kernel.fronts import simulate
 
     for event in range(4):
         strengths, releases = proposed.strengths[:, event], proposed.releases[:, event].copy()

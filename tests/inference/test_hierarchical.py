@@ -12,10 +12,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import beta, halfnorm, lognorm
 
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
-from skred.inference.event_density import integrated_log_density
-from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
-from skred.inference.surface import Surfaces
-from skred.laws import load_law
+from skred.inference.hierarchical.event_density import integrated_log_density
+from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
+from skred.inference.hierarchical.surface import Surfaces
+from skred.physics.laws import load_law
 
 CAMPAIGN = read_campaign(find_campaign("ryggfonn"))
 POPULATION = {

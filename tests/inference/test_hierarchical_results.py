@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from skred.inference.hierarchical import INTEGRATION_LIMIT, HierarchicalProblem, hierarchical_problem
+from skred.inference.calibrate import Calibration, calibrate
+from skred.inference.hierarchical.problem import INTEGRATION_LIMIT, HierarchicalProblem, hierarchical_problem
 from skred.inference.results import save
 from skred.inference.sampling import SamplerSettings
-from skred.laws import load_law
-from skred.work.calibrate import Calibration, calibrate
-from skred.work.output import plain
+from skred.output import plain
+from skred.physics.laws import load_law
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,7 @@ def test_the_summary_sets_the_next_avalanche_beside_the_recorded(calibrated: Cal
 
 
 def test_many_events_thin_the_draws(calibrated: Calibration, monkeypatch: pytest.MonkeyPatch) -> None:
-    import skred.inference.hierarchical_results as module
+    import skred.inference.hierarchical.results as module
 
     monkeypatch.setattr(module, "MOST_AVALANCHES", 22 * 100)
     tree = calibrated.tree

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skred.inference.hierarchical import HierarchicalProblem
+from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.sampling import SamplerSettings
-from skred.laws import load_law
+from skred.physics.laws import load_law
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 N_EVENTS, N_CAMPAIGNS = 6, 12

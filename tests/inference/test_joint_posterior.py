@@ -13,10 +13,10 @@ import pymc as pm
 import pytest
 
 from skred.campaign import find_campaign, read_campaign
-from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
+from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
 from skred.inference.joint_metropolis import JointMetropolis
-from skred.laws import load_law
 from skred.physics.law import Law
+from skred.physics.laws import load_law
 
 FILE = Path(__file__).parents[2] / "benchmarks" / "peers" / "joint_gibbs.py"
 SIX = ["19840302", "19870128", "19890403", "19940318", "20000217", "20050416"]

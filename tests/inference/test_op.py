@@ -13,9 +13,9 @@ from numpy.testing import assert_allclose
 from pytensor.gradient import verify_grad
 
 from skred.campaign import find_campaign, read_campaign
-from skred.inference.op import FrontReadings, FrontReadingsJacobian, front_readings
+from skred.inference.pooled.forward_op import FrontReadings, FrontReadingsJacobian, front_readings
 from skred.physics.geometry import contributions_of, path_of, sensor_table
-from skred.physics.kernel import simulate
+from skred.physics.kernel.fronts import simulate
 from skred.physics.mechanisms import mechanisms
 from skred.physics.reference import read_front
 from skred.physics.terrain import build_terrain

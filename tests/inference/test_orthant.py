@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.special import log_ndtr, logsumexp
 from scipy.stats import truncnorm
 
-from skred.inference.orthant import log_orthant_probability, truncate
+from skred.inference.pooled.orthant import log_orthant_probability, truncate
 
 
 def equicorrelated(d: int, rho: float) -> np.ndarray:

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import halfnorm
 
-from skred.laws import load_law
+from skred.physics.laws import load_law
 
 LAW = load_law("pcm")
 POINTS = np.array([[0.28, 0.0023], [0.2, 0.004], [0.6, 0.001], [0.05, 0.0002], [2.0, 0.01]])

@@ -13,14 +13,14 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import beta, lognorm
 
-from skred.inference.population import (
+from skred.inference.hierarchical.population import (
     correlation_parameters,
     population_factor,
     population_of,
     population_variables,
     spread_parameters,
 )
-from skred.laws import load_law
+from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 
 THREE = [mechanisms()[name] for name in ("coulomb_friction", "turbulent_drag", "viscous_drag")]

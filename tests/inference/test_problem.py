@@ -10,10 +10,10 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skred.campaign import Status
-from skred.inference.density import pooled_log_density
+from skred.inference.pooled.density import pooled_log_density
+from skred.inference.pooled.recordings_covariance import observed_log_likelihood
 from skred.inference.problem import pooled_problem
-from skred.inference.recordings_covariance import observed_log_likelihood
-from skred.laws import load_law
+from skred.physics.laws import load_law
 
 LAW = load_law("pcm")
 STRENGTHS = np.array([[0.28, 0.0023], [0.2, 0.004], [0.6, 0.001], [0.05, 0.0002], [2.0, 0.01]])

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.optimize import minimize
 from scipy.stats import multivariate_normal
 
-from skred.inference.recordings_covariance import (
+from skred.inference.pooled.recordings_covariance import (
     em_step,
     observed_log_likelihood,
     recordings_covariance,

@@ -14,10 +14,10 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 
+from skred.inference.calibrate import calibrate
 from skred.inference.results import save
 from skred.inference.sampling import SamplerSettings
-from skred.laws import load_law
-from skred.work.calibrate import calibrate
+from skred.physics.laws import load_law
 
 GROUPS = {
     "posterior",

@@ -12,7 +12,7 @@ import xarray as xr
 from numpy.testing import assert_array_equal
 
 from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior
-from skred.laws import load_law
+from skred.physics.laws import load_law
 
 LAW = load_law("pcm")
 PROBABILITIES = (0.05, 0.25, 0.5, 0.75, 0.95)

@@ -17,7 +17,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skred.campaign import Status
 from skred.errors import InputError
 from skred.inference.sampling import SamplerSettings
-from skred.laws import load_law
+from skred.physics.laws import load_law
 
 FILE = Path(__file__).parents[2] / "benchmarks" / "sbc.py"
 

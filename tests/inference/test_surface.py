@@ -14,13 +14,13 @@ from numpy.testing import assert_allclose
 from scipy.stats import norm
 
 from skred.campaign import Campaign, Event, Sensor, Status, find_campaign, read_campaign
-from skred.inference.bisection import RELEASE_REACH, Resolution
-from skred.inference.event_density import integrated_log_density
-from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
-from skred.inference.reading_density import log_likelihoods
-from skred.inference.surface import Surfaces
-from skred.laws import load_law
-from skred.physics.kernel import simulate
+from skred.inference.hierarchical.bisection import RELEASE_REACH, Resolution
+from skred.inference.hierarchical.event_density import integrated_log_density
+from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
+from skred.inference.hierarchical.reading_density import log_likelihoods
+from skred.inference.hierarchical.surface import Surfaces
+from skred.physics.kernel.fronts import simulate
+from skred.physics.laws import load_law
 
 CAMPAIGN = read_campaign(find_campaign("ryggfonn"))
 FOUR = ["19831031", "19920311", "19970417", "20000217"]

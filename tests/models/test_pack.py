@@ -14,8 +14,8 @@ from numpy.testing import assert_allclose
 
 from skred.errors import InputError
 from skred.inference.sampling import sample_prior
-from skred.laws import GROUP, UnknownLawError, law_ids, load_law
-from skred.physics.columns import GRAVITY
+from skred.physics.kernel.columns import GRAVITY
+from skred.physics.laws import GROUP, UnknownLawError, law_ids, load_law
 
 LAWS = ("coulomb", "pcm", "constant", "voellmy")
 

@@ -17,10 +17,10 @@ from numpy.testing import assert_allclose
 from test_reference import counter_slope, plane, roll_over_slope, terrain_from_slope
 
 from skred.campaign import find_campaign, read_campaign
-from skred.physics.columns import GRAVITY, Column
 from skred.physics.geometry import path_of, sensor_table
-from skred.physics.inputs import make_contributions
-from skred.physics.kernel import front_speeds, simulate, simulate_with_jacobian
+from skred.physics.kernel.columns import GRAVITY, Column
+from skred.physics.kernel.fronts import front_speeds, simulate, simulate_with_jacobian
+from skred.physics.kernel.inputs import make_contributions
 from skred.physics.reference import read_front, run_front
 from skred.physics.terrain import Terrain, build_terrain
 

@@ -13,15 +13,15 @@ import pytest
 
 import skred.physics.mechanisms
 from skred.campaign import find_campaign, read_campaign
-from skred.diagnosis.extension import Extension, extended, setting_of
-from skred.diagnosis.unlisted import KINDS
-from skred.inference.hierarchical import HierarchicalProblem, hierarchical_problem
-from skred.laws import law_ids, load_law
-from skred.physics.columns import Column
+from skred.diagnosis.discrepancy.profile import KINDS
+from skred.diagnosis.evidence.extension import Extension, extended, setting_of
+from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
 from skred.physics.geometry import contributions_of, path_of
-from skred.physics.inputs import make_contributions
-from skred.physics.kernel import front_speeds
+from skred.physics.kernel.columns import Column
+from skred.physics.kernel.fronts import front_speeds
+from skred.physics.kernel.inputs import make_contributions
 from skred.physics.law import Law
+from skred.physics.laws import law_ids, load_law
 from skred.physics.mechanisms import Mechanism, mechanisms
 from skred.physics.mechanisms.coulomb_friction import WITHOUT_CURVATURE
 from skred.physics.mechanisms.spec import Added, Direction, Group, Setting, Shape

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from time_integrator import integrate_in_time
 
-from skred.physics.columns import GRAVITY, Column
+from skred.physics.kernel.columns import GRAVITY, Column
 from skred.physics.reference import read_front, run_front
 from skred.physics.terrain import Terrain
 

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from skred.campaign import find_campaign, read_campaign
 from skred.physics.geometry import path_of, sensor_table
-from skred.physics.inputs import FRONT_VELOCITY, RUNOUT
+from skred.physics.kernel.inputs import FRONT_VELOCITY, RUNOUT
 from skred.physics.terrain import Terrain, build_terrain
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from skred.prove.crew import Crew
 from skred.prove.plan import Plan
+from skred.prove.pool import Crew
 
 FAKES = Path(__file__).parent / "fakes"
 PLAN = Plan(3, 1_234_567, "sparse", nothing_share=1.0)

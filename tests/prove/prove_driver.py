@@ -6,7 +6,7 @@ import sys
 
 if __name__ == "__main__":
     import skred.prove.run
-    from skred.cli import main
+    from skred.cli.main import main
 
     # As in a terminal, also where the tests run in the background, which ignores interruptions.
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from skred.prove.scores_answers import Pair
+from skred.prove.scoring.answers import Pair
 
 LISTED = (
     "viscous_drag", "turbulent_drag", "segment_drag", "segment_friction", "entrainment", "obstacle",

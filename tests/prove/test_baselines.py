@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from skred.campaign import Campaign, write_campaign
-from skred.diagnosis.odds import NOTHING, UNLISTED
-from skred.trials.draw import draw_trial
+from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
+from skred.simulator.draw import draw_trial
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 NAMES = (

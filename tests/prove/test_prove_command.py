@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from prove_cases import fake
 
-from skred.cli import run
+from skred.cli.main import run
 from skred.prove.folder import ProofFolder
 
 DRIVER = Path(__file__).parent / "prove_driver.py"
@@ -19,7 +19,7 @@ DRIVER = Path(__file__).parent / "prove_driver.py"
 @pytest.mark.parametrize("command", [(), ("seal",), ("run",), ("reveal",), ("show",)])
 def test_help_needs_no_heavy_imports(command: tuple[str, ...]) -> None:
     code = (
-        "import sys; from skred.cli import run; code = run(sys.argv[1:]); "
+        "import sys; from skred.cli.main import run; code = run(sys.argv[1:]); "
         "heavy = {'numpy', 'distributed', 'pymc', 'numba', 'scipy'} & set(sys.modules); "
         "sys.exit(f'imported {heavy}' if heavy else code)"
     )
@@ -54,7 +54,7 @@ def test_bad_use_ends_with_2(
 
 def test_all_in_one_and_again(tmp_path: Path) -> None:
     """Two trials that hide nothing, sealed, answered by a fake, and scored."""
-    pytest.importorskip("skred.report.scorecard")
+    pytest.importorskip("skred.report.scorecard.page")
     out = tmp_path / "proof"
     words = ["prove", "--trials", "2", "--seed", "7", "--quick", "--nothing-share", "1", "--out", str(out)]
     words += ["--workers", "1"]

@@ -12,7 +12,7 @@ from prove_cases import fake
 from skred.errors import InputError
 from skred.prove.child import answer_of
 from skred.prove.folder import ProofFolder, read_object
-from skred.prove.guard import Guard, allowed_roots, within
+from skred.prove.sandbox import Guard, allowed_roots, within
 
 
 def test_the_truth_is_unreachable(proof: ProofFolder) -> None:

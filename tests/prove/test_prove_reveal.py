@@ -11,7 +11,7 @@ import pytest
 from prove_cases import Alone, silent
 from rich.console import Console
 
-from skred.cli import run as skred
+from skred.cli.main import run as skred
 from skred.errors import InputError
 from skred.prove.folder import ProofFolder, read_object
 from skred.prove.ledger import read_ledger
@@ -175,7 +175,7 @@ def test_trials_are_shown_once_they_are_opened(
 
 
 def test_gains_are_realised_once(answered: ProofFolder, monkeypatch: pytest.MonkeyPatch) -> None:
-    import skred.diagnosis.gain
+    import skred.diagnosis.predict.gain
 
     asked: list[Any] = []
 
@@ -186,7 +186,7 @@ def test_gains_are_realised_once(answered: ProofFolder, monkeypatch: pytest.Monk
             raise InputError("damaged")
         return {"realised": 0.4, "se": 0.1, "n_fresh": 12}
 
-    monkeypatch.setattr(skred.diagnosis.gain, "realised_gain", realised)
+    monkeypatch.setattr(skred.diagnosis.predict.gain, "realised_gain", realised)
     for number, after in enumerate(["good", "damaged", None], 1):
         edit(
             answered.answer(f"trial-{number:04d}"),

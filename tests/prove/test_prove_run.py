@@ -17,9 +17,9 @@ import pytest
 from prove_cases import PLAN, Alone, fake, silent
 
 from skred.errors import InputError
-from skred.prove.crew import Crew, alone_in
 from skred.prove.folder import ProofFolder, read_object
 from skred.prove.ledger import read_ledger, trial_names
+from skred.prove.pool import Crew, alone_in
 from skred.prove.run import Limits, run
 
 DRIVER = Path(__file__).parent / "prove_driver.py"
@@ -131,7 +131,7 @@ def test_one_command_at_a_time(proof: ProofFolder, diagnosed: Diagnosed) -> None
 
 
 def test_no_scheduler(proof: ProofFolder, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("skred.prove.crew._PATIENCE_S", 1)
+    monkeypatch.setattr("skred.prove.pool._PATIENCE_S", 1)
     with pytest.raises(InputError, match="no Dask scheduler"):
         run(proof, Crew(1, "nonsense://x"), silent, silent)
     with pytest.raises(ValueError, match="No clients"):

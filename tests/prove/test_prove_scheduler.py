@@ -13,9 +13,9 @@ from typing import NamedTuple
 import pytest
 from prove_cases import fake, silent
 
-from skred.prove.crew import Crew
 from skred.prove.folder import ProofFolder, read_object
 from skred.prove.ledger import read_ledger, trial_names
+from skred.prove.pool import Crew
 from skred.prove.run import Limits, run
 
 _PATIENCE_S = 60.0

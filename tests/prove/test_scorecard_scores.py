@@ -9,16 +9,16 @@ import pytest
 from scipy.special import expit
 from scorecard_cases import CRASH, QUIET, answer, drawn, effect, named, pair, truth
 
-from skred.prove.scores_alarms import detection, false_alarms, logistic_coefficients
-from skred.prove.scores_answers import pairs_of
-from skred.prove.scores_bars import MET, NOT_MET, TOO_FEW, Bar, bars, judge
-from skred.prove.scores_confusion import confusion
-from skred.prove.scores_gain import failures, gains, held_out, times
-from skred.prove.scores_intervals import median, share, upper_limit
-from skred.prove.scores_naming import honesty, naming, unlisted
-from skred.prove.scores_paired import compare, roc_area, score_of, threshold
-from skred.prove.scores_places import places, strengths
-from skred.prove.scores_probability import (
+from skred.prove.scoring.alarms import detection, false_alarms, logistic_coefficients
+from skred.prove.scoring.answers import pairs_of
+from skred.prove.scoring.confusion import confusion
+from skred.prove.scoring.criteria import MET, NOT_MET, TOO_FEW, Bar, bars, judge
+from skred.prove.scoring.gain import failures, gains, held_out, times
+from skred.prove.scoring.intervals import median, share, upper_limit
+from skred.prove.scoring.naming import honesty, naming, unlisted
+from skred.prove.scoring.paired import compare, roc_area, score_of, threshold
+from skred.prove.scoring.places import places, strengths
+from skred.prove.scoring.probability import (
     bin_of,
     brier,
     ece_if_calibrated,
@@ -27,7 +27,7 @@ from skred.prove.scores_probability import (
     per_trial_sums,
     probabilities,
 )
-from skred.prove.scores_standards import NAMED_CEILING, RIGHT_NAME_CEILING, STRENGTHS, ceiling, class_of
+from skred.prove.scoring.standards import NAMED_CEILING, RIGHT_NAME_CEILING, STRENGTHS, ceiling, class_of
 
 NULL = truth("nothing")
 
@@ -361,7 +361,7 @@ def test_bars_are_called_only_with_enough_trials() -> None:
     [(0, 40, TOO_FEW), (0, 60, MET), (1, 120, MET), (2, 120, NOT_MET), (9, 20, NOT_MET)],
 )
 def test_false_alarm_bar_is_on_the_upper_limit(alarms: int, n: int, status: str) -> None:
-    from skred.prove.scores import scores_by_kind
+    from skred.prove.scoring.scores import scores_by_kind
 
     pairs = [pair(NULL, named("obstacle"))] * alarms + [pair(NULL, QUIET)] * (n - alarms)
     rows = bars(scores_by_kind(pairs)["open"], {})
@@ -369,7 +369,7 @@ def test_false_alarm_bar_is_on_the_upper_limit(alarms: int, n: int, status: str)
 
 
 def test_crashes_count_as_false_alarms_in_the_bar() -> None:
-    from skred.prove.scores import scores_by_kind
+    from skred.prove.scoring.scores import scores_by_kind
 
     rows = bars(scores_by_kind([pair(NULL, CRASH)] * 120)["open"], {})
     row = next(row for row in rows if row["what"].startswith("plain nulls"))

@@ -8,24 +8,24 @@ import numpy as np
 import xarray as xr
 from hierarchical_cases import hierarchical_calibration, hierarchical_ryggfonn
 
-from skred.diagnosis.curves import Curve, Fit
-from skred.diagnosis.decide import Decision
+from skred.diagnosis.check.bootstrap_test import Omnibus
+from skred.diagnosis.compare.candidate import Entrant
+from skred.diagnosis.compare.comparison import Heat, Race
+from skred.diagnosis.compare.decision import Decision
+from skred.diagnosis.compare.location import Location
+from skred.diagnosis.detect.detectability import Identifiability, Told
 from skred.diagnosis.diagnose import Diagnosis, Step
-from skred.diagnosis.entrant import Entrant
-from skred.diagnosis.extension import setting_of
-from skred.diagnosis.held_out import HeldOut
-from skred.diagnosis.identify import Identifiability, Told
-from skred.diagnosis.locate import Location
-from skred.diagnosis.odds import prior_odds
-from skred.diagnosis.omnibus import Omnibus
-from skred.diagnosis.predictive import Predicted
-from skred.diagnosis.profile_law import Draws, ProfileLaw
-from skred.diagnosis.race import Heat, Race
-from skred.diagnosis.unlisted import KINDS, Prior, Profile
+from skred.diagnosis.discrepancy.profile import KINDS, Prior, Profile
+from skred.diagnosis.evidence.coefficient import Curve, Fit
+from skred.diagnosis.evidence.extension import setting_of
+from skred.diagnosis.evidence.predictive import Predicted
+from skred.diagnosis.evidence.prior_odds import prior_odds
+from skred.diagnosis.predict.held_out import HeldOut
+from skred.diagnosis.predict.profile_law import Draws, ProfileLaw
 from skred.inference.gate import Gate
-from skred.inference.hierarchical import HierarchicalProblem
-from skred.laws import load_law
+from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.law import Parameter
+from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Direction
 

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from report_cases import DRAWS, comparison, entry, failed_entry, gate, ryggfonn
 
-from skred.inference.hierarchical import HierarchicalProblem
+from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.problem import Problem
 from skred.physics.law import Law
 

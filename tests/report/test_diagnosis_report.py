@@ -7,9 +7,9 @@ from diagnosis_report_cases import diagnosis, location
 from rich.console import Console
 from test_report_html import Page, nulls
 
-from skred.diagnosis.verdict import verdict
-from skred.report.diagnosis import FIGURES, diagnosis_table, render_diagnosis, save_diagnosis_figures
-from skred.report.diagnosis_equation import equations, formula
+from skred.diagnosis.verdict.document import verdict
+from skred.report.diagnosis.equation import equations, formula
+from skred.report.diagnosis.report import FIGURES, diagnosis_table, render_diagnosis, save_diagnosis_figures
 
 KINDS = ("cannot", "gate", "nothing", "silent", "unexplained", "sensor", "tie", "two")
 HOSTILE = "<script>alert(1)</script>$\\frac{[red]&'\""
@@ -17,8 +17,8 @@ HOSTILE = "<script>alert(1)</script>$\\frac{[red]&'\""
 
 @pytest.fixture(autouse=True)
 def quick_profile(monkeypatch):
-    monkeypatch.setattr("skred.diagnosis.locate.locate", lambda heat: location())
-    monkeypatch.setattr("skred.report.style.DPI", 40)
+    monkeypatch.setattr("skred.diagnosis.compare.location.locate", lambda heat: location())
+    monkeypatch.setattr("skred.report.shared.style.DPI", 40)
 
 
 def document_of(found):

@@ -9,16 +9,16 @@ import numpy as np
 import pytest
 from diagnosis_report_cases import diagnosis
 
-from skred.diagnosis.decide import Decision
+from skred.diagnosis.augment.coefficient import FORM, strength_of
+from skred.diagnosis.check.bootstrap_test import Omnibus
+from skred.diagnosis.compare.decision import Decision
 from skred.diagnosis.diagnose import Left
-from skred.diagnosis.odds import NOTHING, UNLISTED
-from skred.diagnosis.omnibus import Omnibus
-from skred.diagnosis.statement import statement
-from skred.diagnosis.strength import FORM, strength_of
-from skred.diagnosis.verdict import verdict
+from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
+from skred.diagnosis.verdict.document import verdict
+from skred.diagnosis.verdict.statement import statement
 from skred.physics.mechanisms.stretches import U_1, U_2
-from skred.report.diagnosis import render_diagnosis
-from skred.report.draws import chains_of
+from skred.report.diagnosis.report import render_diagnosis
+from skred.report.shared.draws import chains_of
 
 
 def document(probability: dict[str, float]) -> dict:
@@ -93,7 +93,7 @@ def test_physics_and_instruments_tied_are_both_told(monkeypatch: pytest.MonkeyPa
         "quantity": "front_velocity", "s_from_m": 1700.0, "s_to_m": 1700.0,
         "splits": ["sensor_bias", "obstacle"],
     }  # fmt: skip
-    monkeypatch.setattr("skred.diagnosis.verdict.next_sensor", lambda found: splits)
+    monkeypatch.setattr("skred.diagnosis.verdict.document.next_sensor", lambda found: splits)
     found, tied = diagnosis("sensor"), ("obstacle", UNLISTED)
     step = replace(found.steps[0], tied=tied)
     alone = verdict(found)

@@ -8,8 +8,8 @@ from diagnosis_report_cases import diagnosis, location
 from rich.console import Console
 from test_report_html import Page
 
-from skred.diagnosis.verdict import verdict
-from skred.report.diagnosis import diagnosis_table, render_diagnosis
+from skred.diagnosis.verdict.document import verdict
+from skred.report.diagnosis.report import diagnosis_table, render_diagnosis
 
 HOSTILE = "<script>alert(1)</script>[red]"
 LOCKED = {
@@ -38,7 +38,7 @@ FOLDS = {
 
 @pytest.fixture(autouse=True)
 def quick_profile(monkeypatch):
-    monkeypatch.setattr("skred.diagnosis.locate.locate", lambda heat: location())
+    monkeypatch.setattr("skred.diagnosis.compare.location.locate", lambda heat: location())
 
 
 def text_of(**more):

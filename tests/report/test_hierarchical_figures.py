@@ -7,14 +7,14 @@ from report_cases import HOSTILE, comparison
 from test_report_figures import assert_pictures
 
 from skred.campaign import Event, Sensor, Status
-from skred.laws import load_law
-from skred.report.comparing_likelihoods import likelihoods_figure
-from skred.report.draws import new_avalanche, shaded_density
-from skred.report.figures import save_comparison_figures, save_model_figures
-from skred.report.labels import population_label, population_role, symbol_text
-from skred.report.new_avalanches import _median_speeds, reached_text
-from skred.report.population import _levels, population_lines, set_limits
-from skred.report.style import new_figure, tint
+from skred.physics.laws import load_law
+from skred.report.calibration.figures import save_comparison_figures, save_model_figures
+from skred.report.calibration.new_avalanches import _median_speeds, reached_text
+from skred.report.calibration.population import _levels, population_lines, set_limits
+from skred.report.comparison.likelihoods import likelihoods_figure
+from skred.report.shared.draws import new_avalanche, shaded_density
+from skred.report.shared.labels import population_label, population_role, symbol_text
+from skred.report.shared.style import new_figure, tint
 
 
 @pytest.fixture(scope="module")

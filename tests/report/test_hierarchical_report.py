@@ -7,10 +7,10 @@ from report_cases import HOSTILE, comparison, gate
 from test_report_html import Page, hostile, nulls
 from test_report_tables import shown
 
-from skred.report.document import is_hierarchical, side_by_side
-from skred.report.html import render_comparison
-from skred.report.relative import relative_new_avalanche
-from skred.report.tables import comparison_table, summary_table
+from skred.report.comparison.html import render_comparison
+from skred.report.shared.document import is_hierarchical, side_by_side
+from skred.report.shared.relative import relative_new_avalanche
+from skred.report.shared.tables import comparison_table, summary_table
 
 NAMES = (
     "comparison_elpd", "likelihoods", "predictions", "pcm/new_avalanche", "pcm/population", "pcm/events",

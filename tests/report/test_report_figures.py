@@ -7,11 +7,11 @@ import pytest
 from report_cases import HOSTILE, calibration, comparison, entry, ryggfonn, with_sensors
 
 from skred.campaign import Event, Sensor
-from skred.laws import load_law
-from skred.report.draws import density, interval, spread
-from skred.report.figures import along_track_figure, save_comparison_figures, save_model_figures
-from skred.report.labels import figure_text, printable, shortened, symbol_text, unit_text
-from skred.report.style import law_colours, write_png
+from skred.physics.laws import load_law
+from skred.report.calibration.figures import along_track_figure, save_comparison_figures, save_model_figures
+from skred.report.shared.draws import density, interval, spread
+from skred.report.shared.labels import figure_text, printable, shortened, symbol_text, unit_text
+from skred.report.shared.style import law_colours, write_png
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -114,7 +114,8 @@ def test_the_users_settings_change_nothing(problem, tmp_path):
 def test_importing_the_report_is_light():
     heavy = "{'matplotlib', 'jinja2', 'rich', 'xarray', 'arviz', 'pymc', 'numba'}"
     code = (
-        "import sys, skred.report.figures, skred.report.html, skred.report.tables; "
+        "import sys, skred.report.calibration.figures, skred.report.comparison.html; "
+        "import skred.report.shared.tables; "
         f"print(sorted({heavy} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

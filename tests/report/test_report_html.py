@@ -5,8 +5,8 @@ from html.parser import HTMLParser
 import pytest
 from report_cases import HOSTILE, comparison
 
-from skred.report.html import render_comparison
-from skred.report.numbers import decimals_for, fixed, floats, rounded, share
+from skred.report.comparison.html import render_comparison
+from skred.report.shared.numbers import decimals_for, fixed, floats, rounded, share
 
 
 class Page(HTMLParser):

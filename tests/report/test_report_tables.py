@@ -3,7 +3,7 @@ import io
 from report_cases import HOSTILE, comparison
 from rich.console import Console
 
-from skred.report.tables import comparison_table, summary_table
+from skred.report.shared.tables import comparison_table, summary_table
 
 
 def shown(table, width=80):

@@ -1,11 +1,11 @@
-"""Compilation of the diagnosis; see `skred.compiled`."""
+"""Compilation of the diagnosis; see `skred.parallel.compile_cache`."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from skred.compiled import compiled, stamp_room
 from skred.inference.compiled import INFERENCE_FINGERPRINT
+from skred.parallel.compile_cache import compiled, stamp_room
 
 __all__ = ["DIAGNOSIS_CACHE_KEY", "compiled"]
 

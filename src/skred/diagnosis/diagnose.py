@@ -9,28 +9,28 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from skred.diagnosis.augmented import CLAIM_LIMIT, AugmentedProblem, augmented_problem
+from skred.diagnosis.augment.augmented import CLAIM_LIMIT, AugmentedProblem, augmented_problem
+from skred.diagnosis.augment.reference import Reference
+from skred.diagnosis.check.bootstrap_test import Omnibus, omnibus
 from skred.diagnosis.clock import Clock, Tell
-from skred.diagnosis.curves import Base, Curve, fit_base
-from skred.diagnosis.decide import Decision, alarmed, decide
-from skred.diagnosis.entrant import Entrant
-from skred.diagnosis.extension import Extension, extended
-from skred.diagnosis.held_out import HeldOut, held_out
-from skred.diagnosis.identify import Identifiability, identify
-from skred.diagnosis.locate import Location, locate
-from skred.diagnosis.modes import Population
-from skred.diagnosis.odds import UNLISTED
-from skred.diagnosis.omnibus import Omnibus, omnibus
-from skred.diagnosis.profile_law import ProfileLaw, profile_law
-from skred.diagnosis.race import Race, race
-from skred.diagnosis.reference import Reference
-from skred.diagnosis.screen import Screen
-from skred.inference.hierarchical import COARSER, HierarchicalProblem
-from skred.inference.population import population_of
+from skred.diagnosis.compare.candidate import Entrant
+from skred.diagnosis.compare.comparison import Race, race
+from skred.diagnosis.compare.decision import Decision, alarmed, decide
+from skred.diagnosis.compare.location import Location, locate
+from skred.diagnosis.detect.detectability import Identifiability, identify
+from skred.diagnosis.detect.score_test import Screen
+from skred.diagnosis.evidence.coefficient import Base, Curve, fit_base
+from skred.diagnosis.evidence.conditional_map import Population
+from skred.diagnosis.evidence.extension import Extension, extended
+from skred.diagnosis.evidence.prior_odds import UNLISTED
+from skred.diagnosis.predict.held_out import HeldOut, held_out
+from skred.diagnosis.predict.profile_law import ProfileLaw, profile_law
+from skred.inference.calibrate import Calibration, calibrate_surely
+from skred.inference.hierarchical.population import population_of
+from skred.inference.hierarchical.problem import COARSER, HierarchicalProblem
 from skred.inference.sampling import SamplerSettings
 from skred.physics.law import Law
 from skred.physics.mechanisms.stretches import is_opposed
-from skred.work.calibrate import Calibration, calibrate_surely
 
 FloatArray = NDArray[np.float64]
 LEAST_EVENTS = 6

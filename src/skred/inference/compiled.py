@@ -1,11 +1,11 @@
-"""Compilation of the likelihoods; see `skred.compiled`."""
+"""Compilation of the likelihoods; see `skred.parallel.compile_cache`."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from skred.compiled import compiled, stamp_room
-from skred.physics.compiled import KERNEL_FINGERPRINT
+from skred.parallel.compile_cache import compiled, stamp_room
+from skred.physics.kernel.compiled import KERNEL_FINGERPRINT
 
 __all__ = ["INFERENCE_CACHE_KEY", "INFERENCE_FINGERPRINT", "compiled"]
 

@@ -15,7 +15,7 @@ from scipy.special import logsumexp
 
 from skred.inference.gate import R_HAT_LIMIT
 from skred.inference.joint_metropolis import JointMetropolis
-from skred.threads import side_by_side
+from skred.parallel.threads import side_by_side
 
 FloatArray = NDArray[np.float64]
 REFIT_CHAINS, REFIT_DRAWS, REFIT_BURN = 4, 500, 100

@@ -13,11 +13,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign, Status
-from skred.inference.density import PooledArrays, pooled_arrays, pooled_log_density
-from skred.inference.recordings_covariance import recordings_covariance
+from skred.inference.pooled.density import PooledArrays, pooled_arrays, pooled_log_density
+from skred.inference.pooled.recordings_covariance import recordings_covariance
 from skred.physics.geometry import contributions_of, path_of, sensor_table
-from skred.physics.inputs import Contributions, Path
-from skred.physics.kernel import front_speeds, simulate
+from skred.physics.kernel.fronts import front_speeds, simulate
+from skred.physics.kernel.inputs import Contributions, Path
 from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
 from skred.physics.terrain import CELL_M, SMOOTHING_M, Terrain, build_terrain
@@ -184,7 +184,7 @@ class PooledProblem(Problem):
 
     def observe(self, mechanisms: Sequence[Mechanism], strengths: Sequence[Any]) -> Any:
         """Observed variable ``recordings``: y_e ~ N(mean response, Sigma)."""
-        from skred.inference.pooled import mean_response, observe
+        from skred.inference.pooled.model import mean_response, observe
 
         return observe(self, mean_response(self, mechanisms, strengths))
 
@@ -196,13 +196,13 @@ class PooledProblem(Problem):
         self, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
     ) -> dict[str, xr.Dataset]:
         """Mean response, and a latent reading of a new avalanche from each event's release."""
-        from skred.inference.pooled_results import predictive_groups
+        from skred.inference.pooled.results import predictive_groups
 
         return predictive_groups(self, law, posterior, prior, seed)
 
     def summary(self, law: Law, tree: xr.DataTree) -> dict[str, Any]:
         """Mean response at each sensor."""
-        from skred.inference.pooled_results import response_rows
+        from skred.inference.pooled.results import response_rows
 
         return {"response": response_rows(self, tree)}
 

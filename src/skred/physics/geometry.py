@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.physics.inputs import (
+from skred.physics.kernel.inputs import (
     FRONT_VELOCITY,
     RUNOUT,
     VELOCITY_TO_STOP,

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skred.physics.columns import GRAVITY
+from skred.physics.kernel.columns import GRAVITY
 from skred.physics.terrain import Terrain
 
 Barrier = tuple[float, float, complex]

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from skred.errors import InputError
-from skred.work.output import plain
+from skred.output import plain
 
 METHOD = "skred"
 """Folder of the answers of the diagnosis itself."""

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from skred.errors import InputError
-from skred.prove.crew import Crew
 from skred.prove.folder import ProofFolder, read_object, write_once
 from skred.prove.hashes import file_sha256
 from skred.prove.ledger import code_of, require_same_code
+from skred.prove.pool import Crew
 
 Answers = dict[str, dict[str, Any]]
 Tell = Callable[[str], None]
@@ -96,7 +96,7 @@ def realise(job: dict[str, Any]) -> dict[str, Any]:
         The name of the trial.
     """
     from skred.campaign import read_campaign
-    from skred.diagnosis.gain import realised_gain
+    from skred.diagnosis.predict.gain import realised_gain
 
     require_same_code(job["code"], f"{job['folder']}, on this worker")
     folder, method, name = ProofFolder(Path(job["folder"])), job["method"], job["trial"]

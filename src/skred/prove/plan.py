@@ -33,7 +33,7 @@ class Plan:
         Of the trials with one listed mechanism, how many are masked.
     nothing_share : float or None
         Of all trials, how many hide nothing, half of them nasty: to the nearest number of trials. None draws
-        each trial's class by `skred.trials.draw.SHARES`.
+        each trial's class by `skred.simulator.draw.SHARES`.
     unlisted_share : float or None
         Of the trials that hide something, how many hide what is in no list; None by the same shares.
     quick : bool
@@ -108,7 +108,7 @@ def _hidden(plan: Plan, seed: int) -> str:
 
 def _shares(plan: Plan) -> dict[str, float]:
     """How often each class is drawn; those that hide something as often together as ever."""
-    from skred.trials.draw import SHARES
+    from skred.simulator.draw import SHARES
 
     if plan.unlisted_share is None:
         return SHARES
@@ -123,7 +123,7 @@ def _shares(plan: Plan) -> dict[str, float]:
 
 def diagnosis_settings(quick: bool) -> dict[str, Any]:
     """How ``skred diagnose`` diagnoses for a user who sets nothing, or only ``--quick``."""
-    from skred.cli_options import DIAGNOSIS_SAMPLING, MAX_MECHANISMS
+    from skred.cli.options import DIAGNOSIS_SAMPLING, MAX_MECHANISMS
     from skred.diagnosis.diagnose import QUICK_REPLICAS, Effort
     from skred.inference.error_model import DEFAULT_ERRORS
     from skred.physics.terrain import SMOOTHING_M

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from skred.errors import InputError
-from skred.prove.crew import Crew, alone_in
 from skred.prove.folder import METHOD, TRIAL_NAME, ProofFolder, read_object
 from skred.prove.gains import with_gains
 from skred.prove.hashes import document_sha256, file_sha256, files_sha256
 from skred.prove.ledger import ledger_sha256, read_ledger, require_same_code, trial_names
+from skred.prove.pool import Crew, alone_in
 
 Scorer = Callable[[Path, dict[str, Any], list[dict[str, Any]], dict[str, dict[str, Any]]], dict[str, Any]]
 Tell = Callable[[str], None]

@@ -11,10 +11,10 @@ from typing import Any
 
 from skred.errors import InputError
 from skred.prove.child import MODULE, answer_of
-from skred.prove.crew import Crew, alone_in
 from skred.prove.folder import ProofFolder, read_object, write_once
-from skred.prove.guard import allowed_roots, within
 from skred.prove.ledger import code_of, ledger_sha256, read_ledger, require_same_code, trial_names
+from skred.prove.pool import Crew, alone_in
+from skred.prove.sandbox import allowed_roots, within
 
 Tell = Callable[[str], None]
 Advance = Callable[[str], None]

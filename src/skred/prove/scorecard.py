@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from skred.prove.scores import KINDS, of_kind, scores_by_kind
-from skred.prove.scores_answers import Pair, pairs_of
-from skred.prove.scores_bars import bars
-from skred.prove.scores_intervals import LEVEL, RESAMPLES, SEED
-from skred.prove.scores_paired import compare
-from skred.prove.scores_places import right_stretch
-from skred.prove.scores_standards import as_plain
-from skred.work.output import plain, write_json, write_text
+from skred.output import plain, write_json, write_text
+from skred.prove.scoring.answers import Pair, pairs_of
+from skred.prove.scoring.criteria import bars
+from skred.prove.scoring.intervals import LEVEL, RESAMPLES, SEED
+from skred.prove.scoring.paired import compare
+from skred.prove.scoring.places import right_stretch
+from skred.prove.scoring.scores import KINDS, of_kind, scores_by_kind
+from skred.prove.scoring.standards import as_plain
 
 DIAGNOSIS = "skred"
 """The method that is on trial; all others are baselines."""
@@ -44,8 +44,8 @@ def write_scorecard(
     dict
         The scorecard as plain data.
     """
-    from skred.report.scorecard import render_scorecard
-    from skred.report.scorecard_figures import save_scorecard_figures
+    from skred.report.scorecard.figures import save_scorecard_figures
+    from skred.report.scorecard.page import render_scorecard
 
     document = scorecard(ledger, trials, answers)
     folder.mkdir(parents=True, exist_ok=True)

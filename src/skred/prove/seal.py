@@ -11,15 +11,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skred.errors import InputError
-from skred.prove.crew import Crew, alone_in
+from skred.output import write_text
 from skred.prove.folder import ProofFolder, read_object, trial_name, write_once
 from skred.prove.hashes import document_sha256, file_sha256, files_sha256
 from skred.prove.ledger import FORMAT, code_identity, read_ledger, require_same_code
 from skred.prove.plan import Plan, asked, diagnosis_settings
-from skred.work.output import write_text
+from skred.prove.pool import Crew, alone_in
 
 if TYPE_CHECKING:
-    from skred.trials.draw import Trial
+    from skred.simulator.draw import Trial
 
 Tell = Callable[[str], None]
 Advance = Callable[[str], None]
@@ -144,7 +144,7 @@ def seal_trial(job: dict[str, Any]) -> dict[str, Any]:
 
 def _drawn(what: dict[str, Any], n: int) -> tuple[Trial, dict[str, Any]]:
     """A trial; where a seed allows nothing plausible, the next seed that belongs to no other trial."""
-    from skred.trials.draw import draw_trial
+    from skred.simulator.draw import draw_trial
 
     for number in range(_MOST_DRAWS):
         seed = what["seed"] + number * n

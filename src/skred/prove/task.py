@@ -18,7 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from skred.prove.guard import shut
+from skred.prove.sandbox import shut
 
 Answer = dict[str, Any]
 CAMPAIGN, VERDICT = "campaign", "verdict.json"
@@ -39,11 +39,11 @@ def diagnose_campaign(campaign: Path, base_model: str, settings: dict[str, Any])
     """
     from skred.campaign import read_campaign
     from skred.diagnosis.diagnose import Effort, diagnose
-    from skred.diagnosis.gain import predictors, promised_gain
-    from skred.diagnosis.verdict import verdict
-    from skred.inference.hierarchical import hierarchical_problem
+    from skred.diagnosis.predict.gain import predictors, promised_gain
+    from skred.diagnosis.verdict.document import verdict
+    from skred.inference.hierarchical.problem import hierarchical_problem
     from skred.inference.sampling import SamplerSettings
-    from skred.laws import load_law
+    from skred.physics.laws import load_law
 
     problem = hierarchical_problem(
         read_campaign(campaign), error_model=settings["errors"], smoothing_m=settings["smoothing_m"]
@@ -71,7 +71,7 @@ def main(diagnosis: Callable[[Path, str, dict[str, Any]], Answer] = diagnose_cam
     except Exception as error:
         answer = {"verdict": "crash", "error": repr(error)[:2000], "traceback": traceback.format_exc()}
 
-    from skred.work.output import write_json
+    from skred.output import write_json
 
     write_json(own / VERDICT, answer)
 

@@ -11,7 +11,7 @@ from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group, Mechanism, Setting
 from skred.physics.mechanisms.stretches import OPPOSED_SCALES, is_opposed
 from skred.physics.terrain import Terrain
-from skred.report.tables import plain_table, plain_text
+from skred.report.shared.tables import plain_table, plain_text
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

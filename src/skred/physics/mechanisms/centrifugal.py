@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.physics.columns import Column
+from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import Added, Mechanism, Strength, along_the_track, one_shape
 from skred.physics.terrain import Terrain
 

@@ -1,6 +1,6 @@
 """Speed-independent shear strength: the same retardation everywhere."""
 
-from skred.physics.columns import Column
+from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import (
     Added,
     Mechanism,

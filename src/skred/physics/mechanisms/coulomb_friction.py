@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.physics.columns import GRAVITY, Column
+from skred.physics.kernel.columns import GRAVITY, Column
 from skred.physics.mechanisms.spec import (
     Added,
     Mechanism,

@@ -1,6 +1,6 @@
 """Mass picked up from a snow cover at rest, where there is snow to erode."""
 
-from skred.physics.columns import Column
+from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import Added, Mechanism, Strength
 from skred.physics.mechanisms.stretches import along_a_stretch, split_stretch, stretches_of_drag
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from skred.physics.columns import GRAVITY, Column
+from skred.physics.kernel.columns import GRAVITY, Column
 from skred.physics.mechanisms.spec import (
     Added,
     Direction,

@@ -1,6 +1,6 @@
 """Forest, boulders, roughness: extra drag quadratic in speed on a stretch."""
 
-from skred.physics.columns import Column
+from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import Added, Mechanism, Strength
 from skred.physics.mechanisms.stretches import along_a_stretch, split_stretch, stretches_of_drag
 

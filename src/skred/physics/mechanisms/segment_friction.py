@@ -1,6 +1,6 @@
 """Another surface on a stretch: extra retardation that does not depend on speed, of either sign."""
 
-from skred.physics.columns import Column
+from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import Added, Mechanism, Strength
 from skred.physics.mechanisms.stretches import along_a_stretch, split_stretch, stretches
 

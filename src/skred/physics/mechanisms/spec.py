@@ -9,7 +9,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.physics.columns import Column
+from skred.physics.kernel.columns import Column
 from skred.physics.terrain import Terrain
 
 FloatArray = NDArray[np.float64]
@@ -68,8 +68,8 @@ class Setting:
     velocities : tuple of bool
         Which of them read a front velocity.
     covariates : mapping
-        Covariates of the events by name, standardised as `skred.diagnosis.covariates` has it, (n_events,)
-        each; constant ones left out.
+        Covariates of the events by name, (n_events,) each, standardised as
+        `skred.diagnosis.evidence.covariates` has it; constant ones left out.
     n_events : int
     front_speed : (n_cells + 1,) array
         Typical speed of the base law's fronts at the cells' edges [m/s]: the root of the mean square over the

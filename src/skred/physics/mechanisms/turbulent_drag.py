@@ -1,6 +1,6 @@
 """Drag quadratic in speed, along the whole track."""
 
-from skred.physics.columns import Column
+from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import (
     Added,
     Mechanism,

@@ -1,6 +1,6 @@
 """Friction that falls with speed, in excess of its value at high speed."""
 
-from skred.physics.columns import Column
+from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import (
     Added,
     Direction,

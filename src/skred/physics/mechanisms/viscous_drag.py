@@ -1,6 +1,6 @@
 """Drag linear in speed."""
 
-from skred.physics.columns import Column
+from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import (
     Added,
     Mechanism,

@@ -1,0 +1,1 @@
+"""What is measured again: each file a program, `python -m benchmarks.NAME`."""

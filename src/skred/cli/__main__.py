@@ -1,0 +1,5 @@
+"""The command line as ``python -m skred.cli``."""
+
+from skred.cli.main import main
+
+main()

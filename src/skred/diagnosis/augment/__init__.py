@@ -1,0 +1,1 @@
+"""Step 4: the named mechanism added to the law, and the law calibrated again."""

@@ -1,0 +1,131 @@
+"""What a posterior with mechanisms added says of avalanches: of each recorded one, and of the next one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from skred.diagnosis.augment.augmented import AugmentedProblem
+from skred.diagnosis.evidence.extension import Extension
+from skred.inference.hierarchical.event_density import draw_nodes
+from skred.inference.hierarchical.event_draws import Avalanches, new_avalanches
+from skred.inference.hierarchical.population import population_of
+from skred.inference.hierarchical.results import add_readings, avalanche_dataset, thinned
+from skred.physics.geometry import sensor_table
+from skred.physics.kernel.fronts import simulate
+from skred.physics.law import Law
+
+FloatArray = NDArray[np.float64]
+
+
+def predictive_groups(
+    problem: AugmentedProblem, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
+) -> dict[str, xr.Dataset]:
+    """Groups as `skred.inference.hierarchical.results.predictive_groups` gives them, with what is added.
+
+    Strengths of an avalanche contain the effect of a covariate, releases their offset, fronts the factor
+    of a sensor: what it would read but for errors. The prior's added strengths are within the tables.
+    """
+    rng = np.random.default_rng([seed, 1])
+    n_events = problem.campaign.n_events
+    kept = thinned(posterior, n_events)
+    samples = _samples(problem, law, kept)
+    points = recorded_points(problem, law, samples, rng)
+    recorded, fronts = fronts_of(problem, points, problem.added_rows(samples))
+    return {
+        "event_posterior": avalanche_dataset(problem, law, kept, recorded, fronts),
+        "posterior_predictive": _predict(problem, law, kept, rng),
+        "prior_predictive": _predict(problem, law, thinned(prior, n_events), rng),
+    }
+
+
+def _samples(problem: AugmentedProblem, law: Law, draws: xr.Dataset) -> dict[str, Any]:
+    return {p.name: draws[p.name].values.ravel() for p in problem.parameters(law)}
+
+
+def _predict(problem: AugmentedProblem, law: Law, draws: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
+    samples = _samples(problem, law, draws)
+    drawn = new_avalanches(problem, law, samples, rng)
+    mean, sd, _ = problem.releases
+    deviation = np.where(sd > 0.0, (drawn.releases - mean) / np.where(sd > 0.0, sd, 1.0), 0.0)
+    points = np.concatenate([np.log(drawn.strengths), deviation[..., None]], axis=-1)
+    avalanches, fronts = fronts_of(problem, points, problem.added_rows(samples))
+    dataset = avalanche_dataset(problem, law, draws, avalanches, fronts)
+    add_readings(problem, dataset, fronts, rng)
+    return dataset
+
+
+def recorded_points(
+    problem: AugmentedProblem, law: Law, samples: Mapping[str, Any], rng: np.random.Generator
+) -> FloatArray:
+    """Each recorded avalanche's own point, (n, n_events, n_base + 1), one for each draw of the population.
+
+    A node of the nearest table by its share of the integral, moved to where it is in between the tables:
+    nodes of the same number follow the events' modes from table to table.
+    """
+    tables, n_events = problem.tables, problem.campaign.n_events
+    means, factors = population_of(law, samples)
+    added = problem.added_rows(samples)
+    uniforms = rng.random((len(means), n_events))
+    nearest = tables.grid.nearest(added)
+    first, points, log_weights = tables.nodes
+    starts = first[:-1].reshape(-1, n_events)
+    number = np.empty((len(means), n_events), dtype=np.int64)
+    for table in np.unique(nearest):
+        these = np.flatnonzero(nearest == table)
+        of_table = first[table * n_events : (table + 1) * n_events + 1]
+        drawn = draw_nodes(means[these], factors[these], uniforms[these], of_table, points, log_weights)
+        number[these] = drawn - starts[table]
+    corners, weights = tables.grid.around(added)
+    coordinates = np.vstack([points, tables.release])
+    result = np.zeros((len(means), n_events, len(coordinates)))
+    for corner, weight in zip(corners.T, weights.T, strict=True):
+        nodes = starts[corner] + number
+        result += weight[:, None, None] * np.moveaxis(coordinates[:, nodes], 0, -1)
+    return result
+
+
+class _Instruments(Extension):
+    """An extension read as instruments do: 0 where a front does not come, spans as a whole."""
+
+    def read(
+        self, events: NDArray[np.int64], points: FloatArray, strengths: FloatArray
+    ) -> tuple[Avalanches, FloatArray]:
+        """Strengths and releases with what is added, and readings without errors, runout last."""
+        rows, releases, factors = self._inputs(events, points, strengths)
+        table = sensor_table([*self.problem.sensor_places, None])
+        readings = simulate(rows, releases, self.problem.path, self.contributions, table)
+        return Avalanches(rows[:, : self.n_base], releases), readings * factors
+
+
+def fronts_of(
+    problem: AugmentedProblem, points: FloatArray, added: FloatArray
+) -> tuple[Avalanches, FloatArray]:
+    """Avalanches as they are with what is added, and their readings without errors.
+
+    Parameters
+    ----------
+    points : (n, n_events, n_base + 1) array
+    added : (n, n_added) array
+
+    Returns
+    -------
+    avalanches : Avalanches
+    fronts : (n, n_events, n_sensors + 1) array
+        The runout last.
+    """
+    n, n_events = points.shape[:2]
+    extension, base = problem.extension, problem.base
+    instruments = _Instruments(extension.problem, extension.law, extension.directions)
+    given = np.column_stack([np.tile(base.strengths, (n, 1)), added]).repeat(n_events, axis=0)
+    avalanches, fronts = instruments.read(
+        np.tile(np.arange(n_events), n), points.reshape(n * n_events, -1), given
+    )
+    shaped = Avalanches(
+        avalanches.strengths.reshape(n, n_events, -1), avalanches.releases.reshape(n, n_events)
+    )
+    return shaped, fronts.reshape(n, n_events, -1)

@@ -1,0 +1,167 @@
+"""Tables of nodes on a grid of added strengths that covers their posterior."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.augment.coefficient_grid import Grid, Located
+from skred.diagnosis.evidence.coefficient import Base, repeated
+from skred.diagnosis.evidence.conditional_map import Population, Rows, event_modes, log_joint
+from skred.diagnosis.evidence.event_quadrature import Budget, Spread, event_nodes
+from skred.diagnosis.evidence.extension import Extension
+from skred.inference.hierarchical.surface import Nodes
+from skred.parallel.threads import in_parts, side_by_side
+
+FloatArray = NDArray[np.float64]
+_LEAST = Budget(128, 128, 256, 1.5, 1.8)
+BUDGETS = _LEAST, _LEAST.times(2)
+"""Of the tables: each where the one before is not good enough."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tables:
+    """Nodes at each strength of a grid.
+
+    Attributes
+    ----------
+    located : Located
+    nodes : Nodes
+        Of all events at the first strengths, then at the next, ...
+    release : (n_nodes,) array
+        The release's deviation at each node, in standard deviations.
+    modes : (n_tables, n_events, n_base + 1) array
+        Most probable points of the events.
+    budget : Budget
+    """
+
+    located: Located
+    nodes: Nodes
+    release: FloatArray
+    modes: FloatArray
+    budget: Budget
+
+    @property
+    def grid(self) -> Grid:
+        """The strengths that there are nodes at."""
+        return self.located.grid
+
+    @property
+    def mean(self) -> FloatArray:
+        """Posterior mean of the strengths by the race's formula, (n_added,)."""
+        return self.located.mean
+
+    @property
+    def arrays(self) -> dict[str, Any]:
+        """What the compiled interpolation reads, by name."""
+        return {**self.grid._asdict(), **self.nodes._asdict()}
+
+
+def build_tables(
+    base: Base, extension: Extension, located: Located, budget: Budget, visited: Population | None = None
+) -> Tables:
+    """Nodes of all events at all strengths of a grid, around populations as wide as what is known of them.
+
+    Parameters
+    ----------
+    visited : Population, optional
+        Others that the nodes must cover, one or more groups.
+    """
+    grid, fits = located.grid, located.fits
+    n, n_tables, n_events = len(base.law.mechanisms), len(fits), len(base.rows.event)
+    rows = repeated(base.rows, n_tables)
+    given = np.column_stack([np.tile(base.strengths, (n_tables, 1)), grid.points]).repeat(n_events, axis=0)
+    found = [fit.found.population(n) for fit in fits]
+    population = Population(
+        np.concatenate([one.mean for one in found]), np.concatenate([one.covariance for one in found])
+    )
+    start = highest(extension, rows, np.stack([fit.points for fit in fits]), given, population)
+    # Populations of the posterior differ in mean and in spread.
+    covariances = np.stack([fit.found.covariance for fit in fits])
+    wider = np.exp(np.minimum(np.sqrt(np.einsum("tii->ti", covariances)[:, n : 2 * n]), 0.7))
+    wide = population.covariance * wider[:, :, None] * wider[:, None, :]
+    wide = wide + np.clip(covariances[:, :n, :n], -1.0, 1.0)
+    reference = base.population if visited is None else base.population.with_more(visited)
+    around = Population(population.mean, wide)
+
+    def spread(part: slice) -> tuple[Spread, FloatArray]:
+        own, at = rows.take(np.arange(len(start))[part]), given[part]
+        modes = event_modes(extension, own, start[part], at, population, n_steps=8)
+        return event_nodes(extension, own, at, around, modes, budget, reference), modes.points
+
+    spreads, modes = zip(*side_by_side(spread, in_parts(len(start))), strict=True)
+    nodes, points = Spread.joined(spreads), np.concatenate(modes).reshape(n_tables, n_events, n + 1)
+    return Tables(located, nodes.nodes, nodes.points[:, :, n].ravel(), points, budget)
+
+
+def highest(
+    extension: Extension, rows: Rows, points: FloatArray, strengths: FloatArray, population: Population
+) -> FloatArray:
+    """The highest of the modes found from each table's own points and from its neighbours', as rows.
+
+    Avalanches that stop at a place or pass it have two modes, and a table that is in the lower one of an
+    event would stand out between its neighbours.
+    """
+
+    def climbed(start: FloatArray) -> tuple[FloatArray, FloatArray]:
+        def climb(part: slice) -> tuple[FloatArray, FloatArray]:
+            own, at = rows.take(np.arange(len(start))[part]), strengths[part]
+            top = event_modes(extension, own, start[part], at, population, n_steps=8).points
+            return top, log_joint(extension, own, top, at, population)
+
+        tops, heights = zip(*side_by_side(climb, in_parts(len(start))), strict=True)
+        return np.concatenate(tops), np.concatenate(heights)
+
+    best, height = climbed(_flat(points))
+    found = best.reshape(points.shape)
+    for side in (1, -1):
+        tried, new = climbed(_flat(np.roll(found, side, axis=0)))
+        best = np.where((new > height)[:, None], tried, best)
+        height = np.maximum(new, height)
+    return best
+
+
+def _flat(points: FloatArray) -> FloatArray:
+    """Points of all tables, (n_tables, n_events, n), as rows."""
+    return points.reshape(-1, points.shape[-1])
+
+
+def exact_nodes(
+    extension: Extension,
+    rows: Rows,
+    strengths: FloatArray,
+    population: Population,
+    start: FloatArray,
+    budget: Budget,
+    reference: Population,
+    shifts: FloatArray | None = None,
+) -> Nodes:
+    """Nodes at some strengths for some populations themselves, one group of rows for each.
+
+    Parameters
+    ----------
+    rows : Rows
+        Of one group.
+    strengths : (n_groups, n_directions) array
+    population : Population
+    start : (n_groups, n_rows, n_base + 1) array
+        Points near the modes.
+    reference : Population
+        As in `event_nodes`.
+    shifts : (n_groups * n_rows, n_base + 1) array, optional
+        As in `event_nodes`.
+    """
+    n_rows = len(rows.event)
+    many, given = repeated(rows, len(strengths)), strengths.repeat(n_rows, axis=0)
+    at = start.reshape(len(given), -1)
+
+    def spread(part: slice) -> Spread:
+        own, added = many.take(np.arange(len(given))[part]), given[part]
+        modes = event_modes(extension, own, at[part], added, population)
+        shifted = None if shifts is None else shifts[part]
+        return event_nodes(extension, own, added, population, modes, budget, reference, shifted)
+
+    return Spread.joined(side_by_side(spread, in_parts(len(given)))).nodes

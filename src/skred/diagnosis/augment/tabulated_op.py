@@ -1,0 +1,173 @@
+"""Integrated log densities of a law with mechanisms added, between the strengths at which there are nodes.
+
+Tables of nodes stand on a regular grid of the added strengths, skewed where two go together. Between them
+the log density of each event is interpolated by cubic polynomials, along every axis through the four
+tables nearest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from pytensor.graph.basic import Variable
+from pytensor.link.numba.dispatch.basic import numba_njit, register_funcify_default_op_cache_key
+
+from skred.diagnosis.compiled import DIAGNOSIS_CACHE_KEY, compiled
+from skred.inference.array_op import ArrayOp
+from skred.inference.hierarchical.event_density import integrated_log_density
+
+LEAST_TABLES = 4
+"""Along each axis: what a cubic polynomial goes through."""
+_WALL = 12.0
+"""Nats that all events lose a step outside the tables: chains turn back, and yet find in from anywhere."""
+_OVERSHOOT = 0.5
+"""How far beyond the densities at the tables an interpolated one may be, in nats."""
+
+
+@compiled()
+def _cubic_weights(place, size, weights):  # type: ignore[no-untyped-def]
+    """Fill the weights of four neighbours on the grid 0, 1, ..., size - 1; returns the first of them."""
+    lowest = int(min(max(math.floor(place) - 1.0, 0.0), size - 4.0))
+    t = place - lowest
+    weights[0] = -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0
+    weights[1] = t * (t - 2.0) * (t - 3.0) / 2.0
+    weights[2] = -t * (t - 1.0) * (t - 3.0) / 2.0
+    weights[3] = t * (t - 1.0) * (t - 2.0) / 6.0
+    return lowest
+
+
+@compiled()
+def tabulated_log_density(  # type: ignore[no-untyped-def]
+    means, factor, strengths, origin, steps, size, first, points, log_weights
+):
+    """Log likelihood of each event at some added strengths, its own strengths integrated over the population.
+
+    Parameters
+    ----------
+    means : (n_events, n_strengths) array
+        Population mean of the logarithms of the base's strengths, for each event.
+    factor : (n_strengths, n_strengths) array
+        Lower Cholesky factor of their covariance.
+    strengths : (n_added,) array
+    origin : (n_added,) array
+        Strengths of the first table.
+    steps : (n_added, n_added) array
+        Lower triangular: each column is the step from table to table along an axis.
+    size : (n_added,) integer array
+        Tables along each axis, at least four.
+    first : (n_tables * n_events + 1,) integer array
+        Where the nodes of each table's events begin, the last axis of the tables running fastest.
+    points : (n_strengths, n_nodes) array
+    log_weights : (n_nodes,) array
+
+    Returns
+    -------
+    (n_events,) array
+        Outside the tables those at their edge, less what turns a chain back.
+    """
+    n_events, n_axes = means.shape[0], strengths.size
+    density = np.zeros(n_events)
+    least, most = np.full(n_events, np.inf), np.full(n_events, -np.inf)
+    weights, lowest = np.empty((n_axes, 4)), np.empty(n_axes, np.int64)
+    place, outside = np.empty(n_axes), 0.0
+    for axis in range(n_axes):
+        place[axis] = strengths[axis] - origin[axis]
+        for before in range(axis):
+            place[axis] -= steps[axis, before] * place[before]
+        place[axis] /= steps[axis, axis]
+    for axis in range(n_axes):
+        inside = min(max(place[axis], 0.0), size[axis] - 1.0)
+        outside += abs(place[axis] - inside)
+        lowest[axis] = _cubic_weights(inside, size[axis], weights[axis])
+    for corner in range(4**n_axes):
+        weight, table, rest = 1.0, 0, corner
+        for axis in range(n_axes):
+            table = table * size[axis] + lowest[axis] + rest % 4
+            weight *= weights[axis, rest % 4]
+            rest //= 4
+        if abs(weight) < 1e-12:
+            continue
+        of_table = first[table * n_events : (table + 1) * n_events + 1]
+        at_corner = integrated_log_density(means, factor, of_table, points, log_weights)
+        for event in range(n_events):
+            density[event] += weight * at_corner[event]
+            least[event] = min(least[event], at_corner[event])
+            most[event] = max(most[event], at_corner[event])
+    # Far from all nodes tables differ by hundreds, and polynomials through them overshoot.
+    for event in range(n_events):
+        density[event] = min(max(density[event], least[event] - _OVERSHOOT), most[event] + _OVERSHOOT)
+        density[event] -= _WALL * outside / n_events
+    return density
+
+
+@compiled()
+def tabulated_log_densities(  # type: ignore[no-untyped-def]
+    means, factors, strengths, n_events, origin, steps, size, first, points, log_weights
+):
+    """As `tabulated_log_density` for many draws of population and strengths, (n, n_events)."""
+    result = np.empty((len(means), n_events))
+    of_event = np.empty((n_events, means.shape[1]))
+    for k in range(len(means)):
+        of_event[:] = means[k]
+        result[k] = tabulated_log_density(
+            of_event, factors[k], strengths[k], origin, steps, size, first, points, log_weights
+        )
+    return result
+
+
+class TabulatedLogDensity(ArrayOp):
+    """Log density of each event, (n_events,), from population, added strengths and tables of nodes.
+
+    See `tabulated_log_density`. It has no gradient: sample with Metropolis or SMC.
+    """
+
+    array_inputs = (
+        ("means", 2, "float64"),
+        ("factor", 2, "float64"),
+        ("strengths", 1, "float64"),
+        ("origin", 1, "float64"),
+        ("steps", 2, "float64"),
+        ("size", 1, "int64"),
+        ("first", 1, "int64"),
+        ("points", 2, "float64"),
+        ("log_weights", 1, "float64"),
+    )
+    differentiable = frozenset({"means", "factor", "strengths"})
+
+    def output_shape(self, shapes: Sequence[tuple[Any, ...]]) -> tuple[Any, ...]:
+        """(n_events,)."""
+        return (shapes[0][0],)
+
+    def evaluate(self, inputs: Sequence[Any]) -> Any:
+        """Log densities from numpy arrays."""
+        return tabulated_log_density(*inputs)
+
+    def pullback(
+        self, inputs: Sequence[Variable], outputs: Sequence[Variable], cotangents: Sequence[Variable]
+    ) -> list[Variable]:
+        """Not there.
+
+        Raises
+        ------
+        TypeError
+            Always.
+        """
+        raise TypeError(
+            "TabulatedLogDensity has no gradient: use --sampler metropolis for a law with mechanisms added"
+        )
+
+
+@register_funcify_default_op_cache_key(TabulatedLogDensity)
+def _funcify(op: TabulatedLogDensity, node: Any = None, **kwargs: Any) -> Any:
+    @numba_njit
+    def tabulated_density(  # type: ignore[no-untyped-def]
+        means, factor, strengths, origin, steps, size, first, points, log_weights
+    ):
+        return tabulated_log_density(
+            means, factor, strengths, origin, steps, size, first, points, log_weights
+        )
+
+    return tabulated_density, DIAGNOSIS_CACHE_KEY

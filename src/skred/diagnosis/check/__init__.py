@@ -1,0 +1,1 @@
+"""Step 2: whether anything is wrong, by a parametric bootstrap test."""

@@ -1,0 +1,100 @@
+"""Is anything wrong? The evidence for anything at all, against what clean campaigns show.
+
+Whole campaigns are simulated from the base law's posterior and everything is refitted to each, so that the
+price of looking at many mechanisms and places is paid; sampling stops as soon as the answer is clear
+(Besag and Clifford, 1991, doi 10.1093/biomet/78.2.301).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import batched
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.check.bootstrap_campaigns import replicas
+from skred.diagnosis.detect.score_test import Screen
+from skred.diagnosis.evidence.conditional_map import Population, Rows
+from skred.diagnosis.evidence.linear_mixed_model import fit_population
+from skred.parallel.threads import side_by_side, threads
+
+FloatArray = NDArray[np.float64]
+LIMIT = 0.01
+"""Share of clean campaigns that may be called wrong."""
+_ENOUGH_ABOVE = 8
+_BATCH = 25
+
+
+@dataclass(frozen=True, eq=False)
+class Omnibus:
+    """The check's outcome.
+
+    Attributes
+    ----------
+    statistic : float
+        Log odds of anything against nothing, in the linear model.
+    simulated : (n,) array
+        The same of clean campaigns.
+    """
+
+    statistic: float
+    simulated: FloatArray
+
+    @property
+    def p_value(self) -> float:
+        """Share of clean campaigns at least as odd, by Besag and Clifford's rule where it stopped early."""
+        above = int(np.sum(self.simulated >= self.statistic))
+        if above >= _ENOUGH_ABOVE:
+            return above / len(self.simulated)
+        return (above + 1) / (len(self.simulated) + 1)
+
+    @property
+    def fired(self) -> bool:
+        """Whether the calibrated limit is passed."""
+        return self.p_value <= LIMIT
+
+
+def omnibus(
+    screen: Screen,
+    rows: Rows,
+    start: tuple[Population, FloatArray],
+    draws: tuple[FloatArray, FloatArray],
+    seed: int,
+    most: int = 300,
+) -> Omnibus:
+    """Check the base law.
+
+    Parameters
+    ----------
+    start : (Population, points)
+        Of the real recordings.
+    draws : (n, n_base) and (n, n_base, n_base) arrays
+        Means and factors of populations from the base law's posterior, at least `most` of them.
+    """
+    statistic = float(_refitted(screen, rows, start)[0])
+    rng = np.random.default_rng([seed, 21])
+    simulated: list[FloatArray] = []
+    for some in batched(range(0, most, _BATCH), threads()):
+        # Simulated one after the other and counted in order: how many threads there are changes nothing.
+        made = [_simulated(screen, draws, slice(first, min(first + _BATCH, most)), rng) for first in some]
+        for refitted in side_by_side(lambda clean: _refitted(screen, *clean), made):
+            simulated.append(refitted)
+            if np.sum(np.concatenate(simulated) >= statistic) >= _ENOUGH_ABOVE:
+                return Omnibus(statistic, np.concatenate(simulated))
+    return Omnibus(statistic, np.concatenate(simulated))
+
+
+def _simulated(
+    screen: Screen, draws: tuple[FloatArray, FloatArray], batch: slice, rng: np.random.Generator
+) -> tuple[Rows, tuple[Population, FloatArray]]:
+    """Clean campaigns from some of the draws, and where to begin refitting them."""
+    means, factors = draws[0][batch], draws[1][batch]
+    rows, points = replicas(screen.extension, screen.strengths, means, factors, rng)
+    return rows, (Population(means.copy(), np.einsum("gij,gkj->gik", factors, factors)), points)
+
+
+def _refitted(screen: Screen, rows: Rows, start: tuple[Population, FloatArray]) -> FloatArray:
+    """The statistic after refitting populations and events, (n_groups,)."""
+    population, points = fit_population(screen.extension, rows, screen.strengths, screen.prior, start)
+    return screen.statistic(screen.scores(rows, points, population))

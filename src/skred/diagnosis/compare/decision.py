@@ -1,0 +1,114 @@
+"""How probabilities become a verdict: the rule of the campaign format, and ties across groups beside it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from skred.diagnosis.check.bootstrap_test import LIMIT
+from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.spec import Group
+
+HELD = 0.9
+"""Share of its group that a tie set holds."""
+TIED_NATS = 2.0
+"""An id of another group is tied with the named one where its log probability is at most so far below: some
+such ties no recordings split (a low dam and a bias of the sensor beside it), and a group leads by less. Which
+group leads decides the verdict, not whether its name stands alone."""
+NOTHING_AT_MOST, NOTHING_ALONE = 0.5, 0.15
+ALARMS = ((LIMIT, NOTHING_AT_MOST), (1.0, NOTHING_ALONE))
+"""The alarm is raised where, for any of these, the check's p-value is at most the first and the probability
+of nothing below the second: the check, unless the race denies it; the race alone. By the evidence alone a
+clean campaign falls below the latter with at most a sixth of probability (Markov's inequality for a Bayes
+factor); it is far rarer (``benchmarks/alarm_limit.py``)."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What the probabilities say.
+
+    Attributes
+    ----------
+    verdict : str
+        As in the campaign format.
+    names : tuple of str
+        One is named, several are tied, none where nothing is. Those of the leading group come first, each
+        group's most probable first; `unlisted` may be among the tied ones, and never comes first.
+    """
+
+    verdict: str
+    names: tuple[str, ...]
+
+    @property
+    def disputed(self) -> bool:
+        """Whether physics, in the list or not, and instruments are tied: either may be off."""
+        faults = [name != UNLISTED and mechanisms()[name].group == Group.INSTRUMENT for name in self.names]
+        return any(faults) and not all(faults)
+
+
+def alarmed(probability: Mapping[str, float], p_value: float) -> bool:
+    """Whether something is wrong, by the check and the race together."""
+    return any(p_value <= most and probability[NOTHING] < below for most, below in ALARMS)
+
+
+def _silent(probability: Mapping[str, float], p_value: float) -> bool:
+    """Whether neither check nor race gives a reason to add anything; less than an alarm is reason enough."""
+    return p_value > LIMIT and probability[NOTHING] >= NOTHING_AT_MOST
+
+
+def decide(probability: Mapping[str, float], p_value: float, can_tell: bool) -> Decision:
+    """Verdict from probabilities.
+
+    Parameters
+    ----------
+    probability : mapping
+        Of each id.
+    p_value : float
+        Of the omnibus check.
+    can_tell : bool
+        Whether relevant strengths would mostly have been found.
+
+    Returns
+    -------
+    Decision
+        Without an alarm `nothing_missing`, if relevant strengths would have been found, the check does not
+        fire and nothing is not less probable than it was beforehand; else `cannot_tell`.
+    """
+    if not alarmed(probability, p_value):
+        nothing = can_tell and _silent(probability, p_value)
+        return Decision("nothing_missing" if nothing else "cannot_tell", ())
+    return blamed(probability)
+
+
+def blamed(probability: Mapping[str, float]) -> Decision:
+    """What is off, if something is: the smallest set of the leading group, and what is tied with its name."""
+    groups: dict[str, dict[str, float]] = {UNLISTED: {UNLISTED: probability[UNLISTED]}}
+    for name, share in probability.items():
+        if name not in (NOTHING, UNLISTED):
+            groups.setdefault(mechanisms()[name].group, {})[name] = share
+    leading = max(groups, key=lambda group: sum(groups[group].values()))
+    if leading == UNLISTED:
+        return Decision("unexplained", ())
+    verdict = "missing_physics" if leading == Group.PHYSICS else "instrument"
+    names = smallest_set(groups[leading])
+    others = {name: share for group in groups if group != leading for name, share in groups[group].items()}
+    return Decision(verdict, (*names, *_within(others, probability[names[0]])))
+
+
+def _within(shares: Mapping[str, float], leading: float) -> tuple[str, ...]:
+    """Ids whose probability is close to that of the named one, most probable first."""
+    close = [name for name, share in shares.items() if share >= math.exp(-TIED_NATS) * leading]
+    return tuple(sorted(close, key=lambda name: -shares[name]))
+
+
+def smallest_set(shares: Mapping[str, float]) -> tuple[str, ...]:
+    """The smallest set of ids that holds 0.9 of their group, most probable first."""
+    total, held, names = sum(shares.values()), 0.0, []
+    for name in sorted(shares, key=lambda name: -shares[name]):
+        names.append(name)
+        held += shares[name]
+        if held >= HELD * total:
+            break
+    return tuple(names)

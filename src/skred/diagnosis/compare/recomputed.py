@@ -1,0 +1,104 @@
+"""What many more nodes, and sampling, change for those that lead a race: mechanisms and free forces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.compare.candidate import Entrant
+from skred.diagnosis.discrepancy.profile import KINDS, Profile
+from skred.diagnosis.discrepancy.sampled_evidence import sampled_log_factor
+from skred.diagnosis.evidence.coefficient import Base, Fit, refit
+from skred.diagnosis.evidence.conditional_map import event_modes
+from skred.diagnosis.evidence.event_quadrature import FINE, event_nodes
+from skred.diagnosis.evidence.extension import Extension, extended
+from skred.diagnosis.evidence.marginal import evidence, importance_evidence
+
+FloatArray = NDArray[np.float64]
+_CHECKED, _DRAWS = 5, 500
+"""Mechanisms looked at, at most, and populations drawn for each."""
+_BEHIND = 6.0
+"""Nats behind the best of all at which nothing is looked at: it counts for a ninetieth, as stated
+(`odds.POWER`), and a look changes what a mechanism has by a nat or so."""
+_COUNTS, _TOO_LOW = 4.0, 4.0
+"""Nats behind the best at which what a force has need not be known better than its first draws tell: two nats
+more there are a tenth of a nat for all together. Nats that it may have more than by Laplace's formula."""
+
+
+def corrected(
+    base: Base,
+    entrants: Mapping[str, Entrant],
+    profiles: Sequence[Profile],
+    pool: ThreadPoolExecutor,
+    best: float = -np.inf,
+) -> tuple[dict[str, Entrant], list[Profile]]:
+    """All candidates under one error model, those that lead looked at once more.
+
+    Mechanisms at the top of their best curve, if it was computed with fronts: what is wrong with a rough one
+    is its own. Profiles by sampling their values.
+
+    Parameters
+    ----------
+    best : float
+        The most that a candidate has under another error model, in nats above nothing under this one.
+    """
+    height = {name: entrant.log_bayes_factor for name, entrant in entrants.items()}
+    force = [one.log_bayes_factor for one in profiles]
+    most = max(best, *height.values(), *force)
+    leading = sorted(
+        (name for name in height if height[name] > most - _BEHIND), key=lambda name: -height[name]
+    )
+    leading = [name for name in leading[:_CHECKED] if not entrants[name].best.rough]
+    # A force that is less probable than none would raise no alarm with some nats more.
+    worth = [k for k, factor in enumerate(force) if factor > max(most - _COUNTS - _TOO_LOW, 0.0)]
+    # Each waits for jobs of the pool, and takes none of its threads for that.
+    with ThreadPoolExecutor(len(KINDS)) as waiting:
+        sampled = {
+            k: waiting.submit(sampled_log_factor, base, profiles[k], pool, max(most - _COUNTS, 0.0))
+            for k in worth
+        }
+        found = _looked_at(base, entrants, leading, pool)
+        factors = {k: one.result() for k, one in sampled.items()}
+    again = [replace(one, log_bayes_factor=factors.get(k, force[k])) for k, one in enumerate(profiles)]
+    return found, again
+
+
+def _looked_at(
+    base: Base, entrants: Mapping[str, Entrant], leading: Sequence[str], pool: ThreadPoolExecutor
+) -> dict[str, Entrant]:
+    """All mechanisms, those that lead with many more nodes at the top of their best curve."""
+    looked = {name: pool.submit(_at_top, base, entrants[name]) for name in leading}
+    plain = extended(base.problem, base.law, base.directions)
+    nothing = pool.submit(_finely, base, plain, base.strengths, base.fit) if leading else None
+    found = dict(entrants)
+    for name, one in looked.items():
+        assert nothing is not None
+        (laplace, fine), without = one.result(), nothing.result()
+        correction = fine - without[1] - float(entrants[name].best.log_evidence.max())
+        disagreement = (fine - laplace) - (without[1] - without[0])
+        found[name] = replace(entrants[name], correction=correction, disagreement=disagreement)
+    return found
+
+
+def _at_top(base: Base, entrant: Entrant) -> tuple[float, float]:
+    """At the top of a mechanism's best curve."""
+    best = entrant.best
+    top = int(np.argmax(best.log_evidence))
+    extension = extended(base.problem, base.law, (*base.directions, best.direction))
+    return _finely(base, extension, np.append(base.strengths, best.strengths[top]), best.fits[top])
+
+
+def _finely(base: Base, extension: Extension, strengths: FloatArray, fit: Fit) -> tuple[float, float]:
+    """Log evidence with many nodes, from where a fit is: by Laplace's formula, by importance sampling."""
+    start = (fit.found.population(len(base.law.mechanisms)), fit.points)
+    fits = refit(extension, base.rows, strengths[None, :], start, base.log_scale, FINE, n_rounds=2)
+    population = fits[0].found.population(len(base.law.mechanisms))
+    modes = event_modes(extension, base.rows, fits[0].points, strengths, population)
+    nodes = event_nodes(extension, base.rows, strengths, population, modes, FINE, base.population).nodes
+    found = evidence(nodes, base.log_scale, fits[0].found.psi)
+    sampled, _ = importance_evidence(nodes, base.log_scale, found, _DRAWS, seed=0)
+    return found.log_evidence, sampled

@@ -1,0 +1,218 @@
+"""What these recordings can tell, before any residual is looked at.
+
+For each mechanism: how much of its information is left once base strengths, their scatter and releases
+have had their share; the smallest strength that would be found in 90 % of cases; what it cannot be told
+from; and the one extra sensor that would help most. It depends on track, sensors and number of events, and
+on where the events' modes are, not on whether the readings fit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from skred.campaign import Sensor, Status
+from skred.diagnosis.detect.score_test import Screen
+from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, campaign_rows
+from skred.diagnosis.evidence.linear_mixed_model import Scores, efficient_scores, without
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.physics.mechanisms.spec import Added, Group, Mechanism
+
+FloatArray = NDArray[np.float64]
+LIMIT_Z = 2.85
+"""Score at which one of about 18 distinguishable candidates stands out in 1 % of clean campaigns."""
+_NINE_IN_TEN = 1.2816
+ALIKE = 0.9
+"""Size of the cosine between two efficient scores above which mechanisms look alike."""
+_PLACES = 12
+_NO_INFORMATION = 1e-6
+"""About a strength in scales of its prior."""
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What the recordings can tell of one mechanism.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    kept : float
+        Share of its information left, at its typical place.
+    limit : float
+        Strength found in 90 % of cases, at its typical place, in its unit.
+    limit_m : (float, float) or None
+        The stretch where that limit is lowest.
+    best_limit : float
+        The limit there.
+    power : float
+        Probability that a relevant strength is found, over its places.
+    alike : tuple of str
+        Ids that it cannot be told from.
+    """
+
+    mechanism: Mechanism
+    kept: float
+    limit: float
+    best_limit: float
+    limit_m: tuple[float, float] | None
+    power: float
+    alike: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Identifiability:
+    """The table, and the sensor that would help most.
+
+    Attributes
+    ----------
+    rows : tuple of Told
+    sensor_m : float or None
+        Where one more velocity sensor raises the power most.
+    power : float
+        Mean power over the listed physics.
+    power_with : float
+        The same with that sensor.
+    """
+
+    rows: tuple[Told, ...]
+    sensor_m: float | None
+    power: float
+    power_with: float
+
+    @property
+    def can_tell(self) -> bool:
+        """Whether a relevant strength of what is listed would be found in at least half of the cases."""
+        return self.power >= 0.5
+
+
+def identify(screen: Screen, rows: Rows, points: FloatArray, population: Population) -> Identifiability:
+    """What the recordings can tell, around the events' modes."""
+    scores = screen.scores(rows, points, population)
+    table = told(screen, scores)
+    places, with_each = extra_sensors(screen, points, population)
+    power = mean_power(table)
+    powers = [mean_power(told(screen, one)) for one in with_each]
+    if not powers:
+        return Identifiability(tuple(table), None, power, power)
+    best = int(np.argmax(powers))
+    return Identifiability(tuple(table), float(places[best]), power, powers[best])
+
+
+def mean_power(table: list[Told]) -> float:
+    """Mean power over the listed physics."""
+    powers = [row.power for row in table if row.mechanism.group is Group.PHYSICS]
+    return float(np.mean(powers)) if powers else 0.0
+
+
+def told(screen: Screen, scores: Scores) -> list[Told]:
+    """One row for each mechanism."""
+    _, information, raw = screen.of_candidates(scores)
+    order = screen.order
+    cosine = scores.information[0][np.ix_(order, order)]
+    scales = np.array([_added(candidate.mechanism).scale for candidate in screen.candidates])
+    informed = information[0] * scales**2 > _NO_INFORMATION
+    own_or_one = np.where(informed, information[0], 1.0)
+    cosine = np.where(np.outer(informed, informed), cosine / np.sqrt(np.outer(own_or_one, own_or_one)), 0.0)
+    ids = np.array([candidate.mechanism.id for candidate in screen.candidates])
+    table = []
+    for name in dict.fromkeys(ids):
+        members = np.flatnonzero(ids == name)
+        own = information[0, members]
+        best = members[int(np.argmax(own))]
+        typical = members[int(np.argsort(own)[len(own) // 2])]
+        mechanism, shape = screen.candidates[best].mechanism, screen.candidates[best].shape
+        added = _added(mechanism)
+        alike = {str(ids[k]) for k in np.flatnonzero(np.abs(cosine[best]) > ALIKE)} - {name}
+        stretch = None if shape.s_from_m is None or shape.s_to_m is None else (shape.s_from_m, shape.s_to_m)
+        kept = information[0, typical] / raw[0, typical] if informed[typical] else 0.0
+        table.append(
+            Told(
+                mechanism,
+                float(np.clip(kept, 0.0, 1.0)),
+                _limit(information[0, typical], informed[typical]),
+                _limit(information[0, best], informed[best]),
+                stretch,
+                float(np.mean(ndtr(np.sqrt(own) * added.relevant - LIMIT_Z))),
+                tuple(sorted(alike)),
+            )
+        )
+    return table
+
+
+def _added(mechanism: Mechanism) -> Added:
+    assert mechanism.added is not None
+    return mechanism.added
+
+
+def _limit(information: float, informed: bool) -> float:
+    """Strength found in 90 % of cases; infinite where the recordings say nothing."""
+    return (LIMIT_Z + _NINE_IN_TEN) / float(np.sqrt(information)) if informed else float("inf")
+
+
+def extra_sensors(
+    screen: Screen, points: FloatArray, population: Population
+) -> tuple[FloatArray, list[Scores]]:
+    """Places for one more velocity sensor, and the information with each."""
+    first, last = screen.setting.recorded_m
+    release = float(screen.problem.releases.mean.max())
+    low = max(release + 20.0, first - 0.5 * (last - first))
+    places = np.linspace(low, min(last, screen.problem.terrain.length_m - 1.0), _PLACES)
+    problem = with_sensors(screen.problem, places)
+    n_new = len(places)
+    setting = replace(
+        screen.setting,
+        sensors=tuple(problem.campaign.sensor_ids),
+        velocities=(*screen.setting.velocities, *[False] * n_new),
+    )
+    wide = replace(screen, problem=problem, setting=setting)
+    rows = campaign_rows(wide.extension)
+    around = wide.around(rows, points)
+    columns = np.arange(n_new) + len(screen.problem.campaign.sensors)
+    found = [
+        efficient_scores(_also_reading(around, problem, int(column)), rows, population, wide.prior)
+        for column in columns
+    ]
+    return places, [without(scores, len(screen.directions)) for scores in found]
+
+
+def _also_reading(modes: Modes, problem: HierarchicalProblem, column: int) -> Modes:
+    """Modes with a reading, as expected, at one more sensor wherever the front comes."""
+    curvature = modes.curvature.copy()
+    readings, speed = problem.readings, modes.predictions[:, column]
+    sd = np.hypot(readings.relative_sd[column] * speed, readings.absolute_sd[column])
+    curvature[:, column] = np.where(speed > 0.0, sd**-2.0, 0.0)
+    return modes._replace(curvature=curvature)
+
+
+def with_sensors(problem: HierarchicalProblem, places: FloatArray) -> HierarchicalProblem:
+    """The problem with more velocity sensors that have read nothing, as good as the campaign's usual one."""
+    campaign = problem.campaign
+    velocities = [sensor for sensor in campaign.sensors if not sensor.is_runout]
+    relative = float(np.median([sensor.relative_sd for sensor in velocities])) if velocities else 0.1
+    absolute = float(np.median([sensor.absolute_sd for sensor in velocities])) if velocities else 0.5
+    taken = set(campaign.sensor_ids)
+    new = tuple(
+        Sensor(_free_name(k, taken), "front_velocity", float(s), float(s), relative, absolute)
+        for k, s in enumerate(places)
+    )
+    empty = np.full((campaign.n_events, len(new)), np.nan)
+    return replace(
+        problem,
+        campaign=replace(
+            campaign,
+            sensors=(*campaign.sensors, *new),
+            values=np.column_stack([campaign.values, empty]),
+            status=np.column_stack([campaign.status, np.full(empty.shape, int(Status.MISSING))]),
+            stated_sd=np.column_stack([campaign.stated_sd, empty]),
+        ),
+    )
+
+
+def _free_name(number: int, taken: set[str]) -> str:
+    name = f"extra {number + 1}"
+    while name in taken:
+        name += "'"
+    return name

@@ -1,0 +1,198 @@
+"""What a campaign's recordings can tell, without sampling: identify.json and a table for the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from skred.diagnosis.detect.detectability import Identifiability, Told
+from skred.diagnosis.detect.detectability import identify as look
+from skred.diagnosis.detect.score_test import Screen
+from skred.diagnosis.diagnose import too_little
+from skred.diagnosis.evidence.coefficient import Base, fit_base
+from skred.diagnosis.evidence.conditional_map import campaign_rows
+from skred.diagnosis.evidence.extension import extended
+from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.output import write_json
+from skred.physics.law import Law
+from skred.report.shared.labels import shortened
+from skred.report.shared.numbers import decimals_for, rounded, share
+from skred.report.shared.tables import plain_table, plain_text
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+Tell = Callable[[str], None]
+FILE = "identify.json"
+_ROUNDS = 40
+_UNSEEN = 20.0
+"""In scales of the prior: a limit beyond is none, as in the verdict."""
+
+
+def identify_to(
+    problem: HierarchicalProblem, law: Law, folder: Path, tell: Tell = lambda line: None
+) -> dict[str, Any]:
+    """What the recordings can tell of a law, written to identify.json.
+
+    Parameters
+    ----------
+    problem : HierarchicalProblem
+    law : Law
+        That something may be missing from.
+    folder : Path
+    tell : callable
+        Is told of each stage.
+
+    Returns
+    -------
+    dict
+        The content of identify.json; ``reason`` says why it tells nothing, where it does not.
+    """
+    reason = too_little(problem)
+    table = None
+    if not reason:
+        tell(f"{law.id}: fitting the population of avalanches")
+        base = base_of(problem, law)
+        tell("what these recordings can tell")
+        table = identifiability(base)
+    document = identify_document(problem, law, table, reason)
+    write_json(folder / FILE, document)
+    return document
+
+
+def base_of(problem: HierarchicalProblem, law: Law) -> Base:
+    """A law with its most probable population, from a wide one, without sampling."""
+    extension, population = extended(problem, law), starting_population(law)
+    rows = campaign_rows(extension)
+    points = np.zeros((len(rows.event), len(law.mechanisms) + 1))
+    points[:, :-1] = population.mean[0]
+    start = fit_population(
+        extension, rows, np.empty(0), mean_prior(law), (population, points), n_rounds=_ROUNDS
+    )
+    return fit_base(problem, law, *start)
+
+
+def identifiability(base: Base) -> Identifiability:
+    """What the recordings can tell around a fitted law."""
+    screen = Screen(base.problem, base.law, base.setting)
+    # A direction that changes no reading has no cosine with any other: nothing looks like it.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return look(screen, base.rows, base.fit.points, base.population)
+
+
+def identify_document(
+    problem: HierarchicalProblem, law: Law, table: Identifiability | None, reason: str = ""
+) -> dict[str, Any]:
+    """The content of identify.json; every key is there, null where it does not apply."""
+    campaign = problem.campaign
+    rows = [] if table is None else [_row(told) for told in table.rows]
+    document: dict[str, Any] = {
+        "campaign": {
+            "name": campaign.name,
+            "fingerprint": campaign.fingerprint(),
+            "n_events": campaign.n_events,
+            "n_sensors": campaign.n_sensors,
+        },
+        "base_model": law.id,
+        "equation": law.equation,
+        "error_model": problem.error_model.id,
+        "smoothing_m": problem.terrain.smoothing_m,
+        "reason": reason or None,
+        "identifiability": rows,
+        "power": None if table is None else table.power,
+        "can_tell": None if table is None else table.can_tell,
+        "next_sensor": None if table is None else _next_sensor(table),
+    }
+    document["statement"] = _statement(document)
+    return document
+
+
+def _row(told: Told) -> dict[str, Any]:
+    mechanism = told.mechanism
+    added = mechanism.added
+    assert added is not None
+    return {
+        "id": mechanism.id,
+        "title": mechanism.title,
+        "group": str(mechanism.group),
+        "parameter": mechanism.strength.name,
+        "unit": mechanism.strength.unit,
+        "kept": told.kept if told.limit < _UNSEEN * added.scale else 0.0,
+        "limit": _seen(told.limit, added.scale),
+        "best_limit": _seen(told.best_limit, added.scale),
+        "best_stretch_m": told.limit_m,
+        "relevant": added.relevant,
+        "power": told.power,
+        "alike": list(told.alike),
+    }
+
+
+def _seen(limit: float, scale: float) -> float | None:
+    return limit if limit < _UNSEEN * scale else None
+
+
+def _next_sensor(table: Identifiability) -> dict[str, Any] | None:
+    if table.sensor_m is None:
+        return None
+    return {
+        "quantity": "front_velocity",
+        "s_from_m": table.sensor_m,
+        "s_to_m": table.sensor_m,
+        "power_with": table.power_with,
+    }
+
+
+def _statement(document: dict[str, Any]) -> list[str]:
+    if document["reason"] is not None:
+        return [f"These recordings cannot tell: {document['reason']}."]
+    silence = "would mean something" if document["can_tell"] else "would mean little"
+    sentences = [
+        "A relevant strength of the listed physics would be found, on average, in a share of"
+        f" {share(document['power'])} of cases: silence {silence}."
+    ]
+    unseen = [row["id"] for row in document["identifiability"] if row["best_limit"] is None]
+    if unseen:
+        sentences.append(f"These recordings say nothing of: {', '.join(unseen)}.")
+    alike = [
+        f"{row['id']} from {', '.join(row['alike'])}" for row in document["identifiability"] if row["alike"]
+    ]
+    if alike:
+        sentences.append(f"Not to be told apart, where each is seen best: {'; '.join(alike)}.")
+    sensor = document["next_sensor"]
+    if sensor is not None and sensor["power_with"] > document["power"]:
+        sentences.append(
+            f"One more speed, at s = {sensor['s_from_m']:.0f} m, would raise that share to"
+            f" {share(sensor['power_with'])}."
+        )
+    return sentences
+
+
+def identify_table(document: dict[str, Any]) -> Table:
+    """The content of identify.json for the terminal."""
+    campaign = document["campaign"]
+    name = f"{shortened(campaign['name'], 30)}, {campaign['n_events']} avalanches"
+    title = f"{name}: what could be told missing from {document['base_model']}"
+    columns = ("unit", "kept", "rele-\nvant", "found\nin", "seen\nfrom", "best\nfrom", "best place,\ns \\[m]")
+    table = plain_table(plain_text(title), left=("mechanism",), right=columns)
+    table.columns[0].no_wrap = True
+    for row in document["identifiability"]:
+        numbers = [
+            "never" if value is None else rounded(value, decimals_for(value))
+            for value in (row["relevant"], row["limit"], row["best_limit"])
+        ]
+        stretch = row["best_stretch_m"]
+        where = "-" if stretch is None else f"{stretch[0]:.0f}-{stretch[1]:.0f}"
+        words = (row["id"], row["unit"], share(row["kept"]), numbers[0], share(row["power"]), *numbers[1:])
+        table.add_row(*map(plain_text, (*words, where)))
+    table.caption = plain_text(
+        "Kept: share of the information left after the base law, its scatter and releases. Relevant: the"
+        " median size under the prior, found in that share of cases, over all places. Seen from: the strength"
+        " found in 90 % of cases at a typical place, and at the best. It depends on track, sensors and"
+        " avalanches, not on whether the readings fit."
+    )
+    table.caption_justify = "left"
+    return table

@@ -1,0 +1,211 @@
+"""The cheap look at everything that could be missing: efficient scores at the events' modes.
+
+It is what detection limits come from, and the omnibus check's statistic: the evidence for anything at all
+over every mechanism, place, instrument and the unlisted force, with their prior odds, in the linear
+model. Being cheap, it is computed for the recordings and for simulated ones alike.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import log_ndtr
+
+from skred.diagnosis.discrepancy.profile import KINDS, entering, hats, knots, priors_of
+from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, look_around
+from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.evidence.linear_mixed_model import (
+    MeanPrior,
+    Scores,
+    efficient_scores,
+    mean_prior,
+    without,
+)
+from skred.diagnosis.evidence.prior_odds import prior_odds
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.physics.kernel.columns import Column
+from skred.physics.law import Law
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
+from skred.physics.mechanisms.stretches import shares
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A mechanism of one shape that could be missing."""
+
+    mechanism: Mechanism
+    shape: Shape
+    direction: Direction
+
+    @property
+    def with_speed(self) -> bool:
+        """Whether it enters with U itself: its fronts take the kernel four times as long as others."""
+        return bool({Column.LINEAR, Column.WEAKENING} & set(self.direction.columns))
+
+
+def candidates(setting: Setting, *, ties: bool = True) -> list[Candidate]:
+    """All that could be missing from a base law; without `ties`, one of each two that are the same term."""
+    found = []
+    for mechanism in mechanisms().values():
+        added = mechanism.added
+        if added is None or not added.joins(setting.base) or (mechanism.same_term_as and not ties):
+            continue
+        for shape in added.shapes(setting):
+            found.append(Candidate(mechanism, shape, added.direction(setting, shape)))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """Everything that could be missing from a law on a campaign.
+
+    Attributes
+    ----------
+    problem : HierarchicalProblem
+    law : Law
+    setting : Setting
+    directions : tuple of Direction
+        Already in, with `strengths`; their share is taken from everything else.
+    strengths : (n_directions,) array
+    """
+
+    problem: HierarchicalProblem
+    law: Law
+    setting: Setting
+    directions: tuple[Direction, ...] = ()
+    strengths: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    @cached_property
+    def candidates(self) -> list[Candidate]:
+        """The candidates, those that enter with U last."""
+        return sorted(candidates(self.setting), key=lambda candidate: candidate.with_speed)
+
+    @cached_property
+    def knots_m(self) -> FloatArray:
+        """Places of the knots of the unlisted force [m]."""
+        return knots(self.setting)
+
+    @cached_property
+    def _parts(self) -> list[Extension]:
+        """Extensions whose directions follow each other: candidates, profiles; then candidates with U."""
+        basis = hats(self.setting.terrain, self.knots_m)
+        profiles = [entering(self.setting, kind, row) for kind in KINDS for row in basis]
+        plain = [c.direction for c in self.candidates if not c.with_speed]
+        parts = [[*plain, *profiles]]
+        by_scale: dict[float | None, list[Direction]] = {}
+        for candidate in self.candidates:
+            if candidate.with_speed:
+                by_scale.setdefault(candidate.direction.weakening_speed, []).append(candidate.direction)
+        parts += list(by_scale.values())
+        return [Extension(self.problem, self.law, (*self.directions, *part)) for part in parts]
+
+    @property
+    def extension(self) -> Extension:
+        """The law itself."""
+        return Extension(self.problem, self.law, self.directions)
+
+    @cached_property
+    def order(self) -> NDArray[np.int64]:
+        """Where each candidate's direction is, over all parts."""
+        position: dict[int, int] = {}
+        for part in self._parts:
+            for direction in part.directions[len(self.directions) :]:
+                position[id(direction)] = len(position)
+        return np.array([position[id(candidate.direction)] for candidate in self.candidates])
+
+    @cached_property
+    def prior(self) -> MeanPrior:
+        """Prior of the population's mean."""
+        return mean_prior(self.law)
+
+    def scores(self, rows: Rows, points: FloatArray, population: Population) -> Scores:
+        """Efficient scores of all directions at the events' modes."""
+        scores = efficient_scores(self.around(rows, points), rows, population, self.prior)
+        return without(scores, len(self.directions))
+
+    def around(self, rows: Rows, points: FloatArray) -> Modes:
+        """Tangents by all directions at the events' modes."""
+        around: list[Modes] = []
+        n_in = len(self.directions)
+        for part in self._parts:
+            strengths = np.zeros(len(part.directions))
+            strengths[:n_in] = self.strengths
+            around.append(look_around(part, rows, points, strengths))
+        changes = [part.by_strengths[:, :, 0 if k == 0 else n_in :] for k, part in enumerate(around)]
+        by_strengths = np.concatenate(changes, axis=2)
+        return around[0]._replace(by_strengths=by_strengths)
+
+    def of_candidates(self, scores: Scores) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Score, information kept and raw information of each candidate, (n_groups, n_candidates)."""
+        order = self.order
+        return scores.score[:, order], scores.own[:, order], scores.raw[:, order]
+
+    def log_factors(self, scores: Scores) -> FloatArray:
+        """Log Bayes factor of each candidate in the linear model, (n_groups, n_candidates)."""
+        score, information, _ = self.of_candidates(scores)
+        result = np.empty_like(score)
+        for k, candidate in enumerate(self.candidates):
+            added = candidate.mechanism.added
+            assert added is not None
+            scale = added.scale_of(candidate.shape)
+            precision = information[:, k] + scale**-2.0
+            result[:, k] = 0.5 * score[:, k] ** 2 / precision - 0.5 * np.log(scale**2 * precision)
+            if not added.either_sign:
+                result[:, k] += math.log(2.0) + log_ndtr(score[:, k] / np.sqrt(precision))
+        return result
+
+    def strengths_found(self, scores: Scores) -> dict[tuple[str, Shape], float]:
+        """Most probable strength in the linear model of each candidate that stands out, by id and shape."""
+        score, information, _ = self.of_candidates(scores)
+        found = {}
+        for k, candidate in enumerate(self.candidates):
+            added = candidate.mechanism.added
+            assert added is not None
+            precision = float(information[0, k]) + added.scale_of(candidate.shape) ** -2.0
+            if abs(score[0, k]) > math.sqrt(precision):
+                found[candidate.mechanism.id, candidate.shape] = float(score[0, k]) / precision
+        return found
+
+    def log_factor_of_unlisted(self, scores: Scores) -> FloatArray:
+        """Log Bayes factor of the unlisted force in the linear model, (n_groups,)."""
+        first = sum(not candidate.with_speed for candidate in self.candidates)
+        n = len(self.knots_m)
+        factors = []
+        for number, kind in enumerate(KINDS):
+            part = slice(first + n * number, first + n * (number + 1))
+            score, information = scores.score[:, part], scores.information[:, part, part]
+            for prior, share in priors_of(kind, self.knots_m).items():
+                found = _of_profile(score, information, prior.cover(self.knots_m))
+                factors.append(found + share + math.log(kind.share))
+        result: FloatArray = np.logaddexp.reduce(np.array(factors), axis=0)
+        return result
+
+    def statistic(self, scores: Scores) -> FloatArray:
+        """Log odds that anything is missing against nothing, in the linear model, (n_groups,)."""
+        factors, unlisted = self.log_factors(scores), self.log_factor_of_unlisted(scores)
+        odds = prior_odds({candidate.mechanism for candidate in self.candidates})
+        ids = np.array([candidate.mechanism.id for candidate in self.candidates])
+        shapes = [candidate.shape for candidate in self.candidates]
+        terms = [unlisted + math.log(odds["unlisted"])]
+        for name in dict.fromkeys(ids):
+            own = np.flatnonzero(ids == name)
+            log_shares = np.log(shares([shapes[k] for k in own]))
+            terms.append(np.logaddexp.reduce(factors[:, own] + log_shares, axis=1) + math.log(odds[name]))
+        result: FloatArray = np.logaddexp.reduce(np.array(terms), axis=0) - math.log(odds["nothing"])
+        return result
+
+
+def _of_profile(score: FloatArray, information: FloatArray, cover: FloatArray) -> FloatArray:
+    """Log Bayes factor of a normal process in the linear model, (n_groups,)."""
+    inside = np.eye(len(cover)) + cover @ information
+    _, log_det = np.linalg.slogdet(inside)
+    pulled = np.linalg.solve(inside, np.einsum("ij,gj->gi", cover, score)[:, :, None])[:, :, 0]
+    result: FloatArray = 0.5 * np.einsum("gi,gi->g", score, pulled) - 0.5 * log_det
+    return result

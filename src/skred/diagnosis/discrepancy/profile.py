@@ -1,0 +1,212 @@
+"""The unlisted force: a profile along the track, of no shape in particular, inside the equation of motion.
+
+A normal process for the missing retardation per unit mass, independent of speed, in proportion to U^2, or to
+the difference of U^2 from its typical value, which shows only in what is unusual about each front; of several
+correlation lengths, and amplitudes about what listed mechanisms do; everywhere, or about one place. It is the
+way out of the list, and it says where: missing forces estimated inside the equation, not in the residuals
+(Hooker, 2009, doi 10.1111/j.1541-0420.2008.01172.x), with base strengths, events' deviations and releases
+having their share first (orthogonal model error: Sargsyan, Huan and Najm, 2019, doi
+10.1615/Int.J.UncertaintyQuantification.2019027384).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.evidence.coefficient import Base, Curve, Fit
+from skred.diagnosis.evidence.extension import Extension, extended
+from skred.physics.kernel.columns import Column
+from skred.physics.mechanisms.spec import Direction, Setting
+from skred.physics.mechanisms.stretches import OPPOSED_SCALES, OPPOSED_SHARE, is_opposed
+from skred.physics.terrain import Terrain
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One way in which the profile goes with speed.
+
+    Attributes
+    ----------
+    column : Column
+        CONSTANT or QUADRATIC.
+    opposed : bool
+        Whether it is nil at the typical speed.
+    unit : str
+    amplitude : float
+        Typical standard deviation of the profile; `PRIORS` are relative to it.
+    share : float
+        Prior probability among the kinds.
+    equation : str
+        Its term, f the profile and U_0 the typical speed.
+    """
+
+    column: Column
+    opposed: bool
+    unit: str
+    amplitude: float
+    share: float
+    equation: str
+
+
+@dataclass(frozen=True)
+class Prior:
+    """How strong and how smooth the profile is, and where.
+
+    Attributes
+    ----------
+    amplitude : float
+        Its standard deviation.
+    length_m : float
+        Its correlation length [m].
+    centre_m : float or None
+        About which place it acts; None is everywhere.
+    """
+
+    amplitude: float
+    length_m: float
+    centre_m: float | None = None
+
+    def cover(self, at: FloatArray) -> FloatArray:
+        """Covariance of the profile at places (n,), (n, n)."""
+        distance = (at[:, None] - at[None, :]) / self.length_m
+        alike = np.exp(-0.5 * distance**2)
+        if self.centre_m is not None:
+            near = np.exp(-0.5 * ((at - self.centre_m) / NEAR_M) ** 2)
+            alike *= near[:, None] * near[None, :]
+        found: FloatArray = self.amplitude**2 * (alike + 1e-6 * np.eye(len(at)))
+        return found
+
+
+KINDS = (
+    Kind(Column.CONSTANT, False, "m s-2", 0.8, 0.5 * (1.0 - OPPOSED_SHARE), "-f(s)"),
+    Kind(Column.QUADRATIC, False, "m-1", 1.5e-3, 0.5 * (1.0 - OPPOSED_SHARE), "-f(s) U^2"),
+    Kind(Column.QUADRATIC, True, "m-1", OPPOSED_SCALES * 1.5e-3, OPPOSED_SHARE, "-f(s) (U^2 - U_0^2)"),
+)
+AMPLITUDES, LENGTHS_M = (1.0 / 3.0, 1.0, 3.0), (40.0, 120.0, 400.0)
+"""Amplitudes in typical ones, and correlation lengths, all of equal prior probability. With one amplitude, a
+profile pays for each of its freedoms what the amplitude is off by; a listed mechanism pays that once."""
+NEAR_M, _CENTRES_M = 120.0, 150.0
+"""Standard deviation of the window of a profile that is local, and the distance of the windows' centres."""
+MOST_KNOTS, _LEAST_STEP_M = 32, 30.0
+
+
+class Hill(NamedTuple):
+    """Roughly what is known of a profile's values under one prior.
+
+    Attributes
+    ----------
+    mean : (n,) array
+    covariance : (n, n) array
+    log_factor : float
+        Log Bayes factor and log prior probability of the prior.
+    """
+
+    mean: FloatArray
+    covariance: FloatArray
+    log_factor: float
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """A fitted profile of one kind.
+
+    Attributes
+    ----------
+    kind : Kind
+    prior : Prior
+        The most probable one, under which it is fitted.
+    knots_m : (n,) array
+        Between which it is linear; 0 outside.
+    mean : (n,) array
+        At the knots, in the kind's unit; positive retards.
+    covariance : (n, n) array
+    log_bayes_factor : float
+        Against no such force, over all priors.
+    gain : float
+        Gain in log evidence at the mean itself, before the price of its freedom.
+    fit : Fit
+        Population and events with the mean in.
+    hills : tuple of Hill
+        Where values are to be looked for: one for each prior that may count.
+    """
+
+    kind: Kind
+    prior: Prior
+    knots_m: FloatArray
+    mean: FloatArray
+    covariance: FloatArray
+    log_bayes_factor: float
+    gain: float
+    fit: Fit
+    hills: tuple[Hill, ...]
+
+
+def priors_of(kind: Kind, at: FloatArray) -> dict[Prior, float]:
+    """All priors of a kind's profile with knots at places, and the log of each one's prior probability.
+
+    Everywhere or local with equal probability, as listed forces are; each equally shared.
+    """
+    n = max(round((at[-1] - at[0]) / _CENTRES_M), 1)
+    centres = at[0] + (np.arange(n) + 0.5) * (at[-1] - at[0]) / n
+    sizes = [(kind.amplitude * part, length) for part in AMPLITUDES for length in LENGTHS_M]
+    everywhere = [Prior(*size) for size in sizes]
+    local = [Prior(*size, float(centre)) for size in sizes if size[1] <= NEAR_M for centre in centres]
+    return {one: -math.log(2.0 * len(group)) for group in (everywhere, local) for one in group}
+
+
+def knots(setting: Setting) -> FloatArray:
+    """Places of the knots [m]: the recorded part of the track."""
+    first, last = setting.recorded_m
+    n = int(np.clip(round((last - first) / _LEAST_STEP_M), 4, MOST_KNOTS))
+    return np.linspace(first, min(last, setting.terrain.length_m), n)
+
+
+def hats(terrain: Terrain, at: FloatArray) -> FloatArray:
+    """Piecewise linear basis, (n_knots, n_cells): 1 at its own knot, 0 at all others and outside."""
+    middle = 0.5 * (terrain.edge_s_m[1:] + terrain.edge_s_m[:-1])
+    inside = (middle >= at[0]) & (middle <= at[-1])
+    rows = [np.interp(middle, at, unit) * inside for unit in np.eye(len(at))]
+    return np.array(rows)
+
+
+def knot_by_knot(base: Base, kind: Kind, at: FloatArray) -> Extension:
+    """The base law with the profile's value at each knot as a strength."""
+    added = [entering(base.setting, kind, row) for row in hats(base.setting.terrain, at)]
+    return extended(base.problem, base.law, [*base.directions, *added])
+
+
+def combined(setting: Setting, kind: Kind, at: FloatArray, values: FloatArray) -> Direction:
+    """The profile as one direction, of strength 1."""
+    return entering(setting, kind, values @ hats(setting.terrain, at))
+
+
+def entering(setting: Setting, kind: Kind, profile: FloatArray) -> Direction:
+    """A profile over the cells, (n_cells,), in the equation of motion."""
+    if not kind.opposed:
+        return Direction((kind.column,), profile[None, :])
+    return Direction((kind.column, Column.CONSTANT), np.array([profile, -profile * setting.front_square]))
+
+
+def alike(kind: Kind, curve: Curve) -> bool:
+    """Whether a listed mechanism goes with speed as a kind of the unlisted force does."""
+    return kind.column in curve.direction.columns and kind.opposed == is_opposed(curve.shape)
+
+
+def most_probable(profiles: Sequence[Profile]) -> Profile:
+    """The profile of the most probable kind."""
+    return max(profiles, key=lambda one: one.log_bayes_factor + math.log(one.kind.share))
+
+
+def log_evidence_of(profiles: Sequence[Profile]) -> float:
+    """Log Bayes factor of the unlisted force over its kinds."""
+    factors = [profile.log_bayes_factor for profile in profiles]
+    shares = np.array([profile.kind.share for profile in profiles])
+    return float(np.logaddexp.reduce(np.array(factors) + np.log(shares / shares.sum())))

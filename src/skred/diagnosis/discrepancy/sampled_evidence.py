@@ -1,0 +1,187 @@
+"""The evidence of an unlisted force, its values sampled: the second route beside Laplace's formula.
+
+Where fronts stop near sensors, a climb ends on what is left of integration errors, next to the top and not at
+it, and the hill is not as curved as the readings' tangents say. By Laplace's formula alone the free force can
+have four nats less than its due, and a listed mechanism its place.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import Executor
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import multivariate_normal, multivariate_t
+
+from skred.diagnosis.discrepancy.fit import hill_at
+from skred.diagnosis.discrepancy.profile import KINDS, Hill, Profile, knot_by_knot, priors_of
+from skred.diagnosis.evidence.coefficient import Base, refit
+from skred.diagnosis.evidence.event_quadrature import USUAL
+
+FloatArray = NDArray[np.float64]
+_FEWEST, _MOST, _DRAWS = 2, 6, 64
+"""Turns of sampling, and draws of each."""
+_ENOUGH = 25.0
+"""Effective draws that are enough: right to a fifth of a nat."""
+_ODD, _NEW_SHARE = 0.1, 0.3
+"""Share of all weight on one draw from which on a hill is looked for there, and of draws on it."""
+_AT_ONCE = 32
+"""Draws fitted together."""
+_WIDER, _DEGREES = 1.1, 7
+"""Width of the proposals in that of Laplace's approximation, and their degrees of freedom."""
+_EVENED = 0.5
+"""Power of the hills' Bayes factors in how many draws each one has: what is known of them is rough."""
+
+
+class _Proposal(NamedTuple):
+    """A mixture of Student distributions, one on each hill.
+
+    Attributes
+    ----------
+    log_weights : (n_hills,) array
+    means : (n_hills, n_knots) array
+    covariances : (n_hills, n_knots, n_knots) array
+    centred : list of frozen distributions
+        Each hill's, around 0.
+    """
+
+    log_weights: FloatArray
+    means: FloatArray
+    covariances: FloatArray
+    centred: list[Any]
+
+    def drawn(self, n: int, rng: np.random.Generator) -> FloatArray:
+        """Values of the profile, (n, n_knots); of each hill as many as its weight says."""
+        steps = (np.arange(n) + rng.random()) / n
+        hills = np.searchsorted(np.cumsum(np.exp(self.log_weights)), steps).clip(max=len(self.means) - 1)
+        counts = np.bincount(hills, minlength=len(self.means)).tolist()
+        return np.concatenate([self._of_hill(k, count, rng) for k, count in enumerate(counts) if count])
+
+    def _of_hill(self, k: int, n: int, rng: np.random.Generator) -> FloatArray:
+        # Not by scipy's own draws: singular vectors turn with the last digit, Cholesky's factor does not.
+        zero = np.zeros(self.means.shape[1])
+        normal = rng.multivariate_normal(zero, self.covariances[k], n, method="cholesky")
+        return self.means[k] + normal / np.sqrt(rng.chisquare(_DEGREES, n) / _DEGREES)[:, None]
+
+    def log_densities(self, values: FloatArray) -> FloatArray:
+        """Of each hill with its weight, (n_hills, n)."""
+        pairs = zip(self.centred, self.means, strict=True)
+        found = [one.logpdf(values - mean).reshape(-1) for one, mean in pairs]
+        return np.array(found) + self.log_weights[:, None]
+
+    def adapted(self, values: FloatArray, weights: FloatArray) -> _Proposal:
+        """With weights and means that weighted values call for.
+
+        Population Monte Carlo: Cappé and others, 2008, doi 10.1007/s11222-008-9059-x.
+        """
+        log_densities = self.log_densities(values)
+        shares = weights * np.exp(log_densities - np.logaddexp.reduce(log_densities, axis=0))
+        total = shares.sum(axis=1)
+        effective = total**2 / np.maximum(np.sum(shares**2, axis=1), 1e-300)
+        # A mean of fewer effective draws than knots would be farther off than the hill's own.
+        trust = effective / (self.means.shape[1] + effective)
+        found = (shares @ values) / np.maximum(total, 1e-300)[:, None]
+        means = self.means + trust[:, None] * (found - self.means)
+        return self._replace(log_weights=np.log(0.5 * np.exp(self.log_weights) + 0.5 * total), means=means)
+
+    def joined_by(self, hill: Hill) -> _Proposal:
+        """With one hill more, and a share of the draws on it."""
+        covariance = _WIDER**2 * hill.covariance
+        return _Proposal(
+            np.append(self.log_weights + math.log1p(-_NEW_SHARE), math.log(_NEW_SHARE)),
+            np.vstack([self.means, hill.mean]),
+            np.concatenate([self.covariances, covariance[None]]),
+            [*self.centred, multivariate_t(shape=covariance, df=_DEGREES)],
+        )
+
+
+def sampled_log_factor(
+    base: Base,
+    profile: Profile,
+    pool: Executor,
+    least: float = -math.inf,
+    seed: int = 0,
+    turns: int = _MOST,
+    enough: float = _ENOUGH,
+) -> float:
+    """Log Bayes factor of a kind of profile over all its priors, by importance sampling of its values.
+
+    Parameters
+    ----------
+    pool : Executor
+        For the fits, some draws at once. This itself must not be a job of the pool: it waits for those.
+    least : float
+        Where it is less than this after the first turns, further ones are not worth it.
+    turns : int
+        Of sampling, at most.
+    enough : float
+        Effective draws from which on there is none further.
+    """
+    rng = np.random.default_rng([seed, 61, KINDS.index(profile.kind)])
+    proposals, values, heights = [_on_hills(profile)], np.empty((0, len(profile.mean))), np.empty(0)
+    while True:
+        drawn = proposals[-1].drawn(_DRAWS, rng)
+        values = np.concatenate([values, drawn])
+        heights = np.append(heights, _heights(base, profile, drawn, pool))
+        # All draws are weighed by the mixture of all proposals.
+        densities = [np.logaddexp.reduce(one.log_densities(values), axis=0) for one in proposals]
+        log_weights = heights - np.logaddexp.reduce(densities, axis=0) + math.log(len(proposals))
+        total = float(np.logaddexp.reduce(log_weights))
+        if total == -math.inf:  # no draw has fronts that tell anything
+            return profile.log_bayes_factor
+        factor, weights = _mean(log_weights), np.exp(log_weights - total)
+        ended = factor < least or 1.0 / np.sum(weights**2) > enough
+        if (ended and len(proposals) >= _FEWEST) or len(proposals) >= turns:
+            return factor
+        proposal = proposals[-1].adapted(values, weights)
+        if weights.max() > _ODD:
+            # Where fronts stop there are more hills than climbs find: so do Raftery and Bao, 2010,
+            # doi 10.1111/j.1541-0420.2010.01399.x.
+            odd = values[np.argmax(weights)]
+            proposal = proposal.joined_by(pool.submit(hill_at, base, profile, odd).result())
+        proposals.append(proposal)
+
+
+def _mean(log_weights: FloatArray) -> float:
+    """Log of the weights' mean, no weight larger than this times the root of their number.
+
+    A single draw on a spike does not decide then: Ionides, 2008, doi 10.1198/106186008X320456.
+    """
+    most = float(np.logaddexp.reduce(log_weights)) - 0.5 * math.log(len(log_weights))
+    return float(np.logaddexp.reduce(np.minimum(log_weights, most))) - math.log(len(log_weights))
+
+
+def _on_hills(profile: Profile) -> _Proposal:
+    """Where the fit says that values are."""
+    evened = _EVENED * np.array([hill.log_factor for hill in profile.hills])
+    means = np.array([hill.mean for hill in profile.hills])
+    covariances = _WIDER**2 * np.array([hill.covariance for hill in profile.hills])
+    centred = [multivariate_t(shape=one, df=_DEGREES) for one in covariances]
+    return _Proposal(evened - np.logaddexp.reduce(evened), means, covariances, centred)
+
+
+def _heights(base: Base, profile: Profile, values: FloatArray, pool: Executor) -> FloatArray:
+    """Gain in log evidence at values of the profile, (n, n_knots), and their log prior density."""
+    parts = [values[first : first + _AT_ONCE] for first in range(0, len(values), _AT_ONCE)]
+    found = np.concatenate(list(pool.map(partial(_log_evidence, base, profile), parts)))
+    nothing = profile.fit.found.log_evidence - profile.gain
+    priors = priors_of(profile.kind, profile.knots_m).items()
+    densities = [
+        share + multivariate_normal(cov=prior.cover(profile.knots_m)).logpdf(values).reshape(-1)
+        for prior, share in priors
+    ]
+    heights = found - nothing + np.logaddexp.reduce(densities, axis=0)
+    return np.where(np.isfinite(heights), heights, -np.inf)
+
+
+def _log_evidence(base: Base, profile: Profile, values: FloatArray) -> FloatArray:
+    """At values of the profile, (n, n_knots)."""
+    extension = knot_by_knot(base, profile.kind, profile.knots_m)
+    start = profile.fit.found.population(len(base.law.mechanisms)), profile.fit.points
+    given = np.column_stack([np.tile(base.strengths, (len(values), 1)), values])
+    # With as many nodes and rounds as the peak and nothing: what is left of integration errors is alike.
+    fits = refit(extension, base.rows, given, start, base.log_scale, USUAL, n_rounds=1)
+    return np.array([fit.found.log_evidence for fit in fits])

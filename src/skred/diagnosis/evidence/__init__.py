@@ -1,0 +1,1 @@
+"""The evidence of what is added to a law: events and population integrated over."""

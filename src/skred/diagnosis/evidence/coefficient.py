@@ -1,0 +1,394 @@
+"""The evidence along the strength of an added mechanism: everything else refitted at each value.
+
+No derivative by the strength is taken at the null: a strong effect may hide there, behind base strengths
+and scatter that absorb it, and show only when it is let in.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import Akima1DInterpolator
+
+from skred.diagnosis.evidence.conditional_map import (
+    Population,
+    Rows,
+    campaign_rows,
+    event_modes,
+    log_joint,
+    take_rows,
+)
+from skred.diagnosis.evidence.event_quadrature import FIRST, USUAL, Budget, event_nodes
+from skred.diagnosis.evidence.extension import Extension, extended, setting_of, typical_speed
+from skred.diagnosis.evidence.linear_mixed_model import mean_prior
+from skred.diagnosis.evidence.marginal import Evidence, coordinates, evidence, prior_log_scale
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.hierarchical.surface import Nodes
+from skred.physics.law import Law
+from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
+
+FloatArray = NDArray[np.float64]
+_NEAR = (-3.5, -2.0, -1.0, 0.0, 1.0, 2.0, 3.5)
+"""Strengths around what was found before, in its standard deviations."""
+_PASSES = 4
+_ROUNDS, _MOST_ROUNDS = 2, 6
+_FAR_MEAN, _FAR_SPREAD = 0.7, 0.35
+"""Change of a population after which nodes are made anew: of its mean in spreads, of a log spread."""
+_BETWEEN = 60
+"""Points at which a curve is integrated between each two strengths."""
+_DEEP = 40.0
+
+
+class Fit(NamedTuple):
+    """A law, perhaps extended, fitted at fixed strengths of what is added.
+
+    Attributes
+    ----------
+    found : Evidence
+    points : (n_events, n_base + 1) array
+        The events' modes.
+    """
+
+    found: Evidence
+    points: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """The law that mechanisms are added to, fitted.
+
+    Attributes
+    ----------
+    problem : HierarchicalProblem
+    law : Law
+    setting : Setting
+    rows : Rows
+    fit : Fit
+    directions : tuple of Direction
+        Already in, with `strengths`.
+    strengths : (n_directions,) array
+    """
+
+    problem: HierarchicalProblem
+    law: Law
+    setting: Setting
+    rows: Rows
+    fit: Fit
+    directions: tuple[Direction, ...] = ()
+    strengths: FloatArray = field(default_factory=lambda: np.empty(0))
+    _nothing: dict[Budget, Fit] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def log_scale(self) -> FloatArray:
+        """Logarithm of the scales of the medians' priors."""
+        return prior_log_scale(mean_prior(self.law))
+
+    @property
+    def population(self) -> Population:
+        """The most probable population."""
+        return self.fit.found.population(len(self.law.mechanisms))
+
+    def with_nothing(self, budget: Budget) -> Fit:
+        """Refitted with nothing added, as `curve_at` does with something: the same for all mechanisms."""
+        if budget not in self._nothing:
+            extension = extended(self.problem, self.law, self.directions)
+            self._nothing[budget] = _refit_from(self, extension, np.empty(0), budget)[0]
+        return self._nothing[budget]
+
+
+def refit(
+    extension: Extension,
+    rows: Rows,
+    strengths: FloatArray,
+    start: tuple[Population, FloatArray],
+    log_scale: FloatArray,
+    budget: Budget = USUAL,
+    first_budget: Budget | None = None,
+    n_rounds: int = _ROUNDS,
+    fits: Sequence[Fit] | None = None,
+) -> list[Fit]:
+    """Refit population and events at some strengths, one group of rows each.
+
+    Parameters
+    ----------
+    rows : Rows
+        The campaign's rows.
+    strengths : (n_groups, n_directions) array
+    start : (Population, (n_events, n_base + 1) array)
+        Of one group: where to begin, and a population that nodes cover in any case.
+    first_budget : Budget, optional
+        Of the rounds before the last, which only move the population there.
+    fits : sequence of Fit, optional
+        Where to begin instead, one for each group.
+    """
+    n_groups, n_events, n = len(strengths), len(rows.event), start[0].mean.shape[1]
+    state = list(fits) if fits is not None else [Fit(_unfitted(start[0]), start[1])] * n_groups
+    active = list(range(n_groups))
+    for number in range(_MOST_ROUNDS):
+        many = repeated(rows, len(active))
+        given = np.repeat(strengths[active], n_events, axis=0)
+        parts = [state[k].found.population(n) for k in active]
+        population = Population(*(np.concatenate([part[a] for part in parts]) for a in range(2)))
+        points = np.concatenate([state[k].points for k in active])
+        modes = event_modes(extension, many, points, given, population, n_steps=6)
+        spent = budget if number > 0 or first_budget is None else first_budget
+        nodes = event_nodes(extension, many, given, population, modes, spent, start[0]).nodes
+        moved = []
+        for k, part, own in zip(
+            active,
+            _split(nodes, len(active), n_events),
+            modes.points.reshape(len(active), n_events, -1),
+            strict=True,
+        ):
+            before = state[k].found.psi
+            found = evidence(part, log_scale, before)
+            state[k] = Fit(found, own)
+            if number + 1 < n_rounds or _moved(before, found.psi, n):
+                moved.append(k)
+        active = moved
+        if not active:
+            break
+    return state
+
+
+def _unfitted(population: Population) -> Evidence:
+    """A population to begin with."""
+    psi = coordinates(population)
+    return Evidence(-np.inf, psi, np.eye(len(psi)))
+
+
+def _moved(before: FloatArray, after: FloatArray, n: int) -> bool:
+    """Whether a population is far from the one that its nodes were made for."""
+    mean = np.abs(after[:n] - before[:n]) / np.exp(before[n : 2 * n])
+    spread = np.abs(after[n : 2 * n] - before[n : 2 * n])
+    return bool(mean.max() > _FAR_MEAN or spread.max() > _FAR_SPREAD)
+
+
+def repeated(rows: Rows, n_groups: int) -> Rows:
+    """The same rows for each of several groups."""
+    n = len(rows.event)
+    group_rows = np.tile(np.arange(n), n_groups)
+    repeated = take_rows(rows.readings, group_rows)
+    group = np.repeat(np.arange(n_groups), n)
+    return Rows(np.tile(rows.event, n_groups), group, repeated, rows.errors)
+
+
+def _split(nodes: Nodes, n_groups: int, n_events: int) -> list[Nodes]:
+    """Nodes of each group."""
+    parts = []
+    for k in range(n_groups):
+        first = nodes.first[k * n_events : (k + 1) * n_events + 1]
+        inside = slice(first[0], first[-1])
+        points = np.ascontiguousarray(nodes.points[:, inside])
+        parts.append(Nodes(first - first[0], points, nodes.log_weights[inside]))
+    return parts
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Evidence along the strength of one mechanism of one shape.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    shape : Shape
+    direction : Direction
+    strengths : (n,) array
+        In the strength's unit, increasing, 0 among them.
+    log_evidence : (n,) array
+        Relative to strength 0.
+    fits : tuple of Fit
+        One for each strength.
+    rough : bool
+        Whether readings at nodes were taken along tangents.
+    """
+
+    mechanism: Mechanism
+    shape: Shape
+    direction: Direction
+    strengths: FloatArray
+    log_evidence: FloatArray
+    fits: tuple[Fit, ...]
+    rough: bool = False
+
+    def nearest(self, strength: float) -> Fit:
+        """The fit at the strength closest to one."""
+        return self.fits[int(np.abs(self.strengths - strength).argmin())]
+
+    def joined(self, other: Curve) -> Curve:
+        """With another curve's strengths, of the same mechanism, shape and budget."""
+        strengths, numbers = np.unique(np.concatenate([self.strengths, other.strengths]), return_index=True)
+        heights = np.concatenate([self.log_evidence, other.log_evidence])[numbers]
+        fits = [*self.fits, *other.fits]
+        return replace(
+            self, strengths=strengths, log_evidence=heights, fits=tuple(fits[number] for number in numbers)
+        )
+
+    def fine(self, scale: float | None = None) -> tuple[FloatArray, FloatArray]:
+        """Strengths on a fine grid, and the log posterior density there, not normalised."""
+        added = self.mechanism.added
+        assert added is not None
+        scale = added.scale_of(self.shape) if scale is None else scale
+        # As many between each two that were computed: these lie close where the curve is narrow.
+        parts = np.linspace(self.strengths[:-1], self.strengths[1:], _BETWEEN, endpoint=False, axis=1)
+        strengths = np.append(parts.ravel(), self.strengths[-1])
+        floor = self.log_evidence.max() - _DEEP
+        heights = np.maximum(self.log_evidence, floor)
+        spline = Akima1DInterpolator(self.strengths, heights, method="makima")
+        log_prior = -0.5 * (strengths / scale) ** 2 - 0.5 * math.log(2.0 * math.pi * scale**2)
+        if not added.either_sign:
+            log_prior = log_prior + math.log(2.0)
+        return strengths, spline(strengths) + log_prior
+
+    @cached_property
+    def log_bayes_factor(self) -> float:
+        """Against strength 0, in nats."""
+        return self.log_bayes_factor_at(None)
+
+    def log_bayes_factor_at(self, scale: float | None) -> float:
+        """Against strength 0, in nats, with the prior of another scale."""
+        strengths, log_density = self.fine(scale)
+        most = float(log_density.max())
+        return most + math.log(float(np.trapezoid(np.exp(log_density - most), strengths)))
+
+    @cached_property
+    def moments(self) -> tuple[float, float]:
+        """Posterior mean and standard deviation of the strength, if the mechanism is there."""
+        strengths, log_density = self.fine()
+        width = np.diff(strengths)
+        weights = (
+            np.exp(log_density - log_density.max()) * 0.5 * (np.append(width, 0.0) + np.insert(width, 0, 0.0))
+        )
+        weights /= weights.sum()
+        mean = float(weights @ strengths)
+        return mean, math.sqrt(max(float(weights @ (strengths - mean) ** 2), 0.0))
+
+
+def curve_near(base: Base, mechanism: Mechanism, shape: Shape, near: Curve, first: Budget) -> Curve:
+    """Evidence along the strength of a mechanism, around where another curve, perhaps a rough one, has it.
+
+    Parameters
+    ----------
+    near : Curve
+        Of the same mechanism and nearly the same shape.
+    first : Budget
+        For finding where to look; what counts is computed there with fronts.
+    """
+    assert mechanism.added is not None
+    least = 0.03 * mechanism.added.scale_of(shape)
+    for number in range(_PASSES):
+        budget = first if number == 0 and first.linear else USUAL
+        before = near.moments
+        near = curve_at(base, mechanism, shape, _strengths_near(near), budget, near)
+        after = near.moments
+        sd = max(before[1], least), max(after[1], least)
+        if budget is USUAL and abs(after[0] - before[0]) < sd[0] and 0.5 < sd[1] / sd[0] < 2.0:
+            break
+    return near
+
+
+def _strengths_near(near: Curve) -> FloatArray:
+    """Strengths around the mean of a curve, without 0."""
+    added = near.mechanism.added
+    assert added is not None
+    mean, sd = near.moments
+    sd = max(sd, 0.03 * added.scale_of(near.shape))
+    strengths = mean + sd * np.array(_NEAR)
+    if abs(mean) > 2.0 * abs(_NEAR[0]) * sd:  # nothing between 0 and there otherwise
+        strengths = np.append(strengths, 0.5 * (mean - math.copysign(abs(_NEAR[0]) * sd, mean)))
+    return strengths if added.either_sign else strengths[strengths > 0.05 * sd]
+
+
+def curve_at(
+    base: Base,
+    mechanism: Mechanism,
+    shape: Shape,
+    strengths: FloatArray,
+    budget: Budget = USUAL,
+    near: Curve | None = None,
+) -> Curve:
+    """Evidence along the strength of a mechanism, at some strengths and at 0.
+
+    Parameters
+    ----------
+    near : Curve, optional
+        Whose fits are where to begin; else the base's.
+    """
+    added = mechanism.added
+    assert added is not None
+    direction = added.direction(base.setting, shape)
+    extension = extended(base.problem, base.law, (*base.directions, direction))
+    strengths = np.sort(strengths[np.abs(strengths) > 1e-3 * added.scale_of(shape)])
+    place = int(np.searchsorted(strengths, 0.0))
+    # Strength 0 like all others, so that what is left of integration errors is the same there.
+    if near is None:
+        found = _refit_from(base, extension, strengths, budget) if len(strengths) else []
+        found.insert(place, base.with_nothing(budget))
+        strengths = np.insert(strengths, place, 0.0)
+    else:
+        strengths = np.insert(strengths, place, 0.0)
+        fits = [near.nearest(strength) for strength in strengths]
+        found = _refit_from(base, extension, strengths, budget, fits)
+    heights = np.array([fit.found.log_evidence for fit in found])
+    heights = np.nan_to_num(heights - heights[strengths == 0.0], nan=-1e3, neginf=-1e3)
+    return Curve(mechanism, shape, direction, strengths, heights, tuple(found), budget.linear)
+
+
+def _refit_from(
+    base: Base, extension: Extension, strengths: FloatArray, budget: Budget, fits: list[Fit] | None = None
+) -> list[Fit]:
+    """Fits at strengths of the extension's last direction, or without it; begun at fits or at the base's."""
+    given = base.strengths[None, :]
+    if len(strengths):
+        given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
+    start = (base.population, base.fit.points)
+    first = None if budget.linear or fits is not None else FIRST
+    n_rounds = _ROUNDS if fits is None else 1
+    return refit(extension, base.rows, given, start, base.log_scale, budget, first, n_rounds, fits)
+
+
+def fit_base(
+    problem: HierarchicalProblem,
+    law: Law,
+    population: Population,
+    points: FloatArray | None = None,
+    directions: tuple[Direction, ...] = (),
+    strengths: FloatArray | None = None,
+) -> Base:
+    """The base law fitted, from roughly where its population is; perhaps with something in already.
+
+    With nothing in, the population is that of the law's likelihood surfaces, in which no mode is missed.
+    """
+    extension = extended(problem, law, directions)
+    rows = campaign_rows(extension)
+    if points is None:
+        points = np.zeros((len(rows.event), len(law.mechanisms) + 1))
+        points[:, :-1] = population.mean[0]
+    given = np.empty(0) if strengths is None else strengths
+    log_scale = prior_log_scale(mean_prior(law))
+    if directions:
+        fit = refit(extension, rows, given[None, :], (population, points), log_scale, n_rounds=4)[0]
+    else:
+        found = evidence(problem.surfaces(law.mechanisms).nodes, log_scale, coordinates(population), 30)
+        exact = found.population(len(law.mechanisms))
+        starts = (points, _best_nodes(problem.surfaces(law.mechanisms).nodes, exact))
+        tried = [event_modes(extension, rows, start, given, exact, n_steps=20).points for start in starts]
+        heights = [log_joint(extension, rows, one, given, exact) for one in tried]
+        fit = Fit(found, np.where((heights[1] > heights[0])[:, None], tried[1], tried[0]))
+    setting = setting_of(problem, law, typical_speed(extension.speeds(fit.points, given)))
+    return Base(problem, law, setting, rows, fit, directions, given)
+
+
+def _best_nodes(nodes: Nodes, population: Population) -> FloatArray:
+    """The node of each event's surface that the population makes most likely; releases as noted."""
+    deviation = nodes.points - population.mean[0][:, None]
+    white = np.linalg.solve(np.linalg.cholesky(population.covariance[0]), deviation)
+    height = nodes.log_weights - 0.5 * np.sum(white**2, axis=0)
+    best = [int(a + np.argmax(height[a:b])) for a, b in zip(nodes.first[:-1], nodes.first[1:], strict=True)]
+    return np.column_stack([nodes.points[:, best].T, np.zeros(len(best))])

@@ -1,0 +1,276 @@
+"""The most probable strengths and release of each event, given its population: Gauss-Newton, row by row."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.evidence.score_information import reading_slopes
+from skred.inference.error_model import Errors, EventReadings
+from skred.inference.hierarchical.reading_density import log_likelihoods
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+_LARGEST_STEP = 1.0
+_STARTING_DAMPING = 1e-3
+_SETTLED = 1e-2
+_LOST, _GAINED = 20.0, 1.0
+"""Nats less than at best that the readings of a lost row have, and that another place must have more."""
+_ASIDE = np.multiply.outer((-1.0, 1.0), (0.01, 0.03, 0.08, 0.2, 0.5, 1.0)).ravel()
+"""Where to look for lost rows: changes of the logarithm of the first strength, from what moves a stop by ten
+metres to what the largest step of a climb is."""
+_STEEPEST = 1e4
+"""Largest change of a reading, in standard deviations, per unit of an event's log strength."""
+
+
+class Rows(NamedTuple):
+    """Recordings to be explained: those of a campaign, or of many replicates of it one after the other.
+
+    Attributes
+    ----------
+    event : (n_rows,) integer array
+        Whose release and covariates each row has.
+    group : (n_rows,) integer array
+        Which replicate it belongs to.
+    readings : EventReadings
+        With one row each.
+    errors : Errors
+    """
+
+    event: IntArray
+    group: IntArray
+    readings: EventReadings
+    errors: Errors
+
+    def take(self, chosen: IntArray) -> Rows:
+        """Some of the rows, of the same groups."""
+        return Rows(self.event[chosen], self.group[chosen], take_rows(self.readings, chosen), self.errors)
+
+    @property
+    def n_groups(self) -> int:
+        """Number of replicates."""
+        return int(self.group[-1]) + 1
+
+
+class Population(NamedTuple):
+    """Normal population of the logarithms of the strengths, one for each group.
+
+    Attributes
+    ----------
+    mean : (n_groups, n_base) array
+    covariance : (n_groups, n_base, n_base) array
+    """
+
+    mean: FloatArray
+    covariance: FloatArray
+
+    @property
+    def precision(self) -> FloatArray:
+        """Inverse covariances, the release's unit precision last, (n_groups, n_base + 1, n_base + 1)."""
+        n = self.mean.shape[1]
+        result = np.zeros((len(self.mean), n + 1, n + 1))
+        result[:, :n, :n] = np.linalg.inv(self.covariance)
+        result[:, n, n] = 1.0
+        return result
+
+    @property
+    def groups(self) -> list[Population]:
+        """Each group by itself."""
+        return [Population(self.mean[k : k + 1], self.covariance[k : k + 1]) for k in range(len(self.mean))]
+
+    def with_more(self, more: Population) -> Population:
+        """These groups and others."""
+        return Population(*(np.concatenate([a, b]) for a, b in zip(self, more, strict=True)))
+
+
+class Modes(NamedTuple):
+    """Most probable points and what the readings say around them.
+
+    Attributes
+    ----------
+    points : (n_rows, n_base + 1) array
+    tangents_at : (n_rows, n_base + 1) array
+        Where what follows was computed: at the points, or a last, small step before them.
+    predictions : (n_rows, n_columns) array
+    by_points : (n_rows, n_columns, n_base + 1) array
+    by_strengths : (n_rows, n_columns, n_directions) array
+    slope, curvature : (n_rows, n_columns) arrays
+        Of the log likelihood by the predictions.
+    shared : (n_rows, n_columns) array
+        What an error common to a row's velocities takes from the curvature: its product with itself.
+    """
+
+    points: FloatArray
+    tangents_at: FloatArray
+    predictions: FloatArray
+    by_points: FloatArray
+    by_strengths: FloatArray
+    slope: FloatArray
+    curvature: FloatArray
+    shared: FloatArray
+
+    @property
+    def information(self) -> FloatArray:
+        """Of the readings about the points, (n_rows, n_base + 1, n_base + 1)."""
+        result: FloatArray = self.by_points.transpose(0, 2, 1) @ self.weighed(self.by_points)
+        return result
+
+    def weighed(self, changes: FloatArray) -> FloatArray:
+        """Changes of the predictions, (n_rows, n_columns, n), times the readings' information."""
+        weighed: FloatArray = self.curvature[:, :, None] * changes
+        if self.shared.any():
+            weighed -= self.shared[:, :, None] * (self.shared[:, None, :] @ changes)
+        return weighed
+
+
+def look_around(extension: Extension, rows: Rows, points: FloatArray, strengths: FloatArray) -> Modes:
+    """Tangents and slopes at some points; strengths are (n_directions,) or (n_rows, n_directions)."""
+    predictions, by_points, by_strengths = extension.tangents(rows.event, points, strengths)
+    at = np.arange(len(points))
+    slope, curvature, shared = reading_slopes(at, predictions, rows.readings, rows.errors)
+    # Where friction falls with speed a front can be at the very edge of stopping: a slope without end.
+    steepest = np.sqrt(curvature) * np.abs(by_points).max(axis=2)
+    limited = 1.0 / np.maximum(steepest / _STEEPEST, 1.0)
+    by_points, by_strengths = by_points * limited[:, :, None], by_strengths * limited[:, :, None]
+    return Modes(points, points, predictions, by_points, by_strengths, slope, curvature, shared)
+
+
+def log_joint(
+    extension: Extension, rows: Rows, points: FloatArray, strengths: FloatArray, population: Population
+) -> FloatArray:
+    """Log likelihood of each row plus the exponent of its population's density, (n_rows,)."""
+    predictions = extension.predict(rows.event, points, strengths)
+    likelihood: FloatArray = log_likelihoods(np.arange(len(points)), predictions, rows.readings, rows.errors)
+    deviation = points.copy()
+    deviation[:, :-1] -= population.mean[rows.group]
+    return likelihood - 0.5 * np.einsum(
+        "ri,rij,rj->r", deviation, population.precision[rows.group], deviation
+    )
+
+
+def event_modes(
+    extension: Extension,
+    rows: Rows,
+    start: FloatArray,
+    strengths: FloatArray,
+    population: Population,
+    n_steps: int = 12,
+) -> Modes:
+    """Most probable points by damped Gauss-Newton steps; a step that makes a row worse is not taken.
+
+    Rows that are far from their readings then, as where a front stops before a sensor that the recorded one
+    passed and no slope leads it on, climb once more from the best of some places along the first strength,
+    where one is better.
+    """
+    given = np.broadcast_to(strengths, (len(start), len(extension.directions)))
+    found = _climbed(extension, rows, start, given, population, n_steps)
+    lost = _lost(rows, found.predictions)
+    if len(lost):
+        points, gained = _aside(extension, rows.take(lost), found.points[lost], given[lost], population)
+        moved = lost[gained]
+        again = _climbed(extension, rows.take(moved), points[gained], given[moved], population, n_steps)
+        for whole, part in zip(found, again, strict=True):
+            whole[moved] = part
+    return found
+
+
+def _climbed(
+    extension: Extension,
+    rows: Rows,
+    start: FloatArray,
+    given: FloatArray,
+    population: Population,
+    n_steps: int,
+) -> Modes:
+    """Where damped Gauss-Newton steps from one place lead."""
+    points, precision = start.copy(), population.precision
+    best = log_joint(extension, rows, points, given, population)
+    damping = np.full(len(points), _STARTING_DAMPING)
+    active, found = np.arange(len(points)), list[FloatArray]()
+    for _ in range(n_steps):
+        part = rows.take(active)
+        around = look_around(extension, part, points[active], given[active])
+        deviation = points[active].copy()
+        deviation[:, :-1] -= population.mean[part.group]
+        prior = precision[part.group]
+        gradient = np.einsum("ri,rij->rj", around.slope, around.by_points)
+        gradient -= np.einsum("rij,rj->ri", prior, deviation)
+        damped = around.information + prior
+        diagonal = np.einsum("rii->ri", damped)
+        diagonal *= 1.0 + damping[active][:, None]
+        step = np.linalg.solve(damped, gradient[:, :, None])[:, :, 0]
+        size = np.abs(step).max(axis=1)
+        step *= np.minimum(1.0, _LARGEST_STEP / np.maximum(size, 1e-12))[:, None]
+        new = log_joint(extension, part, points[active] + step, given[active], population)
+        gained = new - best[active]
+        better = gained >= -1e-9
+        points[active[better]] += step[better]
+        best[active[better]] = new[better]
+        damping[active] = np.where(better, 0.2 * damping[active], np.maximum(20.0 * damping[active], 0.1))
+        _store(found, active, around)
+        active = active[~better | (gained > _SETTLED)]
+        if len(active) == 0:
+            break
+    # Tangents are those before each row's last, small step; the points are after it.
+    return Modes(points, *found[1:])
+
+
+def _lost(rows: Rows, predictions: FloatArray) -> IntArray:
+    """Rows whose readings would be much likelier if they, and the range of the stop, were as predicted."""
+    readings, at = rows.readings, np.arange(len(predictions))
+    met = predictions.copy()
+    met[:, :-1] = np.where(readings.observed, readings.values, predictions[:, :-1])
+    met[:, -1] = np.clip(predictions[:, -1], readings.reached, readings.not_reached)
+    heights = [log_likelihoods(at, one, readings, rows.errors) for one in (predictions, met)]
+    # Half a nat a reading is what noise alone takes.
+    return np.flatnonzero(heights[1] > heights[0] + _LOST + 0.5 * readings.observed.sum(axis=1))
+
+
+def _aside(
+    extension: Extension, rows: Rows, points: FloatArray, given: FloatArray, population: Population
+) -> tuple[FloatArray, BoolArray]:
+    """The best of each row's point and some places on either side of it, and whether it is one of those."""
+    n_rows, n_places = len(points), len(_ASIDE)
+    around = np.repeat(points, n_places, axis=0)
+    around[:, 0] += np.tile(_ASIDE, n_rows)
+    which = np.repeat(np.arange(n_rows), n_places)
+    heights = log_joint(extension, rows.take(which), around, given[which], population).reshape(
+        n_rows, n_places
+    )
+    before = log_joint(extension, rows, points, given, population)
+    gained = heights.max(axis=1) > before + _GAINED
+    best = around.reshape(n_rows, n_places, -1)[np.arange(n_rows), heights.argmax(axis=1)]
+    return np.where(gained[:, None], best, points), gained
+
+
+def _store(found: list[FloatArray], active: IntArray, around: Modes) -> None:
+    """Keep what was found at the active rows."""
+    for k, values in enumerate(around):
+        if len(found) <= k:
+            found.append(np.empty((0, *values.shape[1:])))
+        if len(found[k]) == 0:
+            found[k] = values.copy()
+        else:
+            found[k][active] = values
+
+
+def take_rows(readings: EventReadings, rows: IntArray) -> EventReadings:
+    """Recordings of some events, in this order, perhaps repeated."""
+    return readings._replace(
+        values=readings.values[rows],
+        observed=readings.observed[rows],
+        stated_sd=readings.stated_sd[rows],
+        reached=readings.reached[rows],
+        not_reached=readings.not_reached[rows],
+    )
+
+
+def campaign_rows(extension: Extension) -> Rows:
+    """The recordings of the campaign itself."""
+    problem = extension.problem
+    n = problem.campaign.n_events
+    return Rows(np.arange(n), np.zeros(n, dtype=np.int64), problem.readings, problem.error_model.errors)

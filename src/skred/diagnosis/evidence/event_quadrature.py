@@ -1,0 +1,372 @@
+"""Nodes: each event's likelihood over its own strengths, where a population makes them likely.
+
+A mixture of proposals, many nodes around the event's own mode, some over the whole population, and many
+where those have found the weight to be, weighs each node by the mixture's density; so a second mode
+(reached, not reached) that the first proposal misses is still counted. The same quasi-random numbers serve
+every strength, which makes differences between strengths smoother than the integrals themselves. Where there
+is one strength and nothing else that is free, nodes lie on a line (`line_nodes`) and nothing is random.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+from scipy.stats import qmc
+
+from skred.diagnosis.compiled import compiled
+from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows
+from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.evidence.line_quadrature import line_nodes
+from skred.inference.hierarchical.reading_density import log_likelihoods
+from skred.inference.hierarchical.surface import Nodes
+
+FloatArray = NDArray[np.float64]
+_LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
+
+
+class Budget(NamedTuple):
+    """How many nodes an event gets, and how much wider than the linear model the proposals are.
+
+    On a line only their total counts.
+
+    Attributes
+    ----------
+    around_mode, over_population : int
+        Powers of 2, as those below.
+    adapted : int
+        Put where the others have found the weight to be: around modes that nobody looked for, along the
+        edges that stops make.
+    linear : bool
+        Take readings at the nodes from the tangents at the mode instead of from fronts: quick, and wrong
+        where a front stops near a sensor.
+    """
+
+    around_mode: int = 16
+    over_population: int = 64
+    adapted: int = 64
+    wider: float = 1.35
+    population_wider: float = 1.6
+    linear: bool = False
+
+    @property
+    def total(self) -> int:
+        """All of an event's nodes."""
+        return self.around_mode + self.over_population + self.adapted
+
+    def times(self, more: int) -> Budget:
+        """So many times the nodes."""
+        return self._replace(
+            around_mode=more * self.around_mode,
+            over_population=more * self.over_population,
+            adapted=more * self.adapted,
+        )
+
+
+USUAL, FIRST, FINE = Budget(), Budget(32, 16, 0), Budget(256, 128, 512, 1.5, 1.8)
+ROUGH, FRONTS = Budget(32, 16, 0, linear=True), Budget(16, 32, 32)
+"""For a first look: along tangents, and with fronts where those mislead."""
+_CENTRES = 16
+"""Places that adapted nodes are put around, of each event."""
+_SHRUNK = 3.0
+"""As how many effective nodes the linear model counts for the width around those places."""
+_ADAPTED_WIDER = 1.3
+
+
+class Spread(NamedTuple):
+    """Nodes of all rows, as many each.
+
+    Attributes
+    ----------
+    points : (n_rows, n_nodes, n_base + 1) array
+        The release's deviation last.
+    log_weights : (n_rows, n_nodes) array
+    """
+
+    points: FloatArray
+    log_weights: FloatArray
+
+    @classmethod
+    def joined(cls, parts: Sequence[Spread]) -> Spread:
+        """Those of some rows, then those of others."""
+        return cls(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+
+    @property
+    def nodes(self) -> Nodes:
+        """As the compiled sums over a population read them."""
+        n_rows, n_nodes, n = self.points.shape
+        points = np.ascontiguousarray(self.points[:, :, : n - 1].reshape(-1, n - 1).T)
+        return Nodes(n_nodes * np.arange(n_rows + 1), points, self.log_weights.ravel())
+
+
+class _Part(NamedTuple):
+    """A share of the nodes: mixtures of normal densities of one width each, one for each row.
+
+    Attributes
+    ----------
+    size : int
+        Nodes of a row.
+    centres : (n_rows, n_centres, n_axes) array
+    factor : (n_rows, n_axes, n_axes) array
+    """
+
+    size: int
+    centres: FloatArray
+    factor: FloatArray
+
+    def points(self, numbers: FloatArray) -> FloatArray:
+        """Nodes from normal numbers, both (n_rows, size, n_axes)."""
+        # Around each centre a run of the quasi-random sequence: every sixteenth number would fill a sliver.
+        at = np.arange(self.size) * self.centres.shape[1] // self.size
+        points: FloatArray = self.centres[:, at] + numbers @ self.factor.transpose(0, 2, 1)
+        return points
+
+    def log_density(self, points: FloatArray) -> FloatArray:
+        """At points of the rows, (n_rows, k, n_axes) to (n_rows, k)."""
+        whiten = np.linalg.inv(self.factor)
+        log_scale = np.log(np.einsum("rii->ri", whiten)).sum(axis=1) - points.shape[2] * _LOG_SQRT_2PI
+        white = points @ whiten.transpose(0, 2, 1), self.centres @ whiten.transpose(0, 2, 1)
+        result: FloatArray = _log_mixture(*white) + log_scale[:, None]
+        return result
+
+
+@compiled()
+def _log_mixture(points, centres):  # type: ignore[no-untyped-def]
+    """Log of the mean of unit normal densities around centres, but for their constant, row by row."""
+    n_rows, n_points, n_axes = points.shape
+    n_centres = centres.shape[1]
+    result, squares = np.empty((n_rows, n_points)), np.empty(n_centres)
+    for row in range(n_rows):
+        for k in range(n_points):
+            for centre in range(n_centres):
+                squares[centre] = 0.0
+                for axis in range(n_axes):
+                    squares[centre] += (points[row, k, axis] - centres[row, centre, axis]) ** 2
+            if n_centres == 1:  # most parts: no exponential and no logarithm, a tenth of the time
+                result[row, k] = -0.5 * squares[0]
+                continue
+            least, total = squares.min(), 0.0
+            for centre in range(n_centres):
+                total += math.exp(0.5 * (least - squares[centre]))
+            result[row, k] = math.log(total / n_centres) - 0.5 * least
+    return result
+
+
+@cache
+def _normal_numbers(n_events: int, n: int, n_axes: int, seed: int) -> FloatArray:
+    """Quasi-random standard normal numbers, (n_events, n, n_axes): of its own for each event.
+
+    With the same for all events, what is left of the integration errors would add up in one direction.
+    """
+    uniforms = [
+        qmc.Sobol(n_axes, scramble=True, rng=np.random.default_rng([seed, event])).random(n)
+        for event in range(n_events)
+    ]
+    numbers: FloatArray = ndtri(np.clip(np.array(uniforms), 1e-12, 1.0 - 1e-12))
+    return numbers
+
+
+def event_nodes(
+    extension: Extension,
+    rows: Rows,
+    strengths: FloatArray,
+    population: Population,
+    modes: Modes,
+    budget: Budget = USUAL,
+    reference: Population | None = None,
+    shifts: FloatArray | None = None,
+) -> Spread:
+    """Nodes of all rows, as many for each: on a line where one strength is free, else importance nodes.
+
+    Parameters
+    ----------
+    strengths : (n_directions,) or (n_rows, n_directions) array
+        Of what is added.
+    population : Population
+        Roughly where the events' strengths are.
+    modes : Modes
+        Around which many nodes are put.
+    reference : Population, optional
+        Other populations that the nodes of all rows must cover: those over the population are shared with
+        them. Without any, a population that has become too narrow would never see what it misses.
+    shifts : (n_rows, n_base + 1) array, optional
+        By which each row's quasi-random numbers are moved round along each axis, 0 to 1. For means over
+        rows, not differences: what is left of the integration errors then averages out. On a line there are
+        no such numbers, and nothing is moved.
+    """
+    if _axes(extension, rows) == 1:
+        return on_a_line(extension, rows, strengths, population, modes, budget, reference)
+    return importance_nodes(extension, rows, strengths, population, modes, budget, reference, shifts)
+
+
+def importance_nodes(
+    extension: Extension,
+    rows: Rows,
+    strengths: FloatArray,
+    population: Population,
+    modes: Modes,
+    budget: Budget,
+    reference: Population | None = None,
+    shifts: FloatArray | None = None,
+) -> Spread:
+    """As `event_nodes`, over any number of strengths, with the release where it is uncertain.
+
+    All are weighted by the mixture of all that was proposed, what was found by adaptation included (adaptive
+    multiple importance sampling: Cornuet and others, 2012, doi 10.1111/j.1467-9469.2011.00756.x).
+    """
+    n, axes = population.mean.shape[1], _axes(extension, rows)
+    cover = _cover(rows, population, modes, axes)
+    parts = [
+        _Part(budget.around_mode, modes.points[:, None, :axes], budget.wider * np.linalg.cholesky(cover))
+    ]
+    covered = _covered(population, reference)
+    # As many as quasi-random numbers come in.
+    size = 1 << ((budget.over_population // len(covered)).bit_length() - 1)
+    for one in covered:
+        centre, over = _over(one, rows, axes, budget.population_wider)
+        parts.append(_Part(size, centre[:, None, :], over))
+
+    def spread(part: _Part, seed: int) -> tuple[FloatArray, FloatArray]:
+        """Nodes of a part, and the log likelihoods there, the release's prior included."""
+        numbers = _normal_numbers(extension.problem.campaign.n_events, part.size, axes, seed)[rows.event]
+        points = part.points(_rotated(numbers, shifts))
+        return points, _log_likelihoods(extension, rows, strengths, modes, points, budget.linear)
+
+    found = [spread(part, seed) for seed, part in enumerate(parts)]
+    points, log_l = (np.concatenate([one[k] for one in found], axis=1) for k in range(2))
+    log_weights = log_l - _log_proposal(parts, points)
+    if budget.adapted:
+        centre, over = _over(population, rows, n, 1.0)
+        log_prior = _Part(0, centre[:, None, :], over).log_density(points[:, :, :n])
+        parts.append(_adapted(points, log_weights + log_prior, cover, budget.adapted))
+        more, log_more = spread(parts[-1], len(parts))
+        points, log_l = np.concatenate([points, more], axis=1), np.concatenate([log_l, log_more], axis=1)
+        log_weights = log_l - _log_proposal(parts, points)
+    n_rows, n_nodes = log_weights.shape
+    full = np.zeros((n_rows, n_nodes, n + 1))
+    full[:, :, :axes] = points
+    return Spread(full, log_weights - math.log(n_nodes))
+
+
+def on_a_line(
+    extension: Extension,
+    rows: Rows,
+    strengths: FloatArray,
+    population: Population,
+    modes: Modes,
+    budget: Budget,
+    reference: Population | None = None,
+) -> Spread:
+    """As `event_nodes`, where one strength is all that is free; see `line_nodes`."""
+    cover = _cover(rows, population, modes, 1)
+    over = [_over(one, rows, 1, 1.0) for one in _covered(population, reference)]
+    centres = np.column_stack([modes.points[:, 0], *(centre[:, 0] for centre, _ in over)])
+    widths = [budget.wider * np.sqrt(cover[:, 0, 0])]
+    widths += [budget.population_wider * factor[:, 0, 0] for _, factor in over]
+
+    def log_likelihoods_at(points: FloatArray) -> FloatArray:
+        return _log_likelihoods(extension, rows, strengths, modes, points[:, :, None], budget.linear)
+
+    populations = centres[:, 1:], np.column_stack([factor[:, 0, 0] for _, factor in over])
+    points, log_weights = line_nodes(
+        log_likelihoods_at, centres, np.column_stack(widths), populations, budget.total
+    )
+    full = np.zeros((*points.shape, 2))
+    full[:, :, 0] = points
+    return Spread(full, log_weights)
+
+
+def _axes(extension: Extension, rows: Rows) -> int:
+    """How many there are to integrate over: the base's strengths, and the release where it is uncertain."""
+    return extension.n_base + int((extension.problem.releases.sd[rows.event] > 0.0).any())
+
+
+def _covered(population: Population, reference: Population | None) -> list[Population]:
+    """The rows' own population first, then each that the nodes of all rows must cover."""
+    return [population, *([] if reference is None else reference.groups)]
+
+
+def _cover(rows: Rows, population: Population, modes: Modes, axes: int) -> FloatArray:
+    """Covariance of the linear model about each row's mode, (n_rows, axes, axes)."""
+    cover = np.linalg.inv(modes.information + population.precision[rows.group])[:, :axes, :axes]
+    result: FloatArray = 0.5 * (cover + cover.transpose(0, 2, 1))
+    return result
+
+
+def _log_likelihoods(
+    extension: Extension, rows: Rows, strengths: FloatArray, modes: Modes, points: FloatArray, linear: bool
+) -> FloatArray:
+    """At nodes, (n_rows, k, n_axes) to (n_rows, k); with the prior of a release that is an axis."""
+    n_rows, size, axes = points.shape
+    n = extension.n_base
+    flat = np.zeros((n_rows * size, n + 1))
+    flat[:, :axes] = points.reshape(-1, axes)
+    which = np.repeat(np.arange(n_rows), size)
+    if linear:
+        predictions = _linear_predictions(modes, flat.reshape(n_rows, size, n + 1))
+    else:
+        given = np.broadcast_to(strengths, (n_rows, len(extension.directions)))
+        predictions = extension.predict(rows.event[which], flat, given[which])
+    log_l: FloatArray = log_likelihoods(which, predictions, rows.readings, rows.errors)
+    if axes > n:
+        log_l = log_l - 0.5 * flat[:, n] ** 2 - _LOG_SQRT_2PI
+    return log_l.reshape(n_rows, size)
+
+
+def _log_proposal(parts: list[_Part], points: FloatArray) -> FloatArray:
+    """Log density of the mixture of all parts, by their sizes."""
+    total = sum(part.size for part in parts)
+    terms = [math.log(part.size / total) + part.log_density(points) for part in parts]
+    return np.asarray(np.logaddexp.reduce(terms, axis=0))
+
+
+def _adapted(points: FloatArray, log_posterior: FloatArray, cover: FloatArray, size: int) -> _Part:
+    """Where weighted nodes say that each row's posterior is: normal densities around some of them."""
+    weights = np.exp(log_posterior - log_posterior.max(axis=1, keepdims=True))
+    weights /= weights.sum(axis=1, keepdims=True)
+    effective = 1.0 / np.sum(weights**2, axis=1)
+    deviation = points - np.sum(weights[:, :, None] * points, axis=1)[:, None, :]
+    covariance = deviation.transpose(0, 2, 1) @ (weights[:, :, None] * deviation)
+    shrink = (_SHRUNK / (_SHRUNK + effective))[:, None, None]
+    covariance = shrink * cover + (1.0 - shrink) * covariance
+    # Systematic resampling, and the usual bandwidth of a kernel density of so many.
+    steps = (np.arange(_CENTRES) + 0.5) / _CENTRES
+    chosen = (np.cumsum(weights, axis=1)[:, None, :] < steps[:, None]).sum(axis=2)
+    centres = np.take_along_axis(points, np.minimum(chosen, points.shape[1] - 1)[:, :, None], axis=1)
+    n_axes = points.shape[2]
+    count = np.minimum(effective, _CENTRES)
+    bandwidth = _ADAPTED_WIDER * (4.0 / ((n_axes + 2) * count)) ** (1.0 / (n_axes + 4))
+    return _Part(size, centres, bandwidth[:, None, None] * np.linalg.cholesky(covariance))
+
+
+def _rotated(numbers: FloatArray, shifts: FloatArray | None) -> FloatArray:
+    """Normal numbers, (n_rows, n, n_axes), their quantiles moved round by each row's shifts."""
+    if shifts is None:
+        return numbers
+    quantiles = (ndtr(numbers) + shifts[:, None, : numbers.shape[2]]) % 1.0
+    rotated: FloatArray = ndtri(np.clip(quantiles, 1e-12, 1.0 - 1e-12))
+    return rotated
+
+
+def _linear_predictions(modes: Modes, points: FloatArray) -> FloatArray:
+    """Readings at nodes along the tangents at each row's mode; a speed below zero is none."""
+    change = (points - modes.tangents_at[:, None, :]) @ modes.by_points.transpose(0, 2, 1)
+    result: FloatArray = np.maximum(modes.predictions[:, None, :] + change, 0.0)
+    return result.reshape(-1, result.shape[2])
+
+
+def _over(population: Population, rows: Rows, axes: int, wider: float) -> tuple[FloatArray, FloatArray]:
+    """Centre and factor of a proposal over a whole population, for each row."""
+    n = population.mean.shape[1]
+    group = rows.group if len(population.mean) > 1 else np.zeros_like(rows.group)
+    centre, factor = np.zeros((len(group), axes)), np.zeros((len(group), axes, axes))
+    centre[:, :n] = population.mean[group]
+    factor[:, :n, :n] = wider * np.linalg.cholesky(population.covariance)[group]
+    if axes > n:
+        factor[:, n, n] = 1.0
+    return centre, factor

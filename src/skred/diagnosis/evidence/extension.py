@@ -1,0 +1,198 @@
+"""A base law with mechanisms added: what its fronts would be read as, with tangents."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.evidence.covariates import standard_of
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.physics.geometry import WEAKENING_SPEED_M_S
+from skred.physics.kernel.fronts import front_speeds, simulate, simulate_with_jacobian
+from skred.physics.kernel.inputs import Contributions, make_contributions
+from skred.physics.law import Law
+from skred.physics.mechanisms.spec import Direction, Setting
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+def setting_of(problem: HierarchicalProblem, law: Law, front_speed: FloatArray | None = None) -> Setting:
+    """What mechanisms added to a law on a campaign can refer to.
+
+    Parameters
+    ----------
+    front_speed : (n_cells + 1,) array, optional
+        Typical speed of the fitted fronts [m/s]; left at 0 nothing is looked for that refers to it.
+    """
+    campaign = problem.campaign
+    names = sorted({name for event in campaign.events for name in event.covariates})
+    standards = {name: standard_of(campaign.events, name) for name in names}
+    covariates = {
+        name: standard.standardised(campaign.events, name)
+        for name, standard in standards.items()
+        if standard is not None
+    }
+    return Setting(
+        terrain=problem.terrain,
+        base=tuple(mechanism.id for mechanism in law.mechanisms),
+        recorded_m=recorded_range(problem),
+        sensors=tuple(campaign.sensor_ids),
+        velocities=tuple(not sensor.is_runout for sensor in campaign.sensors),
+        covariates=covariates,
+        n_events=campaign.n_events,
+        front_speed=np.zeros(problem.terrain.n_cells + 1) if front_speed is None else front_speed,
+    )
+
+
+def recorded_range(problem: HierarchicalProblem) -> tuple[float, float]:
+    """Between which places of the track something was recorded [m]."""
+    places = [place for place in problem.sensor_places if place is not None]
+    first = [place[0] for place in places]
+    last = [place[1] for place in places]
+    for j, sensor in enumerate(problem.campaign.sensors):
+        if sensor.is_runout and problem.observed[:, j].any():
+            stops = problem.values[problem.observed[:, j], j]
+            first.append(float(stops.min()))
+            last.append(float(stops.max()))
+    return min(first), max(max(last), min(first) + 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Extension:
+    """A law with mechanisms added, on a campaign.
+
+    Points below are the logarithms of an event's base strengths and, last, its release's deviation in
+    standard deviations; rows are runs of the kernel, each of some event.
+
+    Attributes
+    ----------
+    problem : HierarchicalProblem
+    law : Law
+    directions : tuple of Direction
+        One for each added mechanism.
+    """
+
+    problem: HierarchicalProblem
+    law: Law
+    directions: tuple[Direction, ...] = ()
+
+    @property
+    def n_base(self) -> int:
+        """Number of the base law's strengths."""
+        return len(self.law.mechanisms)
+
+    @cached_property
+    def contributions(self) -> Contributions:
+        """How the base's and the added strengths enter the equation of motion."""
+        base = self.problem.contributions(self.law.mechanisms)
+        columns = [base.columns] + [
+            np.array([int(c) for c in d.columns]) for d in self.directions if d.columns
+        ]
+        profiles = [base.profiles] + [d.profiles for d in self.directions if d.columns]
+        speeds = [d.weakening_speed for d in self.directions if d.weakening_speed is not None]
+        contributions: Contributions = make_contributions(
+            np.concatenate(columns).astype(np.int64),
+            np.ascontiguousarray(np.concatenate(profiles)),
+            float(speeds[0] if speeds else WEAKENING_SPEED_M_S),
+        )
+        return contributions
+
+    @cached_property
+    def _owner(self) -> IntArray:
+        """Which added mechanism each added column belongs to."""
+        return np.repeat(np.arange(len(self.directions)), [len(d.columns) for d in self.directions])
+
+    def _log_strength_shift(self, events: IntArray, strengths: FloatArray) -> FloatArray:
+        shift = np.zeros(len(events))
+        for k, direction in enumerate(self.directions):
+            if direction.log_strengths is not None:
+                shift += strengths[:, k] * direction.log_strengths[events]
+        return shift
+
+    def _inputs(
+        self, events: IntArray, points: FloatArray, strengths: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Strengths of all columns, releases, and factors of the readings."""
+        logs = points[:, : self.n_base].copy()
+        logs[:, 0] += self._log_strength_shift(events, strengths)
+        rows = np.column_stack([np.exp(logs), strengths[:, self._owner]])
+        releases = self.problem.releases
+        place = releases.mean[events] + releases.sd[events] * points[:, -1]
+        log_factor = np.zeros((len(events), len(self.problem.sensors)))
+        for k, direction in enumerate(self.directions):
+            place = place + strengths[:, k] * direction.release
+            if direction.log_readings is not None:
+                log_factor[:, :-1] += np.outer(strengths[:, k], direction.log_readings)
+        return rows, np.clip(place, 0.0, releases.length), np.exp(log_factor)
+
+    def predict(self, events: IntArray, points: FloatArray, strengths: FloatArray) -> FloatArray:
+        """Readings of fronts, (n, n_sensors + 1), the runout last; spans up to the stop.
+
+        Parameters
+        ----------
+        events : (n,) integer array
+        points : (n, n_base + 1) array
+        strengths : (n_directions,) or (n, n_directions) array
+        """
+        given = np.broadcast_to(strengths, (len(events), len(self.directions)))
+        rows, releases, factors = self._inputs(events, points, given)
+        path, sensors = self.problem.path, self.problem.sensors
+        readings: FloatArray = simulate(rows, releases, path, self.contributions, sensors)
+        return readings * factors
+
+    def speeds(self, points: FloatArray, strengths: FloatArray) -> FloatArray:
+        """Front speed of each event at the cells' edges [m/s], (n_events, n_cells + 1), at one point each."""
+        given = np.broadcast_to(strengths, (len(points), len(self.directions)))
+        rows, releases, _ = self._inputs(np.arange(len(points)), points, given)
+        found: FloatArray = front_speeds(rows, releases, self.problem.path, self.contributions)
+        return found
+
+    def tangents(
+        self, events: IntArray, points: FloatArray, strengths: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """As `predict`, with the derivatives by the points and by the strengths added.
+
+        Returns
+        -------
+        readings : (n, n_sensors + 1) array
+        by_points : (n, n_sensors + 1, n_base + 1) array
+        by_strengths : (n, n_sensors + 1, n_directions) array
+        """
+        given = np.broadcast_to(strengths, (len(events), len(self.directions)))
+        rows, releases, factors = self._inputs(events, points, given)
+        readings, jacobian = simulate_with_jacobian(
+            rows, releases, self.problem.path, self.contributions, self.problem.sensors
+        )
+        readings = readings * factors
+        jacobian = jacobian * factors[:, :, None]
+        inside = (releases > 0.0) & (releases < self.problem.releases.length)
+        by_release = jacobian[:, :, -1] * inside[:, None]
+        by_logs = jacobian[:, :, : self.n_base] * rows[:, None, : self.n_base]
+        sd = self.problem.releases.sd[events]
+        by_points = np.concatenate([by_logs, (by_release * sd[:, None])[:, :, None]], axis=2)
+        by_strengths = np.zeros((*readings.shape, len(self.directions)))
+        added = jacobian[:, :, self.n_base : -1]
+        for k, direction in enumerate(self.directions):
+            by_strengths[:, :, k] = added[:, :, self._owner == k].sum(axis=2) + by_release * direction.release
+            if direction.log_strengths is not None:
+                by_strengths[:, :, k] += by_logs[:, :, 0] * direction.log_strengths[events][:, None]
+            if direction.log_readings is not None:
+                by_strengths[:, :-1, k] += readings[:, :-1] * direction.log_readings
+        return readings, by_points, by_strengths
+
+
+def typical_speed(speeds: FloatArray) -> FloatArray:
+    """Root of the mean square over the fronts that come by, 0 where none does, (n_edges,)."""
+    fronts = np.maximum((speeds > 0.0).sum(axis=0), 1)
+    typical: FloatArray = np.sqrt((speeds**2).sum(axis=0) / fronts)
+    return typical
+
+
+def extended(problem: HierarchicalProblem, law: Law, directions: Sequence[Direction] = ()) -> Extension:
+    """A law with mechanisms added."""
+    return Extension(problem, law, tuple(directions))

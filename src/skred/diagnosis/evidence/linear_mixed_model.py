@@ -1,0 +1,208 @@
+"""The linear mixed model around the events' own modes: population fit, efficient scores and information.
+
+Around its mode, an event's readings are linear in its own strengths, in its release and in the strength of
+anything added; the population makes the own strengths random. What is left of a direction after the
+population's mean, the events' own deviations and the releases have had their share is its efficient
+score and information (Lindstrom and Bates, 1990, doi 10.2307/2532087). Linearised at each event's own
+mode, never at the population's mean: that would alarm on clean recordings with small errors.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, event_modes
+from skred.diagnosis.evidence.extension import Extension
+from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
+from skred.physics.law import Law
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+MEDIAN_LOG_MEAN, MEDIAN_LOG_SD = -0.64, 1.1
+"""Mean and standard deviation of the log of a half-normal variable of scale 1."""
+_PRIOR_EVENTS = 2.0
+_STARTING_SPREAD = 0.3
+
+
+class MeanPrior(NamedTuple):
+    """Normal prior of the population mean, (n_base,) each."""
+
+    mean: FloatArray
+    sd: FloatArray
+
+
+def mean_prior(law: Law) -> MeanPrior:
+    """Prior of the population mean of a law's log strengths, as its half-normal priors say roughly."""
+    scales = np.array([mechanism.strength.prior_scale for mechanism in law.mechanisms])
+    return MeanPrior(np.log(scales) + MEDIAN_LOG_MEAN, np.full(len(scales), MEDIAN_LOG_SD))
+
+
+class Scores(NamedTuple):
+    """Efficient scores and information about the strengths added, by group.
+
+    Attributes
+    ----------
+    score : (n_groups, n_directions) array
+    information : (n_groups, n_directions, n_directions) array
+    raw : (n_groups, n_directions) array
+        Information before population and releases had their share.
+    """
+
+    score: FloatArray
+    information: FloatArray
+    raw: FloatArray
+
+    @property
+    def own(self) -> FloatArray:
+        """Information about each strength if all others are nil, (n_groups, n_directions)."""
+        return np.maximum(_diagonal(self.information), 1e-300)
+
+    @property
+    def z(self) -> FloatArray:
+        """Score in standard deviations, (n_groups, n_directions)."""
+        return self.score / np.sqrt(self.own)
+
+
+def _diagonal(matrices: FloatArray) -> FloatArray:
+    """Diagonals of many matrices, (n, k)."""
+    return np.array(np.einsum("gii->gi", matrices))
+
+
+def _by_group(rows: Rows, values: FloatArray) -> FloatArray:
+    """Sum over the rows of each group; groups have equally many rows, one after the other."""
+    result: FloatArray = values.reshape(rows.n_groups, -1, *values.shape[1:]).sum(axis=1)
+    return result
+
+
+def _products(rows: Rows, first: FloatArray, second: FloatArray) -> FloatArray:
+    """Products of two matrices (n_rows, k, n) over k, summed over each group's rows, (n_groups, n, n)."""
+    one, other = (part.reshape(rows.n_groups, -1, part.shape[2]) for part in (first, second))
+    result: FloatArray = one.transpose(0, 2, 1) @ other
+    return result
+
+
+def deviations(points: FloatArray, rows: Rows, population: Population) -> FloatArray:
+    """Deviation of points from their population's mean, the release's last."""
+    deviation = points.copy()
+    deviation[:, :-1] -= population.mean[rows.group]
+    return deviation
+
+
+def efficient_scores(modes: Modes, rows: Rows, population: Population, prior: MeanPrior) -> Scores:
+    """Efficient scores and information of the directions of the modes."""
+    n = population.mean.shape[1]
+    precision = population.precision[rows.group]
+    information = modes.information
+    cover = np.linalg.inv(information + precision)
+    deviation = deviations(modes.points, rows, population)
+    # Weighted residuals about the population's mean.
+    pull = modes.slope + modes.weighed(modes.by_points @ deviation[:, :, None])[:, :, 0]
+    weighted = modes.weighed(modes.by_strengths)
+    mixed = np.einsum("rij,rik->rjk", modes.by_points, weighted, optimize=True)
+    at_points = np.einsum("rij,ri->rj", modes.by_points, pull)
+    score = np.einsum("rij,ri->rj", modes.by_strengths, pull)
+    shrunk = np.einsum("rij,rjk->rik", cover, mixed, optimize=True)
+    score = score - np.einsum("rji,rj->ri", shrunk, at_points)
+    of_mean = at_points - np.einsum("rij,rjk,rk->ri", information, cover, at_points, optimize=True)
+    mean_info = information - np.einsum("rij,rjk,rkl->ril", information, cover, information, optimize=True)
+    cross = mixed - np.einsum("rij,rjk->rik", information, shrunk, optimize=True)
+    mean_total = _by_group(rows, mean_info[:, :n, :n]) + np.diag(prior.sd**-2.0)
+    mean_score = _by_group(rows, of_mean[:, :n]) + (prior.mean - population.mean) / prior.sd**2
+    crossed = _by_group(rows, cross[:, :n])
+    solved = np.linalg.solve(mean_total, crossed)
+    result = _by_group(rows, score) - np.einsum("gji,gj->gi", solved, mean_score)
+    left = _products(rows, modes.by_strengths, weighted) - _products(rows, mixed, shrunk)
+    efficient = left - np.einsum("gji,gjk->gik", crossed, solved, optimize=True)
+    raw = _by_group(rows, np.einsum("rij,rij->rj", modes.by_strengths, weighted))
+    return Scores(result, efficient, raw)
+
+
+def without(scores: Scores, n_first: int) -> Scores:
+    """Scores after the first directions, which are in already and free, have had their share too."""
+    if n_first == 0:
+        return scores
+    first, rest = slice(0, n_first), slice(n_first, None)
+    own = scores.information[:, first, first]
+    crossed = scores.information[:, first, rest]
+    solved = np.linalg.solve(own + 1e-12 * np.eye(n_first) * own.max(), crossed)
+    return Scores(
+        scores.score[:, rest] - np.einsum("gij,gi->gj", solved, scores.score[:, first]),
+        scores.information[:, rest, rest] - np.einsum("gij,gik->gjk", crossed, solved),
+        scores.raw[:, rest],
+    )
+
+
+def fit_population(
+    extension: Extension,
+    rows: Rows,
+    strengths: FloatArray,
+    prior: MeanPrior,
+    start: tuple[Population, FloatArray],
+    n_rounds: int = 25,
+    tolerance: float = 5e-3,
+) -> tuple[Population, FloatArray]:
+    """Most probable population of each group, by expectation-maximisation around the modes.
+
+    Parameters
+    ----------
+    strengths : (n_directions,) or (n_rows, n_directions) array
+        Of what is added, held fixed.
+    start : (Population, (n_rows, n_base + 1) array)
+        Population and points to begin with.
+
+    Returns
+    -------
+    population : Population
+    points : (n_rows, n_base + 1) array
+        The modes.
+    """
+    population, points = start
+    n, per_group = population.mean.shape[1], len(rows.event) // rows.n_groups
+    for _ in range(n_rounds):
+        modes = event_modes(extension, rows, points, strengths, population, n_steps=2)
+        points = modes.points
+        cover = np.linalg.inv(modes.information + population.precision[rows.group])
+        # The mean by a full step of its linear model, the spreads by expectation.
+        precision = np.linalg.inv(population.covariance)
+        deviation = deviations(points, rows, population)[:, :n]
+        score = np.einsum("gij,gj->gi", precision, _by_group(rows, deviation))
+        score += (prior.mean - population.mean) / prior.sd**2
+        lost = np.einsum("gij,gjk,gkl->gil", precision, _by_group(rows, cover[:, :n, :n]), precision)
+        total = per_group * precision - lost + np.diag(prior.sd**-2.0)
+        step = np.clip(np.linalg.solve(total, score[:, :, None])[:, :, 0], -0.5, 0.5)
+        moment = _by_group(rows, np.einsum("ri,rj->rij", deviation, deviation) + cover[:, :n, :n])
+        covariance = _most_probable_covariance(moment, per_group)
+        change = max(
+            float(np.abs(step / np.sqrt(_diagonal(covariance))).max()),
+            float(np.abs(np.log(_diagonal(covariance) / _diagonal(population.covariance))).max()),
+        )
+        population = Population(population.mean + step, covariance)
+        if change < tolerance:
+            break
+    return population, event_modes(extension, rows, points, strengths, population).points
+
+
+def _most_probable_covariance(moment: FloatArray, n_events: int) -> FloatArray:
+    """Covariance of each group: most probable spreads under their log-normal prior, mild correlation."""
+    squares = _diagonal(moment)
+    log_spread = 0.5 * np.log(squares / n_events + 1e-12)
+    for _ in range(12):
+        ratio = squares * np.exp(-2.0 * log_spread)
+        slope = n_events - ratio + (log_spread - math.log(SPREAD_MEDIAN)) / SPREAD_LOG_SD**2
+        log_spread = log_spread - np.clip(slope / (2.0 * ratio + SPREAD_LOG_SD**-2.0), -1.0, 1.0)
+    regular = moment + _PRIOR_EVENTS * SPREAD_MEDIAN**2 * np.eye(moment.shape[1])
+    scale = np.sqrt(_diagonal(regular))
+    spread = np.exp(log_spread)
+    result: FloatArray = regular * (spread / scale)[:, :, None] * (spread / scale)[:, None, :]
+    return result
+
+
+def starting_population(law: Law, n_groups: int = 1) -> Population:
+    """A wide population at the prior's median strengths."""
+    n = len(law.mechanisms)
+    mean = np.tile(mean_prior(law).mean, (n_groups, 1))
+    return Population(mean, np.tile(_STARTING_SPREAD**2 * np.eye(n), (n_groups, 1, 1)))

@@ -1,0 +1,69 @@
+"""What an avalanche would be read as, by draws of the population that it comes from."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.evidence.extension import Extension
+
+FloatArray = NDArray[np.float64]
+
+
+class Predicted(NamedTuple):
+    """Predictions of readings, m/s or m.
+
+    Attributes
+    ----------
+    mean : (..., n_sensors) array
+        Of the readings without errors.
+    low, high : (..., n_sensors) arrays
+        5 % and 95 % quantiles of the readings with errors.
+    """
+
+    mean: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+    def where(self, seen: NDArray[np.bool_]) -> Predicted:
+        """The same, NaN where nothing was seen."""
+        return Predicted(*(np.where(seen, values, np.nan) for values in self))
+
+    def covered(self, values: FloatArray, seen: NDArray[np.bool_]) -> FloatArray:
+        """1 where the central 90 % of the predictions hold the reading, else 0, NaN where none was seen."""
+        return np.where(seen, (values >= self.low) & (values <= self.high), np.nan)
+
+
+def predict_event(
+    extension: Extension,
+    event: int,
+    means: FloatArray,
+    factors: FloatArray,
+    added: FloatArray,
+    rng: np.random.Generator,
+) -> Predicted:
+    """Predict one event's readings, one front for each draw of the population.
+
+    Parameters
+    ----------
+    extension : Extension
+        What fronts do.
+    event : int
+        Its number: from which release, past which sensors.
+    means, factors : (n, n_base) and (n, n_base, n_base) arrays
+        Of the populations.
+    added : (n, n_directions) array
+        Strengths of what is added.
+    """
+    readings = extension.problem.readings
+    normal = rng.standard_normal((len(means), means.shape[1]))
+    logs = means + np.einsum("rij,rj->ri", factors, normal)
+    points = np.column_stack([logs, rng.standard_normal(len(means))])
+    fronts = extension.predict(np.full(len(means), event), points, added)[:, :-1]
+    own = readings.stated_sd[event]
+    sd = np.where(own > 0.0, own, np.hypot(readings.relative_sd * fronts, readings.absolute_sd))
+    noisy = fronts + sd * rng.standard_normal(fronts.shape)
+    low, high = np.quantile(noisy, [0.05, 0.95], axis=0)
+    return Predicted(fronts.mean(axis=0), low, high)

@@ -1,0 +1,1 @@
+"""Step 5: avalanches that were held out, before and after."""

@@ -1,0 +1,142 @@
+"""Predictions of avalanches that a calibration has not seen: leave-one-event-out, before and after."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from arviz_stats.base import array_stats
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.evidence.predictive import Predicted, predict_event
+from skred.inference.hierarchical.population import population_of
+from skred.inference.leave_one_out import exact_leave_one_out
+
+FloatArray = NDArray[np.float64]
+K_LIMIT = 0.7
+_DRAWS = 300
+_FRONTS = 4
+"""New fronts for each draw of a population."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """How well a calibration predicts each event from the others.
+
+    Attributes
+    ----------
+    pointwise : (n_events,) array
+        Expected log predictive density of each event.
+    pareto_k : (n_events,) array
+        Of the importance sampling, before refits.
+    refitted : tuple of str
+        Events that it was not trusted for, refitted without.
+    not_converged : tuple of str
+        Those of them whose refit did not converge.
+    predicted : Predicted
+        Of each reading, (n_events, n_sensors); NaN where there is none.
+    covered : (n_events, n_sensors) array
+        1 where the central 90 % of the predictions hold the reading, NaN where there is none.
+    """
+
+    pointwise: FloatArray
+    pareto_k: FloatArray
+    refitted: tuple[str, ...]
+    not_converged: tuple[str, ...]
+    predicted: Predicted
+    covered: FloatArray
+
+    @property
+    def elpd(self) -> float:
+        """Sum over events."""
+        return float(self.pointwise.sum())
+
+
+def held_out(
+    calibration: Any, extension: Extension, added: FloatArray, seed: int, *, exact: bool = False
+) -> HeldOut:
+    """Leave each event out in turn.
+
+    Parameters
+    ----------
+    calibration : skred.inference.calibrate.Calibration
+        Of the base law, or of the augmented one.
+    extension : Extension
+        What its fronts do.
+    added : (n_draws, n_directions) array
+        Strengths of what is added, for all draws, chain after chain.
+    exact : bool
+        Refit without every event instead of only where importance sampling is unreliable.
+    """
+    problem, tree = calibration.problem, calibration.tree
+    log_likelihood = tree["log_likelihood"]["recordings"]
+    array = log_likelihood.transpose("chain", "draw", "event")
+    densities = np.asarray(array.values, dtype=float).reshape(-1, array.sizes["event"])
+    log_weights, k = _smoothed(densities)
+    weights = np.exp(log_weights - logsumexp(log_weights, axis=0))
+    pointwise = logsumexp(densities + np.log(np.maximum(weights, 1e-300)), axis=0)
+    events = list(problem.campaign.event_ids)
+    again = list(range(len(events))) if exact else [int(e) for e in np.flatnonzero(~(k <= K_LIMIT))]
+    failed: tuple[str, ...] = ()
+    if again:
+        refits = exact_leave_one_out(calibration.model, calibration.step, events, seed, which=again)
+        pointwise[again] = refits.pointwise
+        failed = refits.failed
+    predicted, covered = _predictions(calibration, extension, added, weights, seed)
+    return HeldOut(pointwise, k, tuple(events[e] for e in again), failed, predicted, covered)
+
+
+def _smoothed(densities: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Pareto-smoothed log weights of leaving each event out, (n_draws, n_events), and Pareto k.
+
+    ArviZ takes log likelihoods and changes their sign itself.
+    """
+    log_weights, k = array_stats.psislw(densities.T, axis=-1)
+    return np.asarray(log_weights, dtype=float).T, np.asarray(k, dtype=float)
+
+
+def _predictions(
+    calibration: Any, extension: Extension, added: FloatArray, weights: FloatArray, seed: int
+) -> tuple[Predicted, FloatArray]:
+    """Predictions of each event's readings by the others, and whether 90 % intervals hold them."""
+    problem, law = calibration.problem, calibration.law
+    posterior = calibration.tree["posterior"].to_dataset()
+    names = [parameter.name for parameter in problem.parameters(law)]
+    samples = {name: posterior[name].transpose("chain", "draw").values.ravel() for name in names}
+    means, factors = population_of(law, samples)
+    rng = np.random.default_rng([seed, 31])
+    n_events, readings = problem.campaign.n_events, problem.readings
+    parts = []
+    for event in range(n_events):
+        drawn = rng.choice(len(weights), size=_DRAWS, p=weights[:, event])
+        drawn = np.repeat(drawn, _FRONTS)
+        parts.append(predict_event(extension, event, means[drawn], factors[drawn], added[drawn], rng))
+    found = Predicted(*(np.array(values) for values in zip(*parts, strict=True)))
+    return found.where(readings.observed), found.covered(readings.values, readings.observed)
+
+
+def errors(found: HeldOut, problem: Any) -> dict[str, float | None]:
+    """Root mean square error of speeds [m/s] and runouts [m], and coverage of the 90 % intervals."""
+    velocity = problem.readings.is_velocity
+    difference = np.where(problem.observed, found.predicted.mean - problem.values, np.nan)
+
+    def rms(columns: NDArray[np.bool_]) -> float | None:
+        chosen = difference[:, columns]
+        chosen = chosen[np.isfinite(chosen)]
+        return float(np.sqrt(np.mean(chosen**2))) if chosen.size else None
+
+    known = found.covered[np.isfinite(found.covered)]
+    return {
+        "rmse_velocity": rms(velocity),
+        "rmse_runout": rms(~velocity),
+        "coverage_90": float(known.mean()) if known.size else None,
+    }
+
+
+def paired(after: HeldOut, before: HeldOut) -> tuple[float, float]:
+    """Difference of the log scores and its standard error, from paired differences per event."""
+    difference = after.pointwise - before.pointwise
+    return float(difference.sum()), float(np.sqrt(len(difference)) * difference.std(ddof=1))

@@ -1,0 +1,341 @@
+"""Avalanches that a calibration has not seen: how probable they were, and what was predicted of them.
+
+A `Predictor` is what is left of a calibration for that: draws of the population and of what is added, small
+enough to be written beside an answer, and plain data, so that it can be kept and used elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from skred.campaign import Campaign
+from skred.diagnosis.augment.augmented import AugmentedProblem
+from skred.diagnosis.augment.tables import exact_nodes
+from skred.diagnosis.discrepancy.profile import Kind, Profile, entering, hats
+from skred.diagnosis.evidence.conditional_map import Population, Rows, campaign_rows, event_modes, log_joint
+from skred.diagnosis.evidence.covariates import Standard, standard_of
+from skred.diagnosis.evidence.event_quadrature import Budget
+from skred.diagnosis.evidence.extension import Extension, extended, setting_of
+from skred.diagnosis.evidence.predictive import Predicted, predict_event
+from skred.diagnosis.predict.held_out import HeldOut
+from skred.errors import InputError
+from skred.inference.calibrate import Calibration
+from skred.inference.error_model import ERROR_MODELS
+from skred.inference.hierarchical.event_density import integrated_log_density
+from skred.inference.hierarchical.population import population_of
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.physics.law import Law
+from skred.physics.laws import load_law
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.spec import Direction, Setting, Shape
+from skred.physics.terrain import build_terrain
+
+FloatArray = NDArray[np.float64]
+N_DRAWS = 200
+_NODES = Budget(32, 32, 0, 1.5, 1.8)
+"""Nodes of an event for each draw; their errors average out over the draws. None are adapted: where those go
+depends on the others' weights, and few of them are too low in the mean (``benchmarks/unseen_nodes.py``)."""
+_SHARED = 16
+"""As many times the nodes where all draws share them."""
+_AT_ONCE = 20
+"""Draws whose nodes are held in memory together."""
+_TRIED, _TRIED_WIDER = 64, 1.6
+"""Points of the population among which each event's mode is looked for, and how much wider they lie."""
+_FRONTS = 1200
+"""Fronts that a prediction is made of."""
+_FARTHEST = 100.0
+"""How many standard deviations a covariate may be from the average that a predictor knows."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """A mechanism that is added.
+
+    Attributes
+    ----------
+    mechanism : str
+        Its id.
+    shape : Shape
+    standard : Standard or None
+        What its covariate is standardised by, if it has one.
+    """
+
+    mechanism: str
+    shape: Shape
+    standard: Standard | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class ProfileTerm:
+    """A force profile that is added, each knot with a strength of its own.
+
+    Attributes
+    ----------
+    kind : Kind
+    knots_m : (n_knots,) array
+        Between which it is linear; 0 outside.
+    edge_m, front_speed : (n,) arrays
+        Places between the knots, and the typical speed there [m/s] that a force refers to which is nil at it.
+    """
+
+    kind: Kind
+    knots_m: FloatArray
+    edge_m: FloatArray
+    front_speed: FloatArray
+
+    @classmethod
+    def of(cls, profile: Profile, setting: Setting) -> ProfileTerm:
+        """Of a profile that was fitted in a setting."""
+        edge, at = setting.terrain.edge_s_m, profile.knots_m
+        step = np.diff(edge).max()
+        near = (edge >= at[0] - step) & (edge <= at[-1] + step)
+        return cls(profile.kind, at, edge[near], setting.front_speed[near])
+
+    def directions(self, setting: Setting) -> list[Direction]:
+        """One for each knot."""
+        speed = np.interp(setting.terrain.edge_s_m, self.edge_m, self.front_speed)
+        setting = replace(setting, front_speed=speed)
+        return [entering(setting, self.kind, row) for row in hats(setting.terrain, self.knots_m)]
+
+
+@dataclass(frozen=True, eq=False)
+class Predictor:
+    """What a calibration says of avalanches to come on its path.
+
+    Attributes
+    ----------
+    law, error_model : str
+        Ids of the base law and of the error model.
+    place_sd_m, smoothing_m : float
+        How well it is known where a front stopped relative to a sensor; smoothing of the terrain.
+    means : (n_draws, n_base) array
+        Of the logarithms of the base strengths across events.
+    factors : (n_draws, n_base, n_base) array
+        Lower Cholesky factors of their covariance.
+    terms : tuple of Term
+        What is added, if anything.
+    strengths : (n_draws, n_terms + n_knots) array
+        Of what is added; of a profile its values at the knots.
+    profile : ProfileTerm or None
+        The force profile that is added, if one is.
+    """
+
+    law: str
+    error_model: str
+    place_sd_m: float
+    smoothing_m: float
+    means: FloatArray
+    factors: FloatArray
+    terms: tuple[Term, ...]
+    strengths: FloatArray
+    profile: ProfileTerm | None = None
+
+    @property
+    def n_draws(self) -> int:
+        """Number of draws."""
+        return len(self.means)
+
+
+def predictor_of(calibration: Calibration, n_draws: int = N_DRAWS) -> Predictor:
+    """What a calibration says of avalanches to come.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        Hierarchical: of a base law, or of one with mechanisms added.
+    n_draws : int
+        Draws kept, evenly spaced over all of the posterior.
+
+    Raises
+    ------
+    ValueError
+        If something is in the law with a fixed strength.
+    """
+    problem, law = calibration.problem, calibration.law
+    assert isinstance(problem, HierarchicalProblem)
+    posterior = calibration.tree["posterior"].to_dataset()
+    names = [parameter.name for parameter in problem.parameters(law)]
+    samples = {name: posterior[name].transpose("chain", "draw").values.ravel() for name in names}
+    chosen = np.linspace(0, len(samples[names[0]]) - 1, n_draws).round().astype(int)
+    samples = {name: values[chosen] for name, values in samples.items()}
+    means, factors = population_of(law, samples)
+    terms, strengths = tuple[Term, ...](), np.empty((len(means), 0))
+    if isinstance(problem, AugmentedProblem):
+        if problem.base.directions:
+            raise ValueError("a predictor cannot hold what is added with a fixed strength")
+        terms = tuple(_term(problem, one.mechanism.id, one.shape) for one in problem.added)
+        strengths = problem.added_rows(samples)
+    smoothing, place_sd = problem.terrain.smoothing_m, problem.place_sd_m
+    return Predictor(law.id, problem.error_model.id, place_sd, smoothing, means, factors, terms, strengths)
+
+
+def _term(problem: HierarchicalProblem, mechanism: str, shape: Shape) -> Term:
+    standard = standard_of(problem.campaign.events, shape.covariate) if shape.covariate is not None else None
+    return Term(mechanism, shape, standard)
+
+
+def log_scores(predictor: Predictor, campaign: Campaign, seed: int = 0) -> FloatArray:
+    """Log predictive density of each event of a campaign on the predictor's path, (n_events,).
+
+    The mean, over the draws, of how likely all of an event's readings are, its own strengths and release
+    integrated over; 0 where an event has no reading.
+
+    Raises
+    ------
+    InputError
+        If the predictor is of another path, or says nothing finite.
+    """
+    extension = extension_of(predictor, campaign)
+    try:
+        draws = predictor.means, predictor.factors, predictor.strengths
+        densities = log_densities(extension, campaign_rows(extension), *draws, seed)
+    except np.linalg.LinAlgError as error:
+        raise InputError("the predictor's draws are no populations: it is damaged") from error
+    scores: FloatArray = logsumexp(densities, axis=0) - np.log(len(densities))
+    if not np.isfinite(scores).all():
+        names = [name for name, x in zip(campaign.event_ids, scores, strict=True) if not np.isfinite(x)]
+        raise InputError(f"the predictor gives no finite score to {', '.join(names)}: is it of another path?")
+    return scores
+
+
+def predictions(predictor: Predictor, campaign: Campaign, seed: int = 0) -> Predicted:
+    """Mean and 5 and 95 % quantiles of each reading, (n_events, n_sensors) each; seen or not.
+
+    Raises
+    ------
+    InputError
+        If the predictor is of another path.
+    """
+    extension, rng = extension_of(predictor, campaign), np.random.default_rng([seed, 33])
+    n_events = campaign.n_events
+    drawn = np.resize(np.arange(predictor.n_draws), _FRONTS)
+    draws = predictor.means[drawn], predictor.factors[drawn], predictor.strengths[drawn]
+    parts = [predict_event(extension, event, *draws, rng) for event in range(n_events)]
+    return Predicted(*(np.array(values) for values in zip(*parts, strict=True)))
+
+
+def unseen(predictor: Predictor, campaign: Campaign, seed: int = 0) -> HeldOut:
+    """Scores and predictions of a campaign's events, as of events left out; nothing was reweighted."""
+    problem, found = problem_of(predictor, campaign), predictions(predictor, campaign, seed)
+    seen = problem.observed
+    covered = found.covered(problem.readings.values, seen)
+    scores = log_scores(predictor, campaign, seed)
+    return HeldOut(scores, np.zeros(len(scores)), (), (), found.where(seen), covered)
+
+
+def problem_of(predictor: Predictor, campaign: Campaign) -> HierarchicalProblem:
+    """The campaign's recordings as the predictor reads them."""
+    x_m, z_m = campaign.track.x_m, campaign.track.z_m
+    terrain = build_terrain(x_m, z_m, smoothing_m=predictor.smoothing_m)
+    errors = ERROR_MODELS[predictor.error_model]
+    return HierarchicalProblem(campaign, terrain, errors, predictor.place_sd_m)
+
+
+def extension_of(predictor: Predictor, campaign: Campaign) -> Extension:
+    """The law with what is added, on other avalanches of the same path.
+
+    Raises
+    ------
+    InputError
+        If what is added does not go with the campaign.
+    """
+    problem, law = problem_of(predictor, campaign), load_law(predictor.law)
+    directions = [_direction(term, problem, law) for term in predictor.terms]
+    if predictor.profile is not None:
+        _check_on_track(predictor.profile.knots_m[-1], problem)
+        directions += predictor.profile.directions(setting_of(problem, law))
+    return extended(problem, law, directions)
+
+
+def _check_on_track(place_m: float, problem: HierarchicalProblem) -> None:
+    if place_m > problem.terrain.length_m + 1.0:
+        name = problem.campaign.name
+        raise InputError(f"{name}: the predictor speaks of a place beyond the end of its track")
+
+
+def _direction(term: Term, problem: HierarchicalProblem, law: Law) -> Direction:
+    """What a unit of the mechanism changes for these avalanches, by the scale that it was fitted on."""
+    campaign, shape = problem.campaign, term.shape
+    if shape.sensor is not None and shape.sensor not in campaign.sensor_ids:
+        raise InputError(f"{campaign.name}: has no sensor {shape.sensor!r}, which the predictor speaks of")
+    if shape.s_to_m is not None:
+        _check_on_track(shape.s_to_m, problem)
+    covariates: Mapping[str, FloatArray] = {}
+    if shape.covariate is not None and term.standard is not None:
+        values = term.standard.standardised(campaign.events, shape.covariate)
+        if np.abs(values).max(initial=0.0) > _FARTHEST:
+            raise InputError(f"{campaign.name}: {shape.covariate!r} is far off what the predictor knows")
+        covariates = {shape.covariate: values}
+    added = mechanisms()[term.mechanism].added
+    assert added is not None
+    try:
+        return added.direction(replace(setting_of(problem, law), covariates=covariates), shape)
+    except (AssertionError, KeyError, TypeError, ValueError) as error:
+        raise InputError(f"the predictor's {term.mechanism} has a shape that it cannot have") from error
+
+
+def log_densities(
+    extension: Extension, rows: Rows, means: FloatArray, factors: FloatArray, strengths: FloatArray, seed: int
+) -> FloatArray:
+    """Log density of each row's event for each draw, its own strengths integrated out, (n_draws, n_rows).
+
+    Parameters
+    ----------
+    means, factors : (n_draws, n_base) and (n_draws, n_base, n_base) arrays
+        Of populations.
+    strengths : (n_draws, n_directions) array
+        Of what is added.
+    """
+    covariances = np.einsum("nij,nkj->nik", factors, factors)
+    typical = Population(means.mean(axis=0)[None], covariances.mean(axis=0)[None])
+    rng = np.random.default_rng([seed, 35])
+    start = _points(extension, rows, typical, strengths.mean(axis=0), rng)
+    n_events = len(rows.event)
+    result = np.empty((len(means), n_events))
+    if (strengths == strengths[0]).all():
+        # Readings are then as likely at a node whichever draw it is: one set of many nodes serves all.
+        given, at = strengths[:1], start[None]
+        nodes = exact_nodes(extension, rows, given, typical, at, _NODES.times(_SHARED), typical)
+        for k, mean in enumerate(means):
+            result[k] = integrated_log_density(np.tile(mean, (n_events, 1)), factors[k], *nodes)
+        return result
+    for first in range(0, len(means), _AT_ONCE):
+        part = slice(first, first + _AT_ONCE)
+        population = Population(means[part], covariances[part])
+        starts = np.tile(start, (len(population.mean), 1, 1))
+        shifts = rng.random((starts.shape[0] * n_events, starts.shape[2]))
+        nodes = exact_nodes(extension, rows, strengths[part], population, starts, _NODES, typical, shifts)
+        for k in range(len(population.mean)):
+            of_draw = nodes.first[k * n_events : (k + 1) * n_events + 1]
+            mean = np.tile(population.mean[k], (n_events, 1))
+            result[first + k] = integrated_log_density(
+                mean, factors[first + k], of_draw, nodes.points, nodes.log_weights
+            )
+    return result
+
+
+def _points(
+    extension: Extension,
+    rows: Rows,
+    population: Population,
+    strengths: FloatArray,
+    rng: np.random.Generator,
+) -> FloatArray:
+    """Each event's most probable point, (n_events, n_base + 1): climbed to from the best of many."""
+    n_events, n = len(rows.event), population.mean.shape[1]
+    tried = np.zeros((_TRIED, n + 1))
+    tried[1:] = rng.standard_normal((_TRIED - 1, n + 1))
+    tried[:, :n] = tried[:, :n] @ (_TRIED_WIDER * np.linalg.cholesky(population.covariance[0])).T
+    tried[:, :n] += population.mean[0]
+    many = rows.take(np.repeat(np.arange(n_events), _TRIED))
+    points = np.tile(tried, (n_events, 1))
+    given = np.broadcast_to(strengths, (len(points), len(strengths)))
+    heights = log_joint(extension, many, points, given, population).reshape(n_events, _TRIED)
+    start = tried[heights.argmax(axis=1)]
+    found: FloatArray = event_modes(extension, rows, start, strengths, population, n_steps=20).points
+    return found

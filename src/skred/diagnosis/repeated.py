@@ -1,0 +1,153 @@
+"""Diagnoses judged on avalanches that they have not seen: locked ones opened once, and an outer fold.
+
+The gain that selected a model must not be the gain that is reported: avalanches are set aside before anything
+is looked at, and in an outer fold the whole diagnosis is repeated without each part of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from skred.campaign import Campaign
+from skred.campaign.parts import of_events, without_silent_sensors
+from skred.diagnosis.diagnose import Diagnosis, Effort, diagnose, too_little
+from skred.diagnosis.evidence.prior_odds import UNLISTED
+from skred.diagnosis.predict.gain import predictors_of
+from skred.diagnosis.predict.held_out import HeldOut, errors
+from skred.diagnosis.predict.unseen import log_scores, problem_of, unseen
+from skred.errors import InputError
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.paired import sum_se
+from skred.inference.sampling import SamplerSettings
+from skred.physics.law import Law
+
+Tell = Callable[[str], None]
+_ERRORS = ("rmse_velocity", "rmse_runout", "coverage_90")
+
+
+def set_aside(problem: HierarchicalProblem, n: int, seed: int) -> tuple[HierarchicalProblem, Campaign]:
+    """Lock avalanches away, drawn at random among those with a reading.
+
+    Returns
+    -------
+    problem : HierarchicalProblem
+        Of all other avalanches.
+    locked : Campaign
+
+    Raises
+    ------
+    InputError
+        If the others would be too few for a diagnosis.
+    """
+    campaign, recorded = problem.campaign, np.flatnonzero(problem.observed.any(axis=1))
+    if n >= len(recorded):
+        raise InputError(f"--lock {n}: only {len(recorded)} avalanches have a reading; lock fewer")
+    rng = np.random.default_rng([seed, 61])
+    chosen = np.sort(rng.choice(recorded, size=n, replace=False))
+    others = _without(problem, chosen.tolist(), f"--lock {n}")
+    return others, of_events(campaign, chosen.tolist())
+
+
+def open_locked(found: Diagnosis, locked: Campaign, seed: int) -> dict[str, Any]:
+    """What locked avalanches make of a diagnosis; null where nothing was let in, or calibrated at all."""
+    document: dict[str, Any] = {"events": list(locked.event_ids)}
+    keys = ("log_score", *_ERRORS)
+    document |= {f"{key}_{when}": None for when in ("before", "after") for key in keys}
+    document |= {"elpd_diff": None, "elpd_se": None}
+    if found.before is None:
+        return document
+    scored = [unseen(one, locked, seed) for one in predictors_of(found) if one is not None]
+    problem = problem_of(predictors_of(found)[0], locked)
+    for when, one in zip(("before", "after"), scored, strict=False):
+        document |= {f"{key}_{when}": value for key, value in _numbers(one, problem).items()}
+    if len(scored) == 2:
+        document |= _difference(scored[1].pointwise - scored[0].pointwise)
+    return document
+
+
+def _numbers(found: HeldOut, problem: HierarchicalProblem) -> dict[str, Any]:
+    return {"log_score": found.pointwise.tolist(), **errors(found, problem)}
+
+
+def _difference(pairs: Any) -> dict[str, float | None]:
+    """Sum of paired differences, and its standard error where there are several."""
+    return {"elpd_diff": float(pairs.sum()), "elpd_se": sum_se(pairs) if len(pairs) > 1 else None}
+
+
+def folds_of(problem: HierarchicalProblem, k: int, seed: int) -> list[list[int]]:
+    """Numbers of the avalanches of each fold, dealt out at random.
+
+    Raises
+    ------
+    InputError
+        If there are fewer avalanches than folds, or too few for a diagnosis without one of the folds.
+    """
+    n = problem.campaign.n_events
+    if k > n:
+        raise InputError(f"--outer-folds {k}: there are only {n} avalanches; use fewer folds")
+    dealt = np.random.default_rng([seed, 63]).permutation(n)
+    folds = [np.sort(part).tolist() for part in np.array_split(dealt, k)]
+    for fold in folds:
+        _without(problem, fold, f"--outer-folds {k}")
+    return folds
+
+
+def outer_folds(
+    problem: HierarchicalProblem,
+    law: Law,
+    settings: SamplerSettings,
+    effort: Effort,
+    k: int,
+    tell: Tell = lambda line: None,
+) -> dict[str, Any]:
+    """Repeat the whole diagnosis without each fold, and score the fold before and after by what it let in.
+
+    Where it lets nothing in, after is before.
+    """
+    folds = folds_of(problem, k, settings.seed)
+    entries, pairs = list[dict[str, Any]](), list[float]()
+    for number, fold in enumerate(folds):
+        tell(f"outer fold {number + 1} of {k}: the diagnosis without {len(fold)} avalanches")
+        others = _without(problem, fold, f"--outer-folds {k}")
+        found = diagnose(others, law, settings, replace(effort, exact_loo=False))
+        entry, difference = _fold(found, of_events(problem.campaign, fold), settings.seed)
+        entries.append(entry)
+        pairs += difference
+    return {"k": k, "folds": entries, **_difference(np.array(pairs))}
+
+
+def _fold(found: Diagnosis, left_out: Campaign, seed: int) -> tuple[dict[str, Any], list[float]]:
+    """One fold, and the differences of its avalanches."""
+    before, after = predictors_of(found)
+    first = log_scores(before, left_out, seed)
+    second = first if after is None else log_scores(after, left_out, seed)
+    difference = second - first
+    names = [step.entrant.mechanism.id for step in found.steps]
+    if found.profile is not None:
+        names = [UNLISTED]
+    entry = {
+        "events": list(left_out.event_ids),
+        "verdict": found.decision.verdict,
+        "mechanism": names[0] if names else None,
+        "mechanisms": names,
+        "reason": found.cannot or None,
+        "log_score_before": first.tolist(),
+        "log_score_after": second.tolist(),
+        "elpd_diff": float(difference.sum()),
+    }
+    return entry, difference.tolist()
+
+
+def _without(problem: HierarchicalProblem, rows: Sequence[int], option: str) -> HierarchicalProblem:
+    """The problem without some avalanches, and without sensors that only those passed."""
+    campaign = problem.campaign
+    others = [k for k in range(campaign.n_events) if k not in set(rows)]
+    rest = replace(problem, campaign=without_silent_sensors(of_events(campaign, others)))
+    reason = too_little(rest)
+    if reason:
+        raise InputError(f"{option}: too little is left to diagnose ({reason}); set fewer avalanches aside")
+    return rest

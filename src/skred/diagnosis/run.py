@@ -1,0 +1,83 @@
+"""A diagnosis with its files: verdict.json, report.html, draws as netCDF, and figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from skred.diagnosis.diagnose import Diagnosis, Effort, diagnose
+from skred.diagnosis.repeated import folds_of, open_locked, outer_folds, set_aside
+from skred.diagnosis.verdict.document import verdict
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.results import save
+from skred.inference.sampling import SamplerSettings
+from skred.output import write_json, write_text
+from skred.parallel.processes import meanwhile
+from skred.physics.law import Law
+
+Tell = Callable[[str], None]
+DRAWS = ("base.nc", "base_same_errors.nc", "augmented.nc")
+"""Of the base law, of it under the errors of what was let in, and of the law with that."""
+
+
+def diagnose_to(
+    problem: HierarchicalProblem,
+    law: Law,
+    settings: SamplerSettings,
+    effort: Effort,
+    folder: Path,
+    tell: Tell = lambda line: None,
+    *,
+    lock: int = 0,
+    folds: int = 0,
+) -> dict[str, Any]:
+    """Diagnose, and write everything into a folder; the verdict first, so that it is there in any case.
+
+    Parameters
+    ----------
+    lock : int
+        Avalanches set aside before anything is looked at, and opened once at the end.
+    folds : int
+        Parts of the others without which the whole diagnosis is repeated, one by one; 0 for none.
+    """
+    from skred.report.diagnosis.report import FIGURES, render_diagnosis, save_diagnosis_figures
+
+    locked = None
+    if lock:
+        problem, locked = set_aside(problem, lock, settings.seed)
+    if folds:
+        folds_of(problem, folds, settings.seed)  # refused now rather than after the diagnosis
+    found = diagnose(problem, law, settings, effort, tell)
+    document = verdict(found) | {"settings": settings.as_dict() | {"replicas": effort.replicas}}
+    # Not all of these are written each time: an earlier diagnosis's would be taken for this one's.
+    for name in ("verdict.json", "report.html", *DRAWS, *(f"{figure}.png" for figure in FIGURES)):
+        (folder / name).unlink(missing_ok=True)
+    write_json(folder / "verdict.json", document)
+    if locked is not None:
+        tell(f"opening {lock} locked avalanches")
+        document["locked"] = open_locked(found, locked, settings.seed)
+    if folds:
+        document["outer_folds"] = outer_folds(problem, law, settings, effort, folds, tell)
+    if lock or folds:
+        write_json(folder / "verdict.json", document)
+    tell("writing the report")
+    with ExitStack() as draws:  # written whatever becomes of the figures, and of each other
+        for name, tree in _draws_of(found).items():
+            draws.callback(meanwhile(save, tree, folder / name))
+        figures = save_diagnosis_figures(found, folder)
+        write_text(folder / "report.html", render_diagnosis(found, document, figures))
+    return document
+
+
+def _draws_of(found: Diagnosis) -> dict[str, xr.DataTree]:
+    """Draws of every calibration of a diagnosis, by the name of their file."""
+    kept = {
+        "base.nc": found.calibration,
+        "base_same_errors.nc": found.reference if found.reference is not found.calibration else None,
+        "augmented.nc": found.steps[-1].calibration if found.steps else None,
+    }
+    return {name: one.tree for name, one in kept.items() if one is not None}

@@ -1,0 +1,249 @@
+"""The verdict as plain data: every key of the campaign format, and a statement in plain words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from skred.diagnosis.augment.coefficient import strength_of
+from skred.diagnosis.compare.candidate import Entrant
+from skred.diagnosis.compare.comparison import Race
+from skred.diagnosis.compare.decision import alarmed
+from skred.diagnosis.detect.detectability import Told
+from skred.diagnosis.diagnose import Diagnosis
+from skred.diagnosis.evidence.covariates import standard_of
+from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER
+from skred.diagnosis.predict.held_out import errors, paired
+from skred.diagnosis.predict.profile_law import ProfileLaw
+from skred.diagnosis.verdict.next_sensor import next_sensor
+from skred.diagnosis.verdict.statement import statement
+from skred.physics.mechanisms.stretches import equation_of
+
+_NO_LIMIT = 20.0
+"""Strengths so many prior scales large are no limit: these recordings say nothing of the mechanism."""
+
+
+def verdict(found: Diagnosis) -> dict[str, Any]:
+    """The verdict of a diagnosis, as `verdict.json` holds it."""
+    entrant = found.steps[0].entrant if found.steps else None
+    names = found.decision.names if found.steps else ()
+    document = {
+        "format": 1,
+        "campaign": found.problem.campaign.name,
+        "base_model": found.law.id,
+        "verdict": found.decision.verdict,
+        "mechanism": names[0] if names else None,
+        "mechanisms": [_mechanism(found, number) for number in range(len(found.steps))],
+        "probability": found.race.probability if found.race is not None else {},
+        "indistinguishable": list(names[1:]),
+        "location": _location(found, entrant),
+        "strength": _strength(found, 0) if found.steps else None,
+        "covariate": entrant.best.shape.covariate if entrant is not None else None,
+        "sensor": entrant.best.shape.sensor if entrant is not None else None,
+        "equation": equation_of(entrant.mechanism, entrant.best.shape) if entrant is not None else None,
+        "evidence": _evidence(found),
+        "held_out": _held_out(found),
+        "detection_limits": _detection_limits(found),
+        "next_sensor": next_sensor(found),
+        "diagnostics": _diagnostics(found),
+        "left": _left(found),
+    }
+    document["statement"] = statement(found, document)
+    return document | _more(found)
+
+
+def _location(found: Diagnosis, entrant: Entrant | None) -> dict[str, float] | None:
+    if entrant is not None:
+        stretch = entrant.stretch()
+    elif found.decision.verdict == "unexplained" and found.location is not None:
+        stretch = found.location.stretch_m
+    else:
+        stretch = None
+    return None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]}
+
+
+def _strength(found: Diagnosis, number: int) -> dict[str, Any]:
+    problem: Any = found.steps[-1].calibration.problem
+    added = problem.added[number]
+    mean, sd = strength_of(found.steps, number)
+    return {"parameter": added.name, "unit": added.mechanism.strength.unit, "mean": mean, "sd": sd}
+
+
+def _mechanism(found: Diagnosis, number: int) -> dict[str, Any]:
+    """One mechanism let in, its strength as the last calibration has it."""
+    step = found.steps[number]
+    entrant = step.entrant
+    stretch = entrant.stretch()
+    shape = entrant.best.shape
+    return {
+        "id": entrant.mechanism.id,
+        "strength": _strength(found, number),
+        "location": None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]},
+        "equation": equation_of(entrant.mechanism, shape),
+        "covariate": shape.covariate,
+        "standard": _standard(found, shape.covariate),
+        "sensor": shape.sensor,
+        "constants": dict(shape.constants),
+        "tied_with": list(step.tied),
+        "log_bayes_factor": step.race.log_factors[entrant.mechanism.id],
+    }
+
+
+def _standard(found: Diagnosis, covariate: str | None) -> dict[str, Any] | None:
+    """By what a covariate is standardised before its strength multiplies it."""
+    standard = None if covariate is None else standard_of(found.problem.campaign.events, covariate)
+    return None if standard is None else standard.as_dict()
+
+
+def _evidence(found: Diagnosis) -> dict[str, float | None]:
+    p_value = found.check.p_value if found.check is not None else None
+    factor = None
+    if found.race is not None and found.steps:
+        factor = found.race.log_factors[found.steps[0].entrant.mechanism.id]
+    elif found.race is not None:
+        factor = found.race.log_odds
+    difference, se = None, None
+    if found.before is not None and found.after is not None:
+        difference, se = paired(found.after, found.before)
+    return {"elpd_diff": difference, "elpd_se": se, "log_bayes_factor": factor, "p_value": p_value}
+
+
+def _held_out(found: Diagnosis) -> dict[str, Any]:
+    keys = ("rmse_velocity", "rmse_runout", "coverage_90")
+    result: dict[str, Any] = {"unit": "event"}
+    for when, one in (("before", found.before), ("after", found.after)):
+        values = errors(one, found.problem) if one is not None else dict.fromkeys(keys)
+        result |= {f"{key}_{when}": values[key] for key in keys}
+    return result
+
+
+def _detection_limits(found: Diagnosis) -> dict[str, Any]:
+    """The smallest strength found in 90 % of cases at a typical place."""
+    if found.table is None:
+        return {}
+    return {
+        row.mechanism.id: {
+            "parameter": row.mechanism.strength.name,
+            "unit": row.mechanism.strength.unit,
+            "value": row.limit if row.limit < _NO_LIMIT * _scale(row) else None,
+        }
+        for row in found.table.rows
+    }
+
+
+def _scale(row: Told) -> float:
+    assert row.mechanism.added is not None
+    return row.mechanism.added.scale
+
+
+def _diagnostics(found: Diagnosis) -> dict[str, float | int | None]:
+    calibrations = [
+        one
+        for one in (found.calibration, found.reference, *(s.calibration for s in found.steps))
+        if one is not None
+    ]
+    if not calibrations:
+        return {"r_hat_max": None, "ess_min": None, "pareto_k_max": None, "divergences": None}
+    gates = [one.gate for one in calibrations]
+    held = [one.pareto_k.max() for one in (found.before, found.after) if one is not None]
+    return {
+        "r_hat_max": max(gate.r_hat_max for gate in gates),
+        "ess_min": min(min(gate.ess_bulk_min, gate.ess_tail_min) for gate in gates),
+        "pareto_k_max": float(np.max(held)) if held else None,
+        "divergences": sum(gate.divergences for gate in gates),
+    }
+
+
+def _candidate(race: Race, name: str) -> dict[str, Any]:
+    """One mechanism in the race, where and how strong it is if it is there."""
+    entrant = race.leading(name).entrants[name]
+    mean, sd = entrant.strength()
+    stretch, shape = entrant.stretch(), entrant.best.shape
+    return {
+        "id": name,
+        "log_bayes_factor": race.log_factors[name],
+        "strength": {
+            "parameter": entrant.mechanism.strength.name,
+            "unit": entrant.mechanism.strength.unit,
+            "mean": mean,
+            "sd": sd,
+        },
+        "location": None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]},
+        "covariate": shape.covariate,
+        "sensor": shape.sensor,
+        "estimators_differ_by": entrant.disagreement,
+    }
+
+
+def _left(found: Diagnosis) -> dict[str, Any] | None:
+    """What a race of the augmented law leaned to and was not let in; None where there was no such race."""
+    if found.left.race is None:
+        return None
+    probability = found.left.race.probability
+    first = max(probability, key=lambda name: probability[name])
+    return {
+        "most_probable": first,
+        "probability": probability[first],
+        "nothing": probability[NOTHING],
+        "reason": found.left.reason or None,
+    }
+
+
+def _profile(law: ProfileLaw) -> dict[str, Any]:
+    """The force profile at its knots, its equation's f(s); linear between, nothing outside."""
+    profile = law.profile
+    return {
+        "equation": profile.kind.equation,
+        "unit": profile.kind.unit,
+        "s_m": profile.knots_m.tolist(),
+        "mean": profile.mean.tolist(),
+        "sd": np.sqrt(np.diag(profile.covariance)).tolist(),
+        "prior_sd": profile.prior.amplitude,
+        "correlation_length_m": profile.prior.length_m,
+        "centre_m": profile.prior.centre_m,
+        "log_bayes_factor": profile.log_bayes_factor,
+    }
+
+
+def _more(found: Diagnosis) -> dict[str, Any]:
+    """Keys beyond the format's."""
+    more: dict[str, Any] = {"reason": found.cannot or None, "seconds": found.seconds}
+    if found.race is not None and found.check is not None:
+        more["alarm"] = alarmed(found.race.probability, found.check.p_value)
+        more["log_bayes_factors"] = found.race.log_factors
+        more["calibration"] = {"version": CALIBRATION_VERSION, "power": POWER}
+        more["error_models"] = [heat.error_model for heat in found.race.heats]
+        more["candidates"] = [_candidate(found.race, name) for name in found.race.heats[0].entrants]
+    if found.steps:
+        problem: Any = found.steps[-1].calibration.problem
+        more["error_model"] = problem.error_model.id
+        more["p_value_augmented"] = found.steps[-1].check.p_value
+        more["refitted_events"] = list(found.after.refitted) if found.after is not None else []
+    if found.profile is not None:
+        more["error_model"] = found.profile.error_model
+        more["p_value_augmented"] = found.profile.check.p_value
+        more["profile"] = _profile(found.profile)
+    if found.table is not None:
+        more["identifiability"] = [
+            {
+                "id": row.mechanism.id,
+                "kept": row.kept,
+                "limit": row.limit,
+                "best_limit": row.best_limit,
+                "best_stretch_m": row.limit_m,
+                "relevant": row.mechanism.added.relevant if row.mechanism.added is not None else None,
+                "unit": row.mechanism.strength.unit,
+                "power": row.power,
+                "alike": list(row.alike),
+            }
+            for row in found.table.rows
+        ]
+        more["power"] = found.table.power
+    if found.location is not None:
+        more["missing_work_of"] = "fast front" if found.location.opposed else "typical front"
+        more["missing_work"] = [
+            {"s_from_m": a, "s_to_m": b, "mean": mean, "sd": sd, "unit": "J kg-1"}
+            for a, b, mean, sd in found.location.work.tolist()
+        ]
+    return more

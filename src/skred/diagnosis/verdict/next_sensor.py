@@ -1,0 +1,66 @@
+"""The one more sensor that would say most: that splits a tie, or that sees what these recordings cannot."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from skred.diagnosis.compare.candidate import Entrant
+from skred.diagnosis.detect.detectability import with_sensors
+from skred.diagnosis.diagnose import Diagnosis, Step
+from skred.diagnosis.evidence.extension import extended
+
+_PLACES = 16
+
+
+def next_sensor(found: Diagnosis) -> dict[str, Any] | None:
+    """A velocity sensor in the words of the campaign format; None where nothing is to be split or seen."""
+    if found.table is None:
+        return None
+    if found.steps and (rival := _rival(found.steps[0])) is not None:
+        named = found.steps[0].entrant
+        return _sensor(_splitting(found, named, rival), [named.mechanism.id, rival.mechanism.id])
+    if found.decision.verdict == "cannot_tell" and found.table.sensor_m is not None:
+        return _sensor(found.table.sensor_m, [])
+    return None
+
+
+def _rival(step: Step) -> Entrant | None:
+    """The first of those tied that a speed could split off: listed, and another term."""
+    raced = {name for heat in step.race.heats for name in heat.entrants}
+    rivals = [step.race.leading(name).entrants[name] for name in step.tied if name in raced]
+    return next((one for one in rivals if not one.mechanism.is_same_term(step.entrant.mechanism)), None)
+
+
+def _sensor(place: float, splits: list[str]) -> dict[str, Any]:
+    return {"quantity": "front_velocity", "s_from_m": place, "s_to_m": place, "splits": splits}
+
+
+def _splitting(found: Diagnosis, first: Entrant, second: Entrant) -> float:
+    """Where two fitted candidates differ most in what one more sensor would read, in its standard deviations.
+
+    Each with the events' modes and the strength that fit the recordings best under it.
+    """
+    low, high = found.steps[0].race.heats[0].base.setting.recorded_m
+    release = float(found.problem.releases.mean.max()) + 20.0
+    places = np.linspace(max(release, low - 0.5 * (high - low)), high, _PLACES)
+    problem = with_sensors(found.problem, places)
+    columns = np.arange(_PLACES) + found.problem.campaign.n_sensors
+    speeds = []
+    for entrant in (first, second):
+        curve = entrant.best
+        at = int(np.argmax(curve.log_evidence))
+        direction = curve.direction
+        if direction.log_readings is not None:
+            padded = np.concatenate([direction.log_readings, np.zeros(_PLACES)])
+            direction = type(direction)(log_readings=padded)
+        extension = extended(problem, found.law, [direction])
+        points = curve.fits[at].points
+        events = np.arange(len(points))
+        speeds.append(extension.predict(events, points, curve.strengths[at : at + 1])[:, columns])
+    readings = problem.readings
+    typical = 0.5 * (speeds[0] + speeds[1])
+    sd = np.hypot(readings.relative_sd[columns] * typical, readings.absolute_sd[columns])
+    distance = (((speeds[0] - speeds[1]) / sd) ** 2).sum(axis=0)
+    return float(places[int(np.argmax(distance))])

@@ -1,0 +1,1 @@
+"""The hierarchical likelihood: every avalanche its own parameters, integrated over."""

@@ -1,0 +1,128 @@
+"""Draws of single avalanches: the recorded ones given their readings, and new ones from the population."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+
+from skred.inference.error_model import ErrorModel
+from skred.inference.hierarchical.event_density import draw_nodes
+from skred.inference.hierarchical.population import population_of
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.hierarchical.reading_density import OUTLIER_FACTOR
+from skred.physics.law import Law
+
+FloatArray = NDArray[np.float64]
+_FARTHEST = 230.0
+"""Largest logarithm of a strength, either way: its powers are numbers too."""
+
+
+class Avalanches(NamedTuple):
+    """Avalanches by population draw and event.
+
+    Attributes
+    ----------
+    strengths : (n, n_events, n_strengths) array
+    releases : (n, n_events) array, m
+    """
+
+    strengths: FloatArray
+    releases: FloatArray
+
+
+def recorded_avalanches(
+    problem: HierarchicalProblem, law: Law, samples: Mapping[str, Any], rng: np.random.Generator
+) -> Avalanches:
+    """Each recorded avalanche's own strengths and release, one draw for each draw of the population."""
+    means, factors = population_of(law, samples)
+    surfaces = problem.surfaces(law.mechanisms)
+    n_strengths, n_events = means.shape[1], problem.campaign.n_events
+    node = draw_nodes(means, factors, rng.random((len(means), n_events)), *surfaces.nodes)
+    patch = node // (2 * n_strengths)
+    variance, axes = np.linalg.eigh(surfaces.covariance)
+    spread = axes * np.sqrt(np.maximum(variance, 0.0))[:, None, :]
+    noise = rng.standard_normal((*patch.shape, n_strengths + 1))
+    points = surfaces.mean[patch] + np.einsum("neij,nej->nei", spread[patch], noise)
+    return Avalanches(np.exp(points[..., :n_strengths]), _on_track(problem, points[..., n_strengths]))
+
+
+def new_avalanches(
+    problem: HierarchicalProblem, law: Law, samples: Mapping[str, Any], rng: np.random.Generator
+) -> Avalanches:
+    """A new avalanche from the release of each recorded one, for each draw of the population."""
+    means, factors = population_of(law, samples)
+    n_events = problem.campaign.n_events
+    noise = rng.standard_normal((len(means), n_events, means.shape[1]))
+    logs = means[:, None, :] + np.einsum("nij,nej->nei", factors, noise)
+    mean, sd, length = problem.releases
+    wide = np.maximum(sd, 1e-9)  # cut off where the track ends, as in the likelihood
+    low, high = ndtr(-mean / wide), ndtr((length - mean) / wide)
+    deviation = ndtri(low + (high - low) * rng.random((len(means), n_events)))
+    # Where spreads are absurdly wide a strength can be beyond any number.
+    return Avalanches(np.exp(np.clip(logs, -_FARTHEST, _FARTHEST)), _on_track(problem, deviation))
+
+
+def _on_track(problem: HierarchicalProblem, deviation: FloatArray) -> FloatArray:
+    """Releases [m] from deviations in standard deviations."""
+    mean, sd, length = problem.releases
+    return np.clip(mean + sd * deviation, 0.0, length)
+
+
+def fronts_of(problem: HierarchicalProblem, law: Law, avalanches: Avalanches) -> FloatArray:
+    """Readings of the fronts without errors, (n, n_events, n_sensors + 1), the runout last."""
+    shape = avalanches.releases.shape
+    strengths = avalanches.strengths.reshape(-1, avalanches.strengths.shape[-1])
+    rows = problem.predict(law.mechanisms, strengths, avalanches.releases.ravel())
+    return rows.reshape(*shape, -1)
+
+
+def read_with_errors(
+    problem: HierarchicalProblem, fronts: FloatArray, rng: np.random.Generator
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """What instruments would record of fronts.
+
+    Parameters
+    ----------
+    problem : HierarchicalProblem
+    fronts : (..., n_sensors + 1) array
+        As `fronts_of` gives them.
+    rng : numpy Generator
+
+    Returns
+    -------
+    readings : (..., n_sensors) array, m/s or m
+        Velocities not below 0; 0 where the front does not come.
+    reached : (..., n_sensors) boolean array
+        Whether the front was seen there; always for a runout.
+    """
+    sensors, data = problem.sensors[:-1], problem.readings
+    predicted, stop = fronts[..., :-1], fronts[..., -1:]
+    sd = np.hypot(data.relative_sd * predicted, data.absolute_sd)
+    readings = predicted + sd * _standard_errors(problem.error_model, data.is_velocity, predicted.shape, rng)
+    seen_stop = stop + problem.place_sd_m * rng.standard_normal(stop.shape)
+    reached = np.where(data.is_velocity, sensors[:, 2] < seen_stop, True)
+    readings = np.where(data.is_velocity, np.where(reached, np.maximum(readings, 0.0), 0.0), readings)
+    return readings, reached
+
+
+def _standard_errors(
+    model: ErrorModel, is_velocity: NDArray[np.bool_], shape: tuple[int, ...], rng: np.random.Generator
+) -> FloatArray:
+    """Errors in standard deviations, (..., n_sensors): the same case of the mixture for all of a front's."""
+    errors = model.errors
+    case = rng.choice(len(errors.weights), size=shape[:-1], p=errors.weights / errors.weights.sum())[
+        ..., None
+    ]
+    noise = rng.standard_normal(shape)
+    if errors.degrees > 0.0:
+        noise = rng.standard_t(errors.degrees, shape)
+    if errors.common > 0.0:
+        shared = np.sqrt(errors.common) * rng.standard_normal((*shape[:-1], 1))
+        noise = np.where(is_velocity, shared + np.sqrt(1.0 - errors.common) * noise, noise)
+    outlying = rng.random(shape) < errors.shares[case]
+    result: FloatArray = noise * errors.scales[case] * np.where(outlying, OUTLIER_FACTOR, 1.0)
+    return result

@@ -1,0 +1,145 @@
+"""What a hierarchical posterior says of avalanches: of each recorded one, and of the next one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from skred.inference.hierarchical.event_draws import (
+    fronts_of,
+    new_avalanches,
+    read_with_errors,
+    recorded_avalanches,
+)
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.intervals import interval
+from skred.physics.law import Law
+
+MOST_AVALANCHES = 200_000
+"""Draws times events kept of single avalanches; beyond that draws are thinned."""
+_READING = {"units": "m s-1; m for the runout"}
+
+
+def predictive_groups(
+    problem: HierarchicalProblem, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
+) -> dict[str, xr.Dataset]:
+    """Predictive groups of a result; draws are thinned where there are many events.
+
+    Groups
+    ------
+    event_posterior : each strength by its name, ``release`` (chain, draw, event), and ``front``
+        (chain, draw, event, sensor): the recorded avalanches themselves, readings without errors
+    posterior_predictive : of a new avalanche from each event's release, its strengths, ``release``,
+        ``front`` (readings without errors, 0 where it does not come), ``reading`` (with errors) and
+        ``reached`` (chain, draw, event, sensor)
+    prior_predictive : the same from the prior
+    """
+    rng = np.random.default_rng([seed, 1])
+    kept = thinned(posterior, problem.campaign.n_events)
+    samples = _samples(problem, law, kept)
+    recorded = recorded_avalanches(problem, law, samples, rng)
+    event_posterior = avalanche_dataset(problem, law, kept, recorded, fronts_of(problem, law, recorded))
+    return {
+        "event_posterior": event_posterior,
+        "posterior_predictive": _predict(problem, law, kept, rng),
+        "prior_predictive": _predict(problem, law, thinned(prior, problem.campaign.n_events), rng),
+    }
+
+
+def thinned(draws: xr.Dataset, n_events: int) -> xr.Dataset:
+    """Every so many draws, so that there are no more avalanches than are kept."""
+    n = draws.sizes["chain"] * draws.sizes["draw"]
+    return draws.isel(draw=slice(None, None, max(1, -(-n * n_events // MOST_AVALANCHES))))
+
+
+def _samples(problem: HierarchicalProblem, law: Law, draws: xr.Dataset) -> dict[str, Any]:
+    return {p.name: draws[p.name].values.ravel() for p in problem.parameters(law)}
+
+
+def _predict(
+    problem: HierarchicalProblem, law: Law, draws: xr.Dataset, rng: np.random.Generator
+) -> xr.Dataset:
+    avalanches = new_avalanches(problem, law, _samples(problem, law, draws), rng)
+    fronts = fronts_of(problem, law, avalanches)
+    dataset = avalanche_dataset(problem, law, draws, avalanches, fronts)
+    add_readings(problem, dataset, fronts, rng)
+    return dataset
+
+
+def add_readings(
+    problem: HierarchicalProblem, dataset: xr.Dataset, fronts: Any, rng: np.random.Generator
+) -> None:
+    """Readings of the fronts of a dataset, with errors, and whether each front came; added to it."""
+    readings, reached = read_with_errors(problem, fronts, rng)
+    shape, dims = dataset["front"].shape, dataset["front"].dims
+    dataset["reading"] = (dims, readings.reshape(shape), _READING)
+    dataset["reached"] = (dims, reached.reshape(shape))
+
+
+def avalanche_dataset(
+    problem: HierarchicalProblem, law: Law, draws: xr.Dataset, avalanches: Any, fronts: Any
+) -> xr.Dataset:
+    """Strengths, releases and fronts of avalanches, one of each event for each draw."""
+    sizes = (draws.sizes["chain"], draws.sizes["draw"], problem.campaign.n_events)
+    dims = ("chain", "draw", "event")
+    variables: dict[str, Any] = {
+        mechanism.strength.name: (
+            dims,
+            avalanches.strengths[..., k].reshape(sizes),
+            {"units": mechanism.strength.unit, "symbol": mechanism.strength.symbol},
+        )
+        for k, mechanism in enumerate(law.mechanisms)
+    }
+    variables["release"] = (dims, avalanches.releases.reshape(sizes), {"units": "m"})
+    variables["front"] = ((*dims, "sensor"), fronts[..., :-1].reshape(*sizes, -1), _READING)
+    coords = {"chain": draws["chain"].values, "draw": draws["draw"].values, **problem.coords}
+    return xr.Dataset(variables, coords=coords)
+
+
+def new_avalanche_rows(problem: HierarchicalProblem, tree: xr.DataTree) -> list[dict[str, Any]]:
+    """A new avalanche's reading at each sensor, where it comes there, beside the recorded ones."""
+    predicted = tree["posterior_predictive"].to_dataset()
+    rows = []
+    for number, sensor in enumerate(problem.campaign.sensors):
+        reached = predicted["reached"].values[..., number]
+        values = predicted["reading"].values[..., number][reached]
+        recorded = problem.values[problem.observed[:, number], number]
+        known = problem.observed[:, number] | problem.not_reached[:, number]
+        row = {
+            "sensor": sensor.id,
+            "unit": "m" if sensor.is_runout else "m/s",
+            "reached": float(reached.mean()),
+            # A velocity of 0 is no sign that the front came, here as in the likelihood.
+            "recorded_reached": _share(recorded > 0.0, known) if not sensor.is_runout else 1.0,
+            "n_recorded": len(recorded),
+        }
+        for name, sample in (("", values), ("recorded_", recorded)):
+            low, high = interval(sample) if len(sample) else (float("nan"), float("nan"))
+            row[f"{name}mean"] = float(sample.mean()) if len(sample) else None
+            row[f"{name}sd"] = float(sample.std(ddof=1)) if len(sample) > 1 else None
+            row[f"{name}low"], row[f"{name}high"] = low, high
+        rows.append(row)
+    return rows
+
+
+def _share(came: NDArray[np.bool_], known: NDArray[np.bool_]) -> float | None:
+    """How many of the events of which it is known came."""
+    return float(came.sum() / known.sum()) if known.any() else None
+
+
+def event_rows(problem: HierarchicalProblem, law: Law, tree: xr.DataTree) -> list[dict[str, Any]]:
+    """Each recorded avalanche's own strengths and release."""
+    events = tree["event_posterior"].to_dataset()
+    units = {m.strength.name: m.strength.unit for m in law.mechanisms} | {"release": "m"}
+    rows = []
+    for number, event in enumerate(problem.campaign.event_ids):
+        row: dict[str, Any] = {"event": event}
+        for name, unit in units.items():
+            values = events[name].values[..., number]
+            low, high = interval(values)
+            row[name] = {"median": float(np.median(values)), "low": low, "high": high, "unit": unit}
+        rows.append(row)
+    return rows

@@ -1,0 +1,1 @@
+"""The pooled likelihood: one parameter vector for the path, the paper's."""

@@ -1,0 +1,143 @@
+"""The forward map as a PyTensor Op: strengths and release places in, readings out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pytensor.gradient import DisconnectedType
+from pytensor.graph.basic import Variable
+from pytensor.link.numba.dispatch.basic import numba_njit, register_funcify_default_op_cache_key
+
+from skred.inference.array_op import ArrayOp
+from skred.physics.kernel.compiled import KERNEL_FINGERPRINT
+from skred.physics.kernel.fronts import simulate, simulate_with_jacobian
+from skred.physics.kernel.inputs import Contributions, Path
+
+_CACHE_KEY = int(KERNEL_FINGERPRINT[:12], 16)
+
+
+class _ForwardMap(ArrayOp):
+    """What the forward map and its jacobian share: their inputs."""
+
+    array_inputs = (
+        ("strengths", 2, "float64"),
+        ("releases", 1, "float64"),
+        ("edge", 1, "float64"),
+        ("ground", 2, "float64"),
+        ("barriers", 2, "float64"),
+        ("limits", 1, "float64"),
+        ("columns", 1, "int64"),
+        ("profiles", 2, "float64"),
+        ("weakening_speed", 0, "float64"),
+        ("speed_terms", 0, "bool"),
+        ("sensors", 2, "float64"),
+    )
+
+    @staticmethod
+    def _arguments(inputs: Sequence[Any]) -> tuple[Any, ...]:
+        strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors = inputs
+        path = Path(edge, ground, barriers, limits)
+        law = Contributions(columns, profiles, float(u_c), bool(terms))
+        return strengths, releases, path, law, sensors
+
+
+class FrontReadings(_ForwardMap):
+    """Readings of fronts: (n_runs, n_strengths) and (n_runs,) to (n_runs, n_sensors).
+
+    See `skred.physics.kernel.fronts.simulate`; `front_readings` is the convenient way to apply it.
+    """
+
+    differentiable = frozenset({"strengths", "releases"})
+
+    def output_shape(self, shapes: Sequence[tuple[Any, ...]]) -> tuple[Any, ...]:
+        """(n_runs, n_sensors)."""
+        return (shapes[0][0], shapes[-1][0])
+
+    def evaluate(self, inputs: Sequence[Any]) -> Any:
+        """Readings from numpy arrays."""
+        return simulate(*self._arguments(inputs))
+
+    def pullback(
+        self, inputs: Sequence[Variable], outputs: Sequence[Variable], cotangents: Sequence[Variable]
+    ) -> list[Variable]:
+        """Cotangent of strengths and releases through the tangent-linear jacobian."""
+        jacobian = FrontReadingsJacobian()(*inputs)
+        pulled = (cotangents[0][:, :, None] * jacobian).sum(axis=1)
+        return [pulled[:, :-1], pulled[:, -1]] + [DisconnectedType()() for _ in inputs[2:]]
+
+
+class FrontReadingsJacobian(_ForwardMap):
+    """Derivatives of the readings: (n_runs, n_sensors, n_strengths + 1), the release last."""
+
+    def output_shape(self, shapes: Sequence[tuple[Any, ...]]) -> tuple[Any, ...]:
+        """(n_runs, n_sensors, n_strengths + 1)."""
+        n_strengths = shapes[0][1]
+        return (shapes[0][0], shapes[-1][0], None if n_strengths is None else n_strengths + 1)
+
+    def evaluate(self, inputs: Sequence[Any]) -> Any:
+        """Jacobian from numpy arrays."""
+        return simulate_with_jacobian(*self._arguments(inputs))[1]
+
+
+@register_funcify_default_op_cache_key(FrontReadings)
+def _funcify_readings(op: FrontReadings, node: Any = None, **kwargs: Any) -> Any:
+    @numba_njit
+    def front_readings(  # type: ignore[no-untyped-def]
+        strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors
+    ):
+        path = Path(edge, ground, barriers, limits)
+        law = Contributions(columns, profiles, u_c.item(), terms.item())
+        return simulate(strengths, releases, path, law, sensors)
+
+    return front_readings, _CACHE_KEY
+
+
+@register_funcify_default_op_cache_key(FrontReadingsJacobian)
+def _funcify_jacobian(op: FrontReadingsJacobian, node: Any = None, **kwargs: Any) -> Any:
+    @numba_njit
+    def front_readings_jacobian(  # type: ignore[no-untyped-def]
+        strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors
+    ):
+        path = Path(edge, ground, barriers, limits)
+        law = Contributions(columns, profiles, u_c.item(), terms.item())
+        return simulate_with_jacobian(strengths, releases, path, law, sensors)[1]
+
+    return front_readings_jacobian, _CACHE_KEY
+
+
+def front_readings(
+    strengths: Any, releases: Any, path: Path, law: Contributions, sensors: NDArray[np.float64]
+) -> Variable:
+    """Symbolic readings of fronts.
+
+    Parameters
+    ----------
+    strengths : (n_runs, n_strengths) tensor
+        In the order of the law's contributions, each in its own unit.
+    releases : (n_runs,) tensor, m
+    path : Path
+    law : Contributions
+    sensors : (n_sensors, 3) array
+        See `skred.physics.geometry.sensor_table`.
+
+    Returns
+    -------
+    (n_runs, n_sensors) tensor, m/s or m
+    """
+    result: Variable = FrontReadings()(
+        strengths,
+        releases,
+        path.edge,
+        path.ground,
+        path.barriers,
+        path.limits,
+        law.columns,
+        law.profiles,
+        np.float64(law.weakening_speed),
+        np.bool_(law.speed_terms),
+        sensors,
+    )
+    return result

@@ -1,0 +1,1 @@
+"""Laws compared on one campaign: leave-one-out, WAIC, evidence, weights."""

@@ -1,0 +1,256 @@
+"""Compare laws on one campaign: leave-one-event-out, information criteria, evidence, weights."""
+
+from __future__ import annotations
+
+import json
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import arviz_stats as az
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.campaign import Status
+from skred.inference.calibrate import Calibration, calibrate
+from skred.inference.evidence import SMC_DRAWS, evidence
+from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY
+from skred.inference.leave_one_out import ExactLoo, exact_leave_one_out
+from skred.inference.paired import best_first, paired_difference, sum_se
+from skred.inference.problem import PooledProblem, Problem
+from skred.inference.results import save
+from skred.inference.sampling import SamplerSettings
+from skred.inference.waic import waic
+from skred.model_selection.alpha_beta_entry import alpha_beta_entry
+from skred.model_selection.statement import statement
+from skred.output import write_json, write_text
+from skred.physics.law import Law
+
+EVIDENCE_SEEDS = 2
+Tell = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """Laws calibrated on one problem, with their scores.
+
+    Attributes
+    ----------
+    document : dict
+        As in ``compare.json``.
+    figures : dict of str to Path
+        Of each law, by ``<law id>/<figure>``.
+    """
+
+    document: dict[str, Any]
+    figures: dict[str, Path]
+
+
+def compare(
+    problem: PooledProblem,
+    laws: Sequence[Law],
+    settings: SamplerSettings,
+    folder: Path,
+    tell: Tell = lambda line: None,
+) -> dict[str, Any]:
+    """Calibrate and compare by the pooled likelihood, writing each law's results as soon as they are there.
+
+    Parameters
+    ----------
+    problem : PooledProblem
+    laws : sequence of Law
+    settings : SamplerSettings
+    folder : Path
+        Gets a folder for each law, ``compare.json``, figures and ``report.html``.
+    tell : callable
+        Told one line for each stage.
+
+    Returns
+    -------
+    dict
+        The content of ``compare.json``.
+    """
+    started = time.monotonic()
+    scored = score(problem, laws, settings, folder, tell, exact=True)
+    return write_comparison(scored, folder, started, tell)
+
+
+def score(
+    problem: Problem,
+    laws: Sequence[Law],
+    settings: SamplerSettings,
+    folder: Path,
+    tell: Tell,
+    *,
+    exact: bool,
+) -> Scored:
+    """Calibrate laws and score their predictions; `exact` refits without every event in turn."""
+    from skred.report.calibration.figures import save_model_figures
+
+    entries: list[dict[str, Any]] = []
+    figures: dict[str, Path] = {}
+    trees: dict[str, Any] = {}
+    for law in laws:
+        tell(f"{law.id}: sampling ({problem.likelihood})")
+        calibration = calibrate(problem, law, settings)
+        entry = calibration.entry()
+        if calibration.gate.passed:
+            tell(f"{law.id}: leave-one-event-out and evidence")
+            entry |= scores(calibration, exact=exact)
+            trees[law.id] = calibration.tree
+        else:
+            tell(f"{law.id}: the gate failed: {'; '.join(calibration.gate.problems)}")
+            entry |= dict.fromkeys(("loo", "waic", "exact", "difference", "evidence", "weight"))
+        entries.append(entry)
+        law_folder = folder / law.id
+        law_folder.mkdir(exist_ok=True, parents=True)
+        save(calibration.tree, law_folder / "posterior.nc")
+        drawn = save_model_figures(calibration.tree, law, problem, law_folder)
+        figures |= {f"{law.id}/{figure.stem}": figure for figure in drawn}
+    return Scored(_document(problem, settings, calibration, rank(entries, trees)), figures)
+
+
+def write_comparison(scored: Scored, folder: Path, started: float, tell: Tell) -> dict[str, Any]:
+    """Say what came out, and write ``compare.json``, figures and ``report.html``; returns the document."""
+    from skred.report.calibration.figures import save_comparison_figures
+    from skred.report.comparison.html import render_comparison
+
+    comparison = scored.document
+    comparison["statement"] = statement(comparison)
+    comparison["seconds"] = time.monotonic() - started
+    tell("writing the report")
+    figures = scored.figures | save_comparison_figures(comparison, folder)
+    write_json(folder / "compare.json", comparison)
+    write_text(folder / "report.html", render_comparison(comparison, figures))
+    return comparison
+
+
+def scores(
+    calibration: Calibration,
+    *,
+    exact: bool,
+    evidence_seeds: int = EVIDENCE_SEEDS,
+    evidence_draws: int = SMC_DRAWS,
+) -> dict[str, Any]:
+    """Everything a law's entry says of its predictions.
+
+    Events whose importance sampling is unreliable are refitted exactly, with `exact` all.
+    """
+    events = calibration.problem.campaign.event_ids
+    seed = calibration.settings.seed
+    with _told_elsewhere():
+        loo = az.loo(calibration.tree, var_name="recordings", pointwise=True)
+    information = waic(calibration.tree, variable="recordings")
+    seeds = [10 * seed + k + 1 for k in range(evidence_seeds)]
+    marginal = evidence(calibration.model, seeds, evidence_draws)
+    pareto_k = np.asarray(loo.pareto_k, dtype=float)
+    unreliable = np.flatnonzero(~(pareto_k <= float(loo.good_k)))
+    which = list(range(len(events))) if exact else unreliable.tolist()
+    refits = (
+        exact_leave_one_out(calibration.model, calibration.step, events, seed, which=which) if which else None
+    )
+    return {
+        "loo": {
+            "elpd": float(loo.elpd),
+            "se": float(loo.se),
+            "p": float(loo.p),
+            "pareto_k_max": float(pareto_k.max()),
+            "n_bad": len(unreliable),
+            "pareto_k": pareto_k.tolist(),
+        },
+        "waic": {
+            "elpd": float(information.elpd_waic),
+            "se": float(information.se),
+            "p": float(information.p_waic),
+            "n_unreliable": int(information.n_unreliable),
+        },
+        "exact": _exact_entry(np.asarray(loo.elpd_i, dtype=float), refits, which, events),
+        "evidence": {
+            "log_evidence": list(marginal.log_evidence),
+            "mean": marginal.mean,
+            "spread": marginal.spread,
+            "seeds": seeds,
+        },
+    }
+
+
+def _exact_entry(
+    pointwise: NDArray[np.float64], refits: ExactLoo | None, which: Sequence[int], events: Sequence[str]
+) -> dict[str, Any]:
+    """Leave-one-event-out: exact where an event was refitted, by importance sampling elsewhere."""
+    pointwise = pointwise.copy()
+    if refits is not None:
+        pointwise[list(which)] = refits.pointwise
+    return {
+        "elpd": float(pointwise.sum()),
+        "se": sum_se(pointwise),
+        "mcse": refits.mcse if refits is not None else 0.0,
+        "pointwise": pointwise.tolist(),
+        "refitted": [events[k] for k in which],
+        "failed_refits": list(refits.failed) if refits is not None else [],
+    }
+
+
+def rank(entries: list[dict[str, Any]], trees: dict[str, Any]) -> list[dict[str, Any]]:
+    """Entries, best first by exact elpd, with paired differences to the best and stacking weights.
+
+    Entries whose gate failed come last and are not compared.
+    """
+    valid, failed = best_first(entries, lambda entry: entry["exact"]["elpd"])
+    weights = _stacking([e["id"] for e in valid], trees)
+    for entry in valid:
+        difference = paired_difference(entry["exact"]["pointwise"], valid[0]["exact"]["pointwise"])
+        entry["difference"] = difference._asdict()
+        entry["weight"] = weights[entry["id"]]
+    return valid + failed
+
+
+def _stacking(ids: Sequence[str], trees: dict[str, Any]) -> dict[str, float]:
+    """Weights that predict best together (Yao and others, 2018, doi 10.1214/17-BA1091)."""
+    if len(ids) < 2:
+        return dict.fromkeys(ids, 1.0)
+    with _told_elsewhere():
+        table = az.compare({law: trees[law] for law in ids}, method="stacking", var_name="recordings")
+    return {law: float(table.loc[law, "weight"]) for law in ids}
+
+
+def _document(
+    problem: Problem, settings: SamplerSettings, any_of_them: Calibration, models: list[dict[str, Any]]
+) -> dict[str, Any]:
+    campaign = problem.campaign
+    return {
+        "format": 1,
+        "likelihood": problem.likelihood,
+        "campaign": {
+            "name": campaign.name,
+            "description": campaign.description,
+            "source": campaign.source,
+            "fingerprint": campaign.fingerprint(),
+            "n_events": campaign.n_events,
+            "n_sensors": campaign.n_sensors,
+            "reference_s_m": campaign.reference_s_m,
+            "readings": {status.name.lower(): int((campaign.status == status).sum()) for status in Status},
+        },
+        "settings": {
+            **settings.as_dict(),
+            "smoothing_m": problem.terrain.smoothing_m,
+            "cell_m": float(np.diff(problem.terrain.edge_s_m).max()),
+        },
+        "versions": json.loads(any_of_them.tree.attrs["versions"]),
+        "interval": {"kind": INTERVAL_KIND, "probability": INTERVAL_PROBABILITY},
+        "event_ids": list(campaign.event_ids),
+        "models": models,
+        "alpha_beta": alpha_beta_entry(problem),
+    }
+
+
+@contextmanager
+def _told_elsewhere() -> Iterator[None]:
+    """Silence ArviZ's warnings of large Pareto k: these are in the tables, and such events are refitted."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Estimated shape parameter", category=UserWarning)
+        yield

@@ -1,0 +1,153 @@
+"""The kernel: many fronts down one track, read where the sensors are, with tangents if wanted.
+
+It knows no mechanism. A law is `Contributions`: which column of the coefficient table each
+strength enters and with which profile along the track (see `columns.py` for the equation).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skred.physics.kernel.columns import Column
+from skred.physics.kernel.compiled import compiled
+from skred.physics.kernel.inputs import cell_of, spans_of
+from skred.physics.kernel.march import fill_increments, fill_steps, fill_table, march, march_tangents
+from skred.physics.kernel.march_abreast import ABREAST, march_abreast, room
+from skred.physics.kernel.reading import read, read_tangents
+from skred.physics.kernel.scaled_ground import scale_ground
+
+_N_COLUMNS = len(Column)
+
+
+@compiled()
+def _cells_of(sensors, edge):  # type: ignore[no-untyped-def]
+    """Cell of each sensor's upper end."""
+    cells = np.zeros(sensors.shape[0], dtype=np.int64)
+    for j in range(sensors.shape[0]):
+        cells[j] = cell_of(edge, sensors[j, 1])
+    return cells
+
+
+@compiled()
+def _simulate(strengths, releases, path, law, sensors, readings, jacobian):  # type: ignore[no-untyped-def]
+    """Fill the readings run by run, and the jacobian unless its last axis is empty."""
+    # Unpacked once: reading an array out of a tuple costs as much as ten cells.
+    edge, ground, barriers, limits = path.edge, path.ground, path.barriers, path.limits
+    columns, profiles = law.columns, law.profiles
+    u_c, speed_terms = law.weakening_speed, law.speed_terms
+    n_cells, n_tangents = ground.shape[1], jacobian.shape[2]
+    scaled, cells = scale_ground(edge, ground), _cells_of(sensors, edge)
+    spans = spans_of(profiles)
+    table = np.zeros((_N_COLUMNS, n_cells))
+    keep, gain, v = np.empty(n_cells), np.empty(n_cells), np.empty(n_cells + 1)
+    own, work, rows, runouts, lasts, firsts = room(columns.size, n_cells if speed_terms else 0)
+    # All that only tangents need is empty without them.
+    n_rows = n_cells if n_tangents > 0 else 0
+    increment, dv = np.zeros((n_tangents, n_rows)), np.zeros((n_tangents, n_rows + 1))
+    by_source, by_decay, carry = np.empty(n_rows), np.empty(n_rows), np.empty(n_rows)
+    mean, soften = np.zeros(n_rows), np.ones(n_rows)
+    step, shift = np.zeros(n_tangents), np.zeros(n_tangents)
+    d_time, d_runout = np.zeros(n_tangents), np.zeros(n_tangents)
+    for run in range(releases.size):
+        release = releases[run]
+        fill_table(run, strengths, columns, profiles, spans, table)
+        halvings = 0
+        if not speed_terms or n_tangents > 0:
+            halvings = fill_steps(scaled, table, keep, gain)
+        if speed_terms:
+            place = run % ABREAST
+            if place == 0:
+                march_abreast(
+                    run, strengths, releases, edge, ground, scaled, barriers, limits, columns, profiles, u_c,
+                    own, work, rows, runouts, lasts, firsts,
+                )  # fmt: skip
+            v[:] = rows[place]
+            runout, last, first = runouts[place], lasts[place], firsts[place]
+        else:
+            runout, last, first = march(release, edge, ground, barriers, limits, table, keep, gain, v)
+        read(
+            run, sensors, cells, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms,
+            table, v, readings,
+        )  # fmt: skip
+        if n_tangents > 0:
+            fill_increments(
+                halvings, scaled, ground, table, keep, v, columns, profiles, u_c, speed_terms,
+                by_source, by_decay, mean, soften, carry, increment,
+            )  # fmt: skip
+            march_tangents(
+                release, last, first, edge, ground, barriers, limits, columns, profiles, u_c, speed_terms,
+                table, carry, v, increment, dv, step, shift, d_time, d_runout,
+            )  # fmt: skip
+            read_tangents(
+                run, sensors, cells, release, runout, first, edge, ground, barriers, limits, columns,
+                profiles, u_c, speed_terms, table, v, dv, step, shift, d_time, d_runout, readings, jacobian,
+            )  # fmt: skip
+
+
+@compiled()
+def simulate(strengths, releases, path, law, sensors):  # type: ignore[no-untyped-def]
+    """Readings of many fronts.
+
+    Parameters
+    ----------
+    strengths : (n_runs, n_strengths) array
+        Strength of each contribution in its own unit.
+    releases : (n_runs,) array, m
+        Where each front starts from rest.
+    path : Path
+    law : Contributions
+    sensors : (n_sensors, 3) array
+        Quantity (FRONT_VELOCITY or RUNOUT), s_from and s_to [m]; equal for a point.
+
+    Returns
+    -------
+    (n_runs, n_sensors) array, m/s or m
+        0 for a front velocity where the front does not come.
+
+    """
+    readings = np.empty((releases.size, sensors.shape[0]))
+    jacobian = np.empty((releases.size, sensors.shape[0], 0))
+    _simulate(strengths, releases, path, law, sensors, readings, jacobian)
+    return readings
+
+
+@compiled()
+def simulate_with_jacobian(strengths, releases, path, law, sensors):  # type: ignore[no-untyped-def]
+    """As `simulate`, with the derivatives by every strength and, last, by the release place.
+
+    Returns
+    -------
+    readings : (n_runs, n_sensors) array
+    jacobian : (n_runs, n_sensors, n_strengths + 1) array
+
+    """
+    readings = np.empty((releases.size, sensors.shape[0]))
+    jacobian = np.empty((releases.size, sensors.shape[0], strengths.shape[1] + 1))
+    _simulate(strengths, releases, path, law, sensors, readings, jacobian)
+    return readings, jacobian
+
+
+@compiled()
+def front_speeds(strengths, releases, path, law):  # type: ignore[no-untyped-def]
+    """Front speed U [m/s] at every cell edge, (n_runs, n_cells + 1); parameters as `simulate`."""
+    edge, ground, barriers, limits = path.edge, path.ground, path.barriers, path.limits
+    columns, profiles, n_cells = law.columns, law.profiles, ground.shape[1]
+    scaled, table = scale_ground(edge, ground), np.zeros((_N_COLUMNS, n_cells))
+    spans = spans_of(profiles)
+    keep, gain = np.empty(n_cells), np.empty(n_cells)
+    own, work, rows, runouts, lasts, firsts = room(columns.size, n_cells if law.speed_terms else 0)
+    v = np.empty((releases.size, n_cells + 1))
+    for run in range(releases.size):
+        if law.speed_terms:
+            place = run % ABREAST
+            if place == 0:
+                march_abreast(
+                    run, strengths, releases, edge, ground, scaled, barriers, limits, columns, profiles,
+                    law.weakening_speed, own, work, rows, runouts, lasts, firsts,
+                )  # fmt: skip
+            v[run] = rows[place]
+        else:
+            fill_table(run, strengths, columns, profiles, spans, table)
+            fill_steps(scaled, table, keep, gain)
+            march(releases[run], edge, ground, barriers, limits, table, keep, gain, v[run])
+    return np.sqrt(v)

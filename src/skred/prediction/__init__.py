@@ -1,0 +1,1 @@
+"""A calibrated population of avalanches carried to a track: front speed and runout with probabilities."""

@@ -1,0 +1,143 @@
+"""A prediction's numbers as plain data, for files and tables."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from skred.inference.calibrate import Calibration
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY
+from skred.prediction.probabilities import PARTS
+from skred.prediction.statement import prediction_statement
+from skred.prediction.track import PredictionTrack
+
+_MOST_SENSORS = 30
+
+
+def named_places(problem: HierarchicalProblem, track: PredictionTrack) -> list[tuple[str, float]]:
+    """Sensors of speed (spans by their middle) and the reference, on the campaign's own track only."""
+    if not track.is_own:
+        return []
+    sensors = [s for s in problem.campaign.sensors if not s.is_runout][:_MOST_SENSORS]
+    named = [(sensor.id, 0.5 * (sensor.s_from_m + sensor.s_to_m)) for sensor in sensors]
+    if track.reference_s_m is not None:
+        named.append(("reference", track.reference_s_m))
+    return sorted(((name, min(s, track.length_m)) for name, s in named), key=lambda place: place[1])
+
+
+def prediction_document(
+    calibration: Calibration, track: PredictionTrack, data: xr.Dataset | None
+) -> dict[str, Any]:
+    """Summary of a prediction as plain data; without data, as failed and without any number.
+
+    Its ``statement`` is what may be said of it, sentence by sentence.
+    """
+    problem, law, campaign = calibration.problem, calibration.law, calibration.problem.campaign
+    assert isinstance(problem, HierarchicalProblem)
+    document: dict[str, Any] = {
+        "format": 1,
+        "valid": data is not None,
+        "campaign": {
+            "name": campaign.name,
+            "fingerprint": campaign.fingerprint(),
+            "n_events": campaign.n_events,
+        },
+        "law": {"id": law.id, "title": law.title, "equation": law.equation},
+        "track": {
+            "name": track.name,
+            "is_own": track.is_own,
+            "length_m": track.length_m,
+            "fingerprint": track.fingerprint(),
+            "reference_s_m": track.reference_s_m,
+            "release": track.release_text,
+            "releases_s_m": sorted(set(track.releases.mean.tolist())),
+        },
+        "error_model": {"id": problem.error_model.id, "title": problem.error_model.title},
+        "smoothing_m": problem.terrain.smoothing_m,
+        "settings": calibration.settings.as_dict(),
+        "versions": json.loads(calibration.tree.attrs["versions"]),
+        "gate": calibration.gate.as_dict(),
+        "interval": {"kind": INTERVAL_KIND, "probability": INTERVAL_PROBABILITY},
+    }
+    empty = ("simulation", "reading_errors", "runout", "places")
+    document |= dict.fromkeys(empty) if data is None else _numbers(problem, track, data)
+    document["statement"] = prediction_statement(document)
+    return document
+
+
+def recorded_runouts(problem: HierarchicalProblem, track: PredictionTrack) -> tuple[float, float] | tuple[()]:
+    """Shortest and longest recorded runout [m], on the campaign's own track only."""
+    of_runout = [sensor.is_runout for sensor in problem.campaign.sensors]
+    values = problem.values[:, of_runout]
+    if not track.is_own or not np.isfinite(values).any():
+        return ()
+    return float(np.nanmin(values)), float(np.nanmax(values))
+
+
+def _numbers(problem: HierarchicalProblem, track: PredictionTrack, data: xr.Dataset) -> dict[str, Any]:
+    quantiles = []
+    for k, share in enumerate(data["share"].values):
+        band = _banded(data, "runout_quantile", share=k)
+        at_least = bool(band["value"] >= track.length_m)
+        quantiles.append({"share": float(share), "unit": "m", **band, "at_least": at_least})
+    last = data.sizes["s"] - 1
+    return {
+        "simulation": json.loads(data.attrs["simulation"]),
+        "reading_errors": {
+            "velocity": json.loads(data.attrs["reading_error_velocity"]),
+            "runout": json.loads(data.attrs["reading_error_runout"]),
+        },
+        "runout": {
+            "exceeded_by": quantiles,
+            "end_of_track": {"s_m": track.length_m, **_banded(data, "runout_probability", s=last)},
+            "does_not_start": float(data.attrs["share_that_does_not_start"]),
+            "beyond_recorded": [
+                {"s_m": s, **_banded(data, "runout_probability", s=_nearest(data, s))}
+                for s in recorded_runouts(problem, track)
+            ],
+            "all": _runout_parts(data, "runout"),
+            "beyond_shortest_recorded": _runout_parts(data, "long_runout"),
+        },
+        "places": [_place(data, name, s) for name, s in named_places(problem, track)],
+    }
+
+
+def _place(data: xr.Dataset, name: str, s_m: float) -> dict[str, Any]:
+    """What is predicted at one place."""
+    k = _nearest(data, s_m)
+    return {
+        "name": name,
+        "s_m": s_m,
+        "beyond": _banded(data, "runout_probability", s=k),
+        "faster": [
+            {"speed_m_s": float(speed), **_banded(data, "speed_probability", s=k, speed=j)}
+            for j, speed in enumerate(data["speed"].values)
+        ],
+        "speed_exceeded_by": [
+            {"share": float(q), **_banded(data, "speed_quantile", s=k, share=j)}
+            for j, q in enumerate(data["share"].values)
+        ],
+        "mean_speed_m_s": float(data["mean_speed"][k]),
+        **{f"speed_sd_{part}_m_s": float(data[f"speed_sd_{part}"][k]) for part in (*PARTS, "total")},
+    }
+
+
+def _nearest(data: xr.Dataset, s_m: float) -> int:
+    return int(np.abs(data["s"].values - s_m).argmin())
+
+
+def _runout_parts(data: xr.Dataset, name: str) -> dict[str, float] | None:
+    """Mean and standard deviations [m] of runouts."""
+    if f"{name}_mean" not in data:
+        return None
+    parts = {f"sd_{part}_m": float(data[f"{name}_sd_{part}"]) for part in (*PARTS, "total")}
+    return {"mean_m": float(data[f"{name}_mean"]), **parts}
+
+
+def _banded(data: xr.Dataset, name: str, **place: int) -> dict[str, float]:
+    keys = (("value", ""), ("low", "_low"), ("high", "_high"))
+    return {key: float(data[f"{name}{suffix}"].isel(place)) for key, suffix in keys}

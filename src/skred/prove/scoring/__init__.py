@@ -1,0 +1,1 @@
+"""Scores of answers to trials of which the truth is known."""

@@ -1,0 +1,78 @@
+"""The report of a diagnosis: figures, a page that needs nothing else, and a table for the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from skred.report.diagnosis.evidence import check_figure, probabilities_figure, strength_figure
+from skred.report.diagnosis.held_out import left_out_figure, scores_figure
+from skred.report.diagnosis.places import local_names, places_figure, where_figure
+from skred.report.diagnosis.terminal import diagnosis_table
+from skred.report.diagnosis.words import races
+from skred.report.shared import document as doc
+from skred.report.shared.style import write_png
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from skred.diagnosis.diagnose import Diagnosis
+
+__all__ = ["FIGURES", "diagnosis_table", "render_diagnosis", "save_diagnosis_figures"]
+_OF_RACES = ("probabilities", "strength", "places")
+FIGURES = ("check", "where", *_OF_RACES, *(f"{name}_2" for name in _OF_RACES), "left_out", "scores")
+"""Names of all figures that there may be."""
+
+
+def save_diagnosis_figures(found: Diagnosis, folder: Path) -> dict[str, Path]:
+    """Write the figures of a diagnosis as PNG.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    folder : Path
+        An existing folder.
+
+    Returns
+    -------
+    dict of str to Path
+        Those of `FIGURES` that apply; with _2 those of a second race.
+    """
+    makers: dict[str, Callable[[], Figure]] = {}
+    if found.check is not None:
+        makers["check"] = partial(check_figure, found)
+    makers["where"] = partial(where_figure, found)
+    for number, race in enumerate(races(found)):
+        ending = f"_{number + 1}" if number else ""
+        makers[f"probabilities{ending}"] = partial(probabilities_figure, found, race, number)
+        makers[f"strength{ending}"] = partial(strength_figure, found, race, number)
+        if local_names(race):
+            makers[f"places{ending}"] = partial(places_figure, found, race, number)
+    if found.before is not None:
+        makers["left_out"] = partial(left_out_figure, found)
+    if found.before is not None and found.after is not None:
+        makers["scores"] = partial(scores_figure, found)
+    return {name: write_png(make(), folder / f"{name}.png") for name, make in makers.items()}
+
+
+def render_diagnosis(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) -> str:
+    """Render the report of a diagnosis.
+
+    Parameters
+    ----------
+    found : Diagnosis
+    document : mapping
+        The verdict that is also written as ``verdict.json``.
+    figures : mapping of str to Path
+        As `save_diagnosis_figures` returns them; what is missing is left out.
+
+    Returns
+    -------
+    str
+        A self-contained page: style inside, pictures as data URIs.
+    """
+    from skred.report.diagnosis.page import page
+
+    return page(found, document, figures)

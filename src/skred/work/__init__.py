@@ -1,1 +1,0 @@
-"""Ring 3, work: what a person asks for."""

@@ -1,0 +1,1 @@
+"""What was studied once: the reproduction, Ryggfonn, thresholds, masked effects, the record of the proof."""

@@ -1,0 +1,145 @@
+"""The real recordings diagnosed: what each base law leaves out at Ryggfonn, and what that depends on.
+
+``python benchmarks/ryggfonn_diagnoses.py`` diagnoses each case that has no result yet, writes
+``results/ryggfonn/<case>.json`` and figures, and then ``docs/ryggfonn.md``; the same command goes on with a
+run that was ended. Delete a result to have it made again.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated, Any, NamedTuple
+
+import cyclopts
+
+from skred.output import write_json, write_text
+from studies.ryggfonn import page as ryggfonn_page
+from studies.ryggfonn.groups import groups_figure, retardations
+
+ROOT = Path(__file__).resolve().parent.parent
+RESULTS = ROOT / "benchmarks" / "results" / "ryggfonn"
+FIGURES = ROOT / "docs" / "figures"
+MOVED = ("LC", "CD")
+PRIOR_FACTORS = (0.5, 1.0, 2.0)
+SHOWN = ("where", "probabilities", "places")
+
+
+class Case(NamedTuple):
+    """One diagnosis: a base law, and what is different from the usual settings."""
+
+    name: str
+    base_model: str
+    campaign: str = "ryggfonn"
+    smoothing_m: float = 10.0
+    errors: str = "robust"
+    spans: bool = False
+    sensors_m: tuple[float, float] = (0.0, 0.0)
+    """How far downstream of where they are taken to be the sensors LC and CD are put."""
+    folds: int = 0
+    """Parts of the avalanches without which the diagnosis is repeated; each one is then refitted without."""
+
+
+CASES = (
+    Case("coulomb", "coulomb"),
+    Case("pcm", "pcm"),
+    Case("constant", "constant"),
+    Case("pcm-smoothing-5", "pcm", smoothing_m=5.0),
+    Case("pcm-smoothing-20", "pcm", smoothing_m=20.0),
+    Case("pcm-student", "pcm", errors="student"),
+    Case("pcm-spans", "pcm", spans=True),
+    # Their places were inferred, to within 40 and 20 m (data README).
+    Case("pcm-sensors-up", "pcm", sensors_m=(-40.0, -20.0)),
+    Case("pcm-sensors-down", "pcm", sensors_m=(40.0, 20.0)),
+    Case("pcm-sensors-closer", "pcm", sensors_m=(40.0, -20.0)),
+    Case("pcm-with-dam", "pcm", campaign="ryggfonn-with-dam"),
+    *(Case(f"{law}{ryggfonn_page.UNSEEN}", law, folds=5) for law in ryggfonn_page.LAWS),
+)
+
+
+def campaign_of(case: Case) -> Any:
+    """The recordings of a case."""
+    from skred.campaign import find_campaign, read_campaign
+    from studies.ryggfonn.campaigns import build
+
+    if case.spans:
+        return build(find_campaign("ryggfonn") / "raw", spans=True)
+    campaign = read_campaign(find_campaign(case.campaign))
+    shifts = dict(zip(MOVED, case.sensors_m, strict=True))
+    sensors = [
+        replace(one, s_from_m=one.s_from_m + by, s_to_m=one.s_to_m + by)
+        if (by := shifts.get(one.id)) and one.s_from_m is not None and one.s_to_m is not None
+        else one
+        for one in campaign.sensors
+    ]
+    return replace(campaign, sensors=tuple(sensors))
+
+
+def diagnose_case(case: Case, replicas: int) -> dict[str, Any]:
+    """Diagnose one case; its verdict, and the evidence of each mechanism under other scales of its prior."""
+    from skred.cli.options import DIAGNOSIS_SAMPLING
+    from skred.diagnosis.diagnose import Effort, diagnose
+    from skred.diagnosis.repeated import outer_folds
+    from skred.diagnosis.verdict.document import verdict
+    from skred.inference.hierarchical.problem import hierarchical_problem
+    from skred.physics.laws import load_law
+    from skred.report.diagnosis.report import save_diagnosis_figures
+    from skred.report.shared.style import write_png
+
+    problem = hierarchical_problem(campaign_of(case), error_model=case.errors, smoothing_m=case.smoothing_m)
+    settings = DIAGNOSIS_SAMPLING.settings("hierarchical")
+    law, effort = load_law(case.base_model), Effort(replicas=replicas, exact_loo=case.folds > 0)
+    found = diagnose(problem, law, settings, effort, print)
+    document = verdict(found) | {"case": case._asdict()}
+    if case.folds:
+        document["outer_folds"] = outer_folds(problem, law, settings, effort, case.folds, print)
+    if found.race is not None:
+        document["prior_scales"] = {
+            name: {str(factor): _best_factor(found.race, name, factor) for factor in PRIOR_FACTORS}
+            for name in found.race.heats[0].entrants
+        }
+    if case.name == case.base_model:
+        with TemporaryDirectory() as folder:
+            figures = save_diagnosis_figures(found, Path(folder))
+            for name in SHOWN:
+                if name in figures:
+                    shutil.copy(figures[name], FIGURES / f"ryggfonn-{case.name}-{name}.png")
+    if case.name == "pcm" and found.race is not None:
+        document["retardations"] = retardations(found)
+        write_png(groups_figure(document["retardations"]), FIGURES / "ryggfonn-groups.png")
+    return document
+
+
+def _best_factor(race: Any, name: str, factor: float) -> float:
+    """Log Bayes factor of a mechanism's best shape if its prior were wider or narrower."""
+    entrant = race.leading(name).entrants[name]
+    scale = entrant.mechanism.added.scale_of(entrant.best.shape)
+    return float(entrant.best.log_bayes_factor_at(factor * scale))
+
+
+app = cyclopts.App(help=__doc__)
+
+
+@app.default
+def main(
+    *,
+    replicas: Annotated[int, cyclopts.Parameter(help="Clean campaigns simulated for each check.")] = 120,
+) -> None:
+    """Diagnose what has no result yet, and write the page."""
+    RESULTS.mkdir(parents=True, exist_ok=True)
+    for case in CASES:
+        file = RESULTS / f"{case.name}.json"
+        if not file.exists():
+            print(f"== {case.name}", flush=True)
+            write_json(file, diagnose_case(case, replicas))
+    found = {
+        case.name: json.loads((RESULTS / f"{case.name}.json").read_text(encoding="utf-8")) for case in CASES
+    }
+    write_text(ROOT / "docs" / "ryggfonn.md", ryggfonn_page.page(found))
+
+
+if __name__ == "__main__":
+    app()

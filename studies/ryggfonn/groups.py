@@ -1,0 +1,158 @@
+"""Retardation between LC and CD, avalanche by avalanche: recorded, under M2, and with the unlisted force.
+
+The data's README tells of six avalanches that retard there by two to three m/s² more than the others.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.discrepancy.profile import combined, most_probable
+from skred.diagnosis.evidence.coefficient import Fit
+from skred.diagnosis.evidence.extension import extended
+from skred.diagnosis.evidence.prior_odds import UNLISTED
+from skred.inference.problem import pooled_problem
+from skred.report.shared.style import GREY, RECORDED, legend_below, new_figure, styled
+from studies.reproduction.facts import RecordedRetardation, mean_retardation, recorded_retardation
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from matplotlib.figure import Figure
+
+    from skred.diagnosis.diagnose import Diagnosis
+    from skred.physics.mechanisms.spec import Direction
+
+FloatArray = NDArray[np.float64]
+FIRST, LAST = "LC", "CD"
+_MOST_OF_IT = 50.0
+"""Percent of the gap between the groups from which on it is said to be accounted for."""
+
+
+def retardations(found: Diagnosis) -> list[dict[str, Any]]:
+    """Of each avalanche with both speeds: recorded, and of its most probable front by either law [m s-2].
+
+    Those on the far side of the widest gap between recorded ones are the group that retards more.
+    """
+    assert found.race is not None
+    campaign, heat = found.problem.campaign, found.race.leading(UNLISTED)
+    recorded = recorded_retardation(pooled_problem(campaign), FIRST, LAST)
+    more, _, _ = recorded.groups()
+    base, profile = heat.base, most_probable(heat.profiles)
+    force = combined(base.setting, profile.kind, profile.knots_m, profile.mean)
+    ids = campaign.event_ids
+    modelled = {
+        "base": _retardations(found, base.fit, (), recorded),
+        "with_force": _retardations(found, profile.fit, (force,), recorded),
+    }
+    speeds = found.problem.values[:, campaign.sensor_ids.index(FIRST)]
+    return [
+        {
+            "event": event,
+            "retards_more": event in more,
+            "front_speed_m_s": float(speeds[ids.index(event)]),
+            "recorded": -float(value),
+            **{name: float(values[ids.index(event)]) for name, values in modelled.items()},
+        }
+        for event, value in zip(recorded.events, recorded.values, strict=True)
+    ]
+
+
+def _retardations(
+    found: Diagnosis, fit: Fit, directions: Sequence[Direction], between: RecordedRetardation
+) -> FloatArray:
+    """Of the events' most probable fronts on the way between the sensors [m s-2]."""
+    law = extended(found.problem, found.law, tuple(directions))
+    sensor = found.problem.campaign.sensors[found.problem.campaign.sensor_ids.index(FIRST)]
+    ends = np.array([sensor.s_from_m, sensor.s_from_m + between.length_m], dtype=float)
+    squares = law.speeds(fit.points, np.ones(len(directions))) ** 2
+    edge = np.asarray(found.problem.terrain.edge_s_m)
+    speeds = np.sqrt([np.interp(ends, edge, row) for row in squares])
+    return -mean_retardation(speeds[:, 0], speeds[:, 1], between.length_m, between.drop_m)
+
+
+@styled
+def groups_figure(rows: Sequence[dict[str, Any]]) -> Figure:
+    """Modelled against recorded, without the force and with it."""
+    figure = new_figure(3.6, f"Mean retardation between {FIRST} and {LAST}, avalanche by avalanche")
+    panels = figure.subplots(1, 2, sharex=True, sharey=True)
+    for axes, (key, title) in zip(panels, (("base", "M2"), ("with_force", "M2 and the force")), strict=True):
+        axes.axline((5.0, 5.0), slope=1.0, color=GREY, lw=0.8)
+        for six, marker, label in ((False, "o", "the others"), (True, "D", "the six")):
+            own = [row for row in rows if row["retards_more"] == six]
+            axes.plot(
+                [row["recorded"] for row in own],
+                [row[key] for row in own],
+                marker,
+                color=RECORDED,
+                mfc=RECORDED if six else "white",
+                ms=4.5,
+                label=label,
+            )
+        axes.set_title(title)
+        axes.set_xlabel("recorded [m s$^{-2}$]")
+    panels[0].set_ylabel("most probable front [m s$^{-2}$]")
+    legend_below(figure, panels, columns=2)
+    return figure
+
+
+def words(rows: Sequence[dict[str, Any]]) -> str:
+    """The section of the page."""
+    if not rows:
+        return ""
+    table = "".join(_line(name, own) for name, own in _parts(rows))
+    six, others = (own for _, own in _parts(rows))
+    gap = {key: _mean(six, key) - _mean(others, key) for key in ("recorded", "base", "with_force")}
+    kept = 100.0 * gap["with_force"] / gap["recorded"]
+    alike, among = ([_correlation(own, key) for key in ("base", "with_force")] for own in (rows, others))
+    return f"""### The two groups
+
+The data's README tells of six avalanches that retard more between LC and CD. Mean retardation there, by the
+recorded speeds and by each avalanche's most probable front under M2, without and with the unlisted force:
+
+| | avalanches | speed at LC [m/s] | recorded [m/s²] | M2 | M2 and the force |
+| --- | --- | --- | --- | --- | --- |
+{table}
+The six retard by {gap["recorded"]:.1f} m/s² more as recorded, by {gap["base"]:.1f} under M2 with friction and
+drag of their own, and by {gap["with_force"]:.1f} with the force, {kept:.0f} % of what was recorded.
+Correlation with what was recorded, without and with it: {alike[0]:.2f} and {alike[1]:.2f} over all
+{len(rows)}, {among[0]:.2f} and {among[1]:.2f} among the others alone.
+(Where no speed was left at CD, what is recorded is the least that it can have been.)
+{_told(kept)}
+
+![Modelled and recorded retardation between LC and CD](figures/ryggfonn-groups.png)
+"""
+
+
+def _told(kept: float) -> str:
+    """What follows from how much of the gap between the groups is kept, in percent."""
+    if kept >= _MOST_OF_IT:
+        return "So the force accounts for most of what sets the six apart."
+    return (
+        "So the tool does not find these groups: what it lets in goes with a front's speed, and leaves\n"
+        "the gap as it was. What sets the six apart is left open."
+    )
+
+
+def _line(name: str, own: Sequence[dict[str, Any]]) -> str:
+    speed = _mean(own, "front_speed_m_s")
+    means = " | ".join(f"{_mean(own, key):.1f}" for key in ("recorded", "base", "with_force"))
+    return f"| {name} | {len(own)} | {speed:.0f} | {means} |\n"
+
+
+def _parts(rows: Sequence[dict[str, Any]]) -> list[tuple[str, list[dict[str, Any]]]]:
+    return [
+        ("the six", [row for row in rows if row["retards_more"]]),
+        ("the others", [row for row in rows if not row["retards_more"]]),
+    ]
+
+
+def _mean(rows: Sequence[dict[str, Any]], key: str) -> float:
+    return float(np.mean([row[key] for row in rows]))
+
+
+def _correlation(rows: Sequence[dict[str, Any]], key: str) -> float:
+    return float(np.corrcoef([row["recorded"] for row in rows], [row[key] for row in rows])[0, 1])

@@ -1,0 +1,90 @@
+"""How far log scores of avalanches left out are off, by the nodes that each draw's strengths get.
+
+``python benchmarks/unseen_nodes.py [--json FILE]``: Ryggfonn under PCM with the most probable force profile,
+each avalanche scored by 200 draws, with three sets of random shifts of the nodes; against sixteen times the
+nodes. Beside it how much other draws change the scores.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import cyclopts
+import numpy as np
+
+from skred.campaign import find_campaign, read_campaign
+from skred.diagnosis.compare.comparison import race
+from skred.diagnosis.discrepancy.profile import Profile, most_probable
+from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.evidence.event_quadrature import Budget
+from skred.diagnosis.evidence.prior_odds import UNLISTED
+from skred.diagnosis.predict import unseen
+from skred.diagnosis.predict.profile_law import _with
+from skred.output import write_json
+from studies.thresholds.compared_again import base_on
+
+app = cyclopts.App(help=__doc__)
+USED = unseen._NODES
+BUDGETS = {
+    "used": USED,
+    "twice": USED.times(2),
+    "with adapted ones": Budget(64, 32, 64, 1.5, 1.8),
+    "eight times those": Budget(512, 256, 512, 1.5, 1.8),
+}
+EXACT, SHIFTS = USED.times(16), 3
+
+
+def score(base: Base, event: int, let_in: Any, budget: Budget, seed: int) -> float:
+    """Log score of an avalanche."""
+    extension, draws = let_in
+    unseen._NODES = budget
+    rows = base.rows.take(np.array([event]))
+    densities = unseen.log_densities(extension, rows, *draws, seed)[:, 0]
+    return float(np.logaddexp.reduce(densities) - np.log(len(densities)))
+
+
+def measured(base: Base, profile: Profile) -> list[dict[str, Any]]:
+    """By budget: what scores are off by, and seconds."""
+    events = range(len(base.rows.event))
+    drawn = [_with(base, profile, np.random.default_rng(event)) for event in events]
+    exact = np.array([score(base, event, drawn[event], EXACT, 0) for event in events])
+    rows = []
+    for name, budget in BUDGETS.items():
+        started = time.perf_counter()
+        found = [[score(base, k, drawn[k], budget, seed) for k in events] for seed in range(SHIFTS)]
+        rows.append(_row(name, np.array(found) - exact, budget.total))
+        rows[-1]["seconds"] = (time.perf_counter() - started) / SHIFTS
+    others = [_with(base, profile, np.random.default_rng(1000 + event)) for event in events]
+    again = np.array([score(base, k, others[k], EXACT, 0) for k in events])
+    return [*rows, _row("other draws", again - exact, EXACT.total)]
+
+
+def _row(name: str, errors: Any, nodes: int) -> dict[str, Any]:
+    """Errors in nats: of an avalanche, and of the sum over all."""
+    row = {
+        "nodes": name,
+        "of a draw": nodes,
+        "root mean square": float(np.sqrt(np.mean(errors**2))),
+        "sum": float(np.atleast_2d(errors).sum(axis=1).mean()),
+    }
+    print(row)
+    return row
+
+
+@app.default
+def main(
+    *, out: Annotated[Path | None, cyclopts.Parameter(name="--json", help="File for the figures.")] = None
+) -> None:
+    """Measure."""
+    base = base_on(read_campaign(find_campaign("ryggfonn")), "pcm")
+    assert base is not None
+    heat = race(base).leading(UNLISTED)
+    found = measured(heat.base, most_probable(heat.profiles))
+    if out is not None:
+        write_json(out, found)
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,371 @@
+"""The race's two looks: rough ones at every place, and fronts where a place leads."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
+
+from skred.diagnosis.compare import comparison as race
+from skred.diagnosis.compare import refinement as looking
+from skred.diagnosis.compare.candidate import Entrant
+from skred.diagnosis.compare.comparison import _first_looks, _that_count, _that_may_count, with_errors
+from skred.diagnosis.compare.recomputed import corrected
+from skred.diagnosis.compare.refinement import Place, entrants_of, leading
+from skred.diagnosis.compare.screening import curve, first_look
+from skred.diagnosis.detect.score_test import Screen, candidates
+from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at, curve_near, refit
+from skred.diagnosis.evidence.event_quadrature import FINE, FIRST, FRONTS, ROUGH, USUAL
+from skred.diagnosis.evidence.extension import extended
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.spec import Direction, Shape
+
+
+@pytest.fixture(scope="module")
+def base() -> Base:
+    """A drag is left out, at a signal-to-noise of 7."""
+    return base_of(trial(1013, "sparse", "turbulent_drag", "coulomb", 7.0).campaign, "coulomb")
+
+
+@pytest.mark.parametrize("name", ["turbulent_drag", "viscous_drag", "sensor_bias"])
+def test_second_look_against_many_nodes_on_a_dense_grid(base: Base, name: str) -> None:
+    job = next(one for one in candidates(base.setting) if one.mechanism.id == name)
+    found = curve_near(base, job.mechanism, job.shape, curve(base, job.mechanism, job.shape, ROUGH), ROUGH)
+    assert job.mechanism.added is not None
+    reach = job.mechanism.added.scale * np.linspace(0.0, 3.5, 24)
+    grid = np.concatenate([-reach[:0:-1], reach]) if job.mechanism.added.either_sign else reach
+    exact = curve_at(base, job.mechanism, job.shape, grid, FINE)
+    assert found.log_bayes_factor == pytest.approx(exact.log_bayes_factor, abs=0.4)
+    mean, sd = exact.moments
+    assert abs(found.moments[0] - mean) < 0.25 * sd
+
+
+def test_rough_look_finds_what_is_missing(base: Base) -> None:
+    assert first_look(base) is ROUGH
+    for job in candidates(base.setting):
+        if job.mechanism.id in ("turbulent_drag", "viscous_drag"):
+            assert curve(base, job.mechanism, job.shape, ROUGH).log_bayes_factor > 5.0
+
+
+def test_what_tangents_promise_counts_by_what_fronts_say() -> None:
+    """In a clean campaign friction on many a stretch reads five nats along tangents; none has two."""
+    base = base_of(trial(990001, "sparse", "nothing", "pcm").campaign, "pcm")
+    friction = [one for one in candidates(base.setting) if one.mechanism.id == "segment_friction"]
+    assert first_look(base) is ROUGH and len(friction) > 15
+    found = [curve(base, one.mechanism, one.shape, ROUGH) for one in friction]
+    tangents = [
+        curve_at(base, one.mechanism, one.shape, k.strengths[k.strengths != 0.0], ROUGH)
+        for one, k in zip(friction, found, strict=True)
+    ]
+    promised = np.array([one.log_evidence.max() for one in tangents])
+    assert np.count_nonzero(promised > 5.0) > 3
+    assert max(one.log_evidence.max() for one in found) < 2.0
+    # Nothing is promised for nothing; what speaks against a strength is left as it was.
+    for one, rough in zip(found, tangents, strict=True):
+        assert one.rough and one.log_evidence[one.strengths == 0.0][0] == 0.0
+        against = rough.log_evidence < 0.0
+        np.testing.assert_allclose(one.log_evidence[against], rough.log_evidence[against], atol=1e-6)
+
+
+def test_only_what_fronts_computed_is_corrected(base: Base) -> None:
+    """What is wrong with a rough curve is its own, and not its mechanism's."""
+    job = next(one for one in candidates(base.setting) if one.mechanism.id == "turbulent_drag")
+    rough = curve(base, job.mechanism, job.shape, ROUGH)
+    fronts = curve_near(base, job.mechanism, job.shape, rough, ROUGH)
+    assert rough.rough and not fronts.rough
+    with ThreadPoolExecutor(1) as pool:
+        found = [
+            corrected(base, {"turbulent_drag": Entrant(job.mechanism, (one,), np.zeros(1))}, [], pool, best)
+            for one, best in ((rough, 0.0), (fronts, 0.0), (fronts, fronts.log_bayes_factor + 7.0))
+        ]
+    looked = [entrants["turbulent_drag"] for entrants, _ in found]
+    assert [one.disagreement is None for one in looked] == [True, False, True]
+    assert looked[0].correction == looked[2].correction == 0.0
+    assert looked[1].disagreement is not None
+    assert 0.0 < abs(looked[1].correction) < 0.5 and abs(looked[1].disagreement) < 0.5
+
+
+def test_fronts_are_looked_at_where_readings_are_far_off() -> None:
+    """At Ryggfonn without drag a third of the readings are outliers: tangents miss what ends that."""
+    base = ryggfonn_base("coulomb")
+    assert first_look(base) is FRONTS
+    drag = mechanisms()["velocity_weakening"]
+    assert drag.added is not None
+    found = [curve(base, drag, shape, FRONTS) for shape in drag.added.shapes(base.setting)]
+    rough = [curve(base, drag, shape, ROUGH) for shape in drag.added.shapes(base.setting)]
+    heights = [max(one.log_bayes_factor for one in curves) for curves in (found, rough)]
+    assert heights[0] > 30.0 > heights[1] + 10.0
+
+
+def made(name: str, place: float, height: float) -> Curve:
+    """A curve with a certain Bayes factor, nearly."""
+    mechanism = mechanisms()[name]
+    assert mechanism.added is not None
+    strengths = mechanism.added.scale * np.array([0.0, 0.5, 1.0, 2.0, 3.5])
+    shape = Shape(place, place + 50.0)
+    return Curve(mechanism, shape, Direction(), strengths, height + 0.0 * strengths, ())
+
+
+def test_those_that_lead_after_a_second_look_are_looked_at_too() -> None:
+    curves = [made("segment_drag", 100.0 * k, height) for k, height in enumerate([9.0, 7.5, 8.0, 5.0, 1.0])]
+    assert leading(curves, {}) == [0, 2]
+    # The first falls behind, so the next ones lead.
+    finer = {0: Place((made("segment_drag", 0.0, 2.0),)), 2: Place((made("segment_drag", 200.0, 7.0),))}
+    assert leading(curves, finer) == [1, 2]
+    # Far behind the best is not looked at.
+    assert leading(curves, {1: Place((made("segment_drag", 100.0, 20.0),))}) == [1]
+
+
+def test_what_is_far_behind_is_not_looked_at_again() -> None:
+    heights = {"segment_drag": [30.0, 19.0, 21.0], "obstacle": [12.0, 9.0], "sensor_bias": [14.0, 3.0]}
+    curves = [made(name, 100.0 * k, one) for name, row in heights.items() for k, one in enumerate(row)]
+    assert _that_count(dict(enumerate(curves))) == [0, 2, 3, 4, 5]
+    # A second look at what is hopeless against the best of all would change nothing that is said.
+    assert leading(curves, {}) == [0, 3, 5]
+    assert leading(curves, {0: Place((made("segment_drag", 0.0, 33.0),))}) == [0, 5]
+    assert leading([made("segment_drag", 300.0, 45.0), *curves], {}) == [0]
+    # Parts of what has much may have much more.
+    strong = [made("viscous_drag", 0.0, 91.0), made("segment_drag", 0.0, 71.0), made("obstacle", 0.0, 50.0)]
+    assert leading(strong, {}) == [0, 1]
+
+
+def test_the_leader_is_parted_before_others_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What falls hopelessly behind the leader's parts is left as it is; what keeps up is not."""
+    at_first = [
+        made("segment_drag", 0.0, 20.0),
+        made("obstacle", 100.0, 10.0),
+        made("sensor_bias", 200.0, 12.0),
+    ]
+    looked: list[str] = []
+
+    def curve_near(base: Any, mechanism: Any, shape: Any, near: Curve, first: Any) -> Curve:
+        looked.append(mechanism.id)
+        return made(mechanism.id, shape.s_from_m, 31.0 if mechanism.id == "segment_drag" else 13.0)
+
+    monkeypatch.setattr(looking, "curve_near", curve_near)
+    monkeypatch.setattr(looking, "_parts", lambda *of: [])
+    with ThreadPoolExecutor(1) as pool:
+        base: Any = SimpleNamespace()
+        found = looking.second_look(base, at_first, ROUGH, pool)
+    assert looked == ["segment_drag", "sensor_bias"]
+    assert found["obstacle"].curves == (at_first[1],)
+
+
+def test_mechanisms_that_an_error_model_far_behind_cannot_bring_back() -> None:
+    """Twice what they have under the other one and five nats more, less what it is behind, are too few."""
+    curves = [made("segment_drag", 0.0, 12.0), made("obstacle", 0.0, 4.0), made("sensor_bias", 0.0, -1.0)]
+    curves.append(made("obstacle", 100.0, -3.0))
+    best, low, none, worst = (one.log_bayes_factor for one in curves)
+    assert _that_may_count(curves, 0.0) == [curves[0], curves[1], curves[3]]
+    assert 2.0 * low + 5.0 > best and none + 5.0 < best
+    assert _that_may_count(curves, 2.0 * low + 5.0 - best + 0.01) == [curves[0]]
+    assert _that_may_count(curves, best + 5.01) == []
+    # With nothing that leads they have to keep up with nothing.
+    assert _that_may_count(curves[2:3], none + 4.99) == curves[2:3]
+    assert _that_may_count(curves[2:3], none + 5.01) == []
+
+
+def test_under_another_error_model_each_mechanism_is_looked_at_until_the_rest_is_far_behind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A place that was far behind is looked at once the leading one falls; one that stays behind is not."""
+    before = [made("obstacle", 100.0 * k, one) for k, one in enumerate([30.0, 19.0, 5.0])]
+    now = [made("obstacle", 100.0 * k, one) for k, one in enumerate([12.0, 25.0, 40.0])]
+    looked: list[int] = []
+
+    def curve(base: Any, mechanism: Any, shape: Any, budget: Any, linear: Any) -> Curve:
+        looked.append(int(shape.s_from_m / 100.0))
+        return now[looked[-1]]
+
+    todo = [SimpleNamespace(mechanism=one.mechanism, shape=one.shape) for one in now]
+    monkeypatch.setattr(race, "curve", curve)
+    monkeypatch.setattr(race, "_linear_strengths", lambda base: {})
+    monkeypatch.setattr(race, "candidates", lambda setting, ties: todo)
+    with ThreadPoolExecutor(1) as pool:
+        told: list[tuple[int, int]] = []
+        base: Any = SimpleNamespace(setting=None)
+        found = _first_looks(base, ROUGH, pool, lambda *of: told.append(of), before)
+    assert looked == [0, 1] and found == [now[0], now[1], before[2]] and told[-1] == (3, 3)
+
+
+def test_strengths_of_other_sensors_are_other_strengths() -> None:
+    one, other = made("sensor_bias", 0.0, 1.0), made("sensor_bias", 100.0, 1.0)
+    slope = 4.0 * np.arange(len(other.strengths))
+    other = replace(other, log_evidence=0.9 + slope - slope.max(), shape=Shape(sensor="b"))
+    (entrant,) = entrants_of([replace(one, shape=Shape(sensor="a")), other], {}).values()
+    assert entrant.strength_between_shapes() == 0.0
+
+
+def test_finer_curves_share_the_weight_of_their_place() -> None:
+    curves = [made("segment_drag", 100.0 * k, 1.0) for k in range(3)]
+    same = made("segment_drag", 100.0, 1.0)
+    place = Place((same,)).parted(0, [same] * 3).parted(2, [same] * 2)
+    assert np.exp(place.log_shares) == pytest.approx([1 / 4, 1 / 4, 1 / 12, 1 / 4, 1 / 12, 1 / 12])
+    (entrant,) = entrants_of(curves, {1: place}).values()
+    assert len(entrant.curves) == 8 and np.exp(entrant.log_weights).sum() == pytest.approx(1.0)
+    assert entrant.log_bayes_factor == pytest.approx(curves[0].log_bayes_factor)
+
+
+PEAK_M = (431.0, 587.0)
+"""The best stretch in the next test."""
+
+
+def peaked(shape: Shape, width_m: float) -> float:
+    """40 nats on the best stretch, less with the squares of how far off the ends are."""
+    assert shape.s_from_m is not None and shape.s_to_m is not None
+    apart = np.array([shape.s_from_m, shape.s_to_m]) - PEAK_M
+    return float(40.0 - 0.5 * np.sum((apart / width_m) ** 2))
+
+
+@pytest.mark.parametrize(
+    ("width_m", "most_looks", "off", "error"),
+    [(10.0, 140, 5.0, 2.5), (30.0, 100, 20.0, 1.5), (1e3, 21, 100.0, 0.1)],
+)
+def test_a_place_is_parted_where_one_part_holds_most(
+    monkeypatch: pytest.MonkeyPatch, base: Base, width_m: float, most_looks: int, off: float, error: float
+) -> None:
+    """The peak is found, and the mean over all stretches is that of very many of them."""
+    setting = replace(base.setting, recorded_m=(100.0, 900.0))
+    base = replace(base, setting=setting)
+    looked: list[Shape] = []
+
+    def as_high(shape: Shape) -> Curve:
+        return replace(made("segment_friction", 0.0, peaked(shape, width_m)), shape=shape)
+
+    def curve_near(base: Any, mechanism: Any, shape: Shape, near: Curve, budget: Any) -> Curve:
+        looked.append(shape)
+        return as_high(shape)
+
+    monkeypatch.setattr(looking, "curve_near", curve_near)
+    added = mechanisms()["segment_friction"].added
+    assert added is not None
+    shapes = added.shapes(setting)
+    with ThreadPoolExecutor(1) as pool:
+        found = looking.second_look(base, [as_high(one) for one in shapes], FRONTS, pool)
+    entrant = found["segment_friction"]
+    assert np.exp(entrant.log_weights).sum() == pytest.approx(1.0)
+    assert len(looked) <= most_looks and len(set(looked)) == len(looked)
+    assert max(abs(a - b) for a, b in zip(entrant.stretch() or (), PEAK_M, strict=True)) < off
+    # A stretch stands for those moved by up to a fifth of its length and up to 1.6 times as long or short.
+    rng = np.random.default_rng(0)
+    heights = []
+    for one in shapes:
+        assert one.place_m is not None and one.s_to_m is not None
+        length = (one.s_to_m - one.place_m) * 2.0 * np.exp(rng.uniform(-np.log(1.6), np.log(1.6), 2000))
+        middle = one.place_m + 0.2 * (one.s_to_m - one.place_m) * 2.0 * rng.uniform(-1.0, 1.0, 2000)
+        heights += [
+            peaked(Shape(m - 0.5 * n, m + 0.5 * n), width_m) for m, n in zip(middle, length, strict=True)
+        ]
+    exact = (
+        np.logaddexp.reduce(heights)
+        - np.log(len(heights))
+        + made("segment_friction", 0.0, 0.0).log_bayes_factor
+    )
+    assert exact - error < entrant.log_bayes_factor < exact + 0.5
+
+
+def test_not_knowing_the_place_widens_a_strength() -> None:
+    """The variance of a mixture: within shapes, and between their means."""
+    flat, steep = made("segment_drag", 0.0, 1.0), made("segment_drag", 100.0, 1.0)
+    slope = 4.0 * np.arange(len(steep.strengths))
+    steep = replace(steep, log_evidence=1.0 + slope - slope.max())
+    (entrant,) = entrants_of([flat, steep], {}).values()
+    weights, between = entrant.shape_weights, entrant.strength_between_shapes()
+    within = weights @ np.array([one.moments[1] ** 2 for one in entrant.curves])
+    mean = entrant.strength()[0]
+    about_best = entrant.strength()[1] ** 2 + (mean - entrant.best.moments[0]) ** 2
+    assert between > 0.0 and about_best == pytest.approx(within + between**2)
+    assert entrants_of([flat], {})["segment_drag"].strength_between_shapes() == 0.0
+
+
+def test_other_error_models_start_from_any() -> None:
+    """The evidence of an error model does not depend on the one that it was reached from."""
+    base = sparse_base()
+    student = with_errors(base, "student")
+    there, again = with_errors(base, "robust"), with_errors(student, "robust")
+    assert student.problem.error_model.id == "student"
+    assert again.fit.found.log_evidence == pytest.approx(there.fit.found.log_evidence, abs=0.1)
+    assert replace(again, fit=there.fit).problem.error_model.id == "robust"
+    # Two routes: nodes around modes, and the law's likelihood surfaces.
+    assert there.fit.found.log_evidence == pytest.approx(base.fit.found.log_evidence, abs=0.3)
+
+
+def test_errors_in_common_are_integrated_as_closely_as_others() -> None:
+    """Of a clean campaign with such errors, 42 readings a front: more nodes change nothing.
+
+    Modes that are looked for as if they were independent are somewhere else: 40 nats and more were lost.
+    """
+    clean = trial(2300015, "dense", "nasty", "constant").campaign
+    base = with_errors(base_of(clean, "constant"), "correlated")
+    found = [base.with_nothing(budget).found.log_evidence for budget in (ROUGH, FRONTS, USUAL, FINE)]
+    assert max(found) - min(found) < 1.0
+
+
+def test_a_first_look_leaves_out_only_strengths_that_are_hopeless() -> None:
+    """The same evidence as on the whole grid, without those that have none and have the more the weaker."""
+    base, spared = sparse_base(), 0
+    local = [one for one in candidates(base.setting) if one.mechanism.id in ("segment_friction", "obstacle")]
+    for job in local[::9]:
+        added = job.mechanism.added
+        assert added is not None
+        grid = added.scale_of(job.shape) * np.array([0.2, 0.6, 1.2, 2.2, 3.5])
+        grid = np.append(-grid[::-1], grid) if added.either_sign else grid
+        whole = curve_at(base, job.mechanism, job.shape, grid, FRONTS)
+        found = curve(base, job.mechanism, job.shape, FRONTS)
+        assert found.log_bayes_factor == pytest.approx(whole.log_bayes_factor, abs=0.05)
+        assert set(found.strengths) <= set(whole.strengths)
+        spared += len(whole.strengths) - len(found.strengths)
+    assert spared > 0
+
+
+def test_nothing_is_the_same_whatever_is_not_added() -> None:
+    """At strength 0 of a mechanism, refitted with those of its other strengths or by itself."""
+    base = sparse_base()
+    for job in (candidates(base.setting)[k] for k in (0, 20, -1)):
+        extension = extended(base.problem, base.law, (*base.directions, job.direction))
+        start = (base.population, base.fit.points)
+        for budget, first in ((ROUGH, None), (FRONTS, FIRST)):
+            (zero,) = refit(extension, base.rows, np.zeros((1, 1)), start, base.log_scale, budget, first)
+            found = base.with_nothing(budget)
+            assert found.found.log_evidence == pytest.approx(zero.found.log_evidence, abs=1e-6)
+            assert base.with_nothing(budget) is found
+    # Another base, under another error model say, has its own.
+    assert replace(base).with_nothing(ROUGH) is not base.with_nothing(ROUGH)
+
+
+def test_a_first_look_sees_strengths_far_below_the_grid() -> None:
+    """Many recordings tell a drag of a tenth of its prior's scale; the grid begins at a fifth."""
+    base = base_of(trial(1031, "dense", "turbulent_drag", "constant", 9.5).campaign, "constant")
+    job = next(one for one in candidates(base.setting) if one.mechanism.id == "turbulent_drag")
+    screen = Screen(base.problem, base.law, base.setting)
+    found = screen.strengths_found(screen.scores(base.rows, base.fit.points, base.population))
+    linear = found[job.mechanism.id, job.shape]
+    assert job.mechanism.added is not None and 0.0 < linear < 0.2 * job.mechanism.added.scale
+    rough = curve(base, job.mechanism, job.shape, ROUGH, linear)
+    settled = curve_near(base, job.mechanism, job.shape, rough, ROUGH)
+    assert settled.log_bayes_factor > 20.0
+    assert rough.log_bayes_factor == pytest.approx(settled.log_bayes_factor, abs=5.0)
+    blind = curve(base, job.mechanism, job.shape, ROUGH)
+    assert blind.log_bayes_factor < settled.log_bayes_factor - 5.0
+    assert settled.moments[0] == pytest.approx(linear, abs=6.0 * settled.moments[1])
+
+
+def test_moments_of_a_curve_on_uneven_strengths(base: Base) -> None:
+    """A normal likelihood, narrow beside the grid, under a half-normal prior."""
+    drag = mechanisms()["turbulent_drag"]
+    assert drag.added is not None
+    scale, mean, sd = drag.added.scale, 0.1 * drag.added.scale, 0.01 * drag.added.scale
+    near = mean + sd * np.linspace(-4.0, 4.0, 9)
+    strengths = np.concatenate([[0.0], near, scale * np.array([0.2, 0.6, 1.2, 3.5])])
+    strengths.sort()
+    heights = 0.5 * ((mean / sd) ** 2 - ((strengths - mean) / sd) ** 2)
+    direction = drag.added.direction(base.setting, Shape())
+    one = Curve(drag, Shape(), direction, strengths, heights, (base.fit,) * len(strengths))
+    assert one.moments[0] == pytest.approx(mean, rel=0.01) and one.moments[1] == pytest.approx(sd, rel=0.05)
+    exact = 50.0 + np.log(2.0 * sd / scale) - 0.5 * 0.1**2
+    assert one.log_bayes_factor == pytest.approx(exact, abs=0.1)

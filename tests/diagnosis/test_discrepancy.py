@@ -1,0 +1,289 @@
+"""The unlisted force and its place: basis, linear evidence, a planted force, missing work and bands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_cases import base_of, few_dense_base, recorded
+from numpy.testing import assert_allclose
+from scipy.stats import multivariate_normal, norm
+
+from skred.campaign import find_campaign, read_campaign
+from skred.diagnosis.compare.comparison import Heat
+from skred.diagnosis.compare.location import _band, _resolution, _stretch, _work, locate
+from skred.diagnosis.compare.screening import curve
+from skred.diagnosis.detect.score_test import _of_profile
+from skred.diagnosis.discrepancy.fit import _climb, _fit_at, _peak, _promise, _Seen, as_profile, fit_profile
+from skred.diagnosis.discrepancy.profile import (
+    KINDS,
+    Prior,
+    Profile,
+    alike,
+    combined,
+    hats,
+    knots,
+    log_evidence_of,
+    priors_of,
+)
+from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.evidence.event_quadrature import USUAL
+from skred.diagnosis.evidence.extension import extended
+from skred.physics.kernel.columns import Column
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.spec import Shape
+
+
+@pytest.fixture(scope="module")
+def base() -> Base:
+    return few_dense_base()
+
+
+def planted(base: Base, kind: int, centre: float, size: float) -> Base:
+    """The same avalanches with a force on 200 m."""
+    at = np.array([centre - 100.0, centre - 50.0, centre + 50.0, centre + 100.0])
+    return recorded(base, combined(base.setting, KINDS[kind], at, size * np.array([0.0, 1.0, 1.0, 0.0])))
+
+
+def test_hats_sum_to_one_inside(base: Base) -> None:
+    terrain, at = base.setting.terrain, knots(base.setting)
+    middle = 0.5 * (terrain.edge_s_m[1:] + terrain.edge_s_m[:-1])
+    basis = hats(terrain, at)
+    inside = (middle >= at[0]) & (middle <= at[-1])
+    assert basis.shape == (len(at), terrain.n_cells) and inside.any() and not inside.all()
+    assert_allclose(basis.sum(axis=0)[inside], 1.0)
+    assert np.all(basis[:, ~inside] == 0.0) and np.all(basis >= 0.0)
+    values = np.random.default_rng(0).standard_normal(len(at))
+    assert_allclose((values @ basis)[inside], np.interp(middle[inside], at, values))
+    direction = combined(base.setting, KINDS[0], at, values)
+    assert direction.columns == (Column.CONSTANT,)
+    assert_allclose(direction.profiles[0], values @ basis)
+
+
+@pytest.mark.parametrize("n_groups", [1, 3])
+def test_linear_evidence_of_a_profile(n_groups: int) -> None:
+    """Score and information against the normal density of the readings, with the profile and without."""
+    rng = np.random.default_rng(n_groups)
+    n, n_data = 4, 9
+    factor = rng.standard_normal((n, n))
+    cover = 0.3 * factor @ factor.T + 0.05 * np.eye(n)
+    scores, informations, expected = [], [], []
+    for _ in range(n_groups):
+        design, sd = rng.standard_normal((n_data, n)), rng.uniform(0.5, 2.0, n_data)
+        data = design @ rng.multivariate_normal(np.zeros(n), cover) + sd * rng.standard_normal(n_data)
+        scores.append(design.T @ (data / sd**2))
+        informations.append(design.T @ (design / sd[:, None] ** 2))
+        there = multivariate_normal(np.zeros(n_data), np.diag(sd**2) + design @ cover @ design.T)
+        expected.append(there.logpdf(data) - norm.logpdf(data, scale=sd).sum())
+    assert_allclose(_of_profile(np.array(scores), np.array(informations), cover), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("kind", [0, 1, 2])
+def test_a_planted_force_is_found(base: Base, kind: int, sign: float) -> None:
+    """Where it is, which way it acts, and how much work it does; the clean campaign shows none."""
+    centre = 800.0
+    size = sign * {0: 1.6, 1: 2.5e-3, 2: 1e-2}[kind]
+    changed = planted(base, kind, centre, size)
+    found = fit_profile(changed, KINDS[kind])
+    assert found.log_bayes_factor > 5.0 and found.gain > found.log_bayes_factor
+    z = found.mean / np.sqrt(np.diag(found.covariance))
+    top = int(np.argmax(np.abs(z)))
+    assert abs(found.knots_m[top] - centre) < 120.0 and np.sign(found.mean[top]) == sign
+    first, last = _stretch(found)
+    assert first < centre < last
+    at = np.linspace(found.knots_m[0], found.knots_m[-1], 2001)
+    near = np.abs(at - centre) < 200.0
+    unit = [np.trapezoid(np.interp(at, found.knots_m, row) * near, at) for row in np.eye(len(found.knots_m))]
+    sd = np.sqrt(unit @ found.covariance @ unit)
+    # The typical speed is that of the law fitted to the changed readings: opposed to something else, then.
+    within = 3.0 * sd if kind < 2 else 0.6 * abs(size) * 150.0
+    assert found.mean @ unit == pytest.approx(size * 150.0, abs=within) and sd < 0.4 * abs(size) * 150.0
+    assert fit_profile(base, KINDS[kind]).log_bayes_factor < 2.0
+
+
+def made_profile(base: Base, kind: int) -> Profile:
+    at = knots(base.setting)
+    rng = np.random.default_rng(7)
+    factor = 0.3 * rng.standard_normal((len(at), len(at)))
+    mean = np.sin(at / 90.0)
+    cover = factor @ factor.T + 0.02 * np.eye(len(at))
+    prior = Prior(KINDS[kind].amplitude, 80.0)
+    return Profile(KINDS[kind], prior, at, mean, cover, 0.0, 0.0, base.fit, ())
+
+
+def test_work_is_the_integral_of_the_force(base: Base) -> None:
+    """Between neighbouring sensors, and from the last to the last knot; its standard deviation by draws."""
+    profile, terrain = made_profile(base, 0), base.setting.terrain
+    edge, basis = terrain.edge_s_m, hats(terrain, profile.knots_m)
+    work = _work(base.problem.sensor_places, profile, basis, np.diff(edge), edge)
+    ends = sorted(float(s.s_from_m) for s in base.problem.campaign.sensors if not s.is_runout)
+    if profile.knots_m[-1] > ends[-1] + 1.0:
+        ends = [*ends, profile.knots_m[-1]]
+    assert_allclose(work[:, 0], ends[:-1])
+    assert_allclose(work[:, 1], ends[1:])
+    draws = np.random.default_rng(0).multivariate_normal(profile.mean, profile.covariance, 4000)
+    for first, last, mean, sd in work:
+        at = np.linspace(first, last, 2001)
+        exact = np.trapezoid(np.interp(at, profile.knots_m, profile.mean), at)
+        assert mean == pytest.approx(exact, abs=1.2 * np.diff(edge).max())  # a cell at each end
+        unit = np.trapezoid(
+            [np.interp(at, profile.knots_m, row) for row in np.eye(len(profile.knots_m))], at, axis=1
+        )
+        assert sd == pytest.approx((draws @ unit).std(), rel=0.12, abs=0.6)
+    whole = np.interp(edge, profile.knots_m, profile.mean, 0.0, 0.0)
+    inside = (edge >= ends[0]) & (edge <= ends[-1])
+    assert work[:, 2].sum() == pytest.approx(np.trapezoid(whole[inside], edge[inside]), abs=8.0)
+
+
+def test_band_holds_the_whole_profile(base: Base) -> None:
+    """Nine draws in ten, everywhere at once; wider than pointwise, narrower than Bonferroni's."""
+    profile = made_profile(base, 0)
+    basis = hats(base.setting.terrain, profile.knots_m)
+    basis = basis[:, basis.sum(axis=0) > 0.0]
+    mean, sd, factor = _band(profile, basis)
+    assert_allclose(mean, profile.mean @ basis)
+    assert norm.ppf(0.95) < factor < norm.ppf(1.0 - 0.05 / basis.shape[1])
+    draws = np.random.default_rng(9).multivariate_normal(profile.mean, profile.covariance, 4000) @ basis
+    held = np.all(np.abs(draws - mean) <= factor * sd, axis=1).mean()
+    assert held == pytest.approx(0.9, abs=0.03)
+
+
+def test_the_most_probable_kind_is_shown_or_the_one_asked_for(base: Base) -> None:
+    """An opposed kind has the smaller share; what is missing of a fast front is then meant."""
+    plain = replace(made_profile(base, 0), log_bayes_factor=10.0)
+    opposed = replace(made_profile(base, 2), log_bayes_factor=10.1)
+    heat = Heat("robust", base, {}, [plain, opposed], [])
+    assert locate(heat).log_bayes_factor == 10.0 and not locate(heat).opposed
+    found = locate(heat, opposed=True)
+    assert found.log_bayes_factor == 10.1 and found.opposed
+    speeds = extended(base.problem, base.law).speeds(base.fit.points, base.strengths)
+    edge = base.setting.terrain.edge_s_m
+    squares = 0.5 * (speeds[:, 1:] ** 2 + speeds[:, :-1] ** 2)
+    middle = int(np.abs(0.5 * (edge[1:] + edge[:-1]) - found.s_m[len(found.s_m) // 2]).argmin())
+    here = squares[squares[:, middle] > 0.0, middle]
+    expected = np.interp(found.s_m[len(found.s_m) // 2], opposed.knots_m, opposed.mean) * here.std()
+    assert found.mean[len(found.s_m) // 2] == pytest.approx(expected, rel=1e-6)
+    assert here.mean() == pytest.approx(base.setting.front_square[middle], rel=0.1)
+
+
+def test_resolution(base: Base) -> None:
+    """What is told of nothing is smeared over everything; of everything, over the knots' distance."""
+    profile = made_profile(base, 0)
+    at = profile.knots_m
+    prior = profile.prior.cover(at)
+    length = at[-1] - at[0]
+    assert _resolution(replace(profile, covariance=prior)) == pytest.approx(length)
+    assert _resolution(replace(profile, covariance=0.0 * prior)) == pytest.approx(length / len(at))
+
+
+def test_evidence_of_all_kinds_is_their_mean(base: Base) -> None:
+    profile = made_profile(base, 0)
+    some = [replace(profile, log_bayes_factor=value) for value in (2.0, -1.0, 0.5, 900.0)]
+    assert log_evidence_of(some) == pytest.approx(900.0 - np.log(4.0))
+    assert log_evidence_of(some[:3]) == pytest.approx(np.log(np.exp([2.0, -1.0, 0.5]).mean()))
+    assert sum(kind.share for kind in KINDS) == pytest.approx(1.0)
+    one_of_each = [replace(profile, kind=kind) for kind, profile in zip(KINDS[1:], some, strict=False)]
+    shares = np.array([kind.share for kind in KINDS[1:]])
+    assert log_evidence_of(one_of_each) == pytest.approx(np.log(shares @ np.exp([2.0, -1.0]) / shares.sum()))
+
+
+@pytest.mark.parametrize("errors", ["robust", "scaled"])
+@pytest.mark.parametrize("id_", ["segment_drag", "segment_friction"])
+def test_profile_is_found_from_a_listed_mechanism_where_nothing_is_too_far(errors: str, id_: str) -> None:
+    """At Ryggfonn without drag most readings are outliers: there is no slope to follow from no force.
+
+    A smooth profile can do what a force on one stretch does, with some loss at its edges.
+    """
+    base = base_of(read_campaign(find_campaign("ryggfonn")), "coulomb", errors)
+    listed = curve(base, mechanisms()[id_], Shape(1600.0, 1700.0), USUAL)
+    kind = next(kind for kind in KINDS if alike(kind, listed))
+    from_nothing = fit_profile(base, kind)
+    from_listed = fit_profile(base, kind, as_profile(base, kind, listed))
+    assert listed.log_bayes_factor > 50.0
+    assert from_listed.log_bayes_factor > max(from_nothing.log_bayes_factor, 0.8 * listed.log_bayes_factor)
+
+
+def test_evidence_under_a_prior_from_the_peak_under_another(base: Base) -> None:
+    """The likelihood's slope and curvature say what climbing under the other prior finds."""
+    changed, kind = planted(base, 0, 800.0, 1.0), KINDS[0]
+    at = knots(changed.setting)
+    start = (changed.population, changed.fit.points)
+    nothing = _fit_at(changed, kind, at, np.zeros(len(at)), start)
+    flat = _peak(changed, kind, at, np.zeros(len(at)), nothing)
+    height = nothing.found.log_evidence
+    usual, other = Prior(0.8, 120.0), Prior(1.6, 120.0, 800.0)
+    peak, own = (_climb(changed, kind, at, flat, one.cover(at)) for one in (usual, other))
+    found, exact = (_promise(one, height, other.cover(at)).log_factor() for one in (peak, own))
+    assert exact > 20.0
+    assert found == pytest.approx(exact, abs=0.5)
+    precision = np.linalg.inv(other.cover(at))
+    assert_allclose(own.score, precision @ own.values, atol=0.05 * np.abs(own.score).max())
+
+
+def test_priors_are_probabilities_everywhere_or_local() -> None:
+    at = np.linspace(300.0, 1500.0, 30)
+    priors = priors_of(KINDS[1], at)
+    assert sum(np.exp(share) for share in priors.values()) == pytest.approx(1.0)
+    local = {one: share for one, share in priors.items() if one.centre_m is not None}
+    assert sum(np.exp(share) for share in local.values()) == pytest.approx(0.5)
+    assert {one.centre_m for one in local} == {375.0 + 150.0 * k for k in range(8)}
+    for one in priors:
+        sd = np.sqrt(np.diag(one.cover(at)))
+        assert sd.max() == pytest.approx(one.amplitude, rel=0.02)
+        if one.centre_m is not None:
+            assert np.all(sd[np.abs(at - one.centre_m) > 480.0] < 2e-3 * one.amplitude)
+    middle = [np.median([one.amplitude for one in priors]), np.median([one.length_m for one in priors])]
+    assert middle[0] == pytest.approx(KINDS[1].amplitude) and 40.0 <= middle[1] <= 120.0
+
+
+def test_push_and_pull_beside_each_other_are_of_no_listed_shape(base: Base) -> None:
+    """A short force that changes its sign is worth more as a local profile than as friction on a stretch."""
+    problem_at = [knots(base.setting)[0], knots(base.setting)[-1]]
+    centre = 0.5 * sum(problem_at)
+    at = centre + np.array([-130.0, -120.0, -10.0, 10.0, 120.0, 130.0])
+    values = 1.2 * np.array([0.0, 1.0, 1.0, -1.0, -1.0, 0.0])
+    changed = recorded(base, combined(base.setting, KINDS[0], at, values))
+    profile = fit_profile(changed, KINDS[0])
+    assert profile.prior.length_m < 200.0
+    friction = mechanisms()["segment_friction"]
+    places = [(centre - 120.0, centre), (centre, centre + 120.0)]
+    best = max(curve(changed, friction, Shape(*place), USUAL).log_bayes_factor for place in places)
+    assert profile.log_bayes_factor > best + 2.0
+
+
+@pytest.mark.parametrize(("kind", "size"), [(0, 1.0), (1, 2.0e-3), (0, 0.0)])
+def test_evidence_over_priors_against_climbing_under_each(base: Base, kind: int, size: float) -> None:
+    """The few priors that are climbed under stand for all."""
+    changed = planted(base, kind, 800.0, size) if size else base
+    own, at = KINDS[kind], knots(base.setting)
+    start = (changed.population, changed.fit.points)
+    nothing = _fit_at(changed, own, at, np.zeros(len(at)), start)
+    flat = _peak(changed, own, at, np.zeros(len(at)), nothing)
+    factors = [
+        _promise(_climb(changed, own, at, flat, cover), nothing.found.log_evidence, cover).log_factor()
+        + share
+        for prior, share in priors_of(own, at).items()
+        for cover in [prior.cover(at)]
+    ]
+    found = fit_profile(changed, own).log_bayes_factor
+    assert (found > 5.0) == bool(size)
+    assert found == pytest.approx(float(np.logaddexp.reduce(factors)), abs=1.0)
+
+
+def test_what_is_only_promised_counts_no_more_than_what_was_computed(base: Base) -> None:
+    """A slope at a kink promises hundreds of nats elsewhere: enough to climb there, not to claim them."""
+    own, at = KINDS[0], knots(base.setting)
+    none = np.zeros(len(at))
+    fit = _fit_at(base, own, at, none, (base.population, base.fit.points))
+    flat = _peak(base, own, at, none, fit)
+    priors = priors_of(own, at)
+    seen = _Seen(fit.found.log_evidence, at, priors)
+    climbed = next(one for one in priors if one.centre_m is not None)
+    # Settled under its own prior, which holds its rough values down: to others that is a steep slope.
+    values = 0.05 * own.amplitude * np.sin(2.0 * np.arange(len(at)))
+    score = np.linalg.solve(climbed.cover(at), values)
+    seen.add(climbed, replace(flat, values=values, score=score))
+    assert seen.open and seen.factor(seen.open[0]) > 50.0
+    assert seen.factor(climbed) < 0.0 and seen.log_factor < 0.0

@@ -1,0 +1,239 @@
+"""The schema of verdict.json: what the code writes passes, and so does no verdict that says too little."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable
+from importlib.resources import files
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from skred.campaign import find_campaign, read_campaign
+from skred.diagnosis.diagnose import Diagnosis
+from skred.diagnosis.verdict.document import verdict
+from skred.inference.hierarchical.problem import hierarchical_problem
+from skred.output import plain
+from skred.physics.laws import load_law
+from skred.physics.mechanisms import mechanisms
+
+SCHEMA = json.loads((files("skred") / "verdict.schema.json").read_text(encoding="utf-8"))
+VALIDATOR = Draft202012Validator(SCHEMA)
+KEYS = (
+    "format", "campaign", "base_model", "verdict", "mechanism", "mechanisms", "probability",
+    "indistinguishable", "location", "strength", "covariate", "sensor", "equation", "evidence", "held_out",
+    "detection_limits", "next_sensor", "diagnostics", "statement",
+)  # fmt: skip
+NULLABLE = {
+    "evidence": ("elpd_diff", "elpd_se", "log_bayes_factor", "p_value"),
+    "held_out": ("rmse_velocity_before", "rmse_velocity_after", "rmse_runout_before", "rmse_runout_after"),
+    "diagnostics": ("r_hat_max", "ess_min", "pareto_k_max", "divergences"),
+}
+STRENGTH = {"parameter": "segment_drag", "unit": "m-1", "mean": 0.002, "sd": 0.0004}
+STRETCH = {"s_from_m": 1875.0, "s_to_m": 1950.0}
+SENSOR = {"quantity": "front_velocity", "s_from_m": 1700.0, "s_to_m": 1700.0, "splits": []}
+LIMIT = {"parameter": "viscous_drag", "unit": "s-1", "value": 0.04}
+
+
+def nothing_missing() -> dict[str, Any]:
+    return {
+        "format": 1,
+        "campaign": "made up",
+        "base_model": "pcm",
+        "verdict": "nothing_missing",
+        "mechanism": None,
+        "mechanisms": [],
+        "probability": {"nothing": 0.9, "unlisted": 0.01, "segment_drag": 0.09},
+        "indistinguishable": [],
+        "location": None,
+        "strength": None,
+        "covariate": None,
+        "sensor": None,
+        "equation": None,
+        "evidence": {"elpd_diff": None, "elpd_se": None, "log_bayes_factor": -2.0, "p_value": 0.4},
+        "held_out": {
+            "unit": "event", "rmse_velocity_before": 6.1, "rmse_velocity_after": None,
+            "rmse_runout_before": 71.0, "rmse_runout_after": None,
+        },
+        "detection_limits": {"viscous_drag": LIMIT},
+        "next_sensor": None,
+        "diagnostics": {"r_hat_max": 1.0, "ess_min": 1450, "pareto_k_max": 0.5, "divergences": 0},
+        "statement": "The recordings give no reason to add anything.",
+    }  # fmt: skip
+
+
+def named(mechanism: str, kind: str = "missing_physics", **more: Any) -> dict[str, Any]:
+    equation = mechanisms()[mechanism].equation
+    local = {"id": mechanism, "strength": STRENGTH, "location": more.get("location"), "equation": equation}
+    return nothing_missing() | {
+        "verdict": kind,
+        "mechanism": mechanism,
+        "mechanisms": [local],
+        "probability": {"nothing": 0.02, "unlisted": 0.01, mechanism: 0.97},
+        "strength": STRENGTH,
+        "equation": equation,
+        **more,
+    }
+
+
+def tie() -> dict[str, Any]:
+    sensor = SENSOR | {"splits": ["segment_drag", "obstacle"]}
+    return named("segment_drag", indistinguishable=["obstacle"], next_sensor=sensor, location=STRETCH)
+
+
+def two() -> dict[str, Any]:
+    document = named("segment_drag", location=STRETCH)
+    second = document["mechanisms"][0] | {"id": "sensor_bias", "location": None}
+    return document | {"mechanisms": [*document["mechanisms"], second]}
+
+
+def unexplained() -> dict[str, Any]:
+    return nothing_missing() | {"verdict": "unexplained", "location": STRETCH}
+
+
+def cannot_tell() -> dict[str, Any]:
+    return nothing_missing() | {"verdict": "cannot_tell", "next_sensor": SENSOR}
+
+
+def failed() -> dict[str, Any]:
+    """A gate failed: nothing was raced."""
+    nothing: dict[str, Any] = {part: dict.fromkeys(keys) for part, keys in NULLABLE.items()}
+    nothing["held_out"] |= {"unit": "event"}
+    return cannot_tell() | nothing | {"probability": {}, "detection_limits": {}, "next_sensor": None}
+
+
+VALID: dict[str, Callable[[], dict[str, Any]]] = {
+    "nothing": nothing_missing,
+    "named": lambda: named("segment_drag", location=STRETCH),
+    "global": lambda: named("viscous_drag"),
+    "covariate": lambda: named("covariate_friction", covariate="snow_temperature_degC"),
+    "sensor": lambda: named("sensor_bias", "instrument", sensor="LC"),
+    "release": lambda: named("release_offset", "instrument"),
+    "tie": tie,
+    "tied across groups": lambda: named(
+        "sensor_bias", "instrument", sensor="LC", indistinguishable=["obstacle", "unlisted"]
+    ),
+    "two": two,
+    "unexplained": unexplained,
+    "cannot tell": cannot_tell,
+    "failed": failed,
+    "never seen": lambda: nothing_missing() | {"detection_limits": {"viscous_drag": LIMIT | {"value": None}}},
+    "more keys": lambda: nothing_missing() | {"reason": None, "seconds": {"race": 3.0}},
+}
+
+
+def problems(document: dict[str, Any]) -> list[str]:
+    return [f"{error.json_path}: {error.message}" for error in VALIDATOR.iter_errors(document)]
+
+
+def changed(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
+    """A copy with another value at a path like ``evidence.p_value``."""
+    result = copy.deepcopy(document)
+    *outer, last = path.split(".")
+    part: Any = result
+    for key in outer:
+        part = part[int(key) if isinstance(part, list) else key]
+    part[last] = value
+    return result
+
+
+def test_the_schema_is_one() -> None:
+    Draft202012Validator.check_schema(SCHEMA)
+    assert tuple(SCHEMA["required"]) == KEYS
+    assert tuple(SCHEMA["properties"]) == (*KEYS, "locked", "outer_folds")  # where they were asked for
+
+
+@pytest.mark.parametrize("kind", VALID)
+def test_verdicts_that_are_whole(kind: str) -> None:
+    assert problems(VALID[kind]()) == []
+
+
+@pytest.mark.parametrize("kind", VALID)
+@pytest.mark.parametrize("key", KEYS)
+def test_no_key_is_left_out(kind: str, key: str) -> None:
+    document = VALID[kind]()
+    del document[key]
+    assert problems(document)
+
+
+@pytest.mark.parametrize(("part", "key"), [(part, key) for part, keys in NULLABLE.items() for key in keys])
+def test_numbers_may_be_null_but_not_left_out(part: str, key: str) -> None:
+    document = named("viscous_drag")
+    assert problems(changed(document, f"{part}.{key}", None)) == []
+    assert problems(changed(document, f"{part}.{key}", "1.0"))
+    document[part] = {name: value for name, value in document[part].items() if name != key}
+    assert problems(document)
+
+
+@pytest.mark.parametrize(
+    ("kind", "path", "value"),
+    [
+        ("nothing", "format", 2),
+        ("nothing", "campaign", ""),
+        ("nothing", "campaign", None),
+        ("nothing", "verdict", "all_is_well"),
+        ("nothing", "verdict", None),
+        ("nothing", "verdict", "missing_physics"),
+        ("nothing", "verdict", "instrument"),
+        ("nothing", "verdict", "unexplained"),
+        ("nothing", "mechanism", "segment_drag"),
+        ("nothing", "location", STRETCH),
+        ("nothing", "strength", STRENGTH),
+        ("nothing", "detection_limits", {}),
+        ("nothing", "detection_limits.viscous_drag", LIMIT | {"value": 0.0}),
+        ("nothing", "detection_limits.viscous_drag", LIMIT | {"value": "never"}),
+        ("nothing", "detection_limits.nothing", LIMIT),
+        ("nothing", "probability", {}),
+        ("nothing", "probability", {"nothing": 1.0, "segment_drag": 0.0}),
+        ("nothing", "probability.nothing", 1.2),
+        ("nothing", "probability.nothing", None),
+        ("nothing", "evidence.p_value", -0.1),
+        ("nothing", "held_out.unit", None),
+        ("nothing", "diagnostics.divergences", 0.5),
+        ("nothing", "statement", " "),
+        ("nothing", "indistinguishable", ["obstacle"]),
+        ("named", "verdict", "nothing_missing"),
+        ("named", "verdict", "instrument"),
+        ("named", "mechanism", None),
+        ("named", "mechanism", "unlisted"),
+        ("named", "mechanism", "Segment Drag"),
+        ("named", "mechanisms", []),
+        ("named", "mechanisms.0.strength", None),
+        ("named", "mechanisms.0.equation", ""),
+        ("named", "strength", None),
+        ("named", "strength", {"parameter": "segment_drag", "unit": "m-1", "mean": 0.002}),
+        ("named", "strength.sd", -1.0),
+        ("named", "equation", None),
+        ("named", "location", {"s_from_m": 1875.0}),
+        ("named", "location.s_to_m", None),
+        ("named", "covariate", "snow_type"),
+        ("named", "sensor", "LC"),
+        ("covariate", "covariate", None),
+        ("sensor", "sensor", None),
+        ("sensor", "verdict", "missing_physics"),
+        ("tie", "indistinguishable", ["obstacle", "obstacle"]),
+        ("tie", "next_sensor.quantity", "temperature"),
+        ("tie", "next_sensor.s_from_m", None),
+        ("tie", "next_sensor.splits", None),
+        ("unexplained", "location", None),
+        ("unexplained", "mechanism", "segment_drag"),
+        ("cannot tell", "location", STRETCH),
+        ("failed", "evidence", None),
+    ],
+)
+def test_verdicts_that_are_not(kind: str, path: str, value: Any) -> None:
+    document = VALID[kind]()
+    assert problems(document) == []
+    assert problems(changed(document, path, value))
+
+
+@pytest.mark.parametrize("law_id", ["pcm", "constant"])
+def test_what_is_written_where_no_diagnosis_was_possible(law_id: str) -> None:
+    problem = hierarchical_problem(read_campaign(find_campaign("ryggfonn")))
+    found = Diagnosis(problem, load_law(law_id), cannot="only 3 avalanches with a reading")
+    document = plain(verdict(found))
+    assert problems(document) == []
+    assert document["verdict"] == "cannot_tell" and "only 3 avalanches" in document["statement"]
+    json.dumps(document, allow_nan=False)

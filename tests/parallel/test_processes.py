@@ -1,0 +1,74 @@
+"""Helper processes: what they do is what would have been done here."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+
+from skred.parallel import processes as helping
+from skred.parallel.processes import crew, helpers, meanwhile
+from skred.parallel.threads import threads
+
+
+@pytest.fixture
+def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(helping, "threads", lambda: 2)
+
+
+def where(number: int, base: list[int]) -> tuple[int, int, int, int]:
+    """A job that takes a while: its number, what it makes of it, the process that did it, its threads."""
+    time.sleep(0.05)
+    return number, number + base[0], os.getpid(), threads()
+
+
+def test_a_crew_shares_jobs_between_this_process_and_a_helper(two_cores: None) -> None:
+    base = [100]
+    with helpers("skred.physics.kernel.fronts"), crew() as pool:
+        found = list(pool.map(lambda number: where(number, base), range(60)))  # closures go there too
+    assert [row[:2] for row in found] == [(number, 100 + number) for number in range(60)]
+    processes = {row[2] for row in found}
+    assert os.getpid() in processes and len(processes) == 2
+    (helper,) = processes - {os.getpid()}
+    assert {row[3] for row in found if row[2] == helper} == {1}
+    with pytest.raises(ProcessLookupError):  # ended with the context
+        os.kill(helper, 0)
+
+
+def test_without_helpers_all_is_done_here(two_cores: None) -> None:
+    with crew() as pool:
+        assert {pool.submit(os.getpid).result() for _ in range(4)} == {os.getpid()}
+    assert meanwhile(os.getpid)() == os.getpid()
+
+
+def test_one_core_has_no_helpers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(helping, "threads", lambda: 1)
+    with helpers():
+        assert meanwhile(os.getpid)() == os.getpid()
+
+
+def test_meanwhile_something_is_done_elsewhere(two_cores: None) -> None:
+    with helpers():
+        assert meanwhile(os.getpid)() != os.getpid()
+    with helpers(), pytest.raises(ZeroDivisionError):
+        meanwhile(divmod, 1, 0)()
+
+
+def killed(file: Path) -> int:
+    """Kills the process that does it, unless that is the one that says so in a file."""
+    if os.getpid() != int(file.read_text()):
+        os.kill(os.getpid(), signal.SIGKILL)
+    return os.getpid()
+
+
+def test_what_a_killed_helper_was_to_do_is_done_here(two_cores: None, tmp_path: Path) -> None:
+    file = tmp_path / "process"
+    file.write_text(str(os.getpid()))
+    with helpers():
+        assert meanwhile(killed, file)() == os.getpid()
+        assert meanwhile(killed, file)() == os.getpid()  # also when it is known to be gone
+        with crew() as pool:
+            assert set(pool.map(killed, [file] * 8)) == {os.getpid()}
