@@ -19,7 +19,7 @@ import cyclopts
 
 from skred.prove.folder import ProofFolder
 from skred.prove.plan import Plan, random_seed
-from skred.prove.pool import Crew
+from skred.prove.pool import WorkerPool
 from skred.prove.run import run
 from skred.prove.seal import seal
 
@@ -33,7 +33,7 @@ def silent(line: str) -> None:
 def timed(folder: ProofFolder, workers: int) -> dict[str, Any]:
     """Seconds that a run takes, and how its trials fared; its answers are removed."""
     started = time.monotonic()
-    counts = run(folder, Crew(workers), silent, silent)
+    counts = run(folder, WorkerPool(workers), silent, silent)
     seconds = time.monotonic() - started
     answers = [json.loads(file.read_text()) for file in sorted(folder.answer("any").parent.glob("*.json"))]
     shutil.rmtree(folder.path / "answers")
@@ -58,11 +58,13 @@ def main(
     """Measure."""
     with tempfile.TemporaryDirectory(prefix="throughput-") as scratch:
         first = ProofFolder(Path(scratch) / "first")
-        seal(first, Plan(1, random_seed(), kind, nothing_share=1.0, quick=quick), Crew(1), silent, silent)
+        seal(
+            first, Plan(1, random_seed(), kind, nothing_share=1.0, quick=quick), WorkerPool(1), silent, silent
+        )
         timed(first, 1)
         folder = ProofFolder(Path(scratch) / "proof")
         plan = Plan(trials, random_seed(), kind, nothing_share=1.0, quick=quick)
-        seal(folder, plan, Crew(2), silent, silent)
+        seal(folder, plan, WorkerPool(2), silent, silent)
         rows = [timed(folder, workers) for workers in (1, 2)]
     for row in rows:
         print(

@@ -98,9 +98,10 @@ def line_nodes() -> str:
 ## Integrating one free strength out
 
 `python benchmarks/line_nodes.py --json benchmarks/results/line_nodes.json`: {max(n)} of the integrations of
-Ryggfonn's race under M1 and M3, by trapezoids between nodes on a line and by importance nodes as laws of two
-strengths have them, each against a line with sixteen times the nodes. What a log evidence [nats] is off by,
-less what it is off by at the other strengths of its curve; seconds are of one core, with another one busy.
+Ryggfonn's comparison under M1 and M3, by trapezoids between nodes on a line and by importance nodes as laws
+of two strengths have them, each against a line with sixteen times the nodes. What a log evidence [nats] is
+off by, less what it is off by at the other strengths of its curve; seconds are of one core, with another one
+busy.
 
 | base law | budget | rule | nodes of an event | median | nine in ten within | 97 in 100 within | seconds |
 | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -248,7 +249,7 @@ def alarm_limit() -> str:
     sets += read("alarms_before")["clean"]
     drawn = "".join(f"| {one['source']} | {one['seed']} | {_clean(one['drawn_after'])} |\n" for one in sets)
     return f"""
-## The alarm of the race alone
+## The alarm of the comparison alone
 
 `python benchmarks/alarm_limit.py --n {len(found["trials"])}`: the alarm is raised where the
 probability of nothing is below a limit. From the answers of the opened batches of concealed trials, by
@@ -312,11 +313,11 @@ def free_force_draws() -> str:
 `python benchmarks/free_force_draws.py --json benchmarks/results/free_force_draws.json` (code
 {found["commit"]}): log Bayes factors of what is missing at Ryggfonn against nothing, by the way the force
 goes with speed. By Laplace's formula over its 32 values, and by importance sampling of them, with as many
-draws as a race takes and with 1024; one number a seed. Of the {len(few)} numbers with few draws {near} are
-within {_NEAR} nats of the mean of those with 1024, from {min(few):+.1f} to {max(few):+.1f} and
+draws as a comparison takes and with 1024; one number a seed. Of the {len(few)} numbers with few draws {near}
+are within {_NEAR} nats of the mean of those with 1024, from {min(few):+.1f} to {max(few):+.1f} and
 {fmean(few):+.1f} in the mean; by Laplace's formula from {min(laplace):+.1f} to {max(laplace):+.1f}.
 
-| base law | errors | force | Laplace | as in a race | 1024 draws | best listed | CPU seconds, as in a race |
+| base law | errors | force | Laplace | as in a comparison | 1024 draws | best listed | CPU seconds |
 | --- | --- | --- | --- | --- | --- | --- | --- |
 {rows}"""
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign
-from skred.diagnosis.detect.score_test import Candidate
+from skred.diagnosis.detect.score_test import PlacedMechanism
 from skred.diagnosis.evidence.conditional_map import Population, Rows, log_joint, look_around, take_rows
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import MeanPrior, fit_population, mean_prior
@@ -34,7 +34,7 @@ _GRID = (0.25, 0.7, 1.4, 2.6)
 _ROUNDS = 8
 
 
-def heights(fit: QuickFit, candidate: Candidate | None, strengths: FloatArray) -> FloatArray:
+def heights(fit: QuickFit, candidate: PlacedMechanism | None, strengths: FloatArray) -> FloatArray:
     """Penalised log likelihood at some strengths of a candidate, all else refitted, (n,)."""
     directions = () if candidate is None else (candidate.direction,)
     extension, n = extended(fit.problem, fit.law, directions), len(strengths)
@@ -71,7 +71,7 @@ def _repeated(rows: Rows, n: int) -> Rows:
     )
 
 
-def gain(fit: QuickFit, candidate: Candidate) -> float:
+def gain(fit: QuickFit, candidate: PlacedMechanism) -> float:
     """How much a candidate raises the penalised log likelihood at its best strength."""
     added = candidate.mechanism.added
     assert added is not None
@@ -86,7 +86,7 @@ def gain(fit: QuickFit, candidate: Candidate) -> float:
     return best - float(found[strengths == 0.0][0])
 
 
-def free_numbers(candidate: Candidate) -> int:
+def free_numbers(candidate: PlacedMechanism) -> int:
     """Numbers that a candidate has chosen: its strength and what says where."""
     shape = candidate.shape
     if shape.s_from_m is not None:
@@ -102,8 +102,14 @@ class ForwardBic:
     def answer(self, campaign: Campaign, base_law: str) -> Answer:
         """Refit every candidate and compare BIC."""
         fit = quick_fit(campaign, base_law)
-        todo = [one for one in fit.screen.candidates if not one.mechanism.same_term_as]
-        linear = dict(zip(map(id, fit.screen.candidates), fit.screen.log_factors(fit.scores)[0], strict=True))
+        todo = [one for one in fit.score_test.placed_mechanisms if not one.mechanism.same_term_as]
+        linear = dict(
+            zip(
+                map(id, fit.score_test.placed_mechanisms),
+                fit.score_test.log_factors(fit.scores)[0],
+                strict=True,
+            )
+        )
         n_readings = int(fit.problem.observed.sum())
         factors: dict[str, float] = {}
         stretches: dict[str, Stretch | None] = {}

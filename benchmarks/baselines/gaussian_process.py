@@ -50,9 +50,12 @@ def _places(fit: QuickFit) -> FloatArray:
 
 def patterns(fit: QuickFit) -> FloatArray:
     """Mean change of the readings by each candidate after refitting, (n, n_sensors + 1), in their errors."""
-    modes, rows = fit.screen.around(fit.rows, fit.modes.points), fit.rows
+    modes, rows = fit.score_test.around(fit.rows, fit.modes.points), fit.rows
     weight = np.sqrt(np.maximum(fit.modes.curvature, 0.0))[:, :, None]
-    by_points, by_strengths = weight * modes.by_points, weight * modes.by_strengths[:, :, fit.screen.order]
+    by_points, by_strengths = (
+        weight * modes.by_points,
+        weight * modes.by_strengths[:, :, fit.score_test.order],
+    )
     n = fit.population.mean.shape[1]
     precision = fit.population.precision[rows.group]
     cover = np.linalg.inv(np.einsum("eij,eik->ejk", by_points, by_points) + precision)
@@ -112,7 +115,7 @@ def similarities(fit: QuickFit, seen: FloatArray, expected: FloatArray) -> dict[
     # A change that leaves nothing in the mean has no pattern.
     cosine = np.where(size > 1e-6, expected @ seen / np.maximum(size, 1e-300), 0.0)
     found: dict[str, float] = {}
-    for one, value in zip(fit.screen.candidates, cosine, strict=True):
+    for one, value in zip(fit.score_test.placed_mechanisms, cosine, strict=True):
         added = one.mechanism.added
         assert added is not None
         similar = abs(float(value)) if added.either_sign else float(value)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from skred.campaign import Campaign
-from skred.diagnosis.detect.score_test import Candidate, candidates
+from skred.diagnosis.detect.score_test import PlacedMechanism, placed_mechanisms
 from skred.diagnosis.evidence.extension import setting_of
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
 from skred.physics.kernel.columns import GRAVITY
@@ -209,9 +209,9 @@ def _without_outliers(made: Regression, fits: Fits) -> Regression:
     )  # fmt: skip
 
 
-def log_factors(made: Regression) -> tuple[list[Candidate], FloatArray]:
+def log_factors(made: Regression) -> tuple[list[PlacedMechanism], FloatArray]:
     """Log Bayes factor of every candidate of every shape."""
-    todo = candidates(made.setting, ties=False)
+    todo = placed_mechanisms(made.setting, ties=False)
     n_base = made.x.shape[2] - 1
     of = products(made.x, made.y, made.columns([one.direction for one in todo]))
     scales = np.array([one.mechanism.added.scale for one in todo])  # type: ignore[union-attr]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign
-from skred.diagnosis.check.bootstrap_campaigns import replicas
+from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
 
 from .common import Answer, nearest
 from .quick_fit import QuickFit, quick_fit, stretch_of
@@ -78,14 +78,14 @@ def populations(fit: QuickFit, rng: np.random.Generator, n: int) -> tuple[FloatA
 def corrected_p(fit: QuickFit, seed: int) -> float:
     """The smallest corrected p-value of a campaign."""
     rng = np.random.default_rng([seed, 31])
-    covariates = np.array(list(fit.screen.setting.covariates.values()))
+    covariates = np.array(list(fit.score_test.setting.covariates.values()))
     covariates = covariates.reshape(-1, fit.problem.campaign.n_events)
     readings = fit.problem.readings
     seen = statistics(readings.values[None], readings.observed[None], covariates)[0]
     simulated = []
     for _ in range(_REPLICAS // _BATCH):
         means, factors = populations(fit, rng, _BATCH)
-        made, _ = replicas(fit.screen.extension, np.zeros(0), means, factors, rng)
+        made, _ = bootstrap_campaigns(fit.score_test.extension, np.zeros(0), means, factors, rng)
         shape = (_BATCH, *readings.values.shape)
         values, observed = made.readings.values.reshape(shape), made.readings.observed.reshape(shape)
         simulated.append(statistics(values, observed, covariates))
@@ -101,11 +101,11 @@ class PosteriorPredictive:
         """Check the base law and name the largest score."""
         fit = quick_fit(campaign, base_law)
         p = corrected_p(fit, int(campaign.fingerprint()[:8], 16))
-        score, own, _ = fit.screen.of_candidates(fit.scores)
+        score, own, _ = fit.score_test.of_candidates(fit.scores)
         z = score[0] / np.sqrt(own[0])
         largest: dict[str, float] = {}
         best, stretch = -np.inf, None
-        for one, value in zip(fit.screen.candidates, z, strict=True):
+        for one, value in zip(fit.score_test.placed_mechanisms, z, strict=True):
             added = one.mechanism.added
             assert added is not None
             size = abs(float(value)) if added.either_sign else float(value)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign
-from skred.diagnosis.detect.score_test import Screen
+from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, campaign_rows, event_modes
 from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.linear_mixed_model import (
@@ -36,7 +36,7 @@ class QuickFit:
     ----------
     problem : HierarchicalProblem
     law : Law
-    screen : Screen
+    score_test : ScoreTest
         All that could be missing.
     rows : Rows
     population : Population
@@ -45,7 +45,7 @@ class QuickFit:
 
     problem: HierarchicalProblem
     law: Law
-    screen: Screen
+    score_test: ScoreTest
     rows: Rows
     population: Population
     modes: Modes
@@ -53,21 +53,21 @@ class QuickFit:
     @property
     def scores(self) -> Scores:
         """Efficient scores of all that could be missing."""
-        return self.screen.scores(self.rows, self.modes.points, self.population)
+        return self.score_test.scores(self.rows, self.modes.points, self.population)
 
 
 def quick_fit(campaign: Campaign, base_law: str) -> QuickFit:
     """Fit the base law by expectation-maximisation around the events' modes."""
     problem, law = hierarchical_problem(campaign), load_law(base_law)
-    screen = Screen(problem, law, setting_of(problem, law))
-    rows, none = campaign_rows(screen.extension), np.zeros(0)
+    score_test = ScoreTest(problem, law, setting_of(problem, law))
+    rows, none = campaign_rows(score_test.extension), np.zeros(0)
     points = np.zeros((campaign.n_events, len(law.mechanisms) + 1))
     points[:, :-1] = np.log(starting_coefficients(problem, law, own=True))
     # Each event near its own readings: from a common start some stay where their front stops too early.
     start = Population(np.median(points[:, :-1], axis=0)[None], starting_population(law).covariance)
-    population, points = fit_population(screen.extension, rows, none, mean_prior(law), (start, points))
-    modes = event_modes(screen.extension, rows, points, none, population)
-    return QuickFit(problem, law, screen, rows, population, modes)
+    population, points = fit_population(score_test.extension, rows, none, mean_prior(law), (start, points))
+    modes = event_modes(score_test.extension, rows, points, none, population)
+    return QuickFit(problem, law, score_test, rows, population, modes)
 
 
 def stretch_of(shape: Shape) -> Stretch | None:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_smoothing_spline
 
 from skred.campaign import Campaign
-from skred.diagnosis.detect.score_test import Candidate, candidates
+from skred.diagnosis.detect.score_test import PlacedMechanism, placed_mechanisms
 from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.prior_odds import NOTHING, prior_odds
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
@@ -142,7 +142,9 @@ def taken_out(rows: Rows, base: FloatArray, what: FloatArray) -> FloatArray:
     return left
 
 
-def library(todo: list[Candidate], added: FloatArray, target: FloatArray) -> tuple[list[int], FloatArray]:
+def library(
+    todo: list[PlacedMechanism], added: FloatArray, target: FloatArray
+) -> tuple[list[int], FloatArray]:
     """Which candidates the library has, and their columns in standard units."""
     norm = np.linalg.norm(added, axis=0)
     usual = float(np.median(norm[norm > 0.0])) if (norm > 0.0).any() else 1.0
@@ -180,7 +182,7 @@ class EnsembleSindy:
         problem, law = hierarchical_problem(campaign), load_law(base_law)
         balance = energy_balance(problem, None, law, starting_coefficients(problem, law))
         rows = Rows(problem, balance)
-        todo = candidates(setting_of(problem, law), ties=False)
+        todo = placed_mechanisms(setting_of(problem, law), ties=False)
         base, added = columns(rows, problem, law, [one.direction for one in todo])
         weight = rows.weight[:, None]
         left = taken_out(rows, base * weight, np.column_stack([rows.slope[:, None], added]) * weight)
@@ -192,7 +194,7 @@ class EnsembleSindy:
         return self._answer(campaign, base_law, [todo[k] for k in chosen], np.abs(found), explained)
 
     def _answer(
-        self, campaign: Campaign, base_law: str, terms: list[Candidate], size: FloatArray, score: float
+        self, campaign: Campaign, base_law: str, terms: list[PlacedMechanism], size: FloatArray, score: float
     ) -> Answer:
         """Name what is largest on average; probabilities from how often each is included."""
         ids = np.array([one.mechanism.id for one in terms])

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from benchmarks.commit import commit
 from skred.diagnosis.compare.decision import NOTHING_ALONE
-from skred.diagnosis.detect.score_test import Candidate, Screen
+from skred.diagnosis.detect.score_test import PlacedMechanism, ScoreTest
 from skred.diagnosis.evidence.linear_mixed_model import Scores
 from skred.output import write_json
 from skred.physics.mechanisms.spec import Group
@@ -43,7 +43,7 @@ DRAWS = 100
 STRONGEST = 4.0
 """Strength of a hidden effect in scales of its prior, at most."""
 BY_COVARIATE = "covariate_friction"
-ARMS: dict[str, Callable[[Candidate], bool]] = {
+ARMS: dict[str, Callable[[PlacedMechanism], bool]] = {
     "masked": lambda one: (
         one.mechanism.id in MASKED and (one.mechanism.id == BY_COVARIATE or is_opposed(one.shape))
     ),
@@ -60,10 +60,10 @@ def found_in(number: int) -> dict[str, Any] | None:
     if found is None:
         return None
     base, _ = found
-    screen = Screen(base.problem, base.law, base.setting)
-    information = screen.scores(base.rows, base.fit.points, base.population).information[0]
+    score_test = ScoreTest(base.problem, base.law, base.setting)
+    information = score_test.scores(base.rows, base.fit.points, base.population).information[0]
     rng = np.random.default_rng(number)
-    alarms = {arm: _alarms(screen, information, allowed, rng) for arm, allowed in ARMS.items()}
+    alarms = {arm: _alarms(score_test, information, allowed, rng) for arm, allowed in ARMS.items()}
     return {"kind": KINDS[number % 2], "snr": _evenly().tolist(), "alarms": alarms}
 
 
@@ -73,7 +73,10 @@ def _evenly() -> FloatArray:
 
 
 def _alarms(
-    screen: Screen, information: FloatArray, allowed: Callable[[Candidate], bool], rng: np.random.Generator
+    score_test: ScoreTest,
+    information: FloatArray,
+    allowed: Callable[[PlacedMechanism], bool],
+    rng: np.random.Generator,
 ) -> list[bool | None]:
     """Whether effects of one arm raise the alarm, by signal-to-noise; None where none can have that."""
     values, axes = np.linalg.eigh(information)
@@ -81,28 +84,28 @@ def _alarms(
     scores = rng.standard_normal((DRAWS, len(information))) @ root.T
     reached = np.zeros(DRAWS, dtype=bool)
     for k, snr in enumerate(_evenly()):
-        direction = _one_of(screen, information, allowed, float(snr), rng)
+        direction = _one_of(score_test, information, allowed, float(snr), rng)
         if direction is None:
             continue
         reached[k] = True
         scores[k] += information[:, direction] * snr / math.sqrt(information[direction, direction])
     every = np.broadcast_to(information, (DRAWS, *information.shape))
     raw = np.broadcast_to(np.diag(information), (DRAWS, len(information)))
-    log_odds = screen.statistic(Scores(scores, every, raw))
+    log_odds = score_test.statistic(Scores(scores, every, raw))
     alarm = (log_odds > math.log(1.0 / NOTHING_ALONE - 1.0)).tolist()
     return [one if there else None for one, there in zip(alarm, reached, strict=True)]
 
 
 def _one_of(
-    screen: Screen,
+    score_test: ScoreTest,
     information: FloatArray,
-    allowed: Callable[[Candidate], bool],
+    allowed: Callable[[PlacedMechanism], bool],
     snr: float,
     rng: np.random.Generator,
 ) -> int | None:
     """Direction of a candidate, of any mechanism, that a strength within reason gives the signal-to-noise."""
     by_mechanism: dict[str, list[int]] = {}
-    for one, direction in zip(screen.candidates, screen.order, strict=True):
+    for one, direction in zip(score_test.placed_mechanisms, score_test.order, strict=True):
         added = one.mechanism.added
         assert added is not None
         most = STRONGEST * added.scale_of(one.shape) * math.sqrt(max(information[direction, direction], 0.0))

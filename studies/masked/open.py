@@ -30,10 +30,10 @@ import numpy as np
 
 from benchmarks.commit import commit
 from skred.campaign import Campaign, read_campaign, write_campaign
-from skred.diagnosis.check.bootstrap_test import omnibus
-from skred.diagnosis.compare.comparison import race
+from skred.diagnosis.check.bootstrap_test import bootstrap_test
+from skred.diagnosis.compare.comparison import compare
 from skred.diagnosis.compare.decision import alarmed
-from skred.diagnosis.detect.score_test import Screen
+from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.prior_odds import NOTHING
 from skred.output import write_json
 from skred.simulator.detectability import over_noise
@@ -127,9 +127,12 @@ def alarm_of(campaign: Campaign, law_id: str) -> dict[str, Any]:
         if found is None:
             return {"alarm": False, "failed": "gate"}
         base, draws = found
-        screen, start = Screen(base.problem, base.law, base.setting), (base.population, base.fit.points)
-        p_value = omnibus(screen, base.rows, start, draws, 0, REPLICAS).p_value
-        probability = race(base).probability
+        score_test, start = (
+            ScoreTest(base.problem, base.law, base.setting),
+            (base.population, base.fit.points),
+        )
+        p_value = bootstrap_test(score_test, base.rows, start, draws, 0, REPLICAS).p_value
+        probability = compare(base).probability
     except np.linalg.LinAlgError as error:
         return {"alarm": False, "failed": repr(error)}
     return {"alarm": alarmed(probability, p_value), "p_value": p_value, "nothing": probability[NOTHING]}

@@ -96,10 +96,10 @@ def diagnose_case(case: Case, replicas: int) -> dict[str, Any]:
     document = verdict(found) | {"case": case._asdict()}
     if case.folds:
         document["outer_folds"] = outer_folds(problem, law, settings, effort, case.folds, print)
-    if found.race is not None:
+    if found.comparison is not None:
         document["prior_scales"] = {
-            name: {str(factor): _best_factor(found.race, name, factor) for factor in PRIOR_FACTORS}
-            for name in found.race.heats[0].entrants
+            name: {str(factor): _best_factor(found.comparison, name, factor) for factor in PRIOR_FACTORS}
+            for name in found.comparison.under_each[0].candidates
         }
     if case.name == case.base_model:
         with TemporaryDirectory() as folder:
@@ -107,17 +107,17 @@ def diagnose_case(case: Case, replicas: int) -> dict[str, Any]:
             for name in SHOWN:
                 if name in figures:
                     shutil.copy(figures[name], FIGURES / f"ryggfonn-{case.name}-{name}.png")
-    if case.name == "pcm" and found.race is not None:
+    if case.name == "pcm" and found.comparison is not None:
         document["retardations"] = retardations(found)
         write_png(groups_figure(document["retardations"]), FIGURES / "ryggfonn-groups.png")
     return document
 
 
-def _best_factor(race: Any, name: str, factor: float) -> float:
+def _best_factor(comparison: Any, name: str, factor: float) -> float:
     """Log Bayes factor of a mechanism's best shape if its prior were wider or narrower."""
-    entrant = race.leading(name).entrants[name]
-    scale = entrant.mechanism.added.scale_of(entrant.best.shape)
-    return float(entrant.best.log_bayes_factor_at(factor * scale))
+    candidate = comparison.leading(name).candidates[name]
+    scale = candidate.mechanism.added.scale_of(candidate.best.shape)
+    return float(candidate.best.log_bayes_factor_at(factor * scale))
 
 
 app = cyclopts.App(help=__doc__)

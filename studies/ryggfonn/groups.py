@@ -37,11 +37,11 @@ def retardations(found: Diagnosis) -> list[dict[str, Any]]:
 
     Those on the far side of the widest gap between recorded ones are the group that retards more.
     """
-    assert found.race is not None
-    campaign, heat = found.problem.campaign, found.race.leading(UNLISTED)
+    assert found.comparison is not None
+    campaign, under_errors = found.problem.campaign, found.comparison.leading(UNLISTED)
     recorded = recorded_retardation(pooled_problem(campaign), FIRST, LAST)
     more, _, _ = recorded.groups()
-    base, profile = heat.base, most_probable(heat.profiles)
+    base, profile = under_errors.base, most_probable(under_errors.profiles)
     force = combined(base.setting, profile.kind, profile.knots_m, profile.mean)
     ids = campaign.event_ids
     modelled = {

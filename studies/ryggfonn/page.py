@@ -152,7 +152,7 @@ def _dam(found: Mapping[str, Found]) -> str:
     for name in ("pcm", "constant"):
         row = _candidate(found[name], "obstacle")
         if row is None:
-            lines.append(f"- Base `{name}`: no race was run ({found[name]['reason']}).")
+            lines.append(f"- Base `{name}`: no comparison was run ({found[name]['reason']}).")
             continue
         middle = 0.5 * (row["location"]["s_from_m"] + row["location"]["s_to_m"])
         best = max(one["log_bayes_factor"] for one in found[name]["candidates"])
@@ -242,7 +242,7 @@ def _unseen(found: Mapping[str, Found]) -> str:
         usual, exact = found[name]["evidence"], found[name + UNSEEN]["evidence"]
         outer = found[name + UNSEEN]["outer_folds"]
         gains = " | ".join(_gain(one) for one in (usual, exact, outer))
-        rows.append(f"| `{name}` | {_let_in(found[name])} | {gains} |")
+        rows.append(f"| `{name}` | {_added_terms(found[name])} | {gains} |")
         for number, one in enumerate(outer["folds"], start=1):
             names = " and ".join(_named_in_fold(mechanism) for mechanism in one["mechanisms"]) or "nothing"
             without = ", ".join(one["events"])
@@ -274,7 +274,7 @@ def _named_in_fold(mechanism: str) -> str:
     return "the force profile" if mechanism == "unlisted" else f"`{mechanism}`"
 
 
-def _let_in(one: Found) -> str:
+def _added_terms(one: Found) -> str:
     names = " and ".join(f"`{row['id']}`" for row in one["mechanisms"])
     return names or ("the force profile" if one.get("profile") else "nothing")
 

@@ -1,4 +1,4 @@
-"""How small the probability of nothing must be for the race alone to raise the alarm.
+"""How small the probability of nothing must be for the comparison alone to raise the alarm.
 
 ``python benchmarks/alarm_limit.py [--n 80] [--workers 2]``. The limit was taken from the answers of opened
 batches of concealed trials: how many campaigns with nothing hidden fall below it, nasty ones counted, and how

@@ -1,7 +1,7 @@
 """Opened trials raced again by the present code: what it says of forces that are in no list.
 
 ``python benchmarks/race_again.py [--batches SEED ...] [--hidden CLASS ...] [--workers 2]`` draws trials of
-opened batches in which something was found again from their seeds and races them. The leading listed
+opened batches in which something was found again from their seeds and comparisons them. The leading listed
 mechanism is let in at its best strength, and the unlisted force fitted about it: each kind, its amplitude,
 smoothness and place open. What its most probable profile gains, before any price of its freedom, is about
 all that could tell a force that is in no list from the listed one that passes for it; beside it stands the
@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from skred.campaign import Campaign, read_campaign, write_campaign
 from skred.cli.options import DIAGNOSIS_SAMPLING
-from skred.diagnosis.compare.comparison import Race, race
+from skred.diagnosis.compare.comparison import Comparison, compare
 from skred.diagnosis.diagnose import as_diagnosed, population_draws, typical
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS
@@ -84,16 +84,16 @@ def base_of(sealed: dict[str, Any]) -> Base | None:
     return base_on(campaign, truth["base_model"])
 
 
-def beyond(raced: Race, name: str) -> float:
+def beyond(raced: Comparison, name: str) -> float:
     """What the unlisted force gains about a listed mechanism at its best strength, in nats, at most."""
-    heat = raced.leading(name)
-    best = heat.entrants[name].best
+    under_errors = raced.leading(name)
+    best = under_errors.candidates[name].best
     top = int(np.argmax(best.log_evidence))
     about = replace(
-        heat.base,
+        under_errors.base,
         fit=best.fits[top],
-        directions=(*heat.base.directions, best.direction),
-        strengths=np.append(heat.base.strengths, best.strengths[top]),
+        directions=(*under_errors.base.directions, best.direction),
+        strengths=np.append(under_errors.base.strengths, best.strengths[top]),
     )
     return max(fit_profile(about, kind).gain for kind in KINDS)
 
@@ -112,7 +112,7 @@ def look(sealed: dict[str, Any]) -> dict[str, Any]:
         base = base_of(sealed)
         if base is None:
             return told | {"failed": "gate"}
-        raced = race(base)
+        raced = compare(base)
         name = leading_name(raced)
         gain = beyond(raced, name)
     except np.linalg.LinAlgError as error:
@@ -137,7 +137,7 @@ def found_trials(batches: Sequence[int], hidden: Sequence[str]) -> dict[str, dic
 def main(
     *, batches: tuple[int, ...] = (), hidden: tuple[str, ...] = CLASSES, workers: int = 2, seed: int = 0
 ) -> None:
-    """Race opened trials again.
+    """Comparison opened trials again.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def summarise(found: Collection[dict[str, Any]]) -> None:
 
 
 def stated_of(log_factors: Mapping[str, float], power: float = POWER) -> dict[str, float]:
-    """Probabilities as they are stated of a race, or would be with another power."""
+    """Probabilities as they are stated of a comparison, or would be with another power."""
     raced = [mechanisms()[name] for name in log_factors if name in mechanisms()]
     return stated(log_factors, prior_odds(raced), power)
 

@@ -1,8 +1,9 @@
-"""The evidence of a force in no list: from as many draws as a race takes, from many, by Laplace's formula.
+"""The evidence of a force not in the list: by few draws, by many, by Laplace's approximation.
 
-``python benchmarks/free_force_draws.py [--json FILE]`` races what is missing at Ryggfonn under two base laws,
-fits the unlisted force under each error model and in each way it may go with speed, and takes its evidence
-by either route, with several seeds. Under ``voellmy`` fronts stop near sensors, and Laplace's formula fails.
+``python benchmarks/free_force_draws.py [--json FILE]`` compares what is missing at Ryggfonn under two base
+laws, fits the unlisted force under each error model and in each way it may go with speed, and takes its
+evidence by either route, with several seeds. Under ``voellmy`` fronts stop near sensors, and Laplace's
+formula fails.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import cyclopts
 
 from benchmarks.commit import commit
 from skred.campaign import find_campaign, read_campaign
-from skred.diagnosis.compare.comparison import Heat, free_force, race
+from skred.diagnosis.compare.comparison import ComparisonUnderErrors, compare, free_force
 from skred.diagnosis.discrepancy.profile import KINDS
 from skred.diagnosis.discrepancy.sampled_evidence import sampled_log_factor
 from skred.output import write_json
@@ -30,23 +31,23 @@ LAWS = ("voellmy", "pcm")
 SEEDS, MANY_SEEDS, MANY_TURNS = range(1, 5), range(101, 103), 16
 
 
-def both_ways(law: str, heat: Heat, pool: Executor) -> Iterator[dict[str, Any]]:
+def both_ways(law: str, under_errors: ComparisonUnderErrors, pool: Executor) -> Iterator[dict[str, Any]]:
     """Each kind of force that Laplace's formula gives more evidence than none."""
-    listed = max(entrant.log_bayes_factor for entrant in heat.entrants.values())
+    listed = max(candidate.log_bayes_factor for candidate in under_errors.candidates.values())
     for kind in KINDS:
-        profile = free_force(heat.base, kind, heat.entrants)
+        profile = free_force(under_errors.base, kind, under_errors.candidates)
         if profile.log_bayes_factor <= 0.0:
             continue
         started = time.process_time()
-        usual = [sampled_log_factor(heat.base, profile, pool, seed=seed) for seed in SEEDS]
+        usual = [sampled_log_factor(under_errors.base, profile, pool, seed=seed) for seed in SEEDS]
         seconds = (time.process_time() - started) / len(SEEDS)
         many = [
-            sampled_log_factor(heat.base, profile, pool, seed=seed, turns=MANY_TURNS, enough=math.inf)
+            sampled_log_factor(under_errors.base, profile, pool, seed=seed, turns=MANY_TURNS, enough=math.inf)
             for seed in MANY_SEEDS
         ]
         yield {
             "base_model": law,
-            "errors": heat.error_model,
+            "errors": under_errors.error_model,
             "force": kind.equation,
             "best_listed": listed,
             "laplace": profile.log_bayes_factor,
@@ -67,8 +68,8 @@ def main(
         if base is None:
             sys.exit(f"{law}: the gate of the base law failed")
         with ThreadPoolExecutor(1) as pool:
-            for heat in race(base).heats:
-                for row in both_ways(law, heat, pool):
+            for under_errors in compare(base).under_each:
+                for row in both_ways(law, under_errors, pool):
                     print(row, flush=True)
                     rows.append(row)
     if out is not None:

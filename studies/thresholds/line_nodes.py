@@ -1,9 +1,9 @@
-"""Nodes on a line beside importance nodes: what the race's evidences are wrong by, and what that costs.
+"""Nodes on a line beside importance nodes: what the comparison's evidences are wrong by, and what that costs.
 
-``python benchmarks/line_nodes.py [--json FILE]`` keeps one in eight of the integrations of Ryggfonn's race,
-under each error model that is raced, and does each again by both rules with the race's budgets, and with
-nodes on a line sixteen times as close, which stand for exact. Importance nodes, as many as a minute or so
-allows, are the second route to those.
+``python benchmarks/line_nodes.py [--json FILE]`` keeps one in eight of the integrations of Ryggfonn's
+comparison, under each error model that is raced, and does each again by both rules with the comparison's
+budgets, and with nodes on a line sixteen times as close, which stand for exact. Importance nodes, as many as
+a minute or so allows, are the second route to those.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from skred.campaign import find_campaign, read_campaign
-from skred.diagnosis.compare.comparison import race
+from skred.diagnosis.compare.comparison import compare
 from skred.diagnosis.evidence import coefficient as curves
 from skred.diagnosis.evidence.event_quadrature import (
     FINE,
@@ -39,7 +39,7 @@ LAWS = ("coulomb", "constant")
 BUDGETS = {"first round": FIRST, "first look": FRONTS, "usual": USUAL, "fine": FINE}
 EXACT, MANY = USUAL.times(256), USUAL.times(32)
 KEPT = 0.125
-"""Share of the race's integrations that are done again."""
+"""Share of the comparison's integrations that are done again."""
 MOST = 40
 QUANTILES = {"median": 0.5, "nine in ten": 0.9, "97 in 100": 0.97}
 RULES = {"line": on_a_line, "importance": importance_nodes}
@@ -84,7 +84,7 @@ def measured(law_id: str) -> dict[str, Any]:
     base, calls = base_on(read_campaign(find_campaign("ryggfonn")), law_id), list[tuple[Any, ...]]()
     assert base is not None
     with watched(calls), threadpool_limits(1, user_api="blas"):
-        race(base)
+        compare(base)
     chosen = np.random.default_rng(1).permutation(len(calls))[:MOST]
     exact = [evidences("line", EXACT, calls[k], base.log_scale)[0] for k in chosen]
     cases = {(rule, name): budget for rule in RULES for name, budget in BUDGETS.items()}

@@ -15,7 +15,7 @@ import cyclopts
 import numpy as np
 
 from skred.campaign import find_campaign, read_campaign
-from skred.diagnosis.compare.comparison import race
+from skred.diagnosis.compare.comparison import compare
 from skred.diagnosis.discrepancy.profile import Profile, most_probable
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.event_quadrature import Budget
@@ -80,8 +80,8 @@ def main(
     """Measure."""
     base = base_on(read_campaign(find_campaign("ryggfonn")), "pcm")
     assert base is not None
-    heat = race(base).leading(UNLISTED)
-    found = measured(heat.base, most_probable(heat.profiles))
+    under_errors = compare(base).leading(UNLISTED)
+    found = measured(under_errors.base, most_probable(under_errors.profiles))
     if out is not None:
         write_json(out, found)
 

@@ -25,7 +25,7 @@ from skred.diagnosis.detect.run import (
     identify_table,
     identify_to,
 )
-from skred.diagnosis.detect.score_test import candidates
+from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.diagnose import QUICK_REPLICAS, Diagnosis, Effort, too_little
 from skred.diagnosis.verdict.document import verdict
 from skred.inference.hierarchical.problem import hierarchical_problem
@@ -60,7 +60,7 @@ def test_a_row_for_whatever_can_be_missing(law_id: str) -> None:
     problem, law = hierarchical_problem(RYGGFONN), load_law(law_id)
     base = base_of(problem, law)
     document = identify_document(problem, law, identifiability(base))
-    assert set(by_id(document)) == {candidate.mechanism.id for candidate in candidates(base.setting)}
+    assert set(by_id(document)) == {candidate.mechanism.id for candidate in placed_mechanisms(base.setting)}
     for row in document["identifiability"]:
         assert 0.0 <= row["kept"] <= 1.0 and 0.0 <= row["power"] <= 1.0
         assert row["limit"] is None or row["limit"] >= row["best_limit"] > 0.0

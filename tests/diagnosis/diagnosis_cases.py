@@ -10,7 +10,7 @@ import numpy as np
 
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.campaign.parts import of_events
-from skred.diagnosis.detect.score_test import Screen
+from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.conditional_map import campaign_rows
 from skred.diagnosis.evidence.extension import extended
@@ -57,8 +57,8 @@ def base_of(campaign: Campaign, law_id: str, error_model: str = "robust") -> Bas
     return fit_base(problem, law, found, points)
 
 
-def screen_of(base: Base) -> Screen:
-    return Screen(base.problem, base.law, base.setting)
+def score_test_of(base: Base) -> ScoreTest:
+    return ScoreTest(base.problem, base.law, base.setting)
 
 
 @cache

@@ -12,11 +12,11 @@ from diagnosis_cases import base_of, first_events, trial, with_sensors
 from numpy.testing import assert_allclose
 
 from skred.campaign import Campaign, CampaignError, Sensor, Status, write_campaign
-from skred.diagnosis.compare.comparison import race
+from skred.diagnosis.compare.comparison import compare
 from skred.diagnosis.compare.decision import decide
 from skred.diagnosis.compare.location import locate
 from skred.diagnosis.detect.detectability import told
-from skred.diagnosis.detect.score_test import Screen
+from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.diagnose import Effort, diagnose
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.extension import setting_of
@@ -47,13 +47,13 @@ def assert_refused(document: dict[str, Any], words: str) -> None:
 
 
 def outcome(base: Base) -> tuple[str, tuple[str, ...]]:
-    """Screen, race, place and rule without the sampler."""
-    screen = Screen(base.problem, base.law, base.setting)
-    scores = screen.scores(base.rows, base.fit.points, base.population)
-    assert np.isfinite(screen.statistic(scores)).all()
-    for row in told(screen, scores):
+    """ScoreTest, comparison, place and rule without the sampler."""
+    score_test = ScoreTest(base.problem, base.law, base.setting)
+    scores = score_test.scores(base.rows, base.fit.points, base.population)
+    assert np.isfinite(score_test.statistic(scores)).all()
+    for row in told(score_test, scores):
         assert 0.0 <= row.power <= 1.0
-    raced = race(base)
+    raced = compare(base)
     assert sum(raced.probability.values()) == pytest.approx(1.0)
     assert np.isfinite(list(raced.log_factors.values())).all()
     place = locate(raced.leading(UNLISTED))

@@ -34,7 +34,7 @@ def closed_form(top: float, sd: float, scale: float, either_sign: bool) -> tuple
 @pytest.mark.parametrize("top", [-0.8, 0.0, 0.3, 1.0, 1.9])
 @pytest.mark.parametrize("sd", [0.3, 0.6, 1.5])
 def test_half_normal(top: float, sd: float) -> None:
-    """The race's grid: strengths in scales of the prior."""
+    """The comparison's grid: strengths in scales of the prior."""
     scale = mechanisms()["segment_drag"].added.scale  # type: ignore[union-attr]
     grid = scale * np.array([0.0, 0.2, 0.6, 1.2, 2.2, 3.5])
     one = quadratic("segment_drag", grid, top * scale, sd * scale)

@@ -1,4 +1,4 @@
-"""The race's two looks: rough ones at every place, and fronts where a place leads."""
+"""The comparison's two looks: rough ones at every place, and fronts where a place leads."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
 
-from skred.diagnosis.compare import comparison as race
+from skred.diagnosis.compare import comparison
 from skred.diagnosis.compare import refinement as looking
-from skred.diagnosis.compare.candidate import Entrant
+from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import _first_looks, _that_count, _that_may_count, with_errors
-from skred.diagnosis.compare.recomputed import corrected
+from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import Place, entrants_of, leading
-from skred.diagnosis.compare.screening import curve, first_look
-from skred.diagnosis.detect.score_test import Screen, candidates
+from skred.diagnosis.compare.screening import curve, screening_budget
+from skred.diagnosis.detect.score_test import ScoreTest, placed_mechanisms
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at, curve_near, refit
 from skred.diagnosis.evidence.event_quadrature import FINE, FIRST, FRONTS, ROUGH, USUAL
 from skred.diagnosis.evidence.extension import extended
@@ -34,7 +34,7 @@ def base() -> Base:
 
 @pytest.mark.parametrize("name", ["turbulent_drag", "viscous_drag", "sensor_bias"])
 def test_second_look_against_many_nodes_on_a_dense_grid(base: Base, name: str) -> None:
-    job = next(one for one in candidates(base.setting) if one.mechanism.id == name)
+    job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == name)
     found = curve_near(base, job.mechanism, job.shape, curve(base, job.mechanism, job.shape, ROUGH), ROUGH)
     assert job.mechanism.added is not None
     reach = job.mechanism.added.scale * np.linspace(0.0, 3.5, 24)
@@ -46,8 +46,8 @@ def test_second_look_against_many_nodes_on_a_dense_grid(base: Base, name: str) -
 
 
 def test_rough_look_finds_what_is_missing(base: Base) -> None:
-    assert first_look(base) is ROUGH
-    for job in candidates(base.setting):
+    assert screening_budget(base) is ROUGH
+    for job in placed_mechanisms(base.setting):
         if job.mechanism.id in ("turbulent_drag", "viscous_drag"):
             assert curve(base, job.mechanism, job.shape, ROUGH).log_bayes_factor > 5.0
 
@@ -55,8 +55,8 @@ def test_rough_look_finds_what_is_missing(base: Base) -> None:
 def test_what_tangents_promise_counts_by_what_fronts_say() -> None:
     """In a clean campaign friction on many a stretch reads five nats along tangents; none has two."""
     base = base_of(trial(990001, "sparse", "nothing", "pcm").campaign, "pcm")
-    friction = [one for one in candidates(base.setting) if one.mechanism.id == "segment_friction"]
-    assert first_look(base) is ROUGH and len(friction) > 15
+    friction = [one for one in placed_mechanisms(base.setting) if one.mechanism.id == "segment_friction"]
+    assert screening_budget(base) is ROUGH and len(friction) > 15
     found = [curve(base, one.mechanism, one.shape, ROUGH) for one in friction]
     tangents = [
         curve_at(base, one.mechanism, one.shape, k.strengths[k.strengths != 0.0], ROUGH)
@@ -74,16 +74,18 @@ def test_what_tangents_promise_counts_by_what_fronts_say() -> None:
 
 def test_only_what_fronts_computed_is_corrected(base: Base) -> None:
     """What is wrong with a rough curve is its own, and not its mechanism's."""
-    job = next(one for one in candidates(base.setting) if one.mechanism.id == "turbulent_drag")
+    job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == "turbulent_drag")
     rough = curve(base, job.mechanism, job.shape, ROUGH)
     fronts = curve_near(base, job.mechanism, job.shape, rough, ROUGH)
     assert rough.rough and not fronts.rough
     with ThreadPoolExecutor(1) as pool:
         found = [
-            corrected(base, {"turbulent_drag": Entrant(job.mechanism, (one,), np.zeros(1))}, [], pool, best)
+            recomputed(
+                base, {"turbulent_drag": Candidate(job.mechanism, (one,), np.zeros(1))}, [], pool, best
+            )
             for one, best in ((rough, 0.0), (fronts, 0.0), (fronts, fronts.log_bayes_factor + 7.0))
         ]
-    looked = [entrants["turbulent_drag"] for entrants, _ in found]
+    looked = [candidates["turbulent_drag"] for candidates, _ in found]
     assert [one.disagreement is None for one in looked] == [True, False, True]
     assert looked[0].correction == looked[2].correction == 0.0
     assert looked[1].disagreement is not None
@@ -93,7 +95,7 @@ def test_only_what_fronts_computed_is_corrected(base: Base) -> None:
 def test_fronts_are_looked_at_where_readings_are_far_off() -> None:
     """At Ryggfonn without drag a third of the readings are outliers: tangents miss what ends that."""
     base = ryggfonn_base("coulomb")
-    assert first_look(base) is FRONTS
+    assert screening_budget(base) is FRONTS
     drag = mechanisms()["velocity_weakening"]
     assert drag.added is not None
     found = [curve(base, drag, shape, FRONTS) for shape in drag.added.shapes(base.setting)]
@@ -151,7 +153,7 @@ def test_the_leader_is_parted_before_others_are_looked_at(monkeypatch: pytest.Mo
     monkeypatch.setattr(looking, "_parts", lambda *of: [])
     with ThreadPoolExecutor(1) as pool:
         base: Any = SimpleNamespace()
-        found = looking.second_look(base, at_first, ROUGH, pool)
+        found = looking.refine(base, at_first, ROUGH, pool)
     assert looked == ["segment_drag", "sensor_bias"]
     assert found["obstacle"].curves == (at_first[1],)
 
@@ -183,9 +185,9 @@ def test_under_another_error_model_each_mechanism_is_looked_at_until_the_rest_is
         return now[looked[-1]]
 
     todo = [SimpleNamespace(mechanism=one.mechanism, shape=one.shape) for one in now]
-    monkeypatch.setattr(race, "curve", curve)
-    monkeypatch.setattr(race, "_linear_strengths", lambda base: {})
-    monkeypatch.setattr(race, "candidates", lambda setting, ties: todo)
+    monkeypatch.setattr(comparison, "curve", curve)
+    monkeypatch.setattr(comparison, "_linear_strengths", lambda base: {})
+    monkeypatch.setattr(comparison, "placed_mechanisms", lambda setting, ties: todo)
     with ThreadPoolExecutor(1) as pool:
         told: list[tuple[int, int]] = []
         base: Any = SimpleNamespace(setting=None)
@@ -197,8 +199,8 @@ def test_strengths_of_other_sensors_are_other_strengths() -> None:
     one, other = made("sensor_bias", 0.0, 1.0), made("sensor_bias", 100.0, 1.0)
     slope = 4.0 * np.arange(len(other.strengths))
     other = replace(other, log_evidence=0.9 + slope - slope.max(), shape=Shape(sensor="b"))
-    (entrant,) = entrants_of([replace(one, shape=Shape(sensor="a")), other], {}).values()
-    assert entrant.strength_between_shapes() == 0.0
+    (candidate,) = entrants_of([replace(one, shape=Shape(sensor="a")), other], {}).values()
+    assert candidate.strength_between_shapes() == 0.0
 
 
 def test_finer_curves_share_the_weight_of_their_place() -> None:
@@ -206,9 +208,9 @@ def test_finer_curves_share_the_weight_of_their_place() -> None:
     same = made("segment_drag", 100.0, 1.0)
     place = Place((same,)).parted(0, [same] * 3).parted(2, [same] * 2)
     assert np.exp(place.log_shares) == pytest.approx([1 / 4, 1 / 4, 1 / 12, 1 / 4, 1 / 12, 1 / 12])
-    (entrant,) = entrants_of(curves, {1: place}).values()
-    assert len(entrant.curves) == 8 and np.exp(entrant.log_weights).sum() == pytest.approx(1.0)
-    assert entrant.log_bayes_factor == pytest.approx(curves[0].log_bayes_factor)
+    (candidate,) = entrants_of(curves, {1: place}).values()
+    assert len(candidate.curves) == 8 and np.exp(candidate.log_weights).sum() == pytest.approx(1.0)
+    assert candidate.log_bayes_factor == pytest.approx(curves[0].log_bayes_factor)
 
 
 PEAK_M = (431.0, 587.0)
@@ -246,11 +248,11 @@ def test_a_place_is_parted_where_one_part_holds_most(
     assert added is not None
     shapes = added.shapes(setting)
     with ThreadPoolExecutor(1) as pool:
-        found = looking.second_look(base, [as_high(one) for one in shapes], FRONTS, pool)
-    entrant = found["segment_friction"]
-    assert np.exp(entrant.log_weights).sum() == pytest.approx(1.0)
+        found = looking.refine(base, [as_high(one) for one in shapes], FRONTS, pool)
+    candidate = found["segment_friction"]
+    assert np.exp(candidate.log_weights).sum() == pytest.approx(1.0)
     assert len(looked) <= most_looks and len(set(looked)) == len(looked)
-    assert max(abs(a - b) for a, b in zip(entrant.stretch() or (), PEAK_M, strict=True)) < off
+    assert max(abs(a - b) for a, b in zip(candidate.stretch() or (), PEAK_M, strict=True)) < off
     # A stretch stands for those moved by up to a fifth of its length and up to 1.6 times as long or short.
     rng = np.random.default_rng(0)
     heights = []
@@ -266,7 +268,7 @@ def test_a_place_is_parted_where_one_part_holds_most(
         - np.log(len(heights))
         + made("segment_friction", 0.0, 0.0).log_bayes_factor
     )
-    assert exact - error < entrant.log_bayes_factor < exact + 0.5
+    assert exact - error < candidate.log_bayes_factor < exact + 0.5
 
 
 def test_not_knowing_the_place_widens_a_strength() -> None:
@@ -274,11 +276,11 @@ def test_not_knowing_the_place_widens_a_strength() -> None:
     flat, steep = made("segment_drag", 0.0, 1.0), made("segment_drag", 100.0, 1.0)
     slope = 4.0 * np.arange(len(steep.strengths))
     steep = replace(steep, log_evidence=1.0 + slope - slope.max())
-    (entrant,) = entrants_of([flat, steep], {}).values()
-    weights, between = entrant.shape_weights, entrant.strength_between_shapes()
-    within = weights @ np.array([one.moments[1] ** 2 for one in entrant.curves])
-    mean = entrant.strength()[0]
-    about_best = entrant.strength()[1] ** 2 + (mean - entrant.best.moments[0]) ** 2
+    (candidate,) = entrants_of([flat, steep], {}).values()
+    weights, between = candidate.shape_weights, candidate.strength_between_shapes()
+    within = weights @ np.array([one.moments[1] ** 2 for one in candidate.curves])
+    mean = candidate.strength()[0]
+    about_best = candidate.strength()[1] ** 2 + (mean - candidate.best.moments[0]) ** 2
     assert between > 0.0 and about_best == pytest.approx(within + between**2)
     assert entrants_of([flat], {})["segment_drag"].strength_between_shapes() == 0.0
 
@@ -309,7 +311,9 @@ def test_errors_in_common_are_integrated_as_closely_as_others() -> None:
 def test_a_first_look_leaves_out_only_strengths_that_are_hopeless() -> None:
     """The same evidence as on the whole grid, without those that have none and have the more the weaker."""
     base, spared = sparse_base(), 0
-    local = [one for one in candidates(base.setting) if one.mechanism.id in ("segment_friction", "obstacle")]
+    local = [
+        one for one in placed_mechanisms(base.setting) if one.mechanism.id in ("segment_friction", "obstacle")
+    ]
     for job in local[::9]:
         added = job.mechanism.added
         assert added is not None
@@ -326,7 +330,7 @@ def test_a_first_look_leaves_out_only_strengths_that_are_hopeless() -> None:
 def test_nothing_is_the_same_whatever_is_not_added() -> None:
     """At strength 0 of a mechanism, refitted with those of its other strengths or by itself."""
     base = sparse_base()
-    for job in (candidates(base.setting)[k] for k in (0, 20, -1)):
+    for job in (placed_mechanisms(base.setting)[k] for k in (0, 20, -1)):
         extension = extended(base.problem, base.law, (*base.directions, job.direction))
         start = (base.population, base.fit.points)
         for budget, first in ((ROUGH, None), (FRONTS, FIRST)):
@@ -341,9 +345,9 @@ def test_nothing_is_the_same_whatever_is_not_added() -> None:
 def test_a_first_look_sees_strengths_far_below_the_grid() -> None:
     """Many recordings tell a drag of a tenth of its prior's scale; the grid begins at a fifth."""
     base = base_of(trial(1031, "dense", "turbulent_drag", "constant", 9.5).campaign, "constant")
-    job = next(one for one in candidates(base.setting) if one.mechanism.id == "turbulent_drag")
-    screen = Screen(base.problem, base.law, base.setting)
-    found = screen.strengths_found(screen.scores(base.rows, base.fit.points, base.population))
+    job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == "turbulent_drag")
+    score_test = ScoreTest(base.problem, base.law, base.setting)
+    found = score_test.strengths_found(score_test.scores(base.rows, base.fit.points, base.population))
     linear = found[job.mechanism.id, job.shape]
     assert job.mechanism.added is not None and 0.0 < linear < 0.2 * job.mechanism.added.scale
     rough = curve(base, job.mechanism, job.shape, ROUGH, linear)

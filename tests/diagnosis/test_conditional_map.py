@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from scipy.stats import kstest
 
 from skred.campaign import Status
-from skred.diagnosis.check.bootstrap_campaigns import replicas
+from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
 from skred.diagnosis.evidence.coefficient import Base, repeated
 from skred.diagnosis.evidence.conditional_map import (
     Population,
@@ -147,7 +147,7 @@ def many() -> tuple[Base, Rows, np.ndarray, np.ndarray]:
     base, n_groups = sparse_base(), 40
     extension = extended(base.problem, base.law)
     factor = np.linalg.cholesky(base.population.covariance)
-    rows, points = replicas(
+    rows, points = bootstrap_campaigns(
         extension,
         NONE,
         np.tile(base.population.mean, (n_groups, 1)),
@@ -207,7 +207,7 @@ def test_replicas_under_other_errors(model: str) -> None:
     errors = ERROR_MODELS[model].errors
     extension = extended(base.problem, base.law)
     factor = np.linalg.cholesky(base.population.covariance)
-    rows, points = replicas(
+    rows, points = bootstrap_campaigns(
         extension, NONE, np.tile(base.population.mean, (n_groups, 1)),
         np.tile(factor, (n_groups, 1, 1)), np.random.default_rng(5), errors,
     )  # fmt: skip

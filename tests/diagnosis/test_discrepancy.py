@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal, norm
 
 from skred.campaign import find_campaign, read_campaign
-from skred.diagnosis.compare.comparison import Heat
+from skred.diagnosis.compare.comparison import ComparisonUnderErrors
 from skred.diagnosis.compare.location import _band, _resolution, _stretch, _work, locate
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.detect.score_test import _of_profile
@@ -154,9 +154,9 @@ def test_the_most_probable_kind_is_shown_or_the_one_asked_for(base: Base) -> Non
     """An opposed kind has the smaller share; what is missing of a fast front is then meant."""
     plain = replace(made_profile(base, 0), log_bayes_factor=10.0)
     opposed = replace(made_profile(base, 2), log_bayes_factor=10.1)
-    heat = Heat("robust", base, {}, [plain, opposed], [])
-    assert locate(heat).log_bayes_factor == 10.0 and not locate(heat).opposed
-    found = locate(heat, opposed=True)
+    under_errors = ComparisonUnderErrors("robust", base, {}, [plain, opposed], [])
+    assert locate(under_errors).log_bayes_factor == 10.0 and not locate(under_errors).opposed
+    found = locate(under_errors, opposed=True)
     assert found.log_bayes_factor == 10.1 and found.opposed
     speeds = extended(base.problem, base.law).speeds(base.fit.points, base.strengths)
     edge = base.setting.terrain.edge_s_m

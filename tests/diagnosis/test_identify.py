@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_cases import base_of, first_events, screen_of, trial, with_sensors
+from diagnosis_cases import base_of, first_events, score_test_of, trial, with_sensors
 
 from skred.campaign.parts import of_events
-from skred.diagnosis.check.bootstrap_campaigns import replicas
-from skred.diagnosis.detect.detectability import LIMIT_Z, Told, extra_sensors, mean_power, told
-from skred.diagnosis.detect.score_test import Candidate, Screen, candidates
+from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
+from skred.diagnosis.detect.detectability import LIMIT_Z, Detectability, extra_sensors, mean_power, told
+from skred.diagnosis.detect.score_test import PlacedMechanism, ScoreTest, placed_mechanisms
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import Population, campaign_rows, look_around
 from skred.diagnosis.evidence.extension import extended
@@ -28,15 +28,15 @@ def base() -> Base:
 
 
 @pytest.fixture(scope="module")
-def table(base: Base) -> dict[str, Told]:
-    screen = screen_of(base)
-    scores = screen.scores(base.rows, base.fit.points, base.population)
-    return {row.mechanism.id: row for row in told(screen, scores)}
+def table(base: Base) -> dict[str, Detectability]:
+    score_test = score_test_of(base)
+    scores = score_test.scores(base.rows, base.fit.points, base.population)
+    return {row.mechanism.id: row for row in told(score_test, scores)}
 
 
-def typical(base: Base, name: str) -> Candidate:
+def typical(base: Base, name: str) -> PlacedMechanism:
     """The candidate of middling information, as the table takes it."""
-    own = [c for c in candidates(base.setting) if c.mechanism.id == name]
+    own = [c for c in placed_mechanisms(base.setting) if c.mechanism.id == name]
     extension = extended(base.problem, base.law, [c.direction for c in own])
     around = look_around(extension, base.rows, base.fit.points, np.zeros(len(own)))
     found = efficient_scores(around, base.rows, base.population, mean_prior(base.law))
@@ -58,7 +58,7 @@ def typical(base: Base, name: str) -> Candidate:
         ),
     ],
 )
-def test_detection_limit_by_simulation(base: Base, table: dict[str, Told], name: str) -> None:
+def test_detection_limit_by_simulation(base: Base, table: dict[str, Detectability], name: str) -> None:
     """Campaigns with the limit's strength: their refitted scores are 2.85 + 1.28 in the null's deviations."""
     chosen = typical(base, name)
     alone, with_it = extended(base.problem, base.law), extended(base.problem, base.law, [chosen.direction])
@@ -68,7 +68,7 @@ def test_detection_limit_by_simulation(base: Base, table: dict[str, Told], name:
     errors, found = ERROR_MODELS["normal"].errors, []
     for value in (0.0, strength):
         rng = np.random.default_rng(4)
-        rows, points = replicas(with_it, np.array([value]), means, factors, rng, errors)
+        rows, points = bootstrap_campaigns(with_it, np.array([value]), means, factors, rng, errors)
         start = Population(means.copy(), np.tile(base.population.covariance, (n_groups, 1, 1)))
         population, modes = fit_population(alone, rows, NONE, mean_prior(base.law), (start, points))
         around = look_around(with_it, rows, modes, np.zeros(1))
@@ -79,41 +79,41 @@ def test_detection_limit_by_simulation(base: Base, table: dict[str, Told], name:
     assert np.mean(effect > LIMIT_Z) > 0.8  # stated: 0.9
 
 
-def test_more_events_tell_more(base: Base, table: dict[str, Told]) -> None:
+def test_more_events_tell_more(base: Base, table: dict[str, Detectability]) -> None:
     """Every event four times: limits halve, but for the population mean's prior."""
     campaign = base.problem.campaign
     four = of_events(campaign, list(range(campaign.n_events)) * 4)
     events = tuple(replace(event, id=f"{event.id} {k}") for k, event in enumerate(four.events))
     problem = replace(base.problem, campaign=replace(four, events=events))
-    screen = Screen(problem, base.law, replace(base.setting, n_events=4 * campaign.n_events))
-    kept = [c for c in screen.candidates if c.direction.log_strengths is None]
-    screen.__dict__["candidates"] = kept
-    rows = campaign_rows(screen.extension)
-    scores = screen.scores(rows, np.tile(base.fit.points, (4, 1)), base.population)
-    for row in told(screen, scores):
+    score_test = ScoreTest(problem, base.law, replace(base.setting, n_events=4 * campaign.n_events))
+    kept = [c for c in score_test.placed_mechanisms if c.direction.log_strengths is None]
+    score_test.__dict__["candidates"] = kept
+    rows = campaign_rows(score_test.extension)
+    scores = score_test.scores(rows, np.tile(base.fit.points, (4, 1)), base.population)
+    for row in told(score_test, scores):
         before = table[row.mechanism.id]
         assert row.limit < before.limit
         assert row.limit / before.limit == pytest.approx(0.5, abs=0.06), row.mechanism.id
         assert row.power >= before.power - 1e-9
 
 
-def test_an_extra_sensor_never_tells_less(base: Base, table: dict[str, Told]) -> None:
-    screen = screen_of(base)
-    places, scores = extra_sensors(screen, base.fit.points, base.population)
+def test_an_extra_sensor_never_tells_less(base: Base, table: dict[str, Detectability]) -> None:
+    score_test = score_test_of(base)
+    places, scores = extra_sensors(score_test, base.fit.points, base.population)
     before = {name: row for name, row in table.items()}
     power = mean_power(list(table.values()))
     assert len(places) == len(scores) and np.all(np.diff(places) > 0.0)
     for one in scores:
-        rows = told(screen, one)
+        rows = told(score_test, one)
         assert mean_power(rows) >= power - 1e-6
         for row in rows:
             assert row.power >= before[row.mechanism.id].power - 1e-6, row.mechanism.id
             assert row.best_limit <= before[row.mechanism.id].best_limit * (1.0 + 1e-6), row.mechanism.id
 
 
-def test_table(base: Base, table: dict[str, Told]) -> None:
+def test_table(base: Base, table: dict[str, Detectability]) -> None:
     """Each candidate once; limits positive; the best place never worse; ties mutual terms at least."""
-    assert set(table) == {c.mechanism.id for c in candidates(base.setting)}
+    assert set(table) == {c.mechanism.id for c in placed_mechanisms(base.setting)}
     assert "constant_retardation" not in table  # in the base law
     for row in table.values():
         assert 0.0 <= row.kept <= 1.0 and 0.0 <= row.power <= 1.0

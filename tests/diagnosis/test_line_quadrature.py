@@ -8,7 +8,7 @@ from skred.diagnosis.evidence.line_quadrature import line_nodes
 
 MEAN, SD = np.array([1.5, -0.4]), np.array([0.04, 0.3])
 OTHERS = 144
-"""As many importance nodes as the race takes."""
+"""As many importance nodes as the comparison takes."""
 
 
 def log_integrals(log_likelihood, others=OTHERS, mode=0.0):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from diagnosis_cases import screen_of, sparse_base
+from diagnosis_cases import score_test_of, sparse_base
 from numpy.testing import assert_allclose
 
-from skred.diagnosis.check.bootstrap_campaigns import replicas
+from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
 from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, take_rows
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import (
@@ -125,7 +125,7 @@ def test_population_of_simulated_campaigns_is_recovered() -> None:
     extension, n_groups = extended(base.problem, base.law), 12
     mean, spread = base.population.mean[0] + 0.05, 0.22
     means, factors = np.tile(mean, (n_groups, 1)), np.full((n_groups, 1, 1), spread)
-    rows, true = replicas(extension, np.zeros(0), means, factors, np.random.default_rng(1))
+    rows, true = bootstrap_campaigns(extension, np.zeros(0), means, factors, np.random.default_rng(1))
     far = Population(means - 0.3, np.full((n_groups, 1, 1), 0.3**2))
     start = np.column_stack([np.tile(mean - 0.3, (len(true), 1)), np.zeros(len(true))])
     found, points = fit_population(extension, rows, np.zeros(0), mean_prior(base.law), (far, start))
@@ -143,15 +143,15 @@ def test_population_of_simulated_campaigns_is_recovered() -> None:
 
 def test_order_of_events_does_not_matter() -> None:
     base = sparse_base()
-    screen = screen_of(base)
+    score_test = score_test_of(base)
     order = np.random.default_rng(2).permutation(len(base.rows.event))
     turned = base.rows._replace(event=base.rows.event[order], readings=take_rows(base.rows.readings, order))
     found = []
     for rows, points in ((base.rows, base.fit.points), (turned, base.fit.points[order])):
         population, modes = fit_population(
-            screen.extension, rows, np.zeros(0), screen.prior, (base.population, points)
+            score_test.extension, rows, np.zeros(0), score_test.prior, (base.population, points)
         )
-        found.append(screen.statistic(screen.scores(rows, modes, population))[0])
+        found.append(score_test.statistic(score_test.scores(rows, modes, population))[0])
     assert_allclose(found[1], found[0], atol=1e-6)
 
 

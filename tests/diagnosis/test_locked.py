@@ -52,11 +52,11 @@ def predictor(problem: HierarchicalProblem, bias: float | None = None) -> Predic
 def seen(monkeypatch: pytest.MonkeyPatch, problem: HierarchicalProblem) -> Iterator[list[Campaign]]:
     """Diagnoses made up, every other one lets a biased sensor in; what they saw is kept."""
     campaigns: list[Campaign] = []
-    entrant: Any = SimpleNamespace(mechanism=SimpleNamespace(id="sensor_bias"))
+    candidate: Any = SimpleNamespace(mechanism=SimpleNamespace(id="sensor_bias"))
 
     def made_up(problem: Any, law: Any, settings: Any, effort: Any, tell: Any = None) -> Diagnosis:
         campaigns.append(problem.campaign)
-        step: Any = SimpleNamespace(entrant=entrant)
+        step: Any = SimpleNamespace(candidate=candidate)
         steps: tuple[Step, ...] = (step,) if len(campaigns) % 2 else ()
         held: Any = object()
         verdict = Decision("instrument" if steps else "nothing_missing", ())

@@ -66,7 +66,7 @@ def test_nodes_agree_with_surfaces(law_id: str) -> None:
     ],
 )
 def test_few_nodes_agree_with_surfaces(law_id: str) -> None:
-    """With as many nodes as each strength in the race gets."""
+    """With as many nodes as each strength in the comparison gets."""
     base = ryggfonn_base(law_id)
     start = base.fit.found.psi
     exact = evidence(base.problem.surfaces(base.law.mechanisms).nodes, base.log_scale, start)

@@ -198,7 +198,7 @@ def test_which_forces_are_sampled(
     def factors(laplace: list[float], best: float) -> list[float]:
         asked.clear()
         profiles = [replace(profile, log_bayes_factor=one) for one in laplace]
-        _, again = corrections.corrected(base, {}, profiles, pool, best)
+        _, again = corrections.recomputed(base, {}, profiles, pool, best)
         return [one.log_bayes_factor for one in again]
 
     assert factors([19.0, 13.0, 11.0], 20.0) == [22.0, 16.0, 11.0]

@@ -11,7 +11,7 @@ import pytest
 from diagnosis_cases import base_of, first_events, trial, with_sensors
 from numpy.testing import assert_array_equal
 
-from skred.diagnosis.compare.comparison import Heat, Race
+from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
 from skred.diagnosis.diagnose import Diagnosis, Effort, _before
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, combined, knots
@@ -28,7 +28,7 @@ from skred.inference.sampling import SamplerSettings
 
 def law_of(base: Base) -> ProfileLaw:
     profiles = [fit_profile(base, KINDS[0])]
-    return profile_law(Heat("robust", base, {}, profiles, []), most=40, seed=0)
+    return profile_law(ComparisonUnderErrors("robust", base, {}, profiles, []), most=40, seed=0)
 
 
 def thinned(hidden: str, snr: float | None) -> Base:
@@ -44,7 +44,7 @@ def hidden() -> Base:
 
 
 @pytest.fixture(scope="module")
-def let_in(hidden: Base) -> ProfileLaw:
+def add_mechanisms(hidden: Base) -> ProfileLaw:
     return law_of(hidden)
 
 
@@ -61,10 +61,15 @@ def test_a_force_that_is_not_there_does_not() -> None:
 
 
 def diagnosed(hidden: Base, let_in: ProfileLaw) -> Diagnosis:
-    heat = Heat("robust", hidden, {}, [let_in.profile], [])
-    race = Race((heat,), {}, {"robust": 0.0})
+    under_errors = ComparisonUnderErrors("robust", hidden, {}, [let_in.profile], [])
+    comparison = Comparison((under_errors,), {}, {"robust": 0.0})
     return Diagnosis(
-        hidden.problem, hidden.law, race=race, profile=let_in, before=let_in.before, after=let_in.after
+        hidden.problem,
+        hidden.law,
+        comparison=comparison,
+        profile=let_in,
+        before=let_in.before,
+        after=let_in.after,
     )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from skred.diagnosis.check.bootstrap_test import LIMIT, Omnibus
+from skred.diagnosis.check.bootstrap_test import LIMIT, BootstrapTest
 from skred.diagnosis.compare.decision import Decision, decide, smallest_set
 from skred.diagnosis.evidence.prior_odds import POWER, prior_odds, probabilities, stated
 from skred.physics.mechanisms import mechanisms
@@ -49,19 +49,19 @@ def test_probabilities_by_hand() -> None:
 def test_p_value_of_besag_and_clifford() -> None:
     """Few above after all: (above + 1) / (n + 1); eight above, stopped: above / n."""
     clean = np.arange(300.0)
-    assert Omnibus(1000.0, clean).p_value == pytest.approx(1.0 / 301.0)
-    assert Omnibus(298.0, clean).p_value == pytest.approx(3.0 / 301.0)
-    assert Omnibus(293.0, clean).p_value == pytest.approx(8.0 / 301.0)  # seven above
-    assert Omnibus(292.0, clean).p_value == pytest.approx(8.0 / 300.0)
-    assert Omnibus(15.0, np.arange(25.0)).p_value == pytest.approx(10.0 / 25.0)
-    assert Omnibus(0.0, np.zeros(25)).p_value == 1.0  # ties count as above
+    assert BootstrapTest(1000.0, clean).p_value == pytest.approx(1.0 / 301.0)
+    assert BootstrapTest(298.0, clean).p_value == pytest.approx(3.0 / 301.0)
+    assert BootstrapTest(293.0, clean).p_value == pytest.approx(8.0 / 301.0)  # seven above
+    assert BootstrapTest(292.0, clean).p_value == pytest.approx(8.0 / 300.0)
+    assert BootstrapTest(15.0, np.arange(25.0)).p_value == pytest.approx(10.0 / 25.0)
+    assert BootstrapTest(0.0, np.zeros(25)).p_value == 1.0  # ties count as above
 
 
 def test_limit_of_the_check() -> None:
     assert LIMIT == 0.01
-    assert Omnibus(9.0, np.zeros(99)).fired and not Omnibus(9.0, np.zeros(98)).fired
-    assert Omnibus(9.0, np.append(np.zeros(298), [10.0, 10.0])).fired
-    assert not Omnibus(9.0, np.append(np.zeros(297), [10.0] * 3)).fired
+    assert BootstrapTest(9.0, np.zeros(99)).fired and not BootstrapTest(9.0, np.zeros(98)).fired
+    assert BootstrapTest(9.0, np.append(np.zeros(298), [10.0, 10.0])).fired
+    assert not BootstrapTest(9.0, np.append(np.zeros(297), [10.0] * 3)).fired
 
 
 def shares(nothing: float, unlisted: float, **named: float) -> dict[str, float]:
@@ -78,7 +78,7 @@ def test_silence() -> None:
 
 
 def test_short_of_an_alarm_nothing_is_not_claimed() -> None:
-    """A race at three to one is no alarm, and no reason to say that nothing is missing; nor is a check."""
+    """A comparison at three to one is no alarm, and no reason to claim nothing; nor is a check."""
     loud = shares(0.25, 0.05, obstacle=0.65, sensor_bias=0.05)
     assert decide(loud, p_value=0.3, can_tell=True) == Decision("cannot_tell", ())
     even = shares(0.5, 0.0, obstacle=0.5)
@@ -152,7 +152,7 @@ def test_no_instrument_in_the_race() -> None:
 
 
 def test_the_race_alone_and_the_check_alone() -> None:
-    """A race that leaves nothing less than 15 % is an alarm; a check that fires against it is none."""
+    """A comparison that leaves nothing less than 15 % is an alarm; a check that fires against it is none."""
     sure = shares(0.14, 0.01, obstacle=0.85)
     assert decide(sure, p_value=0.9, can_tell=True).names == ("obstacle",)
     assert decide(shares(0.16, 0.0, obstacle=0.84), 0.011, True).verdict == "cannot_tell"

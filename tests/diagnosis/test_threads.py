@@ -6,11 +6,11 @@ import os
 
 import numpy as np
 import pytest
-from diagnosis_cases import screen_of, sparse_base
+from diagnosis_cases import score_test_of, sparse_base
 
 from skred.diagnosis.augment.coefficient_grid import locate
 from skred.diagnosis.augment.tables import BUDGETS, build_tables
-from skred.diagnosis.check.bootstrap_test import omnibus
+from skred.diagnosis.check.bootstrap_test import bootstrap_test
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import curve_near
 from skred.diagnosis.evidence.event_quadrature import ROUGH
@@ -49,7 +49,9 @@ def test_the_check_is_the_same_in_threads(monkeypatch: pytest.MonkeyPatch) -> No
     found = []
     for said in ("1", "2"):
         monkeypatch.setenv("OMP_NUM_THREADS", said)
-        found.append(omnibus(screen_of(base), base.rows, (base.population, base.fit.points), draws, 5, 120))
+        found.append(
+            bootstrap_test(score_test_of(base), base.rows, (base.population, base.fit.points), draws, 5, 120)
+        )
     one, two = found
     assert one.statistic == two.statistic
     assert 25 <= len(one.simulated) < 120  # it stopped early, with batches begun that do not count

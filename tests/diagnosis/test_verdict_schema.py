@@ -120,7 +120,7 @@ VALID: dict[str, Callable[[], dict[str, Any]]] = {
     "cannot tell": cannot_tell,
     "failed": failed,
     "never seen": lambda: nothing_missing() | {"detection_limits": {"viscous_drag": LIMIT | {"value": None}}},
-    "more keys": lambda: nothing_missing() | {"reason": None, "seconds": {"race": 3.0}},
+    "more keys": lambda: nothing_missing() | {"reason": None, "seconds": {"comparison": 3.0}},
 }
 
 

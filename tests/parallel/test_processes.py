@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from skred.parallel import processes as helping
-from skred.parallel.processes import crew, helpers, meanwhile
+from skred.parallel.processes import helpers, meanwhile, worker_pool
 from skred.parallel.threads import threads
 
 
@@ -27,7 +27,7 @@ def where(number: int, base: list[int]) -> tuple[int, int, int, int]:
 
 def test_a_crew_shares_jobs_between_this_process_and_a_helper(two_cores: None) -> None:
     base = [100]
-    with helpers("skred.physics.kernel.fronts"), crew() as pool:
+    with helpers("skred.physics.kernel.fronts"), worker_pool() as pool:
         found = list(pool.map(lambda number: where(number, base), range(60)))  # closures go there too
     assert [row[:2] for row in found] == [(number, 100 + number) for number in range(60)]
     processes = {row[2] for row in found}
@@ -39,7 +39,7 @@ def test_a_crew_shares_jobs_between_this_process_and_a_helper(two_cores: None) -
 
 
 def test_without_helpers_all_is_done_here(two_cores: None) -> None:
-    with crew() as pool:
+    with worker_pool() as pool:
         assert {pool.submit(os.getpid).result() for _ in range(4)} == {os.getpid()}
     assert meanwhile(os.getpid)() == os.getpid()
 
@@ -70,5 +70,5 @@ def test_what_a_killed_helper_was_to_do_is_done_here(two_cores: None, tmp_path: 
     with helpers():
         assert meanwhile(killed, file)() == os.getpid()
         assert meanwhile(killed, file)() == os.getpid()  # also when it is known to be gone
-        with crew() as pool:
+        with worker_pool() as pool:
             assert set(pool.map(killed, [file] * 8)) == {os.getpid()}

@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from skred.prove.plan import Plan
-from skred.prove.pool import Crew
+from skred.prove.pool import WorkerPool
 
 FAKES = Path(__file__).parent / "fakes"
 PLAN = Plan(3, 1_234_567, "sparse", nothing_share=1.0)
 
 
-class Alone(Crew):
+class Alone(WorkerPool):
     """Does everything itself, here."""
 
     def carry_out(self, work: Any, jobs: Any, done: Any, lost: Any) -> None:

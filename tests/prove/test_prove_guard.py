@@ -12,7 +12,7 @@ from prove_cases import fake
 from skred.errors import InputError
 from skred.prove.child import answer_of
 from skred.prove.folder import ProofFolder, read_object
-from skred.prove.sandbox import Guard, allowed_roots, within
+from skred.prove.sandbox import Sandbox, allowed_roots, within
 
 
 def test_the_truth_is_unreachable(proof: ProofFolder) -> None:
@@ -41,13 +41,13 @@ def test_links_are_followed_before_a_path_is_judged(tmp_path: Path) -> None:
     own.mkdir()
     other.mkdir()
     (own / "link").symlink_to(other)
-    guard = Guard(own)
-    guard("open", (str(own / "verdict.json"), "w", 0))
-    guard("open", (3, "w", 0))
-    guard("open", (os.fsencode(own / "new" / "file"), "w", 0))
-    guard("os.listdir", (None,))
-    guard("os.listdir", (str(own),))
-    guard("subprocess.Popen", ("/usr/bin/g++", ["g++", "-v"], None, None))
+    sandbox = Sandbox(own)
+    sandbox("open", (str(own / "verdict.json"), "w", 0))
+    sandbox("open", (3, "w", 0))
+    sandbox("open", (os.fsencode(own / "new" / "file"), "w", 0))
+    sandbox("os.listdir", (None,))
+    sandbox("os.listdir", (str(own),))
+    sandbox("subprocess.Popen", ("/usr/bin/g++", ["g++", "-v"], None, None))
     for path in (
         own / "link" / "x",
         own / ".." / "other" / "x",
@@ -56,7 +56,7 @@ def test_links_are_followed_before_a_path_is_judged(tmp_path: Path) -> None:
         Path("/proc/self/environ"),
     ):
         with pytest.raises(PermissionError, match="may not reach"):
-            guard("open", (str(path), "r", 0))
+            sandbox("open", (str(path), "r", 0))
     for event, arguments in (
         ("os.listdir", (str(other),)),
         ("os.rename", (str(other / "x"), str(own / "x"), -1, -1)),
@@ -65,7 +65,7 @@ def test_links_are_followed_before_a_path_is_judged(tmp_path: Path) -> None:
         ("os.system", (b"true",)),
     ):
         with pytest.raises(PermissionError):
-            guard(event, arguments)
+            sandbox(event, arguments)
 
 
 def test_python_the_package_and_its_laws_are_within() -> None:

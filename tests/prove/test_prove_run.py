@@ -19,7 +19,7 @@ from prove_cases import PLAN, Alone, fake, silent
 from skred.errors import InputError
 from skred.prove.folder import ProofFolder, read_object
 from skred.prove.ledger import read_ledger, trial_names
-from skred.prove.pool import Crew, alone_in
+from skred.prove.pool import WorkerPool, alone_in
 from skred.prove.run import Limits, run
 
 DRIVER = Path(__file__).parent / "prove_driver.py"
@@ -133,7 +133,7 @@ def test_one_command_at_a_time(proof: ProofFolder, diagnosed: Diagnosed) -> None
 def test_no_scheduler(proof: ProofFolder, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("skred.prove.pool._PATIENCE_S", 1)
     with pytest.raises(InputError, match="no Dask scheduler"):
-        run(proof, Crew(1, "nonsense://x"), silent, silent)
+        run(proof, WorkerPool(1, "nonsense://x"), silent, silent)
     with pytest.raises(ValueError, match="No clients"):
         distributed.default_client()
 
@@ -188,7 +188,7 @@ def test_what_is_run_by_default() -> None:
 
 @pytest.mark.slow
 def test_a_diagnosis_as_it_is(proof: ProofFolder) -> None:
-    """One real diagnosis, guard and all; minutes."""
+    """One real diagnosis, sandbox and all; minutes."""
     for name in trial_names(read_ledger(proof))[1:]:
         proof.answer(name).parent.mkdir(parents=True, exist_ok=True)
         proof.answer(name).write_text('{"verdict": "cannot_tell"}')

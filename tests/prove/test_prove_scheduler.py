@@ -15,7 +15,7 @@ from prove_cases import fake, silent
 
 from skred.prove.folder import ProofFolder, read_object
 from skred.prove.ledger import read_ledger, trial_names
-from skred.prove.pool import Crew
+from skred.prove.pool import WorkerPool
 from skred.prove.run import Limits, run
 
 _PATIENCE_S = 60.0
@@ -54,7 +54,7 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
 
 def test_trials_run_on_a_scheduler_that_is_there(proof: ProofFolder, cluster: Cluster) -> None:
     limits = Limits(60.0, fake("quick"))
-    found = run(proof, Crew(1, cluster.address), silent, silent, limits)
+    found = run(proof, WorkerPool(1, cluster.address), silent, silent, limits)
     assert found == {"answered": 3, "before": 0, "crashed": 0, "late": 0}
     for name in trial_names(read_ledger(proof)):
         assert read_object(proof.answer(name))["verdict"] == "nothing_missing"
@@ -65,7 +65,7 @@ def test_a_worker_elsewhere_that_dies_is_its_trials_answer(proof: ProofFolder, c
     """Its own nanny starts it again; the other trials are answered."""
     first, *others = trial_names(read_ledger(proof))
     proof.request(first).write_text('{"base_model": "murderous"}')
-    found = run(proof, Crew(1, cluster.address), silent, silent, Limits(60.0, fake("murderous")))
+    found = run(proof, WorkerPool(1, cluster.address), silent, silent, Limits(60.0, fake("murderous")))
     assert found["answered"] == 3 and found["crashed"] == 1
     assert read_object(proof.answer(first))["error"] == "worker died twice"
     assert [read_object(proof.answer(name))["verdict"] for name in others] == ["nothing_missing"] * 2

@@ -8,12 +8,12 @@ import numpy as np
 import xarray as xr
 from hierarchical_cases import hierarchical_calibration, hierarchical_ryggfonn
 
-from skred.diagnosis.check.bootstrap_test import Omnibus
-from skred.diagnosis.compare.candidate import Entrant
-from skred.diagnosis.compare.comparison import Heat, Race
+from skred.diagnosis.check.bootstrap_test import BootstrapTest
+from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
 from skred.diagnosis.compare.decision import Decision
 from skred.diagnosis.compare.location import Location
-from skred.diagnosis.detect.detectability import Identifiability, Told
+from skred.diagnosis.detect.detectability import Detectability, Identifiability
 from skred.diagnosis.diagnose import Diagnosis, Step
 from skred.diagnosis.discrepancy.profile import KINDS, Prior, Profile
 from skred.diagnosis.evidence.coefficient import Curve, Fit
@@ -45,7 +45,7 @@ def hostile_problem(text: str) -> HierarchicalProblem:
     return replace(problem, campaign=attacked)
 
 
-def curves_of(mechanism, setting, top: float, at: float) -> Entrant:
+def curves_of(mechanism, setting, top: float, at: float) -> Candidate:
     """A parabola of evidence for each shape, highest near a place."""
     added = mechanism.added
     curves = []
@@ -57,13 +57,13 @@ def curves_of(mechanism, setting, top: float, at: float) -> Entrant:
         heights = height - 20.0 * (strengths / added.scale - 1.0) ** 2
         heights[0] = 0.0
         curves.append(Curve(mechanism, shape, Direction(), strengths, heights, ()))
-    return Entrant(mechanism, tuple(curves), np.full(len(curves), -np.log(len(curves))))
+    return Candidate(mechanism, tuple(curves), np.full(len(curves), -np.log(len(curves))))
 
 
-def race_of(problem: HierarchicalProblem, tops: dict[str, float], n_heats: int = 1) -> Race:
-    """A race in which some candidates have evidence."""
+def race_of(problem: HierarchicalProblem, tops: dict[str, float], n_heats: int = 1) -> Comparison:
+    """A comparison in which some candidates have evidence."""
     setting = setting_of(problem, LAW)
-    entrants = {
+    candidates = {
         name: curves_of(mechanism, setting, tops.get(name, -2.0), 1800.0)
         for name, mechanism in mechanisms().items()
         if mechanism.added is not None
@@ -71,17 +71,20 @@ def race_of(problem: HierarchicalProblem, tops: dict[str, float], n_heats: int =
         and mechanism.added.shapes(setting)
     }
     profile = SimpleNamespace(log_bayes_factor=tops.get("unlisted", -1.0), kind=KINDS[0])
-    heats = tuple(
-        Heat(name, SimpleNamespace(), entrants, [profile], []) for name in ("robust", "student")[:n_heats]
+    under_each = tuple(
+        ComparisonUnderErrors(name, SimpleNamespace(), candidates, [profile], [])
+        for name in ("robust", "student")[:n_heats]
     )
-    odds = prior_odds(entrant.mechanism for entrant in entrants.values())
-    return Race(heats, odds, {"robust": -100.0, "student": -103.0})
+    odds = prior_odds(candidate.mechanism for candidate in candidates.values())
+    return Comparison(under_each, odds, {"robust": -100.0, "student": -103.0})
 
 
 def told(problem: HierarchicalProblem, power: float) -> Identifiability:
     setting = setting_of(problem, LAW)
     rows = tuple(
-        Told(one, 0.3, 2.0 * one.added.scale, one.added.scale, (1700.0, 1800.0), power, ("obstacle",))
+        Detectability(
+            one, 0.3, 2.0 * one.added.scale, one.added.scale, (1700.0, 1800.0), power, ("obstacle",)
+        )
         for one in mechanisms().values()
         if one.added is not None and one.added.joins(setting.base)
     )
@@ -151,7 +154,7 @@ def diagnosis(kind: str, text: str = "") -> Diagnosis:
         "sensor": {"sensor_bias": 40.0},
         "unexplained": {"unlisted": 30.0},
     }.get(kind, {})
-    race = race_of(problem, tops, 2 if kind in ("tie", "sensor") else 1)
+    comparison = race_of(problem, tops, 2 if kind in ("tie", "sensor") else 1)
     names = {
         "tie": ("entrainment", "segment_drag"), "two": ("covariate_friction",), "sensor": ("sensor_bias",),
     }.get(kind, ())  # fmt: skip
@@ -160,16 +163,16 @@ def diagnosis(kind: str, text: str = "") -> Diagnosis:
         "unexplained": "unexplained", "nothing": "nothing_missing", "silent": "cannot_tell",
     }  # fmt: skip
     clean = np.random.default_rng(1).normal(0.0, 1.0, 120)
-    steps = _steps(problem, race, names, clean, second=kind == "two")
+    steps = _steps(problem, comparison, names, clean, second=kind == "two")
     alarm = kind in ("tie", "two", "sensor", "unexplained")
     table = told(problem, 0.3 if kind == "silent" else 0.8)
     return Diagnosis(
         problem, LAW, "", calibration(problem), SimpleNamespace(), table,
-        Omnibus(30.0 if alarm else 0.3, clean), race, Decision(verdicts[kind], names),
+        BootstrapTest(30.0 if alarm else 0.3, clean), comparison, Decision(verdicts[kind], names),
         location() if alarm else None, steps,
         profile=profile_law(problem, clean) if kind == "unexplained" else None,
         before=held(problem, 0.0), after=held(problem, 1.1) if alarm else None,
-        seconds={"base": 12.3, "race": 45.6},
+        seconds={"base": 12.3, "comparison": 45.6},
     )  # fmt: skip
 
 
@@ -181,21 +184,23 @@ def profile_law(problem: HierarchicalProblem, clean: np.ndarray) -> ProfileLaw:
     profile = Profile(KINDS[0], prior, at, mean, 0.01 * np.eye(20), 30.0, 42.0, fit, ())
     draws = Draws(np.empty((0, 1)), np.empty((0, 1, 1)), np.empty((0, 0)))
     scores = held(problem, 0.0), held(problem, 1.1)
-    return ProfileLaw(profile, "robust", Omnibus(0.1, clean), *scores, draws, draws)
+    return ProfileLaw(profile, "robust", BootstrapTest(0.1, clean), *scores, draws, draws)
 
 
-def _steps(problem, race, names, clean, *, second):
+def _steps(problem, comparison, names, clean, *, second):
     if not names:
         return ()
-    raced = [(names, race)]
+    raced = [(names, comparison)]
     if second:
         again = race_of(problem, {"obstacle": 30.0})
         raced.append((("obstacle",), again))
     added, steps = (), []
     for (name, *tied), its_race in raced:
-        entrant = its_race.heats[0].entrants[name]
-        best = entrant.best
+        candidate = its_race.under_each[0].candidates[name]
+        best = candidate.best
         strength = best.mechanism.strength.name
         added += (SimpleNamespace(name=strength, mechanism=best.mechanism, shape=best.shape),)
-        steps.append(Step(entrant, tuple(tied), its_race, calibration(problem, added), Omnibus(0.1, clean)))
+        steps.append(
+            Step(candidate, tuple(tied), its_race, calibration(problem, added), BootstrapTest(0.1, clean))
+        )
     return tuple(steps)

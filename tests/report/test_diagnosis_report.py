@@ -17,7 +17,7 @@ HOSTILE = "<script>alert(1)</script>$\\frac{[red]&'\""
 
 @pytest.fixture(autouse=True)
 def quick_profile(monkeypatch):
-    monkeypatch.setattr("skred.diagnosis.compare.location.locate", lambda heat: location())
+    monkeypatch.setattr("skred.diagnosis.compare.location.locate", lambda under_errors: location())
     monkeypatch.setattr("skred.report.shared.style.DPI", 40)
 
 

@@ -1,4 +1,4 @@
-"""Where the race leans to something and the check does not fire, the statement says both."""
+"""Where the comparison leans to something and the check does not fire, the statement says both."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from diagnosis_report_cases import diagnosis
 
 from skred.diagnosis.augment.coefficient import FORM, strength_of
-from skred.diagnosis.check.bootstrap_test import Omnibus
+from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.compare.decision import Decision
 from skred.diagnosis.diagnose import Left
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
@@ -42,7 +42,7 @@ def test_a_lean_that_the_check_does_not_bear_out_is_told_and_not_claimed(kind: s
     plain = statement(found, document({"nothing": 0.6, "obstacle": 0.3, "unlisted": 0.1}))
     assert "would be the most probable" not in plain
     assert "odder than clean campaigns" not in plain
-    fired = replace(found, check=Omnibus(10.0, np.zeros(120)))
+    fired = replace(found, check=BootstrapTest(10.0, np.zeros(120)))
     odd = statement(fired, document({"nothing": 0.6, "obstacle": 0.3, "unlisted": 0.1}))
     assert "to the check they are odder than clean campaigns are, all but 1 %" in odd
 
@@ -50,15 +50,15 @@ def test_a_lean_that_the_check_does_not_bear_out_is_told_and_not_claimed(kind: s
 def test_what_a_last_race_leaned_to_is_told() -> None:
     """Also that it was not let in, and why; and nothing where it leaned to nothing, or was not run."""
     found = diagnosis("tie")
-    assert verdict(found)["left"] is None and "Another race" not in verdict(found)["statement"]
-    leaning = replace(found, left=Left(diagnosis("two").race, "the gate failed"))
+    assert verdict(found)["left"] is None and "Another comparison" not in verdict(found)["statement"]
+    leaning = replace(found, left=Left(diagnosis("two").comparison, "the gate failed"))
     document = verdict(leaning)
     assert document["left"]["most_probable"] == "covariate_friction"
-    assert document["left"]["nothing"] == leaning.left.race.probability["nothing"]
+    assert document["left"]["nothing"] == leaning.left.comparison.probability["nothing"]
     assert "leans to friction that goes with a property" in document["statement"]
     assert "it was not let in (the gate failed)" in document["statement"]
-    nothing = verdict(replace(found, left=Left(diagnosis("nothing").race)))
-    assert nothing["left"]["most_probable"] == "nothing" and "Another race" not in nothing["statement"]
+    nothing = verdict(replace(found, left=Left(diagnosis("nothing").comparison)))
+    assert nothing["left"]["most_probable"] == "nothing" and "Another comparison" not in nothing["statement"]
 
 
 @pytest.mark.parametrize(
@@ -77,11 +77,12 @@ def test_a_relief_that_opposes_a_named_drag_is_told() -> None:
     """In the statement and in the equation, with the speeds at which they are equal."""
     found = diagnosis("tie")
     assert "a relief equals it" not in verdict(found)["statement"]
-    entrant = found.steps[0].entrant
+    candidate = found.steps[0].candidate
     curves = tuple(
-        replace(one, shape=replace(one.shape, constants=((U_1, 31.0), (U_2, 24.0)))) for one in entrant.curves
+        replace(one, shape=replace(one.shape, constants=((U_1, 31.0), (U_2, 24.0))))
+        for one in candidate.curves
     )
-    step = replace(found.steps[0], entrant=replace(entrant, curves=curves))
+    step = replace(found.steps[0], candidate=replace(candidate, curves=curves))
     document = verdict(replace(found, steps=(step,)))
     assert "a relief equals it at about the typical speed (31 to 24 m/s)" in document["statement"]
     assert "(U^2 - U_0^2)" in document["equation"] and document["mechanisms"][0]["constants"][U_1] == 31.0
@@ -140,8 +141,8 @@ def test_a_candidate_that_is_not_excluded_is_told() -> None:
 
 def test_how_sure_a_force_in_no_list_is() -> None:
     found = diagnosis("unexplained")
-    assert found.race is not None
-    document, factors = verdict(found), found.race.log_factors
+    assert found.comparison is not None
+    document, factors = verdict(found), found.comparison.log_factors
     listed = [name for name in factors if name not in (NOTHING, UNLISTED)]
     closest = max(listed, key=lambda name: factors[name])
     nil = dict.fromkeys(document["probability"], 0.0)
@@ -166,7 +167,7 @@ def test_the_force_profile_let_in_is_told() -> None:
     assert profile["equation"] == "-f(s)" and profile["unit"] == "m s-2"
     assert profile["s_m"] == found.profile.profile.knots_m.tolist() and max(profile["mean"]) > 0.45
     assert document["p_value_augmented"] == found.profile.check.p_value
-    failed = replace(found.profile, check=Omnibus(30.0, found.profile.check.simulated))
+    failed = replace(found.profile, check=BootstrapTest(30.0, found.profile.check.simulated))
     assert "still fails the check" in verdict(replace(found, profile=failed))["statement"]
     assert "still fails the check" not in document["statement"]
 
@@ -178,7 +179,7 @@ def test_what_the_form_of_a_term_is_uncertain_by_is_in_the_strength(kind: str) -
     (step,) = found.steps
     mean, sd = strength_of(found.steps, 0)
     draws = chains_of(step.calibration.tree, step.calibration.problem.added[0].name)
-    shapes = step.entrant.strength_between_shapes()
+    shapes = step.candidate.strength_between_shapes()
     form = 0.0 if kind == "sensor" else FORM * mean
     assert sd == pytest.approx(float(np.sqrt(draws.std(ddof=1) ** 2 + shapes**2 + form**2)))
 

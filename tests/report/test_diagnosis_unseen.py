@@ -38,7 +38,7 @@ FOLDS = {
 
 @pytest.fixture(autouse=True)
 def quick_profile(monkeypatch):
-    monkeypatch.setattr("skred.diagnosis.compare.location.locate", lambda heat: location())
+    monkeypatch.setattr("skred.diagnosis.compare.location.locate", lambda under_errors: location())
 
 
 def text_of(**more):

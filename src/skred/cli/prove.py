@@ -17,7 +17,7 @@ from skred.errors import InputError
 if TYPE_CHECKING:
     from skred.prove.folder import ProofFolder
     from skred.prove.plan import Plan
-    from skred.prove.pool import Crew
+    from skred.prove.pool import WorkerPool
 
 DONE = 0
 QUICK_TRIALS = 12
@@ -137,11 +137,11 @@ class Working:
         ),
     ] = None
 
-    def crew(self) -> "Crew":
+    def worker_pool(self) -> "WorkerPool":
         """As sealing and running want it."""
-        from skred.prove.pool import Crew
+        from skred.prove.pool import WorkerPool
 
-        return Crew(self.workers, self.scheduler)
+        return WorkerPool(self.workers, self.scheduler)
 
 
 SEALING, WORKING = Sealing(), Working()
@@ -261,7 +261,7 @@ def _seal(folder: "ProofFolder", sealing: Sealing, working: Working, silent: boo
     if not folder.ledger.exists():
         _tell(f"seed {plan.seed}", silent)
     with _Told(silent, plan.n) as told:
-        ledger = seal_trials(folder, plan, working.crew(), told.tell, told.advance)
+        ledger = seal_trials(folder, plan, working.worker_pool(), told.tell, told.advance)
     _tell(f"sealed: {folder.ledger}, SHA-256 {ledger_sha256(ledger)}", silent)
 
 
@@ -273,7 +273,7 @@ def _run(folder: "ProofFolder", working: Working, time_limit: float, silent: boo
 
     n = read_ledger(folder)["n"]
     with _Told(silent, n) as told:
-        counts = run_trials(folder, working.crew(), told.tell, told.advance, Limits(time_limit))
+        counts = run_trials(folder, working.worker_pool(), told.tell, told.advance, Limits(time_limit))
     failed = f"{counts['crashed']} crashed, {counts['late']} ran out of time"
     _tell(f"answered: {counts['answered']} now, {counts['before']} before; of those now {failed}", silent)
 
@@ -282,8 +282,8 @@ def _reveal(folder: "ProofFolder", working: Working, partial: bool, as_json: boo
     """Open and score, and say where the scores are."""
     from skred.prove.reveal import reveal as reveal_trials
 
-    crew, silent = working.crew(), quiet or as_json
-    scorecard = reveal_trials(folder, crew, lambda line: _tell(line, silent), partial=partial)
+    pool, silent = working.worker_pool(), quiet or as_json
+    scorecard = reveal_trials(folder, pool, lambda line: _tell(line, silent), partial=partial)
     if as_json:
         write_json(scorecard)
     elif not quiet:

@@ -11,14 +11,14 @@ from threadpoolctl import threadpool_limits
 
 from skred.diagnosis.augment.augmented import CLAIM_LIMIT, AugmentedProblem, augmented_problem
 from skred.diagnosis.augment.reference import Reference
-from skred.diagnosis.check.bootstrap_test import Omnibus, omnibus
+from skred.diagnosis.check.bootstrap_test import BootstrapTest, bootstrap_test
 from skred.diagnosis.clock import Clock, Tell
-from skred.diagnosis.compare.candidate import Entrant
-from skred.diagnosis.compare.comparison import Race, race
+from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.comparison import Comparison, compare
 from skred.diagnosis.compare.decision import Decision, alarmed, decide
 from skred.diagnosis.compare.location import Location, locate
 from skred.diagnosis.detect.detectability import Identifiability, identify
-from skred.diagnosis.detect.score_test import Screen
+from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.coefficient import Base, Curve, fit_base
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.extension import Extension, extended
@@ -70,38 +70,38 @@ class Step:
 
     Attributes
     ----------
-    entrant : Entrant
+    candidate : Candidate
         The one let in.
     tied : tuple of str
         Ids that the recordings cannot tell from it.
-    race : Race
+    comparison : Comparison
         In which it won.
     calibration : Calibration
         Of the augmented law.
-    check : Omnibus
+    check : BootstrapTest
         The omnibus check of the augmented law.
     """
 
-    entrant: Entrant
+    candidate: Candidate
     tied: tuple[str, ...]
-    race: Race
+    comparison: Comparison
     calibration: Calibration
-    check: Omnibus
+    check: BootstrapTest
 
 
 @dataclass(frozen=True)
 class Left:
-    """What a last race, of the augmented law, found and did not let in.
+    """What a last comparison, of the augmented law, found and did not let in.
 
     Attributes
     ----------
-    race : Race or None
-        None where no such race was run.
+    comparison : Comparison or None
+        None where no such comparison was run.
     reason : str
         Why what it would name was not let in, where it would name something.
     """
 
-    race: Race | None = None
+    comparison: Comparison | None = None
     reason: str = ""
 
 
@@ -117,10 +117,10 @@ class Diagnosis:
         Why no diagnosis was possible, empty if one was; what follows is None as far as it did not get there.
     calibration : Calibration
         Of the base law.
-    screen : Screen
+    score_test : ScoreTest
     table : Identifiability
-    check : Omnibus
-    race : Race
+    check : BootstrapTest
+    comparison : Comparison
     decision : Decision
     location : Location
     steps : tuple of Step
@@ -140,10 +140,10 @@ class Diagnosis:
     law: Law
     cannot: str = ""
     calibration: Calibration | None = None
-    screen: Screen | None = None
+    score_test: ScoreTest | None = None
     table: Identifiability | None = None
-    check: Omnibus | None = None
-    race: Race | None = None
+    check: BootstrapTest | None = None
+    comparison: Comparison | None = None
     decision: Decision = Decision("cannot_tell", ())
     location: Location | None = None
     steps: tuple[Step, ...] = ()
@@ -202,21 +202,21 @@ def _steps(
         return Diagnosis(problem, law, why, calibration, seconds=clock.seconds)
     draws = population_draws(calibration, effort.replicas, settings.seed)
     base = fit_base(problem, law, typical(draws))
-    screen = Screen(problem, law, base.setting)
+    score_test = ScoreTest(problem, law, base.setting)
     clock.stage("identify", "what these recordings can tell")
     start = (base.population, base.fit.points)
-    table = identify(screen, base.rows, base.fit.points, base.population)
+    table = identify(score_test, base.rows, base.fit.points, base.population)
     clock.stage("check", "is anything wrong: clean campaigns simulated and refitted")
-    check = omnibus(screen, base.rows, start, draws, settings.seed, effort.replicas)
-    clock.stage("race", "what is missing: every candidate refitted")
-    raced = race(base)
+    check = bootstrap_test(score_test, base.rows, start, draws, settings.seed, effort.replicas)
+    clock.stage("comparison", "what is missing: every candidate refitted")
+    raced = compare(base)
     decision = decide(raced.probability, check.p_value, table.can_tell)
     location = _location(raced, decision) if alarmed(raced.probability, check.p_value) else None
     steps, reference, cannot, left = tuple[Step, ...](), calibration, "", Left()
     references = Reference(calibration)
     if decision.names:
         clock.stage("augment", f"{law.id} + {decision.names[0]}: calibrating the augmented law")
-        steps, cannot, left = let_in(base, raced, decision, references, settings, effort, clock)
+        steps, cannot, left = add_mechanisms(base, raced, decision, references, settings, effort, clock)
     if steps:
         reference, cannot = references.on(_base_of(steps[-1]))
         steps = steps if not cannot else ()
@@ -231,7 +231,7 @@ def _steps(
     after = profile.after if profile is not None else _after(steps, settings.seed, effort)
     clock.end()
     return Diagnosis(
-        problem, law, cannot, calibration, screen, table, check, raced, decision, location, steps,
+        problem, law, cannot, calibration, score_test, table, check, raced, decision, location, steps,
         reference, profile, before, after, left, clock.seconds,
     )  # fmt: skip
 
@@ -241,12 +241,14 @@ def as_diagnosed(problem: HierarchicalProblem) -> HierarchicalProblem:
     return replace(problem, integration_limit=CLAIM_LIMIT, fineness=COARSER)
 
 
-def _location(raced: Race, decision: Decision) -> Location:
+def _location(raced: Comparison, decision: Decision) -> Location:
     """Where: of what is named the profile that goes with speed as that does, else the most probable."""
-    heat = raced.leading(UNLISTED)
+    under_errors = raced.leading(UNLISTED)
     if not decision.names:
-        return locate(heat)
-    return locate(heat, is_opposed(raced.leading(decision.names[0]).entrants[decision.names[0]].best.shape))
+        return locate(under_errors)
+    return locate(
+        under_errors, is_opposed(raced.leading(decision.names[0]).candidates[decision.names[0]].best.shape)
+    )
 
 
 def _problem_of(calibration: Calibration) -> HierarchicalProblem:
@@ -285,9 +287,9 @@ def _nothing_added(calibration: Calibration) -> FloatArray:
     return np.empty((sizes["chain"] * sizes["draw"], 0))
 
 
-def let_in(
+def add_mechanisms(
     base: Base,
-    raced: Race,
+    raced: Comparison,
     decision: Decision,
     references: Reference,
     settings: SamplerSettings,
@@ -302,11 +304,11 @@ def let_in(
     cannot, left = "", Left()
     names, chosen = decision.names, list[Curve]()
     for number in range(effort.max_mechanisms):
-        heat = raced.leading(names[0])
-        entrant = heat.entrants[names[0]]
-        chosen.append(entrant.best)
-        references.begin(heat.base.problem)
-        problem = augmented_problem(_plain(heat.base), chosen)
+        under_errors = raced.leading(names[0])
+        candidate = under_errors.candidates[names[0]]
+        chosen.append(candidate.best)
+        references.begin(under_errors.base.problem)
+        problem = augmented_problem(_plain(under_errors.base), chosen)
         # Its chains start around the posterior: half the tuning does.
         calibration = calibrate_surely(problem, base.law, replace(settings, tune=settings.tune // 2))
         if not calibration.gate.passed:
@@ -315,13 +317,13 @@ def let_in(
             left = replace(left, reason=cannot) if steps else left
             break
         clock.stage("check again", "is anything wrong with the augmented law")
-        check, next_base = _check_again(heat.base, calibration, problem, chosen, settings, effort)
-        steps.append(Step(entrant, names[1:], raced, calibration, check))
+        check, next_base = _check_again(under_errors.base, calibration, problem, chosen, settings, effort)
+        steps.append(Step(candidate, names[1:], raced, calibration, check))
         left = Left()
         if check.p_value > RACE_AGAIN or number + 1 == effort.max_mechanisms:
             break
-        clock.stage("second race", "something may be left: every candidate refitted again")
-        raced = race(next_base)
+        clock.stage("second comparison", "something may be left: every candidate refitted again")
+        raced = compare(next_base)
         left = Left(raced)
         second = decide(raced.probability, check.p_value, True)
         if not second.names:
@@ -343,17 +345,17 @@ def _check_again(
     chosen: list[Curve],
     settings: SamplerSettings,
     effort: Effort,
-) -> tuple[Omnibus, Base]:
-    """The omnibus check of the augmented law, and that law as a base for another race."""
+) -> tuple[BootstrapTest, Base]:
+    """The omnibus check of the augmented law, and that law as a base for another comparison."""
     directions = tuple(one.direction for one in chosen)
     strengths = _added(calibration).mean(axis=0)
     draws = population_draws(calibration, effort.replicas, settings.seed + 1)
     again = fit_base(base.problem, base.law, typical(draws), base.fit.points, directions, strengths)
     setting = replace(again.setting, base=(*base.setting.base, *_global_ids(chosen)))
     again = replace(again, setting=setting)
-    screen = Screen(base.problem, base.law, setting, directions, strengths)
+    score_test = ScoreTest(base.problem, base.law, setting, directions, strengths)
     start = (again.population, again.fit.points)
-    check = omnibus(screen, again.rows, start, draws, settings.seed + 1, effort.replicas)
+    check = bootstrap_test(score_test, again.rows, start, draws, settings.seed + 1, effort.replicas)
     return check, again
 
 

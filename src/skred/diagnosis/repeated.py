@@ -126,7 +126,7 @@ def _fold(found: Diagnosis, left_out: Campaign, seed: int) -> tuple[dict[str, An
     first = log_scores(before, left_out, seed)
     second = first if after is None else log_scores(after, left_out, seed)
     difference = second - first
-    names = [step.entrant.mechanism.id for step in found.steps]
+    names = [step.candidate.mechanism.id for step in found.steps]
     if found.profile is not None:
         names = [UNLISTED]
     entry = {

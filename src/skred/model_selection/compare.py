@@ -67,7 +67,7 @@ def compare(
     folder : Path
         Gets a folder for each law, ``compare.json``, figures and ``report.html``.
     tell : callable
-        Told one line for each stage.
+        Detectability one line for each stage.
 
     Returns
     -------

@@ -43,7 +43,7 @@ def compare_hierarchical(
     folder : Path
         Gets a folder for each law, ``pooled`` with the same, ``compare.json``, figures and ``report.html``.
     tell : callable
-        Told one line for each stage.
+        Detectability one line for each stage.
     exact : bool
         Refit without every event in turn, not only where importance sampling is unreliable.
 

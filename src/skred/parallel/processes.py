@@ -87,7 +87,7 @@ def _begun[Result](work: Callable[..., Result], *given: Any) -> Future[Result] |
         return None
 
 
-def crew() -> ThreadPoolExecutor:
+def worker_pool() -> ThreadPoolExecutor:
     """A pool for jobs that know nothing of each other, to be used in a ``with`` statement.
 
     One of its threads works in this process, and each other one lets a helper work: jobs and results are

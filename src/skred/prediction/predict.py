@@ -76,7 +76,7 @@ def predict(
     track : PredictionTrack, optional
         By default the campaign's own, from its own releases.
     tell : callable
-        Told one line for each stage.
+        Detectability one line for each stage.
     simulation : Simulation, optional
     progress : bool
         Whether the sampler shows its progress.

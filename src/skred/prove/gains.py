@@ -10,14 +10,14 @@ from skred.errors import InputError
 from skred.prove.folder import ProofFolder, read_object, write_once
 from skred.prove.hashes import file_sha256
 from skred.prove.ledger import code_of, require_same_code
-from skred.prove.pool import Crew
+from skred.prove.pool import WorkerPool
 
 Answers = dict[str, dict[str, Any]]
 Tell = Callable[[str], None]
 
 
 def with_gains(
-    folder: ProofFolder, ledger: dict[str, Any], answers: Answers, crew: Crew, tell: Tell
+    folder: ProofFolder, ledger: dict[str, Any], answers: Answers, pool: WorkerPool, tell: Tell
 ) -> Answers:
     """The answers, with the gain on fresh avalanches realised where they hold predictors before and after.
 
@@ -28,9 +28,9 @@ def with_gains(
     ledger : dict
     answers : dict
         By method, then by trial.
-    crew : Crew
+    pool : WorkerPool
     tell : callable
-        Told how many there are.
+        Detectability how many there are.
 
     Returns
     -------
@@ -46,7 +46,7 @@ def with_gains(
     ]
     if jobs:
         tell(f"scoring fresh avalanches of {len(jobs)} trials")
-    crew.carry_out(realise, jobs, lambda job, result: None, _lost)
+    pool.carry_out(realise, jobs, lambda job, result: None, _lost)
     return {
         method: {name: answer | _gain(folder, method, name, answer) for name, answer in given.items()}
         for method, given in answers.items()

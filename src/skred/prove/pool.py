@@ -20,7 +20,7 @@ Job = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Crew:
+class WorkerPool:
     """How many work, and where.
 
     Attributes
@@ -56,9 +56,9 @@ class Crew:
         jobs : sequence of dict
             Each with the name of its trial.
         done : callable
-            Told of each job and what came out as it is finished.
+            Detectability of each job and what came out as it is finished.
         lost : callable
-            Told of a job that Dask has given up, because every worker that took it died.
+            Detectability of a job that Dask has given up, because every worker that took it died.
         """
         if not jobs:
             return

@@ -11,7 +11,7 @@ from skred.prove.folder import METHOD, TRIAL_NAME, ProofFolder, read_object
 from skred.prove.gains import with_gains
 from skred.prove.hashes import document_sha256, file_sha256, files_sha256
 from skred.prove.ledger import ledger_sha256, read_ledger, require_same_code, trial_names
-from skred.prove.pool import Crew, alone_in
+from skred.prove.pool import WorkerPool, alone_in
 
 Scorer = Callable[[Path, dict[str, Any], list[dict[str, Any]], dict[str, dict[str, Any]]], dict[str, Any]]
 Tell = Callable[[str], None]
@@ -19,7 +19,7 @@ _SEALED_BY_ALL = ("settings", "skred_version", "source_sha256", "scorer_sha256")
 
 
 def reveal(
-    folder: ProofFolder, crew: Crew, tell: Tell, *, partial: bool = False, score: Scorer | None = None
+    folder: ProofFolder, pool: WorkerPool, tell: Tell, *, partial: bool = False, score: Scorer | None = None
 ) -> dict[str, Any]:
     """Verify what was sealed, then score.
 
@@ -27,10 +27,10 @@ def reveal(
     ----------
     folder : ProofFolder
         Sealed and diagnosed.
-    crew : Crew
+    pool : WorkerPool
         Who scores fresh avalanches.
     tell : callable
-        Told of stages.
+        Detectability of stages.
     partial : bool
         Score also where trials have no answer yet.
     score : callable, optional
@@ -60,7 +60,7 @@ def reveal(
         trials = verified(folder, ledger)
         if missing:
             tell(f"partial: {missing} of {ledger['n']} trials have no answer yet")
-        answers = with_gains(folder, ledger, answers, crew, tell)
+        answers = with_gains(folder, ledger, answers, pool, tell)
         return (score or _scorer())(folder.path, ledger, trials, answers)
 
 

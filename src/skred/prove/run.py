@@ -13,7 +13,7 @@ from skred.errors import InputError
 from skred.prove.child import MODULE, answer_of
 from skred.prove.folder import ProofFolder, read_object, write_once
 from skred.prove.ledger import code_of, ledger_sha256, read_ledger, require_same_code, trial_names
-from skred.prove.pool import Crew, alone_in
+from skred.prove.pool import WorkerPool, alone_in
 from skred.prove.sandbox import allowed_roots, within
 
 Tell = Callable[[str], None]
@@ -40,7 +40,7 @@ class Limits:
 
 
 def run(
-    folder: ProofFolder, crew: Crew, tell: Tell, advance: Advance, limits: Limits | None = None
+    folder: ProofFolder, pool: WorkerPool, tell: Tell, advance: Advance, limits: Limits | None = None
 ) -> dict[str, int]:
     """Diagnose every trial that has no answer yet.
 
@@ -48,9 +48,9 @@ def run(
     ----------
     folder : ProofFolder
         Sealed.
-    crew : Crew
+    pool : WorkerPool
     tell, advance : callable
-        Told of stages, and of each trial as it is answered.
+        Detectability of stages, and of each trial as it is answered.
     limits : Limits, optional
 
     Returns
@@ -87,7 +87,7 @@ def run(
         def lost(job: dict[str, Any]) -> None:
             done(job, _store(folder, job, _worker_died()))
 
-        crew.carry_out(diagnose_trial, jobs, done, lost)
+        pool.carry_out(diagnose_trial, jobs, done, lost)
         shutil.rmtree(folder.path / "attempts", ignore_errors=True)
     counts = {"crashed": verdicts.count("crash"), "late": verdicts.count("timeout")}
     return {"answered": len(jobs), "before": before, **counts}

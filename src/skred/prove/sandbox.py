@@ -1,6 +1,6 @@
 """What the process that diagnoses may open: its own folder, Python, the package and caches; nothing else.
 
-The guard is an audit hook of Python. It stops what Python code opens, lists, links or starts, and so every
+The sandbox is an audit hook of Python. It stops what Python code opens, lists, links or starts, and so every
 accident and every plain attempt to look behind the trial. It is not a wall against hostile machine code: a C
 extension may open files without telling Python. The simulator of trials is out of reach as well: a diagnosis
 that could redraw trials would not need to open any file.
@@ -84,7 +84,7 @@ def within(path: str | Path, roots: list[Path]) -> bool:
     return any(real.is_relative_to(root) for root in roots)
 
 
-class Guard:
+class Sandbox:
     """An audit hook.
 
     Parameters
@@ -138,6 +138,6 @@ class Guard:
 
 
 def shut(own: Path) -> None:
-    """Guard this process from now on; there is no way back."""
-    guard: Callable[[str, tuple[Any, ...]], None] = Guard(own)
-    sys.addaudithook(guard)
+    """Sandbox this process from now on; there is no way back."""
+    sandbox: Callable[[str, tuple[Any, ...]], None] = Sandbox(own)
+    sys.addaudithook(sandbox)

@@ -16,7 +16,7 @@ from skred.prove.folder import ProofFolder, read_object, trial_name, write_once
 from skred.prove.hashes import document_sha256, file_sha256, files_sha256
 from skred.prove.ledger import FORMAT, code_identity, read_ledger, require_same_code
 from skred.prove.plan import Plan, asked, diagnosis_settings
-from skred.prove.pool import Crew, alone_in
+from skred.prove.pool import WorkerPool, alone_in
 
 if TYPE_CHECKING:
     from skred.simulator.draw import Trial
@@ -26,7 +26,7 @@ Advance = Callable[[str], None]
 _MOST_DRAWS = 8
 
 
-def seal(folder: ProofFolder, plan: Plan, crew: Crew, tell: Tell, advance: Advance) -> dict[str, Any]:
+def seal(folder: ProofFolder, plan: Plan, pool: WorkerPool, tell: Tell, advance: Advance) -> dict[str, Any]:
     """Draw and seal every trial that is not sealed yet, then publish the ledger.
 
     Parameters
@@ -34,9 +34,9 @@ def seal(folder: ProofFolder, plan: Plan, crew: Crew, tell: Tell, advance: Advan
     folder : ProofFolder
         New, or with the same plan begun and not finished.
     plan : Plan
-    crew : Crew
+    pool : WorkerPool
     tell, advance : callable
-        Told of stages, and of each trial as it is sealed.
+        Detectability of stages, and of each trial as it is sealed.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def seal(folder: ProofFolder, plan: Plan, crew: Crew, tell: Tell, advance: Advan
         for name in names:
             if name not in to_do:
                 advance(name)
-        crew.carry_out(seal_trial, jobs, lambda job, _: advance(job["trial"]), _lost)
+        pool.carry_out(seal_trial, jobs, lambda job, _: advance(job["trial"]), _lost)
         ledger = _ledger(folder, plan, begun, names)
         if not write_once(folder.ledger, ledger):
             raise InputError(f"{folder.ledger}: there already; a ledger is never changed")

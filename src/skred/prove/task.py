@@ -1,7 +1,7 @@
 """One diagnosis, alone: ``python -m skred.prove.task BASE_LAW SETTINGS`` in a folder that holds a campaign.
 
 All that this process is told is the law it is asked about and how much to compute; all that it may open is
-its own folder, Python, the package and caches of compiled code (`guard`). It writes ``verdict.json`` there.
+its own folder, Python, the package and caches of compiled code (`sandbox`). It writes ``verdict.json`` there.
 """
 
 from __future__ import annotations

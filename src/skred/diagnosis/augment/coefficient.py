@@ -22,14 +22,14 @@ real forces have otherwise. Set on 28 opened trials, whose true forms differ on 
 def strength_of(steps: Sequence[Step], number: int) -> tuple[float, float]:
     """Mean and standard deviation of an added strength, as the last calibration has it.
 
-    Shrunk by its prior. The calibration holds its shape fixed; what the shapes in the race differ by is in
-    the standard deviation too, and so is what no race knows of: that a term stands for a force of a somewhat
-    other form.
+    Shrunk by its prior. The calibration holds its shape fixed; what the shapes in the comparison differ by is
+    in the standard deviation too, and so is what no comparison knows of: that a term stands for a force of a
+    somewhat other form.
     """
-    calibration, entrant = steps[-1].calibration, steps[number].entrant
+    calibration, candidate = steps[-1].calibration, steps[number].candidate
     problem: Any = calibration.problem
     name = problem.added[number].name
     draws = np.asarray(calibration.tree["posterior"].to_dataset()[name].values)
     mean = float(draws.mean())
-    form = FORM * abs(mean) if entrant.mechanism.group is Group.PHYSICS else 0.0
-    return mean, math.hypot(float(draws.std(ddof=1)), entrant.strength_between_shapes(), form)
+    form = FORM * abs(mean) if candidate.mechanism.group is Group.PHYSICS else 0.0
+    return mean, math.hypot(float(draws.std(ddof=1)), candidate.strength_between_shapes(), form)

@@ -104,7 +104,8 @@ class Located(NamedTuple):
     factor: FloatArray
 
     def populations_near(self, added: FloatArray, rng: np.random.Generator, wider: float = 1.0) -> FloatArray:
-        """A draw of the population's coordinates at each of some added strengths, by the race's formula.
+        """Draw the population's coordinates at each of some added strengths.
+
 
         Parameters
         ----------

@@ -51,7 +51,7 @@ class Tables:
 
     @property
     def mean(self) -> FloatArray:
-        """Posterior mean of the strengths by the race's formula, (n_added,)."""
+        """Posterior mean of the strengths by the comparison's formula, (n_added,)."""
         return self.located.mean
 
     @property

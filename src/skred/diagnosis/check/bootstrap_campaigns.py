@@ -16,7 +16,7 @@ from skred.physics.kernel.inputs import VELOCITY_TO_STOP
 FloatArray = NDArray[np.float64]
 
 
-def replicas(
+def bootstrap_campaigns(
     extension: Extension,
     strengths: FloatArray,
     means: FloatArray,

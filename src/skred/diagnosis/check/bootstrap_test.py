@@ -13,8 +13,8 @@ from itertools import batched
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.check.bootstrap_campaigns import replicas
-from skred.diagnosis.detect.score_test import Screen
+from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
+from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.conditional_map import Population, Rows
 from skred.diagnosis.evidence.linear_mixed_model import fit_population
 from skred.parallel.threads import side_by_side, threads
@@ -27,7 +27,7 @@ _BATCH = 25
 
 
 @dataclass(frozen=True, eq=False)
-class Omnibus:
+class BootstrapTest:
     """The check's outcome.
 
     Attributes
@@ -55,14 +55,14 @@ class Omnibus:
         return self.p_value <= LIMIT
 
 
-def omnibus(
-    screen: Screen,
+def bootstrap_test(
+    score_test: ScoreTest,
     rows: Rows,
     start: tuple[Population, FloatArray],
     draws: tuple[FloatArray, FloatArray],
     seed: int,
     most: int = 300,
-) -> Omnibus:
+) -> BootstrapTest:
     """Check the base law.
 
     Parameters
@@ -72,29 +72,31 @@ def omnibus(
     draws : (n, n_base) and (n, n_base, n_base) arrays
         Means and factors of populations from the base law's posterior, at least `most` of them.
     """
-    statistic = float(_refitted(screen, rows, start)[0])
+    statistic = float(_refitted(score_test, rows, start)[0])
     rng = np.random.default_rng([seed, 21])
     simulated: list[FloatArray] = []
     for some in batched(range(0, most, _BATCH), threads()):
         # Simulated one after the other and counted in order: how many threads there are changes nothing.
-        made = [_simulated(screen, draws, slice(first, min(first + _BATCH, most)), rng) for first in some]
-        for refitted in side_by_side(lambda clean: _refitted(screen, *clean), made):
+        made = [_simulated(score_test, draws, slice(first, min(first + _BATCH, most)), rng) for first in some]
+        for refitted in side_by_side(lambda clean: _refitted(score_test, *clean), made):
             simulated.append(refitted)
             if np.sum(np.concatenate(simulated) >= statistic) >= _ENOUGH_ABOVE:
-                return Omnibus(statistic, np.concatenate(simulated))
-    return Omnibus(statistic, np.concatenate(simulated))
+                return BootstrapTest(statistic, np.concatenate(simulated))
+    return BootstrapTest(statistic, np.concatenate(simulated))
 
 
 def _simulated(
-    screen: Screen, draws: tuple[FloatArray, FloatArray], batch: slice, rng: np.random.Generator
+    score_test: ScoreTest, draws: tuple[FloatArray, FloatArray], batch: slice, rng: np.random.Generator
 ) -> tuple[Rows, tuple[Population, FloatArray]]:
     """Clean campaigns from some of the draws, and where to begin refitting them."""
     means, factors = draws[0][batch], draws[1][batch]
-    rows, points = replicas(screen.extension, screen.strengths, means, factors, rng)
+    rows, points = bootstrap_campaigns(score_test.extension, score_test.strengths, means, factors, rng)
     return rows, (Population(means.copy(), np.einsum("gij,gkj->gik", factors, factors)), points)
 
 
-def _refitted(screen: Screen, rows: Rows, start: tuple[Population, FloatArray]) -> FloatArray:
+def _refitted(score_test: ScoreTest, rows: Rows, start: tuple[Population, FloatArray]) -> FloatArray:
     """The statistic after refitting populations and events, (n_groups,)."""
-    population, points = fit_population(screen.extension, rows, screen.strengths, screen.prior, start)
-    return screen.statistic(screen.scores(rows, points, population))
+    population, points = fit_population(
+        score_test.extension, rows, score_test.strengths, score_test.prior, start
+    )
+    return score_test.statistic(score_test.scores(rows, points, population))

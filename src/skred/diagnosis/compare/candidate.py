@@ -1,4 +1,4 @@
-"""One mechanism in the race: its evidence, strength and place, over all its shapes."""
+"""One mechanism in the comparison: its evidence, strength and place, over all its shapes."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Entrant:
-    """One mechanism in the race, under one error model.
+class Candidate:
+    """One mechanism in the comparison, under one error model.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The race: nothing, every listed mechanism, every instrument fault and the unlisted force, refitted each.
+"""The candidates compared: nothing, each mechanism, each instrument fault, a force not in the list.
 
 Two error models run: the one that the base law alone prefers and, if that is another, the robust one, so that
 odd events, heavy tails and correlated errors stay error models and do not become findings. Where the robust
@@ -19,12 +19,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.compare.candidate import Entrant
-from skred.diagnosis.compare.recomputed import corrected
-from skred.diagnosis.compare.refinement import second_look
+from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.recomputed import recomputed
+from skred.diagnosis.compare.refinement import refine
 from skred.diagnosis.compare.restarts import better_modes
-from skred.diagnosis.compare.screening import curve, first_look
-from skred.diagnosis.detect.score_test import Screen, candidates
+from skred.diagnosis.compare.screening import curve, screening_budget
+from skred.diagnosis.detect.score_test import ScoreTest, placed_mechanisms
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, alike, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, Curve, refit
@@ -33,7 +33,7 @@ from skred.diagnosis.evidence.event_quadrature import FINE, USUAL, Budget
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds, stated
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
-from skred.parallel.processes import crew
+from skred.parallel.processes import worker_pool
 from skred.parallel.threads import side_by_side
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Shape
@@ -41,7 +41,7 @@ from skred.physics.mechanisms.spec import Shape
 FloatArray = NDArray[np.float64]
 Tell = Callable[[int, int], None]
 ERROR_SHARES = {"robust": 0.55, "student": 0.15, "correlated": 0.15, "scaled": 0.15}
-"""Prior probability of each error model in the race."""
+"""Prior probability of each error model in the comparison."""
 _PREFERRED_BY = 1.0
 _FAR_BEHIND = 10.0
 """Nats behind its mechanism's best at which a place is not looked at under another error model: it counts for
@@ -53,14 +53,14 @@ raced under it, and count for nothing there."""
 
 
 @dataclass(frozen=True, eq=False)
-class Heat:
-    """The race under one error model.
+class ComparisonUnderErrors:
+    """The comparison under one error model.
 
     Attributes
     ----------
     error_model : str
     base : Base
-    entrants : mapping of str to Entrant
+    candidates : mapping of str to Candidate
     profiles : list of Profile
     first_look : list of Curve
         A rough one for each candidate of the mechanisms raced; that under another error model where it
@@ -69,31 +69,31 @@ class Heat:
 
     error_model: str
     base: Base
-    entrants: dict[str, Entrant]
+    candidates: dict[str, Candidate]
     profiles: list[Profile]
     first_look: list[Curve]
 
     @property
     def log_factors(self) -> dict[str, float]:
         """Log Bayes factor of each id against nothing under the same error model."""
-        found = {name: entrant.log_bayes_factor for name, entrant in self.entrants.items()}
+        found = {name: candidate.log_bayes_factor for name, candidate in self.candidates.items()}
         return found | {UNLISTED: log_evidence_of(self.profiles), NOTHING: 0.0}
 
 
 @dataclass(frozen=True, eq=False)
-class Race:
-    """All heats, and what they say together.
+class Comparison:
+    """All under_each, and what they say together.
 
     Attributes
     ----------
-    heats : tuple of Heat
+    under_each : tuple of ComparisonUnderErrors
     odds : mapping
         Prior probability of each id.
     base_evidence : mapping
         Log evidence of the base law under each error model.
     """
 
-    heats: tuple[Heat, ...]
+    under_each: tuple[ComparisonUnderErrors, ...]
     odds: dict[str, float]
     base_evidence: dict[str, float]
 
@@ -101,9 +101,12 @@ class Race:
     def log_factors(self) -> dict[str, float]:
         """Log Bayes factor of each id against nothing, over the error models."""
         parts: dict[str, list[float]] = {}
-        for heat in self.heats:
-            prior = math.log(ERROR_SHARES[heat.error_model]) + self.base_evidence[heat.error_model]
-            for name, factor in heat.log_factors.items():
+        for under_errors in self.under_each:
+            prior = (
+                math.log(ERROR_SHARES[under_errors.error_model])
+                + self.base_evidence[under_errors.error_model]
+            )
+            for name, factor in under_errors.log_factors.items():
                 parts.setdefault(name, []).append(prior + factor)
         nothing = float(np.logaddexp.reduce(parts[NOTHING]))
         return {name: float(np.logaddexp.reduce(values)) - nothing for name, values in parts.items()}
@@ -119,28 +122,30 @@ class Race:
         nothing = self.probability[NOTHING]
         return math.log(max(1.0 - nothing, 1e-300)) - math.log(max(nothing, 1e-300))
 
-    def leading(self, name: str) -> Heat:
-        """The heat in which an id has most of its evidence."""
+    def leading(self, name: str) -> ComparisonUnderErrors:
+        """The under_errors in which an id has most of its evidence."""
 
-        def height(heat: Heat) -> float:
+        def height(under_errors: ComparisonUnderErrors) -> float:
             return (
-                math.log(ERROR_SHARES[heat.error_model])
-                + self.base_evidence[heat.error_model]
-                + heat.log_factors[name]
+                math.log(ERROR_SHARES[under_errors.error_model])
+                + self.base_evidence[under_errors.error_model]
+                + under_errors.log_factors[name]
             )
 
-        return max((heat for heat in self.heats if name in heat.log_factors), key=height)
+        return max(
+            (under_errors for under_errors in self.under_each if name in under_errors.log_factors), key=height
+        )
 
 
-def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
-    """Run the race from a fitted base law.
+def compare(base: Base, tell: Tell = lambda done, of: None) -> Comparison:
+    """Run the comparison from a fitted base law.
 
     Parameters
     ----------
     base : Base
         Under any error model.
     tell : callable
-        Told how many first looks are done, and of how many, under each error model.
+        Detectability how many first looks are done, and of how many, under each error model.
     """
     fitted = side_by_side(lambda name: with_errors(base, name), list(ERROR_SHARES))
     bases = dict(zip(ERROR_SHARES, fitted, strict=True))
@@ -150,18 +155,18 @@ def race(base: Base, tell: Tell = lambda done, of: None) -> Race:
     chosen = [DEFAULT_ERRORS]
     if height[preferred] > height[DEFAULT_ERRORS] + _PREFERRED_BY:
         chosen.insert(0, preferred)
-    heats = [_heat(chosen[0], bases[chosen[0]], tell)]
+    under_each = [_under_errors(chosen[0], bases[chosen[0]], tell)]
     for name in chosen[1:]:
-        before, behind = heats[0].first_look, height[preferred] - height[name]
+        before, behind = under_each[0].first_look, height[preferred] - height[name]
         if behind > _OTHER_ERRORS:
             before = _that_may_count(before, behind)
         if before:
-            best = max(heats[0].log_factors.values()) + behind
-            heats.append(_heat(name, bases[name], tell, before, best))
-    # The evidence of an error model without a heat counts for nothing and everything alike.
-    raced = [entrant.mechanism for entrant in heats[0].entrants.values()]
-    evidence = {heat.error_model: heights[heat.error_model] for heat in heats}
-    return Race(tuple(heats), prior_odds(raced), evidence)
+            best = max(under_each[0].log_factors.values()) + behind
+            under_each.append(_under_errors(name, bases[name], tell, before, best))
+    # The evidence of an error model without a under_errors counts for nothing and everything alike.
+    raced = [candidate.mechanism for candidate in under_each[0].candidates.values()]
+    evidence = {under_errors.error_model: heights[under_errors.error_model] for under_errors in under_each}
+    return Comparison(tuple(under_each), prior_odds(raced), evidence)
 
 
 def with_errors(base: Base, error_model: str) -> Base:
@@ -181,10 +186,10 @@ def with_errors(base: Base, error_model: str) -> Base:
     return replace(base, problem=problem, rows=rows, fit=fit)
 
 
-def _heat(
+def _under_errors(
     error_model: str, base: Base, tell: Tell, before: Sequence[Curve] = (), best: float = -math.inf
-) -> Heat:
-    """The race under one error model.
+) -> ComparisonUnderErrors:
+    """The comparison under one error model.
 
     Parameters
     ----------
@@ -193,26 +198,26 @@ def _heat(
     best : float, optional
         The most that a candidate has under that, in nats above nothing under this one.
     """
-    budget = first_look(base)
+    budget = screening_budget(base)
     base.with_nothing(budget)  # before anyone else does it once more
-    with crew() as pool:
+    with worker_pool() as pool:
         curves = _first_looks(base, budget, pool, tell, before)
-        entrants = second_look(base, curves, budget, pool)
-        profiles = list(pool.map(partial(free_force, base, entrants=entrants), KINDS))
-        entrants, profiles = corrected(base, entrants, profiles, pool, best)
+        candidates = refine(base, curves, budget, pool)
+        profiles = list(pool.map(partial(free_force, base, candidates=candidates), KINDS))
+        candidates, profiles = recomputed(base, candidates, profiles, pool, best)
     for mechanism in mechanisms().values():
-        other = entrants.get(mechanism.same_term_as)
+        other = candidates.get(mechanism.same_term_as)
         if other is not None and mechanism.added is not None and mechanism.added.joins(base.setting.base):
             same = tuple(replace(one, mechanism=mechanism) for one in other.curves)
-            entrants[mechanism.id] = replace(other, mechanism=mechanism, curves=same)
-    return Heat(error_model, base, entrants, profiles, curves)
+            candidates[mechanism.id] = replace(other, mechanism=mechanism, curves=same)
+    return ComparisonUnderErrors(error_model, base, candidates, profiles, curves)
 
 
 def _first_looks(
     base: Base, budget: Budget, pool: ThreadPoolExecutor, tell: Tell, before: Sequence[Curve]
 ) -> list[Curve]:
     """A rough curve for each candidate; those `before`, by another error model, where they cannot count."""
-    todo = [(one.mechanism, one.shape) for one in before or candidates(base.setting, ties=False)]
+    todo = [(one.mechanism, one.shape) for one in before or placed_mechanisms(base.setting, ties=False)]
     curves, looked = dict(enumerate(before)), set[int]()
     linear = _linear_strengths(base)
 
@@ -239,8 +244,8 @@ def _that_may_count(before: Sequence[Curve], behind: float) -> list[Curve]:
 
 def _linear_strengths(base: Base) -> dict[tuple[str, Shape], float]:
     """Roughly how strong the candidates are that stand out."""
-    screen = Screen(base.problem, base.law, base.setting, base.directions, base.strengths)
-    return screen.strengths_found(screen.scores(base.rows, base.fit.points, base.population))
+    score_test = ScoreTest(base.problem, base.law, base.setting, base.directions, base.strengths)
+    return score_test.strengths_found(score_test.scores(base.rows, base.fit.points, base.population))
 
 
 def _that_count(curves: Mapping[int, Curve]) -> list[int]:
@@ -255,9 +260,9 @@ def _that_count(curves: Mapping[int, Curve]) -> list[int]:
     ]
 
 
-def free_force(base: Base, kind: Kind, entrants: Mapping[str, Entrant]) -> Profile:
+def free_force(base: Base, kind: Kind, candidates: Mapping[str, Candidate]) -> Profile:
     """The unlisted force of one kind: from no force, and from the best listed one that enters alike."""
-    near = [one for entrant in entrants.values() for one in entrant.curves if alike(kind, one)]
+    near = [one for candidate in candidates.values() for one in candidate.curves if alike(kind, one)]
     if not near:
         return fit_profile(base, kind)
     return fit_profile(base, kind, as_profile(base, kind, max(near, key=lambda one: one.log_bayes_factor)))

@@ -20,9 +20,9 @@ group leads decides the verdict, not whether its name stands alone."""
 NOTHING_AT_MOST, NOTHING_ALONE = 0.5, 0.15
 ALARMS = ((LIMIT, NOTHING_AT_MOST), (1.0, NOTHING_ALONE))
 """The alarm is raised where, for any of these, the check's p-value is at most the first and the probability
-of nothing below the second: the check, unless the race denies it; the race alone. By the evidence alone a
-clean campaign falls below the latter with at most a sixth of probability (Markov's inequality for a Bayes
-factor); it is far rarer (``benchmarks/alarm_limit.py``)."""
+of nothing below the second: the check, unless the comparison denies it; the comparison alone. By the evidence
+alone a clean campaign falls below the latter with at most a sixth of probability (Markov's inequality for a
+Bayes factor); it is far rarer (``benchmarks/alarm_limit.py``)."""
 
 
 @dataclass(frozen=True)
@@ -49,12 +49,12 @@ class Decision:
 
 
 def alarmed(probability: Mapping[str, float], p_value: float) -> bool:
-    """Whether something is wrong, by the check and the race together."""
+    """Whether something is wrong, by the check and the comparison together."""
     return any(p_value <= most and probability[NOTHING] < below for most, below in ALARMS)
 
 
 def _silent(probability: Mapping[str, float], p_value: float) -> bool:
-    """Whether neither check nor race gives a reason to add anything; less than an alarm is reason enough."""
+    """Whether neither check nor comparison gives a reason to add anything; it takes less than an alarm."""
     return p_value > LIMIT and probability[NOTHING] >= NOTHING_AT_MOST
 
 

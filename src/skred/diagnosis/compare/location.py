@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.compare.comparison import Heat
+from skred.diagnosis.compare.comparison import ComparisonUnderErrors
 from skred.diagnosis.discrepancy.profile import Kind, Profile, hats, most_probable
 from skred.diagnosis.evidence.extension import extended
 from skred.physics.kernel.columns import Column
@@ -54,11 +54,11 @@ class Location:
     log_bayes_factor: float
 
 
-def locate(heat: Heat, opposed: bool | None = None) -> Location:
+def locate(under_errors: ComparisonUnderErrors, opposed: bool | None = None) -> Location:
     """The most probable profile as a retardation; of those that are opposed, or are not, if that is given."""
-    alike = [one for one in heat.profiles if opposed in (None, one.kind.opposed)]
+    alike = [one for one in under_errors.profiles if opposed in (None, one.kind.opposed)]
     profile = most_probable(alike)
-    base = heat.base
+    base = under_errors.base
     terrain = base.setting.terrain
     edge = np.asarray(terrain.edge_s_m)
     speeds = extended(base.problem, base.law, base.directions).speeds(base.fit.points, base.strengths)

@@ -1,4 +1,4 @@
-"""What many more nodes, and sampling, change for those that lead a race: mechanisms and free forces."""
+"""What many more nodes, and sampling, change for those that lead a comparison: mechanisms and free forces."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.compare.candidate import Entrant
+from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.discrepancy.profile import KINDS, Profile
 from skred.diagnosis.discrepancy.sampled_evidence import sampled_log_factor
 from skred.diagnosis.evidence.coefficient import Base, Fit, refit
@@ -29,13 +29,13 @@ _COUNTS, _TOO_LOW = 4.0, 4.0
 more there are a tenth of a nat for all together. Nats that it may have more than by Laplace's formula."""
 
 
-def corrected(
+def recomputed(
     base: Base,
-    entrants: Mapping[str, Entrant],
+    candidates: Mapping[str, Candidate],
     profiles: Sequence[Profile],
     pool: ThreadPoolExecutor,
     best: float = -np.inf,
-) -> tuple[dict[str, Entrant], list[Profile]]:
+) -> tuple[dict[str, Candidate], list[Profile]]:
     """All candidates under one error model, those that lead looked at once more.
 
     Mechanisms at the top of their best curve, if it was computed with fronts: what is wrong with a rough one
@@ -46,13 +46,13 @@ def corrected(
     best : float
         The most that a candidate has under another error model, in nats above nothing under this one.
     """
-    height = {name: entrant.log_bayes_factor for name, entrant in entrants.items()}
+    height = {name: candidate.log_bayes_factor for name, candidate in candidates.items()}
     force = [one.log_bayes_factor for one in profiles]
     most = max(best, *height.values(), *force)
     leading = sorted(
         (name for name in height if height[name] > most - _BEHIND), key=lambda name: -height[name]
     )
-    leading = [name for name in leading[:_CHECKED] if not entrants[name].best.rough]
+    leading = [name for name in leading[:_CHECKED] if not candidates[name].best.rough]
     # A force that is less probable than none would raise no alarm with some nats more.
     worth = [k for k, factor in enumerate(force) if factor > max(most - _COUNTS - _TOO_LOW, 0.0)]
     # Each waits for jobs of the pool, and takes none of its threads for that.
@@ -61,32 +61,32 @@ def corrected(
             k: waiting.submit(sampled_log_factor, base, profiles[k], pool, max(most - _COUNTS, 0.0))
             for k in worth
         }
-        found = _looked_at(base, entrants, leading, pool)
+        found = _looked_at(base, candidates, leading, pool)
         factors = {k: one.result() for k, one in sampled.items()}
     again = [replace(one, log_bayes_factor=factors.get(k, force[k])) for k, one in enumerate(profiles)]
     return found, again
 
 
 def _looked_at(
-    base: Base, entrants: Mapping[str, Entrant], leading: Sequence[str], pool: ThreadPoolExecutor
-) -> dict[str, Entrant]:
+    base: Base, candidates: Mapping[str, Candidate], leading: Sequence[str], pool: ThreadPoolExecutor
+) -> dict[str, Candidate]:
     """All mechanisms, those that lead with many more nodes at the top of their best curve."""
-    looked = {name: pool.submit(_at_top, base, entrants[name]) for name in leading}
+    looked = {name: pool.submit(_at_top, base, candidates[name]) for name in leading}
     plain = extended(base.problem, base.law, base.directions)
     nothing = pool.submit(_finely, base, plain, base.strengths, base.fit) if leading else None
-    found = dict(entrants)
+    found = dict(candidates)
     for name, one in looked.items():
         assert nothing is not None
         (laplace, fine), without = one.result(), nothing.result()
-        correction = fine - without[1] - float(entrants[name].best.log_evidence.max())
+        correction = fine - without[1] - float(candidates[name].best.log_evidence.max())
         disagreement = (fine - laplace) - (without[1] - without[0])
-        found[name] = replace(entrants[name], correction=correction, disagreement=disagreement)
+        found[name] = replace(candidates[name], correction=correction, disagreement=disagreement)
     return found
 
 
-def _at_top(base: Base, entrant: Entrant) -> tuple[float, float]:
+def _at_top(base: Base, candidate: Candidate) -> tuple[float, float]:
     """At the top of a mechanism's best curve."""
-    best = entrant.best
+    best = candidate.best
     top = int(np.argmax(best.log_evidence))
     extension = extended(base.problem, base.law, (*base.directions, best.direction))
     return _finely(base, extension, np.append(base.strengths, best.strengths[top]), best.fits[top])

@@ -1,4 +1,4 @@
-"""The race's second look: leading places with fronts, then in parts as fine as recordings tell them apart.
+"""Local refinement: leading places with fronts, then split as finely as the recordings resolve.
 
 A first look stands for all that is near its place. Where a mechanism leads, its place is computed with
 fronts and moved, shortened and lengthened. Where one of these parts holds most of the evidence it is parted
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from skred.diagnosis.compare.candidate import Entrant
+from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.physics.mechanisms.spec import Shape
@@ -76,9 +76,9 @@ class Place:
         return Place((*self.curves, *parts), (*before, *(share for _ in parts)))
 
 
-def second_look(
+def refine(
     base: Base, curves: Sequence[Curve], budget: Budget, pool: ThreadPoolExecutor
-) -> dict[str, Entrant]:
+) -> dict[str, Candidate]:
     """Entrants whose leading places are computed with fronts and then split; rough curves for the others.
 
     The leading mechanism comes first: others have to keep up with what its parts have. Once a place is looked
@@ -154,7 +154,7 @@ def _may_have(height: float) -> float:
     return height + max(_MORE, _MORE_OF_OWN * height)
 
 
-def entrants_of(curves: Sequence[Curve], places: Mapping[int, Place]) -> dict[str, Entrant]:
+def entrants_of(curves: Sequence[Curve], places: Mapping[int, Place]) -> dict[str, Candidate]:
     """Curves by mechanism; parts of a place share the weight of the one that they stand in for."""
     gathered: dict[str, tuple[list[Curve], list[float]]] = {}
     for name in dict.fromkeys(one.mechanism.id for one in curves):
@@ -165,6 +165,6 @@ def entrants_of(curves: Sequence[Curve], places: Mapping[int, Place]) -> dict[st
             members += place.curves
             weights += [math.log(share) + own_share for own_share in place.log_shares]
     return {
-        name: Entrant(members[0].mechanism, tuple(members), np.array(weights))
+        name: Candidate(members[0].mechanism, tuple(members), np.array(weights))
         for name, (members, weights) in gathered.items()
     }

@@ -1,4 +1,4 @@
-"""The race's first look at a place: quick, and by fronts where tangents mislead."""
+"""The comparison's first look at a place: quick, and by fronts where tangents mislead."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _FAR_OFF, _FAR_SHARE = 4.0, 0.02
 """Standard deviations beyond which a reading is far off, and the share of such readings that is many."""
 
 
-def first_look(base: Base) -> Budget:
+def screening_budget(base: Base) -> Budget:
     """Nodes for a look at every place: readings along tangents, unless many readings are far off.
 
     Robust errors take what is far from a front for outliers and see no direction to go; only fronts

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from skred.campaign import Sensor, Status
-from skred.diagnosis.detect.score_test import Screen
+from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, campaign_rows
 from skred.diagnosis.evidence.linear_mixed_model import Scores, efficient_scores, without
 from skred.inference.hierarchical.problem import HierarchicalProblem
@@ -33,7 +33,7 @@ _NO_INFORMATION = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class Detectability:
     """What the recordings can tell of one mechanism.
 
     Attributes
@@ -68,7 +68,7 @@ class Identifiability:
 
     Attributes
     ----------
-    rows : tuple of Told
+    rows : tuple of Detectability
     sensor_m : float or None
         Where one more velocity sensor raises the power most.
     power : float
@@ -77,7 +77,7 @@ class Identifiability:
         The same with that sensor.
     """
 
-    rows: tuple[Told, ...]
+    rows: tuple[Detectability, ...]
     sensor_m: float | None
     power: float
     power_with: float
@@ -88,48 +88,53 @@ class Identifiability:
         return self.power >= 0.5
 
 
-def identify(screen: Screen, rows: Rows, points: FloatArray, population: Population) -> Identifiability:
+def identify(
+    score_test: ScoreTest, rows: Rows, points: FloatArray, population: Population
+) -> Identifiability:
     """What the recordings can tell, around the events' modes."""
-    scores = screen.scores(rows, points, population)
-    table = told(screen, scores)
-    places, with_each = extra_sensors(screen, points, population)
+    scores = score_test.scores(rows, points, population)
+    table = told(score_test, scores)
+    places, with_each = extra_sensors(score_test, points, population)
     power = mean_power(table)
-    powers = [mean_power(told(screen, one)) for one in with_each]
+    powers = [mean_power(told(score_test, one)) for one in with_each]
     if not powers:
         return Identifiability(tuple(table), None, power, power)
     best = int(np.argmax(powers))
     return Identifiability(tuple(table), float(places[best]), power, powers[best])
 
 
-def mean_power(table: list[Told]) -> float:
+def mean_power(table: list[Detectability]) -> float:
     """Mean power over the listed physics."""
     powers = [row.power for row in table if row.mechanism.group is Group.PHYSICS]
     return float(np.mean(powers)) if powers else 0.0
 
 
-def told(screen: Screen, scores: Scores) -> list[Told]:
+def told(score_test: ScoreTest, scores: Scores) -> list[Detectability]:
     """One row for each mechanism."""
-    _, information, raw = screen.of_candidates(scores)
-    order = screen.order
+    _, information, raw = score_test.of_candidates(scores)
+    order = score_test.order
     cosine = scores.information[0][np.ix_(order, order)]
-    scales = np.array([_added(candidate.mechanism).scale for candidate in screen.candidates])
+    scales = np.array([_added(candidate.mechanism).scale for candidate in score_test.placed_mechanisms])
     informed = information[0] * scales**2 > _NO_INFORMATION
     own_or_one = np.where(informed, information[0], 1.0)
     cosine = np.where(np.outer(informed, informed), cosine / np.sqrt(np.outer(own_or_one, own_or_one)), 0.0)
-    ids = np.array([candidate.mechanism.id for candidate in screen.candidates])
+    ids = np.array([candidate.mechanism.id for candidate in score_test.placed_mechanisms])
     table = []
     for name in dict.fromkeys(ids):
         members = np.flatnonzero(ids == name)
         own = information[0, members]
         best = members[int(np.argmax(own))]
         typical = members[int(np.argsort(own)[len(own) // 2])]
-        mechanism, shape = screen.candidates[best].mechanism, screen.candidates[best].shape
+        mechanism, shape = (
+            score_test.placed_mechanisms[best].mechanism,
+            score_test.placed_mechanisms[best].shape,
+        )
         added = _added(mechanism)
         alike = {str(ids[k]) for k in np.flatnonzero(np.abs(cosine[best]) > ALIKE)} - {name}
         stretch = None if shape.s_from_m is None or shape.s_to_m is None else (shape.s_from_m, shape.s_to_m)
         kept = information[0, typical] / raw[0, typical] if informed[typical] else 0.0
         table.append(
-            Told(
+            Detectability(
                 mechanism,
                 float(np.clip(kept, 0.0, 1.0)),
                 _limit(information[0, typical], informed[typical]),
@@ -153,29 +158,29 @@ def _limit(information: float, informed: bool) -> float:
 
 
 def extra_sensors(
-    screen: Screen, points: FloatArray, population: Population
+    score_test: ScoreTest, points: FloatArray, population: Population
 ) -> tuple[FloatArray, list[Scores]]:
     """Places for one more velocity sensor, and the information with each."""
-    first, last = screen.setting.recorded_m
-    release = float(screen.problem.releases.mean.max())
+    first, last = score_test.setting.recorded_m
+    release = float(score_test.problem.releases.mean.max())
     low = max(release + 20.0, first - 0.5 * (last - first))
-    places = np.linspace(low, min(last, screen.problem.terrain.length_m - 1.0), _PLACES)
-    problem = with_sensors(screen.problem, places)
+    places = np.linspace(low, min(last, score_test.problem.terrain.length_m - 1.0), _PLACES)
+    problem = with_sensors(score_test.problem, places)
     n_new = len(places)
     setting = replace(
-        screen.setting,
+        score_test.setting,
         sensors=tuple(problem.campaign.sensor_ids),
-        velocities=(*screen.setting.velocities, *[False] * n_new),
+        velocities=(*score_test.setting.velocities, *[False] * n_new),
     )
-    wide = replace(screen, problem=problem, setting=setting)
+    wide = replace(score_test, problem=problem, setting=setting)
     rows = campaign_rows(wide.extension)
     around = wide.around(rows, points)
-    columns = np.arange(n_new) + len(screen.problem.campaign.sensors)
+    columns = np.arange(n_new) + len(score_test.problem.campaign.sensors)
     found = [
         efficient_scores(_also_reading(around, problem, int(column)), rows, population, wide.prior)
         for column in columns
     ]
-    return places, [without(scores, len(screen.directions)) for scores in found]
+    return places, [without(scores, len(score_test.directions)) for scores in found]
 
 
 def _also_reading(modes: Modes, problem: HierarchicalProblem, column: int) -> Modes:

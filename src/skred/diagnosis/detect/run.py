@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skred.diagnosis.detect.detectability import Identifiability, Told
+from skred.diagnosis.detect.detectability import Detectability, Identifiability
 from skred.diagnosis.detect.detectability import identify as look
-from skred.diagnosis.detect.score_test import Screen
+from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.diagnose import too_little
 from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.conditional_map import campaign_rows
@@ -78,10 +78,10 @@ def base_of(problem: HierarchicalProblem, law: Law) -> Base:
 
 def identifiability(base: Base) -> Identifiability:
     """What the recordings can tell around a fitted law."""
-    screen = Screen(base.problem, base.law, base.setting)
+    score_test = ScoreTest(base.problem, base.law, base.setting)
     # A direction that changes no reading has no cosine with any other: nothing looks like it.
     with np.errstate(divide="ignore", invalid="ignore"):
-        return look(screen, base.rows, base.fit.points, base.population)
+        return look(score_test, base.rows, base.fit.points, base.population)
 
 
 def identify_document(
@@ -111,7 +111,7 @@ def identify_document(
     return document
 
 
-def _row(told: Told) -> dict[str, Any]:
+def _row(told: Detectability) -> dict[str, Any]:
     mechanism = told.mechanism
     added = mechanism.added
     assert added is not None

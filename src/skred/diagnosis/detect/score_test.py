@@ -37,7 +37,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class PlacedMechanism:
     """A mechanism of one shape that could be missing."""
 
     mechanism: Mechanism
@@ -50,7 +50,7 @@ class Candidate:
         return bool({Column.LINEAR, Column.WEAKENING} & set(self.direction.columns))
 
 
-def candidates(setting: Setting, *, ties: bool = True) -> list[Candidate]:
+def placed_mechanisms(setting: Setting, *, ties: bool = True) -> list[PlacedMechanism]:
     """All that could be missing from a base law; without `ties`, one of each two that are the same term."""
     found = []
     for mechanism in mechanisms().values():
@@ -58,12 +58,12 @@ def candidates(setting: Setting, *, ties: bool = True) -> list[Candidate]:
         if added is None or not added.joins(setting.base) or (mechanism.same_term_as and not ties):
             continue
         for shape in added.shapes(setting):
-            found.append(Candidate(mechanism, shape, added.direction(setting, shape)))
+            found.append(PlacedMechanism(mechanism, shape, added.direction(setting, shape)))
     return found
 
 
 @dataclass(frozen=True, eq=False)
-class Screen:
+class ScoreTest:
     """Everything that could be missing from a law on a campaign.
 
     Attributes
@@ -83,9 +83,9 @@ class Screen:
     strengths: FloatArray = field(default_factory=lambda: np.empty(0))
 
     @cached_property
-    def candidates(self) -> list[Candidate]:
+    def placed_mechanisms(self) -> list[PlacedMechanism]:
         """The candidates, those that enter with U last."""
-        return sorted(candidates(self.setting), key=lambda candidate: candidate.with_speed)
+        return sorted(placed_mechanisms(self.setting), key=lambda candidate: candidate.with_speed)
 
     @cached_property
     def knots_m(self) -> FloatArray:
@@ -97,10 +97,10 @@ class Screen:
         """Extensions whose directions follow each other: candidates, profiles; then candidates with U."""
         basis = hats(self.setting.terrain, self.knots_m)
         profiles = [entering(self.setting, kind, row) for kind in KINDS for row in basis]
-        plain = [c.direction for c in self.candidates if not c.with_speed]
+        plain = [c.direction for c in self.placed_mechanisms if not c.with_speed]
         parts = [[*plain, *profiles]]
         by_scale: dict[float | None, list[Direction]] = {}
-        for candidate in self.candidates:
+        for candidate in self.placed_mechanisms:
             if candidate.with_speed:
                 by_scale.setdefault(candidate.direction.weakening_speed, []).append(candidate.direction)
         parts += list(by_scale.values())
@@ -118,7 +118,7 @@ class Screen:
         for part in self._parts:
             for direction in part.directions[len(self.directions) :]:
                 position[id(direction)] = len(position)
-        return np.array([position[id(candidate.direction)] for candidate in self.candidates])
+        return np.array([position[id(candidate.direction)] for candidate in self.placed_mechanisms])
 
     @cached_property
     def prior(self) -> MeanPrior:
@@ -151,7 +151,7 @@ class Screen:
         """Log Bayes factor of each candidate in the linear model, (n_groups, n_candidates)."""
         score, information, _ = self.of_candidates(scores)
         result = np.empty_like(score)
-        for k, candidate in enumerate(self.candidates):
+        for k, candidate in enumerate(self.placed_mechanisms):
             added = candidate.mechanism.added
             assert added is not None
             scale = added.scale_of(candidate.shape)
@@ -165,7 +165,7 @@ class Screen:
         """Most probable strength in the linear model of each candidate that stands out, by id and shape."""
         score, information, _ = self.of_candidates(scores)
         found = {}
-        for k, candidate in enumerate(self.candidates):
+        for k, candidate in enumerate(self.placed_mechanisms):
             added = candidate.mechanism.added
             assert added is not None
             precision = float(information[0, k]) + added.scale_of(candidate.shape) ** -2.0
@@ -175,7 +175,7 @@ class Screen:
 
     def log_factor_of_unlisted(self, scores: Scores) -> FloatArray:
         """Log Bayes factor of the unlisted force in the linear model, (n_groups,)."""
-        first = sum(not candidate.with_speed for candidate in self.candidates)
+        first = sum(not candidate.with_speed for candidate in self.placed_mechanisms)
         n = len(self.knots_m)
         factors = []
         for number, kind in enumerate(KINDS):
@@ -190,9 +190,9 @@ class Screen:
     def statistic(self, scores: Scores) -> FloatArray:
         """Log odds that anything is missing against nothing, in the linear model, (n_groups,)."""
         factors, unlisted = self.log_factors(scores), self.log_factor_of_unlisted(scores)
-        odds = prior_odds({candidate.mechanism for candidate in self.candidates})
-        ids = np.array([candidate.mechanism.id for candidate in self.candidates])
-        shapes = [candidate.shape for candidate in self.candidates]
+        odds = prior_odds({candidate.mechanism for candidate in self.placed_mechanisms})
+        ids = np.array([candidate.mechanism.id for candidate in self.placed_mechanisms])
+        shapes = [candidate.shape for candidate in self.placed_mechanisms]
         terms = [unlisted + math.log(odds["unlisted"])]
         for name in dict.fromkeys(ids):
             own = np.flatnonzero(ids == name)

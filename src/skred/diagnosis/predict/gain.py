@@ -40,8 +40,8 @@ def predictors_of(diagnosis: Diagnosis) -> tuple[Predictor, Predictor | None]:
 def _with_profile(diagnosis: Diagnosis, law: ProfileLaw) -> tuple[Predictor, Predictor]:
     """Without the force profile that was let in and with it, under one error model."""
     problem = diagnosis.problem
-    assert diagnosis.race is not None
-    term = ProfileTerm.of(law.profile, diagnosis.race.leading(UNLISTED).base.setting)
+    assert diagnosis.comparison is not None
+    term = ProfileTerm.of(law.profile, diagnosis.comparison.leading(UNLISTED).base.setting)
     common = diagnosis.law.id, law.error_model, problem.place_sd_m, problem.terrain.smoothing_m
     before, after = law.draws_before, law.draws_after
     return (

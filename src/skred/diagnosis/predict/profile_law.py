@@ -17,9 +17,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.check.bootstrap_test import Omnibus, omnibus
-from skred.diagnosis.compare.comparison import Heat
-from skred.diagnosis.detect.score_test import Screen
+from skred.diagnosis.check.bootstrap_test import BootstrapTest, bootstrap_test
+from skred.diagnosis.compare.comparison import ComparisonUnderErrors
+from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, combined, knot_by_knot, most_probable
 from skred.diagnosis.evidence.coefficient import Base, Fit, refit
@@ -56,7 +56,7 @@ class ProfileLaw:
         Fitted to all avalanches.
     error_model : str
         Id of the one under which.
-    check : Omnibus
+    check : BootstrapTest
         The omnibus check of the law with it; simulated campaigns are not given another profile, the
         recordings have had theirs fitted to them, so that its p-value is rather too high.
     before, after : HeldOut
@@ -67,7 +67,7 @@ class ProfileLaw:
 
     profile: Profile
     error_model: str
-    check: Omnibus
+    check: BootstrapTest
     before: HeldOut
     after: HeldOut
     draws_before: Draws
@@ -81,17 +81,17 @@ class _Event(NamedTuple):
     predicted: Predicted
 
 
-def profile_law(heat: Heat, most: int, seed: int) -> ProfileLaw:
-    """Let the most probable profile of a race in.
+def profile_law(under_errors: ComparisonUnderErrors, most: int, seed: int) -> ProfileLaw:
+    """Let the most probable profile of a comparison in.
 
     Parameters
     ----------
-    heat : Heat
-        The race under the error model that the unlisted force has most evidence under.
+    under_errors : ComparisonUnderErrors
+        The comparison under the error model that the unlisted force has most evidence under.
     most : int
         Campaigns simulated at most for the check.
     """
-    base, profile = heat.base, most_probable(heat.profiles)
+    base, profile = under_errors.base, most_probable(under_errors.profiles)
     events = range(len(base.rows.event))
     parts = side_by_side(lambda event: _left_out(base, profile, event, seed), events)
     before, after = (_held_out(base, [part[k] for part in parts]) for k in range(2))
@@ -101,15 +101,15 @@ def profile_law(heat: Heat, most: int, seed: int) -> ProfileLaw:
     return ProfileLaw(profile, base.problem.error_model.id, check, before, after, without, within)
 
 
-def _check(base: Base, profile: Profile, most: int, seed: int) -> Omnibus:
+def _check(base: Base, profile: Profile, most: int, seed: int) -> BootstrapTest:
     """The omnibus check of the law with the profile in."""
-    directions, strengths = _let_in(base, profile)
-    screen = Screen(base.problem, base.law, base.setting, directions, strengths)
+    directions, strengths = _added_terms(base, profile)
+    score_test = ScoreTest(base.problem, base.law, base.setting, directions, strengths)
     rng = np.random.default_rng([seed, 51])
     extension = extended(base.problem, base.law, directions)
     draws = _draws(base, extension, profile.fit, strengths, np.empty((most, 0)), rng)
     start = profile.fit.found.population(len(base.law.mechanisms)), profile.fit.points
-    return omnibus(screen, base.rows, start, (draws.means, draws.factors), seed + 1, most)
+    return bootstrap_test(score_test, base.rows, start, (draws.means, draws.factors), seed + 1, most)
 
 
 def _left_out(base: Base, profile: Profile, event: int, seed: int) -> tuple[_Event, _Event]:
@@ -151,12 +151,12 @@ def _with(base: Base, profile: Profile, rng: np.random.Generator) -> tuple[Exten
     wide = knot_by_knot(base, profile.kind, profile.knots_m)
     own = np.tile(base.strengths, (_DRAWS, 1))
     values = rng.multivariate_normal(profile.mean, profile.covariance, _DRAWS)
-    directions, middle = _let_in(base, profile)
+    directions, middle = _added_terms(base, profile)
     narrow = extended(base.problem, base.law, directions)
     return wide, _draws(base, narrow, profile.fit, middle, np.column_stack([own, values]), rng)
 
 
-def _let_in(base: Base, profile: Profile) -> tuple[tuple[Direction, ...], FloatArray]:
+def _added_terms(base: Base, profile: Profile) -> tuple[tuple[Direction, ...], FloatArray]:
     """What is added with a profile's mean as one direction, and its strengths: quicker than a knot each."""
     direction = combined(base.setting, profile.kind, profile.knots_m, profile.mean)
     return (*base.directions, direction), np.append(base.strengths, 1.0)
@@ -197,7 +197,7 @@ def _event(base: Base, extension: Extension, draws: Draws, event: int, rng: np.r
     densities = log_densities(extension, rows, *draws, seed)[:, 0]
     means, factors, strengths = (np.resize(part, (_FRONTS, *part.shape[1:])) for part in draws)
     predicted = predict_event(extension, event, means, factors, strengths, rng)
-    # NumPy's, not scipy's: see `race` on threads.
+    # NumPy's, not scipy's: see `comparison` on threads.
     return _Event(float(np.logaddexp.reduce(densities)) - math.log(len(densities)), predicted)
 
 

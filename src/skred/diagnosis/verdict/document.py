@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from skred.diagnosis.augment.coefficient import strength_of
-from skred.diagnosis.compare.candidate import Entrant
-from skred.diagnosis.compare.comparison import Race
+from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.compare.decision import alarmed
-from skred.diagnosis.detect.detectability import Told
+from skred.diagnosis.detect.detectability import Detectability
 from skred.diagnosis.diagnose import Diagnosis
 from skred.diagnosis.evidence.covariates import standard_of
 from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER
@@ -26,7 +26,7 @@ _NO_LIMIT = 20.0
 
 def verdict(found: Diagnosis) -> dict[str, Any]:
     """The verdict of a diagnosis, as `verdict.json` holds it."""
-    entrant = found.steps[0].entrant if found.steps else None
+    candidate = found.steps[0].candidate if found.steps else None
     names = found.decision.names if found.steps else ()
     document = {
         "format": 1,
@@ -35,13 +35,13 @@ def verdict(found: Diagnosis) -> dict[str, Any]:
         "verdict": found.decision.verdict,
         "mechanism": names[0] if names else None,
         "mechanisms": [_mechanism(found, number) for number in range(len(found.steps))],
-        "probability": found.race.probability if found.race is not None else {},
+        "probability": found.comparison.probability if found.comparison is not None else {},
         "indistinguishable": list(names[1:]),
-        "location": _location(found, entrant),
+        "location": _location(found, candidate),
         "strength": _strength(found, 0) if found.steps else None,
-        "covariate": entrant.best.shape.covariate if entrant is not None else None,
-        "sensor": entrant.best.shape.sensor if entrant is not None else None,
-        "equation": equation_of(entrant.mechanism, entrant.best.shape) if entrant is not None else None,
+        "covariate": candidate.best.shape.covariate if candidate is not None else None,
+        "sensor": candidate.best.shape.sensor if candidate is not None else None,
+        "equation": equation_of(candidate.mechanism, candidate.best.shape) if candidate is not None else None,
         "evidence": _evidence(found),
         "held_out": _held_out(found),
         "detection_limits": _detection_limits(found),
@@ -53,9 +53,9 @@ def verdict(found: Diagnosis) -> dict[str, Any]:
     return document | _more(found)
 
 
-def _location(found: Diagnosis, entrant: Entrant | None) -> dict[str, float] | None:
-    if entrant is not None:
-        stretch = entrant.stretch()
+def _location(found: Diagnosis, candidate: Candidate | None) -> dict[str, float] | None:
+    if candidate is not None:
+        stretch = candidate.stretch()
     elif found.decision.verdict == "unexplained" and found.location is not None:
         stretch = found.location.stretch_m
     else:
@@ -73,20 +73,20 @@ def _strength(found: Diagnosis, number: int) -> dict[str, Any]:
 def _mechanism(found: Diagnosis, number: int) -> dict[str, Any]:
     """One mechanism let in, its strength as the last calibration has it."""
     step = found.steps[number]
-    entrant = step.entrant
-    stretch = entrant.stretch()
-    shape = entrant.best.shape
+    candidate = step.candidate
+    stretch = candidate.stretch()
+    shape = candidate.best.shape
     return {
-        "id": entrant.mechanism.id,
+        "id": candidate.mechanism.id,
         "strength": _strength(found, number),
         "location": None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]},
-        "equation": equation_of(entrant.mechanism, shape),
+        "equation": equation_of(candidate.mechanism, shape),
         "covariate": shape.covariate,
         "standard": _standard(found, shape.covariate),
         "sensor": shape.sensor,
         "constants": dict(shape.constants),
         "tied_with": list(step.tied),
-        "log_bayes_factor": step.race.log_factors[entrant.mechanism.id],
+        "log_bayes_factor": step.comparison.log_factors[candidate.mechanism.id],
     }
 
 
@@ -99,10 +99,10 @@ def _standard(found: Diagnosis, covariate: str | None) -> dict[str, Any] | None:
 def _evidence(found: Diagnosis) -> dict[str, float | None]:
     p_value = found.check.p_value if found.check is not None else None
     factor = None
-    if found.race is not None and found.steps:
-        factor = found.race.log_factors[found.steps[0].entrant.mechanism.id]
-    elif found.race is not None:
-        factor = found.race.log_odds
+    if found.comparison is not None and found.steps:
+        factor = found.comparison.log_factors[found.steps[0].candidate.mechanism.id]
+    elif found.comparison is not None:
+        factor = found.comparison.log_odds
     difference, se = None, None
     if found.before is not None and found.after is not None:
         difference, se = paired(found.after, found.before)
@@ -132,7 +132,7 @@ def _detection_limits(found: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _scale(row: Told) -> float:
+def _scale(row: Detectability) -> float:
     assert row.mechanism.added is not None
     return row.mechanism.added.scale
 
@@ -155,32 +155,32 @@ def _diagnostics(found: Diagnosis) -> dict[str, float | int | None]:
     }
 
 
-def _candidate(race: Race, name: str) -> dict[str, Any]:
-    """One mechanism in the race, where and how strong it is if it is there."""
-    entrant = race.leading(name).entrants[name]
-    mean, sd = entrant.strength()
-    stretch, shape = entrant.stretch(), entrant.best.shape
+def _candidate(comparison: Comparison, name: str) -> dict[str, Any]:
+    """One mechanism in the comparison, where and how strong it is if it is there."""
+    candidate = comparison.leading(name).candidates[name]
+    mean, sd = candidate.strength()
+    stretch, shape = candidate.stretch(), candidate.best.shape
     return {
         "id": name,
-        "log_bayes_factor": race.log_factors[name],
+        "log_bayes_factor": comparison.log_factors[name],
         "strength": {
-            "parameter": entrant.mechanism.strength.name,
-            "unit": entrant.mechanism.strength.unit,
+            "parameter": candidate.mechanism.strength.name,
+            "unit": candidate.mechanism.strength.unit,
             "mean": mean,
             "sd": sd,
         },
         "location": None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]},
         "covariate": shape.covariate,
         "sensor": shape.sensor,
-        "estimators_differ_by": entrant.disagreement,
+        "estimators_differ_by": candidate.disagreement,
     }
 
 
 def _left(found: Diagnosis) -> dict[str, Any] | None:
-    """What a race of the augmented law leaned to and was not let in; None where there was no such race."""
-    if found.left.race is None:
+    """What a comparison of the augmented law leaned to and was not added; None where there was none."""
+    if found.left.comparison is None:
         return None
-    probability = found.left.race.probability
+    probability = found.left.comparison.probability
     first = max(probability, key=lambda name: probability[name])
     return {
         "most_probable": first,
@@ -209,12 +209,14 @@ def _profile(law: ProfileLaw) -> dict[str, Any]:
 def _more(found: Diagnosis) -> dict[str, Any]:
     """Keys beyond the format's."""
     more: dict[str, Any] = {"reason": found.cannot or None, "seconds": found.seconds}
-    if found.race is not None and found.check is not None:
-        more["alarm"] = alarmed(found.race.probability, found.check.p_value)
-        more["log_bayes_factors"] = found.race.log_factors
+    if found.comparison is not None and found.check is not None:
+        more["alarm"] = alarmed(found.comparison.probability, found.check.p_value)
+        more["log_bayes_factors"] = found.comparison.log_factors
         more["calibration"] = {"version": CALIBRATION_VERSION, "power": POWER}
-        more["error_models"] = [heat.error_model for heat in found.race.heats]
-        more["candidates"] = [_candidate(found.race, name) for name in found.race.heats[0].entrants]
+        more["error_models"] = [under_errors.error_model for under_errors in found.comparison.under_each]
+        more["candidates"] = [
+            _candidate(found.comparison, name) for name in found.comparison.under_each[0].candidates
+        ]
     if found.steps:
         problem: Any = found.steps[-1].calibration.problem
         more["error_model"] = problem.error_model.id

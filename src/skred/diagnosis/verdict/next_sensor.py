@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from skred.diagnosis.compare.candidate import Entrant
+from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.detect.detectability import with_sensors
 from skred.diagnosis.diagnose import Diagnosis, Step
 from skred.diagnosis.evidence.extension import extended
@@ -19,37 +19,37 @@ def next_sensor(found: Diagnosis) -> dict[str, Any] | None:
     if found.table is None:
         return None
     if found.steps and (rival := _rival(found.steps[0])) is not None:
-        named = found.steps[0].entrant
+        named = found.steps[0].candidate
         return _sensor(_splitting(found, named, rival), [named.mechanism.id, rival.mechanism.id])
     if found.decision.verdict == "cannot_tell" and found.table.sensor_m is not None:
         return _sensor(found.table.sensor_m, [])
     return None
 
 
-def _rival(step: Step) -> Entrant | None:
+def _rival(step: Step) -> Candidate | None:
     """The first of those tied that a speed could split off: listed, and another term."""
-    raced = {name for heat in step.race.heats for name in heat.entrants}
-    rivals = [step.race.leading(name).entrants[name] for name in step.tied if name in raced]
-    return next((one for one in rivals if not one.mechanism.is_same_term(step.entrant.mechanism)), None)
+    raced = {name for under_errors in step.comparison.under_each for name in under_errors.candidates}
+    rivals = [step.comparison.leading(name).candidates[name] for name in step.tied if name in raced]
+    return next((one for one in rivals if not one.mechanism.is_same_term(step.candidate.mechanism)), None)
 
 
 def _sensor(place: float, splits: list[str]) -> dict[str, Any]:
     return {"quantity": "front_velocity", "s_from_m": place, "s_to_m": place, "splits": splits}
 
 
-def _splitting(found: Diagnosis, first: Entrant, second: Entrant) -> float:
+def _splitting(found: Diagnosis, first: Candidate, second: Candidate) -> float:
     """Where two fitted candidates differ most in what one more sensor would read, in its standard deviations.
 
     Each with the events' modes and the strength that fit the recordings best under it.
     """
-    low, high = found.steps[0].race.heats[0].base.setting.recorded_m
+    low, high = found.steps[0].comparison.under_each[0].base.setting.recorded_m
     release = float(found.problem.releases.mean.max()) + 20.0
     places = np.linspace(max(release, low - 0.5 * (high - low)), high, _PLACES)
     problem = with_sensors(found.problem, places)
     columns = np.arange(_PLACES) + found.problem.campaign.n_sensors
     speeds = []
-    for entrant in (first, second):
-        curve = entrant.best
+    for candidate in (first, second):
+        curve = candidate.best
         at = int(np.argmax(curve.log_evidence))
         direction = curve.direction
         if direction.log_readings is not None:

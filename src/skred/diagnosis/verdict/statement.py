@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from skred.diagnosis.check.bootstrap_test import Omnibus
+from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.compare.decision import NOTHING_AT_MOST, Decision
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.diagnose import Diagnosis, Step
@@ -105,7 +105,7 @@ def _rival(document: dict[str, Any]) -> str:
     return f"Not excluded: {_title(name)} ({_share(others[name])})."
 
 
-def _still_fired(check: Omnibus) -> str:
+def _still_fired(check: BootstrapTest) -> str:
     """That the law fails the check also with what was let in, where it does."""
     if not check.fired:
         return ""
@@ -127,14 +127,14 @@ def _opposed(constants: dict[str, float]) -> str:
 
 
 def _left(document: dict[str, Any]) -> str:
-    """What a last race leaned to."""
+    """What a last comparison leaned to."""
     left = document["left"]
     if left is None or left["most_probable"] == NOTHING:
         return ""
     name = left["most_probable"]
     why = f" ({left['reason']})" if left["reason"] else ""
     return (
-        f"Another race, of the augmented law, leans to {_title(name)} ({_share(left['probability'])};"
+        f"Another comparison, of the augmented law, leans to {_title(name)} ({_share(left['probability'])};"
         f" nothing more: {_share(left['nothing'])}); it was not let in{why}."
     )
 
@@ -200,8 +200,8 @@ def _unlisted_way(location: Location | None) -> str:
 
 def _closest(found: Diagnosis, document: dict[str, Any]) -> str:
     """The listed candidate of the highest evidence, beside the unlisted force."""
-    assert found.race is not None
-    factors = found.race.log_factors
+    assert found.comparison is not None
+    factors = found.comparison.log_factors
     listed = {name: value for name, value in factors.items() if name not in (NOTHING, UNLISTED)}
     name = max(listed, key=lambda one: listed[one])
     return (
@@ -212,7 +212,7 @@ def _closest(found: Diagnosis, document: dict[str, Any]) -> str:
 
 
 def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
-    """What the race would say alone, where it says something and the check does not."""
+    """What the comparison would say alone, where it says something and the check does not."""
     assert found.check is not None
     probability = document["probability"]
     if probability[NOTHING] >= NOTHING_AT_MOST:
@@ -226,7 +226,7 @@ def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
 
 
 def _odd(found: Diagnosis) -> str:
-    """What the check would say alone, where it says something and the race does not."""
+    """What the check would say alone, where it says something and the comparison does not."""
     assert found.check is not None
     if not found.check.fired:
         return ""

@@ -45,7 +45,7 @@ def equations(found: Diagnosis) -> dict[str, Any]:
     """The base law's equation, with each new term, and what is read instead for an instrument's fault."""
     terms, readings = [], []
     for step in found.steps:
-        mechanism, shape = step.entrant.mechanism, step.entrant.best.shape
+        mechanism, shape = step.candidate.mechanism, step.candidate.best.shape
         if mechanism.group is Group.INSTRUMENT:
             readings.append(formula(mechanism.equation.partition(": ")[2] or mechanism.equation))
         else:
@@ -80,7 +80,7 @@ def symbol_rows(found: Diagnosis) -> list[dict[str, Any]]:
         rows += _added_rows(found, step, number)
     if found.profile is not None:
         rows += _profile_rows(found.profile.profile)
-    text = found.law.equation + "".join(step.entrant.mechanism.equation for step in found.steps)
+    text = found.law.equation + "".join(step.candidate.mechanism.equation for step in found.steps)
     present = set(re.findall(r"[A-Za-z]+", text)) | {"s", "U"}
     return rows + [_row(*one) for one in _SIMPLE if one[0] in present]
 
@@ -96,8 +96,8 @@ def _row(symbol: str, unit: str, meaning: str, reference: str = "", doi: str = "
 
 
 def _added_rows(found: Diagnosis, step: Step, number: int) -> list[dict[str, Any]]:
-    entrant = step.entrant
-    mechanism, shape = entrant.mechanism, entrant.best.shape
+    candidate = step.candidate
+    mechanism, shape = candidate.mechanism, candidate.best.shape
     from skred.diagnosis.augment.coefficient import strength_of
 
     mean, sd = strength_of(found.steps, number)

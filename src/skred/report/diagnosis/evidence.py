@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from skred.diagnosis.check.bootstrap_test import Omnibus
-    from skred.diagnosis.compare.comparison import Race
+    from skred.diagnosis.check.bootstrap_test import BootstrapTest
+    from skred.diagnosis.compare.comparison import Comparison
     from skred.diagnosis.diagnose import Diagnosis, Step
     from skred.diagnosis.evidence.coefficient import Curve
 
@@ -62,11 +62,11 @@ def check_figure(found: Diagnosis) -> Figure:
 
 
 def _with(found: Diagnosis, number: int) -> str:
-    names = [step.entrant.mechanism.id for step in found.steps[: number + 1]]
+    names = [step.candidate.mechanism.id for step in found.steps[: number + 1]]
     return " + ".join([found.law.id, *names])
 
 
-def _histogram(axes: Axes, check: Omnibus) -> None:
+def _histogram(axes: Axes, check: BootstrapTest) -> None:
     values = check.simulated[np.isfinite(check.simulated)]
     if len(values) == 0:
         values = np.array([0.0])
@@ -87,9 +87,9 @@ def _histogram(axes: Axes, check: Omnibus) -> None:
 
 
 @styled
-def probabilities_figure(found: Diagnosis, race: Race, number: int) -> Figure:
+def probabilities_figure(found: Diagnosis, comparison: Comparison, number: int) -> Figure:
     """Probability of each candidate, with its prior probability."""
-    shares = race.probability
+    shares = comparison.probability
     names = sorted(shares, key=lambda name: shares[name])
     which = ", given the first finding" if number else ""
     title = f"What is missing{which}: probability of each candidate\n{figure_text(found.law.title, 80)}"
@@ -98,7 +98,7 @@ def probabilities_figure(found: Diagnosis, race: Race, number: int) -> Figure:
     rows = np.arange(len(names))
     values = np.array([shares[name] for name in names])
     axes.barh(rows, values, height=0.66, color=[colour_of(name) for name in names])
-    prior = [race.odds.get(name, math.nan) for name in names]
+    prior = [comparison.odds.get(name, math.nan) for name in names]
     for row, (value, tick) in enumerate(zip(values, prior, strict=True)):
         text = "less than 0.001" if value < 0.001 else "more than 0.999" if value > 0.999 else f"{value:.3f}"
         end = max(value, tick if abs(tick - value) < 0.2 else 0.0) + 0.012
@@ -117,24 +117,24 @@ def probabilities_figure(found: Diagnosis, race: Race, number: int) -> Figure:
 
 
 @styled
-def strength_figure(found: Diagnosis, race: Race, number: int) -> Figure:
+def strength_figure(found: Diagnosis, comparison: Comparison, number: int) -> Figure:
     """Evidence along the strength of the leading candidate, its posterior, and the prior's part in it."""
     step = found.steps[number] if number < len(found.steps) else None
-    entrant = step.entrant if step is not None else leading(race)
-    curve, name = entrant.best, entrant.mechanism.id
+    candidate = step.candidate if step is not None else leading(comparison)
+    curve, name = candidate.best, candidate.mechanism.id
     what = "let in" if step is not None else "came closest, not let in"
     title = f"{figure_text(short_title(name), 60)} ({what}): evidence along its strength"
     figure = new_figure(5.6, f"{title}\n{figure_text(_shape_text(curve), 90)}")
     panels = figure.subplot_mosaic([["evidence", "density"], ["scale", "scale"]])
     _evidence(panels["evidence"], curve)
     _densities(panels["density"], curve, found, step, number)
-    strength = entrant.mechanism.strength
+    strength = candidate.mechanism.strength
     label = f"{name_text(strength.name)} {_symbol(strength.symbol)}{bracketed(strength.unit)}"
     for key in ("evidence", "density"):
         panels[key].set_xlabel(label)
         panels[key].locator_params(axis="x", nbins=6)
         panels[key].ticklabel_format(axis="x", style="sci", scilimits=(-3, 4), useMathText=True)
-    _scales(panels["scale"], race, name)
+    _scales(panels["scale"], comparison, name)
     return figure
 
 
@@ -201,7 +201,7 @@ def _densities(axes: Axes, curve: Curve, found: Diagnosis, step: Step | None, nu
             linewidth=0,
             label="calibrated with all else",
         )
-    axes.plot(strengths, posterior, color=AFTER, linewidth=1.4, label="from the race, if it is there")
+    axes.plot(strengths, posterior, color=AFTER, linewidth=1.4, label="from the comparison, if it is there")
     axes.plot(
         strengths,
         np.exp(_log_prior(curve, strengths)),
@@ -216,17 +216,17 @@ def _densities(axes: Axes, curve: Curve, found: Diagnosis, step: Step | None, nu
     axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1, borderaxespad=0.1, fontsize=7)
 
 
-def _scales(axes: Axes, race: Race, name: str) -> None:
+def _scales(axes: Axes, comparison: Comparison, name: str) -> None:
     """Log Bayes factor against the prior's scale, of the leading candidates."""
-    shares = race.probability
+    shares = comparison.probability
     listed = sorted((n for n in shares if n not in (NOTHING, UNLISTED)), key=lambda n: -shares[n])
     names = [name, *(n for n in listed if n != name and shares[n] > 0.01)][:_MOST_LINES]
     for other, colour in zip(names, _LINES, strict=False):
-        entrant = leading(race, other)
-        added = entrant.mechanism.added
+        candidate = leading(comparison, other)
+        added = candidate.mechanism.added
         assert added is not None
-        values = [factor_at(entrant, relative) for relative in _RELATIVE]
-        unit = bracketed(entrant.mechanism.strength.unit).strip().strip("[]")
+        values = [factor_at(candidate, relative) for relative in _RELATIVE]
+        unit = bracketed(candidate.mechanism.strength.unit).strip().strip("[]")
         label = f"{figure_text(short_title(other), 44)} (scale {added.scale:g}{' ' + unit if unit else ''})"
         axes.plot(
             _RELATIVE, values, color=colour, linewidth=2.0 if other == name else 1.1, marker="o",

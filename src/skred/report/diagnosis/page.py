@@ -21,9 +21,9 @@ from skred.report.comparison.html import environment, picture
 from skred.report.diagnosis import rows, unseen
 from skred.report.diagnosis.equation import equations, parameter_rows, symbol_rows
 from skred.report.diagnosis.words import (
+    comparisons,
     leading_name,
     profile_of,
-    races,
     short_title,
     stretch_of,
     verdict_words,
@@ -74,11 +74,11 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
             verdict=verdict_words(found),
             facts=rows.recorded_facts(found),
             sensors=rows.sensor_rows(found),
-            told=rows.told_rows(found),
+            detectability=rows.detectability_rows(found),
             work=rows.work_rows(found),
             profile=profile_of(found),
             stretch=stretch_of(found),
-            races=[_race(found, number, race) for number, race in enumerate(races(found))],
+            comparisons=[_comparison(found, number, one) for number, one in enumerate(comparisons(found))],
             equations=equations(found),
             symbols=symbol_rows(found),
             parameters=parameter_rows(found),
@@ -109,19 +109,19 @@ def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) 
     )  # fmt: skip
 
 
-def _race(found: Diagnosis, number: int, race: Any) -> dict[str, Any]:
-    """A race, with the ending of its figures' names."""
+def _comparison(found: Diagnosis, number: int, comparison: Any) -> dict[str, Any]:
+    """A comparison, with the ending of its figures' names."""
     step = found.steps[number] if number < len(found.steps) else None
-    winner = step.entrant.mechanism if step is not None else None
+    winner = step.candidate.mechanism if step is not None else None
     ties = step.tied if step is not None else ()
     listed = [mechanisms()[name] for name in ties if name != UNLISTED]
     same = [one.id for one in listed if winner is not None and one.is_same_term(winner)]
     return {
         "ending": f"_{number + 1}" if number else "",
-        "rows": rows.race_rows(race),
-        "errors": rows.error_rows(race),
+        "rows": rows.comparison_rows(comparison),
+        "errors": rows.error_rows(comparison),
         "winner": winner,
-        "leading": leading_name(race),
+        "leading": leading_name(comparison),
         "ties": _in_words(ties),
         "same": same,
     }
@@ -142,10 +142,10 @@ def _too_few(found: Diagnosis) -> bool:
 
 
 def _dropped(found: Diagnosis) -> tuple[str, ...]:
-    """What the race would have named, had its own calibration passed the gate."""
-    if found.race is None or found.check is None or found.table is None or found.steps:
+    """What the comparison would have named, had its own calibration passed the gate."""
+    if found.comparison is None or found.check is None or found.table is None or found.steps:
         return ()
-    return _in_words(decide(found.race.probability, found.check.p_value, found.table.can_tell).names)
+    return _in_words(decide(found.comparison.probability, found.check.p_value, found.table.can_tell).names)
 
 
 def _in_words(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from skred.diagnosis.compare.candidate import Entrant
-    from skred.diagnosis.compare.comparison import Race
+    from skred.diagnosis.compare.candidate import Candidate
+    from skred.diagnosis.compare.comparison import Comparison
     from skred.diagnosis.compare.location import Location
     from skred.diagnosis.diagnose import Diagnosis
     from skred.inference.hierarchical.problem import HierarchicalProblem
@@ -92,7 +92,7 @@ def _marks(axes: Axes, found: Diagnosis) -> None:
         label = f"what is missing: s = {stretch[0]:.0f} to {stretch[1]:.0f} m"
         axes.axvspan(*stretch, color=MISMATCH, alpha=0.18, linewidth=0, label=label, zorder=0)
     for step in found.steps[1:]:
-        second = step.entrant.stretch()
+        second = step.candidate.stretch()
         if second is not None:
             label = f"the second: s = {second[0]:.0f} to {second[1]:.0f} m"
             axes.axvspan(*second, color="#E69F00", alpha=0.25, linewidth=0, label=label, zorder=0)
@@ -145,23 +145,27 @@ def _covered(axes: Axes, profile: Location) -> None:
     axes.set_ylabel("avalanches that\ncame by [%]")
 
 
-def local_names(race: Race) -> list[str]:
-    """Mechanisms of one place, or of one sensor, in a race."""
-    return [name for name in _LOCAL if any(name in heat.entrants for heat in race.heats)]
+def local_names(comparison: Comparison) -> list[str]:
+    """Mechanisms of one place, or of one sensor, in a comparison."""
+    return [
+        name
+        for name in _LOCAL
+        if any(name in under_errors.candidates for under_errors in comparison.under_each)
+    ]
 
 
 @styled
-def places_figure(found: Diagnosis, race: Race, number: int) -> Figure:
+def places_figure(found: Diagnosis, comparison: Comparison, number: int) -> Figure:
     """Log Bayes factor of each local mechanism at each place."""
-    names = local_names(race)
+    names = local_names(comparison)
     which = " given the first finding" if number else ""
     title = f"Evidence against place{which}\nEach bar or point: one place, for all strengths together"
     figure = new_figure(1.2 + 1.35 * len(names), title)
     panels = figure.subplots(len(names), 1, sharex=True, squeeze=False).ravel()
-    window = _window(found, None, [leading(race, name).best.shape for name in names])
+    window = _window(found, None, [leading(comparison, name).best.shape for name in names])
     middles = {sensor.id: sensor for _, sensor, _ in placed_sensors(found.problem)}
     for axes, name in zip(panels, names, strict=True):
-        _at_places(axes, leading(race, name), middles)
+        _at_places(axes, leading(comparison, name), middles)
         axes.set_title(figure_text(short_title(name), 70), fontsize=8.5)
         for _, _, middle in placed_sensors(found.problem):
             axes.axvline(middle, ymin=0.94, color=INK, linewidth=0.8, label="sensors of speed")
@@ -181,13 +185,13 @@ def places_figure(found: Diagnosis, race: Race, number: int) -> Figure:
     return figure
 
 
-def _at_places(axes: Axes, entrant: Entrant, sensors: dict[str, Any]) -> None:
-    colour = colour_of(entrant.mechanism.id)
-    factors = np.array([one.log_bayes_factor for one in entrant.curves])
+def _at_places(axes: Axes, candidate: Candidate, sensors: dict[str, Any]) -> None:
+    colour = colour_of(candidate.mechanism.id)
+    factors = np.array([one.log_bayes_factor for one in candidate.curves])
     top = max(float(factors.max()), 0.0)
     floor = min(top, max(float(factors.min()), -3.0, top - _DEPTH)) - 1.0
-    for one, factor in zip(entrant.curves, np.maximum(factors, floor), strict=True):
-        shape, best = one.shape, one is entrant.best
+    for one, factor in zip(candidate.curves, np.maximum(factors, floor), strict=True):
+        shape, best = one.shape, one is candidate.best
         shade = MISMATCH if best else tint(colour, 0.55)
         ends = (shape.s_from_m, shape.s_to_m)
         if shape.sensor is not None and shape.sensor in sensors:
@@ -200,7 +204,7 @@ def _at_places(axes: Axes, entrant: Entrant, sensors: dict[str, Any]) -> None:
         axes.hlines(
             factor, first, last, color=shade, linewidth=2.6 if best else 1.2, zorder=order, label=label
         )
-        if shape.sensor is not None or entrant.mechanism.id == "obstacle":
+        if shape.sensor is not None or candidate.mechanism.id == "obstacle":
             axes.plot(0.5 * (first + last), factor, marker="o", markersize=4, color=shade, zorder=order)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.set_ylim(floor - 0.5, top + max(1.0, 0.12 * (top - floor)))

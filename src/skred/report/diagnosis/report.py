@@ -11,7 +11,7 @@ from skred.report.diagnosis.evidence import check_figure, probabilities_figure, 
 from skred.report.diagnosis.held_out import left_out_figure, scores_figure
 from skred.report.diagnosis.places import local_names, places_figure, where_figure
 from skred.report.diagnosis.terminal import diagnosis_table
-from skred.report.diagnosis.words import races
+from skred.report.diagnosis.words import comparisons
 from skred.report.shared import document as doc
 from skred.report.shared.style import write_png
 
@@ -38,18 +38,18 @@ def save_diagnosis_figures(found: Diagnosis, folder: Path) -> dict[str, Path]:
     Returns
     -------
     dict of str to Path
-        Those of `FIGURES` that apply; with _2 those of a second race.
+        Those of `FIGURES` that apply; with _2 those of a second comparison.
     """
     makers: dict[str, Callable[[], Figure]] = {}
     if found.check is not None:
         makers["check"] = partial(check_figure, found)
     makers["where"] = partial(where_figure, found)
-    for number, race in enumerate(races(found)):
+    for number, comparison in enumerate(comparisons(found)):
         ending = f"_{number + 1}" if number else ""
-        makers[f"probabilities{ending}"] = partial(probabilities_figure, found, race, number)
-        makers[f"strength{ending}"] = partial(strength_figure, found, race, number)
-        if local_names(race):
-            makers[f"places{ending}"] = partial(places_figure, found, race, number)
+        makers[f"probabilities{ending}"] = partial(probabilities_figure, found, comparison, number)
+        makers[f"strength{ending}"] = partial(strength_figure, found, comparison, number)
+        if local_names(comparison):
+            makers[f"places{ending}"] = partial(places_figure, found, comparison, number)
     if found.before is not None:
         makers["left_out"] = partial(left_out_figure, found)
     if found.before is not None and found.after is not None:

@@ -18,7 +18,7 @@ from skred.report.shared.labels import name_text, unit_text
 from skred.report.shared.numbers import decimals_for, fixed, is_number, rounded, share, whole
 
 if TYPE_CHECKING:
-    from skred.diagnosis.compare.comparison import Race
+    from skred.diagnosis.compare.comparison import Comparison
     from skred.diagnosis.diagnose import Diagnosis
     from skred.physics.mechanisms.spec import Mechanism
 
@@ -77,7 +77,7 @@ def recorded_facts(found: Diagnosis) -> dict[str, Any]:
     }
 
 
-def told_rows(found: Diagnosis) -> Rows:
+def detectability_rows(found: Diagnosis) -> Rows:
     """What the recordings can tell of each mechanism."""
     rows = []
     for row in found.table.rows if found.table is not None else ():
@@ -148,13 +148,13 @@ def work_rows(found: Diagnosis) -> Rows:
     return rows
 
 
-def race_rows(race: Race) -> Rows:
+def comparison_rows(comparison: Comparison) -> Rows:
     """Every candidate, most probable first."""
-    shares, factors = race.probability, race.log_factors
+    shares, factors = comparison.probability, comparison.log_factors
     rows = []
     for name in sorted(shares, key=lambda name: -shares[name]):
-        entrants = [heat.entrants.get(name) for heat in race.heats]
-        lead = race.leading(name).entrants.get(name) if name in factors else None
+        candidates = [under_errors.candidates.get(name) for under_errors in comparison.under_each]
+        lead = comparison.leading(name).candidates.get(name) if name in factors else None
         stretch = lead.stretch() if lead is not None else None
         shape = lead.best.shape if lead is not None else None
         mean, sd = lead.strength() if lead is not None else (None, None)
@@ -164,14 +164,16 @@ def race_rows(race: Race) -> Rows:
                 "id": name,
                 "title": title_of(name),
                 "kind": kind_of(name),
-                "prior": share(race.odds.get(name)),
+                "prior": share(comparison.odds.get(name)),
                 "factor": fixed(factors.get(name), 1),
-                "by_model": [fixed(heat.log_factors.get(name), 1) for heat in race.heats],
+                "by_model": [
+                    fixed(under_errors.log_factors.get(name), 1) for under_errors in comparison.under_each
+                ],
                 "probability": share(shares[name]),
                 "strength": "-" if lead is None else f"{rounded(mean, decimals)} ± {rounded(sd, decimals)}",
                 "unit": "" if lead is None else unit_text(lead.mechanism.strength.unit),
                 "where": _where(stretch, shape),
-                "raced": any(entrants) or name == NOTHING,
+                "raced": any(candidates) or name == NOTHING,
             }
         )
     return rows
@@ -185,17 +187,17 @@ def _where(stretch: tuple[float, float] | None, shape: Any) -> str:
     return "-"
 
 
-def error_rows(race: Race) -> Rows:
+def error_rows(comparison: Comparison) -> Rows:
     """The error models that were raced."""
-    most = max(race.base_evidence.values())
+    most = max(comparison.base_evidence.values())
     return [
         {
-            "id": heat.error_model,
-            "title": ERROR_MODELS[heat.error_model].title,
-            "prior": share(ERROR_SHARES[heat.error_model]),
-            "evidence": fixed(race.base_evidence[heat.error_model] - most, 1),
+            "id": under_errors.error_model,
+            "title": ERROR_MODELS[under_errors.error_model].title,
+            "prior": share(ERROR_SHARES[under_errors.error_model]),
+            "evidence": fixed(comparison.base_evidence[under_errors.error_model] - most, 1),
         }
-        for heat in race.heats
+        for under_errors in comparison.under_each
     ]
 
 
@@ -231,7 +233,7 @@ def trust_rows(found: Diagnosis) -> Rows:
     calibrations = [(found.law.id, found.calibration)]
     names = found.law.id
     for step in found.steps:
-        names += f" + {step.entrant.mechanism.id}"
+        names += f" + {step.candidate.mechanism.id}"
         calibrations.append((names, step.calibration))
     held = {0: found.before, len(found.steps): found.after or found.before}
     rows = []
@@ -265,8 +267,8 @@ def prior_rows(found: Diagnosis) -> Rows:
         kind = "median across avalanches, half-normal"
         rows.append(_prior(mechanism, kind, strength.prior_scale, strength.prior_reason, "base law"))
     raced: list[Mechanism] = []
-    if found.race is not None:
-        raced = [entrant.mechanism for entrant in found.race.heats[0].entrants.values()]
+    if found.comparison is not None:
+        raced = [candidate.mechanism for candidate in found.comparison.under_each[0].candidates.values()]
     for mechanism in raced:
         added = mechanism.added
         if added is not None:

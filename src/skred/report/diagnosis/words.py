@@ -15,8 +15,8 @@ from skred.report.shared.labels import unit_text
 from skred.report.shared.style import GREY
 
 if TYPE_CHECKING:
-    from skred.diagnosis.compare.candidate import Entrant
-    from skred.diagnosis.compare.comparison import Race
+    from skred.diagnosis.compare.candidate import Candidate
+    from skred.diagnosis.compare.comparison import Comparison
     from skred.diagnosis.compare.location import Location
     from skred.diagnosis.diagnose import Diagnosis
 
@@ -86,45 +86,47 @@ def bracketed(unit: str) -> str:
     return "" if unit == "1" else f" [{unit_text(unit)}]"
 
 
-def leading_name(race: Race) -> str:
+def leading_name(comparison: Comparison) -> str:
     """The most probable listed id."""
-    shares = {name: share for name, share in race.probability.items() if name not in (NOTHING, UNLISTED)}
+    shares = {
+        name: share for name, share in comparison.probability.items() if name not in (NOTHING, UNLISTED)
+    }
     return max(shares, key=lambda name: shares[name])
 
 
-def leading(race: Race, name: str = "") -> Entrant:
-    """An id, the most probable listed one if none is given, in the heat in which it has most evidence."""
-    chosen = name or leading_name(race)
-    return race.leading(chosen).entrants[chosen]
+def leading(comparison: Comparison, name: str = "") -> Candidate:
+    """A candidate, by default the most probable listed one, where its evidence is highest."""
+    chosen = name or leading_name(comparison)
+    return comparison.leading(chosen).candidates[chosen]
 
 
-def races(found: Diagnosis) -> list[Race]:
-    """The races that were run and looked at, each once."""
-    first = [found.race] if found.race is not None else []
-    return first + [step.race for step in found.steps[1:]]
+def comparisons(found: Diagnosis) -> list[Comparison]:
+    """The comparisons that were run and looked at, each once."""
+    first = [found.comparison] if found.comparison is not None else []
+    return first + [step.comparison for step in found.steps[1:]]
 
 
-def factor_at(entrant: Entrant, relative: float) -> float:
-    """Log Bayes factor of an entrant with its prior's scale multiplied."""
-    added = entrant.mechanism.added
+def factor_at(candidate: Candidate, relative: float) -> float:
+    """Log Bayes factor of an candidate with its prior's scale multiplied."""
+    added = candidate.mechanism.added
     assert added is not None
-    factors = [one.log_bayes_factor_at(relative * added.scale_of(one.shape)) for one in entrant.curves]
-    return float(logsumexp(entrant.log_weights + np.array(factors)))
+    factors = [one.log_bayes_factor_at(relative * added.scale_of(one.shape)) for one in candidate.curves]
+    return float(logsumexp(candidate.log_weights + np.array(factors)))
 
 
 def profile_of(found: Diagnosis) -> Location | None:
     """The missing force along the track; where there is no alarm, that in which nothing stands out."""
-    if found.location is not None or found.race is None:
+    if found.location is not None or found.comparison is None:
         return found.location
     from skred.diagnosis.compare.location import locate
 
-    return locate(found.race.leading(UNLISTED))
+    return locate(found.comparison.leading(UNLISTED))
 
 
 def stretch_of(found: Diagnosis) -> tuple[float, float] | None:
     """Where the verdict says that something acts [m]."""
     if found.steps:
-        return found.steps[0].entrant.stretch()
+        return found.steps[0].candidate.stretch()
     if found.decision.verdict == "unexplained" and found.location is not None:
         return found.location.stretch_m
     return None
@@ -132,4 +134,4 @@ def stretch_of(found: Diagnosis) -> tuple[float, float] | None:
 
 def blamed_sensors(found: Diagnosis) -> set[str]:
     """Sensors that the verdict blames."""
-    return {step.entrant.best.shape.sensor or "" for step in found.steps} - {""}
+    return {step.candidate.best.shape.sensor or "" for step in found.steps} - {""}
