@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+import json
+import math
 import re
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
 
+from skred.diagnosis.decide import ALARMS, HELD, TIED_NATS
+from skred.diagnosis.odds import POWER, SHARES
+from skred.diagnosis.strength import FORM
+from skred.diagnosis.verdict import verdict
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
 from skred.laws import load_law
+from skred.work.output import plain
 
 DOCS = Path(__file__).parents[2] / "docs"
 LAWS = ("coulomb", "pcm", "constant", "voellmy")
@@ -47,3 +55,67 @@ def test_every_error_model_is_explained_in_its_own_words() -> None:
 
 def test_the_page_of_laws_is_short() -> None:
     assert len(page("laws-and-likelihoods").splitlines()) <= 120
+
+
+def in_code(text: str) -> set[str]:
+    """Every word that stands in code, dotted paths taken apart."""
+    return {word for name in re.findall(r"`([^`\n]+)`", text) for word in re.findall(r"\w+", name)}
+
+
+BY_ID = ("probability", "detection_limits", "log_bayes_factors", "seconds", "constants")
+"""Keys whose own keys are ids and names, not words of the format."""
+
+
+def keys_of(document: object, *, of_ids: bool = False) -> set[str]:
+    """All keys of a document at any depth."""
+    if isinstance(document, list):
+        return {key for item in document for key in keys_of(item)}
+    if not isinstance(document, dict):
+        return set()
+    found = set() if of_ids else set(document)
+    return found.union(*(keys_of(value, of_ids=key in BY_ID) for key, value in document.items()))
+
+
+def keys_of_schema(part: object) -> set[str]:
+    """Names of all properties that a schema speaks of."""
+    if isinstance(part, list):
+        return {key for item in part for key in keys_of_schema(item)}
+    if not isinstance(part, dict):
+        return set()
+    own = set(part.get("properties", {}))
+    return own.union(*(keys_of_schema(value) for value in part.values()))
+
+
+SCHEMA = json.loads((files("skred") / "verdict.schema.json").read_text(encoding="utf-8"))
+
+
+def test_every_key_of_the_schema_is_explained() -> None:
+    text = page("reading-a-verdict")
+    first_cells = {name for cell in re.findall(r"^\| ([^|]+) \|", text, re.M) for name in in_code(cell)}
+    assert set(SCHEMA["properties"]) <= first_cells
+    assert keys_of_schema(SCHEMA) <= in_code(text)
+
+
+def test_every_verdict_is_explained() -> None:
+    assert set(SCHEMA["properties"]["verdict"]["enum"]) <= set(rows(page("reading-a-verdict")))
+
+
+@pytest.mark.parametrize("kind", ["tie", "two", "sensor", "unexplained", "nothing", "gate"])
+def test_every_key_that_is_written_is_explained(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "report")
+    from diagnosis_report_cases import diagnosis
+
+    written = keys_of(plain(verdict(diagnosis(kind))))
+    assert len(written) > len(SCHEMA["required"])
+    assert written <= in_code(page("reading-a-verdict"))
+
+
+def test_rules_on_the_page_are_the_codes() -> None:
+    text = page("reading-a-verdict")
+    (limit, at_most), (_, alone) = ALARMS
+    assert f"p is at most {limit:g} and `nothing` is less probable than {at_most:g}" in text
+    assert f"`nothing` is less probable than {alone:g}, whatever p is" in text
+    assert f"holds {HELD:.0%}".replace("%", " %") in text
+    assert f"at most {math.exp(TIED_NATS):.1f} times less probable" in text
+    assert f"to the power {POWER:g}" in text and f"another {100 * FORM:.0f} % of the mean" in text
+    assert all(f" {share:g}" in text for share in SHARES.values())
