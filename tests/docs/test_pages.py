@@ -119,3 +119,59 @@ def test_rules_on_the_page_are_the_codes() -> None:
     assert f"at most {math.exp(TIED_NATS):.1f} times less probable" in text
     assert f"to the power {POWER:g}" in text and f"another {100 * FORM:.0f} % of the mean" in text
     assert all(f" {share:g}" in text for share in SHARES.values())
+
+
+PAGES = (
+    "campaign-format", "reading-a-verdict", "laws-and-likelihoods", "method", "own-mechanism", "own-law",
+    "ryggfonn", "proof", "reliability", "glossary",
+)  # fmt: skip
+WORDS = """
+    model comparison; comparison under one error model; candidate; added; linearised screening; local
+    refinement; re-computed evidence; model discrepancy; mode; Laplace approximation; prior penalty;
+    Occam factor; tempered; tempering exponent; held-out; worker pool; sandbox; score and information;
+    linear mixed model; conditional MAP; quadrature points; B-spline basis; score test; bootstrap test
+    (parametric); bootstrap campaign; detectability; confounded with; retained information; compensated;
+    credible set; convergence criteria; coefficient; diagnostic signature; contaminated; acceptance
+    criteria; selectivity; nats as odds; front; runout; thalweg; retardation; kernel; tie; Pareto k;
+    r-hat; ESS
+"""
+"""The standard words of names, reports and pages, and those of the field."""
+
+
+def test_the_glossary_is_alphabetical_and_has_the_standard_words() -> None:
+    text = page("glossary")
+    terms = re.findall(r"^- \*\*(.+?)\*\*: ", text, re.M)
+    keys = [re.sub(r"[^a-z0-9]+", " ", term.lower()) for term in terms]
+    assert keys == sorted(keys) and len(set(keys)) == len(keys)
+    assert len(terms) == len(re.findall(r"^- ", text, re.M))
+    bold = set(re.findall(r"\*\*(.+?)\*\*", text))
+    assert {" ".join(word.split()) for word in WORDS.split(";")} <= bold
+
+
+def test_every_reference_within_the_glossary_has_an_entry() -> None:
+    text = page("glossary")
+    terms = {term.lower() for term in re.findall(r"\*\*(.+?)\*\*", text)}
+    terms |= {term.partition(" (")[0] for term in terms} | {"divergences", "priors", "terms"}
+    for word in re.findall(r"(?<!\*)\*([^*\n]+)\*(?!\*)", text.partition("entry of its own.")[2]):
+        name = word.lower()
+        assert any(form in terms for form in (name, name.removesuffix("s"), name.removesuffix("'s"))), word
+
+
+def test_the_first_page_lists_all_pages() -> None:
+    listed = re.findall(r"^\| \[([\w-]+)\]\((\S+)\) \|", page("index"), re.M)
+    assert listed == [(name, f"{name}.md") for name in PAGES]
+
+
+@pytest.mark.parametrize(
+    "name", ["index", "campaign-format", "reading-a-verdict", "laws-and-likelihoods", "own-law", "glossary"]
+)
+def test_links_lead_to_pages_of_the_list_and_to_headings(name: str) -> None:
+    text = page(name)
+    anchors = {
+        re.sub(r"[^\w -]", "", head.lower()).replace(" ", "-")
+        for head in re.findall(r"^#+ (.+)$", text, re.M)
+    }
+    for target in re.findall(r"\]\((?!https?:)([^)]+)\)", text):
+        file, _, anchor = target.partition("#")
+        assert file in ("", *(f"{one}.md" for one in PAGES)), target
+        assert not anchor or file or anchor in anchors, target
