@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from skred.inference.sampling import sample_prior
-from skred.laws import GROUP, law_ids, load_law
 from skred.physics.geometry import WEAKENING_SPEED_M_S
 from skred.physics.law import Law
+from skred.physics.laws import GROUP, law_ids, load_law
 from skred.physics.mechanisms import coulomb_friction, mechanisms
 
 PAGE = (Path(__file__).parents[2] / "docs" / "own-law.md").read_text(encoding="utf-8")

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from skred.diagnosis.decide import ALARMS, HELD, TIED_NATS
-from skred.diagnosis.odds import POWER, SHARES
-from skred.diagnosis.strength import FORM
-from skred.diagnosis.verdict import verdict
+from skred.diagnosis.augment.coefficient import FORM
+from skred.diagnosis.compare.decision import ALARMS, HELD, TIED_NATS
+from skred.diagnosis.evidence.prior_odds import POWER, SHARES
+from skred.diagnosis.verdict.document import verdict
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
-from skred.laws import load_law
-from skred.work.output import plain
+from skred.output import plain
+from skred.physics.laws import load_law
 
 DOCS = Path(__file__).parents[2] / "docs"
 LAWS = ("coulomb", "pcm", "constant", "voellmy")
