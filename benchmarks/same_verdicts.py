@@ -25,8 +25,8 @@ SET = ("--each", "--seed", "3100000", "--n", "40")
 SAME = ("verdict", "mechanism", "indistinguishable")
 """Keys that must be equal."""
 CLOSE = 0.02
-"""Largest difference of a probability that counts as the same: sampling in another order moves the last digits
-of an evidence, and no verdict changes with a hundredth."""
+"""Largest difference of a probability that counts as the same: sampling in another order moves the last
+digits of the evidence, and no verdict hangs on a hundredth."""
 
 app = cyclopts.App(help=__doc__)
 
