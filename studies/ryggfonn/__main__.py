@@ -81,7 +81,9 @@ def campaign_of(case: Case) -> Any:
 def diagnose_case(case: Case, replicas: int, *, figures: bool = True) -> dict[str, Any]:
     """Diagnose one case; its verdict, and the evidence of each mechanism under other scales of its prior."""
     from skred.cli.options import DIAGNOSIS_SAMPLING
-    from skred.diagnosis.diagnose import Effort, diagnose
+    from skred.diagnosis.diagnose import diagnose
+    from skred.diagnosis.effort import Effort
+    from skred.diagnosis.outcome import Diagnosis
     from skred.diagnosis.repeated import outer_folds
     from skred.diagnosis.verdict.document import verdict
     from skred.inference.hierarchical.problem import hierarchical_problem
@@ -96,7 +98,7 @@ def diagnose_case(case: Case, replicas: int, *, figures: bool = True) -> dict[st
     document = verdict(found) | {"case": case._asdict()}
     if case.folds:
         document["outer_folds"] = outer_folds(problem, law, settings, effort, case.folds, print)
-    if found.comparison is not None:
+    if isinstance(found, Diagnosis):
         document["prior_scales"] = {
             name: {str(factor): _best_factor(found.comparison, name, factor) for factor in PRIOR_FACTORS}
             for name in found.comparison.under_each[0].candidates
@@ -107,7 +109,7 @@ def diagnose_case(case: Case, replicas: int, *, figures: bool = True) -> dict[st
             for name in SHOWN:
                 if name in written:
                     shutil.copy(written[name], FIGURES / f"ryggfonn-{case.name}-{name}.png")
-    if figures and case.name == "pcm" and found.comparison is not None:
+    if figures and case.name == "pcm" and isinstance(found, Diagnosis):
         document["retardations"] = retardations(found)
         write_png(groups_figure(document["retardations"]), FIGURES / "ryggfonn-groups.png")
     return document

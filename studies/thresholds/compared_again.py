@@ -29,10 +29,11 @@ from numpy.typing import NDArray
 from skred.campaign import Campaign, read_campaign, write_campaign
 from skred.cli.options import DIAGNOSIS_SAMPLING
 from skred.diagnosis.compare.comparison import Comparison, compare
-from skred.diagnosis.diagnose import as_diagnosed, population_draws, typical
+from skred.diagnosis.diagnose import as_diagnosed
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS
 from skred.diagnosis.evidence.coefficient import Base, fit_base
+from skred.diagnosis.evidence.population_draws import population_draws, typical
 from skred.diagnosis.evidence.prior_odds import POWER, UNLISTED, prior_odds, stated
 from skred.inference.calibrate import calibrate_surely
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import cyclopts
-import numpy as np
 
 from skred.output import write_json
 
@@ -23,9 +22,9 @@ def main(*, law: str = "pcm", errors: str = "scaled", seed: int = 0) -> None:
     """Score Ryggfonn's avalanches, each by the others."""
     from skred.campaign import find_campaign, read_campaign
     from skred.cli.options import DIAGNOSIS_SAMPLING
-    from skred.diagnosis.diagnose import as_diagnosed, population_draws, typical
+    from skred.diagnosis.diagnose import as_diagnosed
     from skred.diagnosis.evidence.coefficient import fit_base
-    from skred.diagnosis.evidence.extension import extended
+    from skred.diagnosis.evidence.population_draws import population_draws, typical
     from skred.diagnosis.predict.held_out import held_out
     from skred.diagnosis.predict.profile_law import base_left_out
     from skred.inference.calibrate import calibrate_surely
@@ -37,11 +36,9 @@ def main(*, law: str = "pcm", errors: str = "scaled", seed: int = 0) -> None:
     base_law = load_law(law)
     calibration = calibrate_surely(problem, base_law, DIAGNOSIS_SAMPLING.settings("hierarchical"))
     used: Any = calibration.problem
-    extension, sizes = extended(used, base_law), calibration.tree["posterior"].to_dataset().sizes
-    added = np.empty((sizes["chain"] * sizes["draw"], 0))
     routes = {
-        "smoothed weights": held_out(calibration, extension, added, seed),
-        "refits by sampling": held_out(calibration, extension, added, seed, exact=True),
+        "smoothed weights": held_out(calibration, seed),
+        "refits by sampling": held_out(calibration, seed, exact=True),
         "refits by importance draws": base_left_out(
             fit_base(used, base_law, typical(population_draws(calibration, 120, seed))), seed
         ),

@@ -26,7 +26,9 @@ from skred.diagnosis.detect.run import (
     identify_to,
 )
 from skred.diagnosis.detect.score_test import placed_mechanisms
-from skred.diagnosis.diagnose import QUICK_REPLICAS, Diagnosis, Effort, too_little
+from skred.diagnosis.detect.too_little import too_little
+from skred.diagnosis.effort import QUICK_REPLICAS, Effort
+from skred.diagnosis.outcome import NotDiagnosed
 from skred.diagnosis.verdict.document import verdict
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.physics.laws import load_law
@@ -221,7 +223,7 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch) -> Diagnosed:
 
 def test_a_diagnosis_is_told_with_its_statement() -> None:
     problem = hierarchical_problem(first_events(5))
-    document = verdict(Diagnosis(problem, load_law("pcm"), cannot=too_little(problem)))
+    document = verdict(NotDiagnosed(problem, load_law("pcm"), too_little(problem)))
     told = io.StringIO()
     Console(width=80, file=told).print(diagnosis_table(document))
     assert " ".join(told.getvalue().split()).count(document["statement"]) == 1

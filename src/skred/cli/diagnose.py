@@ -50,7 +50,7 @@ def diagnose(
         problem = hierarchical_of(recorded, errors, smoothing)
         folder = output.folder("diagnose")
 
-        from skred.diagnosis.diagnose import QUICK_REPLICAS, Effort
+        from skred.diagnosis.effort import QUICK_REPLICAS, Effort
         from skred.diagnosis.run import diagnose_to
         from skred.report.diagnosis.report import diagnosis_table
 

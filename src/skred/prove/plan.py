@@ -124,7 +124,7 @@ def _shares(plan: Plan) -> dict[str, float]:
 def diagnosis_settings(quick: bool) -> dict[str, Any]:
     """How ``skred diagnose`` diagnoses for a user who sets nothing, or only ``--quick``."""
     from skred.cli.options import DIAGNOSIS_SAMPLING, MAX_MECHANISMS
-    from skred.diagnosis.diagnose import QUICK_REPLICAS, Effort
+    from skred.diagnosis.effort import QUICK_REPLICAS, Effort
     from skred.inference.error_model import DEFAULT_ERRORS
     from skred.physics.terrain import SMOOTHING_M
 

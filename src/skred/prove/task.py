@@ -38,9 +38,10 @@ def diagnose_campaign(campaign: Path, base_model: str, settings: dict[str, Any])
         As `skred.prove.plan.diagnosis_settings` gives them.
     """
     from skred.campaign import read_campaign
-    from skred.diagnosis.diagnose import Effort, diagnose
-    from skred.diagnosis.predict.gain import predictors, promised_gain
+    from skred.diagnosis.diagnose import diagnose
+    from skred.diagnosis.effort import Effort
     from skred.diagnosis.verdict.document import verdict
+    from skred.diagnosis.verdict.predictors import predictors, promised_gain
     from skred.inference.hierarchical.problem import hierarchical_problem
     from skred.inference.sampling import SamplerSettings
     from skred.physics.laws import load_law

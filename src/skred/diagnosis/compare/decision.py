@@ -53,6 +53,14 @@ def alarmed(probability: Mapping[str, float], p_value: float) -> bool:
     return any(p_value <= most and probability[NOTHING] < below for most, below in ALARMS)
 
 
+def alarm_by(probability: Mapping[str, float], p_value: float) -> str | None:
+    """Which of the rules of the alarm hold: ``check``, ``evidence``, ``both``; None where none does."""
+    check, evidence = (p_value <= most and probability[NOTHING] < below for most, below in ALARMS)
+    if check and evidence:
+        return "both"
+    return "check" if check else "evidence" if evidence else None
+
+
 def _silent(probability: Mapping[str, float], p_value: float) -> bool:
     """Whether neither check nor comparison gives a reason to add anything; it takes less than an alarm."""
     return p_value > LIMIT and probability[NOTHING] >= NOTHING_AT_MOST

@@ -11,7 +11,7 @@ import numpy as np
 from skred.diagnosis.detect.detectability import Detectability, Identifiability
 from skred.diagnosis.detect.detectability import identify as look
 from skred.diagnosis.detect.score_test import ScoreTest
-from skred.diagnosis.diagnose import too_little
+from skred.diagnosis.detect.too_little import too_little
 from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.conditional_map import campaign_rows
 from skred.diagnosis.evidence.extension import extended

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from skred.diagnosis.augment.step import Step
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.compare.decision import NOTHING_AT_MOST, Decision
 from skred.diagnosis.compare.location import Location
-from skred.diagnosis.diagnose import Diagnosis, Step
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
+from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.stretches import U_1, U_2
@@ -17,8 +18,10 @@ _RIVAL = 0.05
 """Probability from which another candidate than those named is told of."""
 
 
-def statement(found: Diagnosis, document: dict[str, Any]) -> str:
+def statement(found: Outcome, document: dict[str, Any]) -> str:
     """One paragraph in plain words."""
+    if isinstance(found, NotDiagnosed) or found.reason:
+        return f"These recordings cannot tell: {found.reason}."
     parts = {
         "missing_physics": _named,
         "instrument": _named,
@@ -170,7 +173,6 @@ def _improvement(document: dict[str, Any]) -> str:
 
 
 def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
-    assert found.check is not None
     probability = document["probability"]
     doubt = 1.0 - probability[NOTHING] - probability[UNLISTED] >= _RIVAL
     return [
@@ -181,13 +183,13 @@ def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         _closest(found, document),
         "The force profile is the answer: see where it stands out and how much work it does.",
         _improvement(document),
-        _still_fired(found.profile.check) if found.profile is not None else "",
+        _still_fired(found.finding.law.check) if isinstance(found.finding, ProfileAdded) else "",
     ]
 
 
-def _unlisted_way(location: Location | None) -> str:
+def _unlisted_way(location: Location) -> str:
     """Whom an unlisted force brakes where it stands out, if it is nil at the typical speed."""
-    if location is None or not location.opposed:
+    if not location.opposed:
         return ""
     first, last = location.stretch_m
     there = location.mean[(location.s_m >= first) & (location.s_m <= last)]
@@ -200,7 +202,6 @@ def _unlisted_way(location: Location | None) -> str:
 
 def _closest(found: Diagnosis, document: dict[str, Any]) -> str:
     """The listed candidate of the highest evidence, beside the unlisted force."""
-    assert found.comparison is not None
     factors = found.comparison.log_factors
     listed = {name: value for name, value in factors.items() if name not in (NOTHING, UNLISTED)}
     name = max(listed, key=lambda one: listed[one])
@@ -213,7 +214,6 @@ def _closest(found: Diagnosis, document: dict[str, Any]) -> str:
 
 def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
     """What the comparison would say alone, where it says something and the check does not."""
-    assert found.check is not None
     probability = document["probability"]
     if probability[NOTHING] >= NOTHING_AT_MOST:
         return ""
@@ -227,7 +227,6 @@ def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
 
 def _odd(found: Diagnosis) -> str:
     """What the check would say alone, where it says something and the comparison does not."""
-    assert found.check is not None
     if not found.check.fired:
         return ""
     return (
@@ -237,7 +236,6 @@ def _odd(found: Diagnosis) -> str:
 
 
 def _nothing(found: Diagnosis, document: dict[str, Any]) -> list[str]:
-    assert found.check is not None and found.table is not None
     return [
         f"The recordings do not bear out that anything is missing (p = {found.check.p_value:.2g}; probability"
         f" of nothing {_share(document['probability'][NOTHING])}).",
@@ -247,9 +245,6 @@ def _nothing(found: Diagnosis, document: dict[str, Any]) -> list[str]:
 
 
 def _cannot(found: Diagnosis, document: dict[str, Any]) -> list[str]:
-    if found.cannot:
-        return [f"These recordings cannot tell: {found.cannot}."]
-    assert found.check is not None and found.table is not None
     alarm = (
         f"No alarm (p = {found.check.p_value:.2g}; probability of nothing"
         f" {_share(document['probability'][NOTHING])}), but"
