@@ -17,9 +17,10 @@ import pytest
 from prove_cases import PLAN, Alone, fake, silent
 
 from skred.errors import InputError
+from skred.output import alone_in
 from skred.prove.folder import ProofFolder, read_object
 from skred.prove.ledger import read_ledger, trial_names
-from skred.prove.pool import WorkerPool, alone_in
+from skred.prove.pool import WorkerPool
 from skred.prove.run import Limits, run
 
 DRIVER = Path(__file__).parent / "prove_driver.py"
@@ -125,7 +126,7 @@ def test_a_campaign_that_is_gone_is_told(proof: ProofFolder, diagnosed: Diagnose
 
 
 def test_one_command_at_a_time(proof: ProofFolder, diagnosed: Diagnosed) -> None:
-    with alone_in(proof.path), pytest.raises(InputError, match="another"):
+    with alone_in(proof.path, "test"), pytest.raises(InputError, match="another"):
         diagnosed(proof, "quick")
     assert diagnosed(proof, "quick")["answered"] == 3
 

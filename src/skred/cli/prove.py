@@ -249,7 +249,7 @@ def _begun(out: Path) -> bool:
 def _new(out: Path | None) -> Path:
     from skred.output import output_folder
 
-    return output_folder(out, "prove", force=False)
+    return output_folder(out, "prove")
 
 
 def _seal(folder: "ProofFolder", sealing: Sealing, working: Working, silent: bool) -> None:

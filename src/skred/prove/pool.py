@@ -1,14 +1,12 @@
-"""Who does the work: Dask workers, here or elsewhere; and one command at a time in a folder."""
+"""Who does the work: Dask workers, here or elsewhere."""
 
 from __future__ import annotations
 
 import logging
-import sys
 import uuid
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from skred.errors import InputError
@@ -56,9 +54,9 @@ class WorkerPool:
         jobs : sequence of dict
             Each with the name of its trial.
         done : callable
-            Detectability of each job and what came out as it is finished.
+            Is told of each job and what came out as it is finished.
         lost : callable
-            Detectability of a job that Dask has given up, because every worker that took it died.
+            Is told of a job that Dask has given up, because every worker that took it died.
         """
         if not jobs:
             return
@@ -136,25 +134,3 @@ def _client_of(scheduler: str) -> Iterator[Any]:
         raise InputError(message) from error
     with client:
         yield client
-
-
-@contextmanager
-def alone_in(folder: Path) -> Iterator[None]:
-    """Refuse a second command at work in the same folder; the first one's claim ends with its process."""
-    if sys.platform == "win32":
-        yield
-        return
-    import fcntl
-
-    with (folder / ".lock").open("w") as claim:
-        try:
-            fcntl.flock(claim, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(f"{folder}: another `skred prove` is at work here; wait for it") from None
-        except OSError:
-            pass  # some network file systems know no locks
-        try:
-            yield
-        finally:
-            with suppress(OSError):
-                fcntl.flock(claim, fcntl.LOCK_UN)
