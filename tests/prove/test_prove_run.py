@@ -131,10 +131,9 @@ def test_one_command_at_a_time(proof: ProofFolder, diagnosed: Diagnosed) -> None
     assert diagnosed(proof, "quick")["answered"] == 3
 
 
-def test_no_scheduler(proof: ProofFolder, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("skred.prove.pool._PATIENCE_S", 1)
+def test_no_scheduler(proof: ProofFolder) -> None:
     with pytest.raises(InputError, match="no Dask scheduler"):
-        run(proof, WorkerPool(1, "nonsense://x"), silent, silent)
+        run(proof, WorkerPool(1, "nonsense://x", patience_s=1.0), silent, silent)
     with pytest.raises(ValueError, match="No clients"):
         distributed.default_client()
 

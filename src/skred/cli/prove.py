@@ -72,8 +72,8 @@ class Sealing:
         float | None,
         Parameter(
             validator=_SHARE,
-            help="Share of trials, to the nearest whole number, that hide nothing, half of them nasty; "
-            "by default each is drawn so with probability 0.35.",
+            help="Share of trials, to the nearest whole number, that hide nothing, half of them contaminated "
+            "(by a bad reading, say); by default each is drawn so with probability 0.35.",
         ),
     ] = None
     unlisted_share: Annotated[
