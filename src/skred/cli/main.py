@@ -14,8 +14,6 @@ from cyclopts import App, CycloptsError
 
 from skred.cli.inputs import campaign_of, hierarchical_of, laws_of, pooled_or_reason, problem_of
 from skred.cli.options import (
-    DIAGNOSIS_SAMPLING,
-    MAX_MECHANISMS,
     SAMPLING,
     BaseModel,
     Campaigns,
@@ -247,13 +245,14 @@ def diagnose(
         problem = hierarchical_of(recorded, errors, smoothing)
         folder = output.folder("diagnose")
 
-        from skred.diagnosis.effort import QUICK_REPLICAS, Effort
+        from skred.diagnosis.effort import SAMPLING, effort_of
         from skred.diagnosis.run import diagnose_to
         from skred.report.diagnosis.report import diagnosis_table
 
-        replicas = QUICK_REPLICAS if quick else Effort.replicas
-        effort = Effort(replicas, max_mechanisms or MAX_MECHANISMS[quick], exact_loo)
-        settings = replace(DIAGNOSIS_SAMPLING, seed=seed).settings("hierarchical")
+        effort = replace(effort_of(quick), exact_loo=exact_loo)
+        if max_mechanisms is not None:
+            effort = replace(effort, max_mechanisms=max_mechanisms)
+        settings = replace(SAMPLING, seed=seed)
         document = diagnose_to(
             problem, law, settings, effort, folder, output.tell, lock=lock or 0, folds=outer_folds or 0
         )
@@ -279,7 +278,8 @@ def identify(
     problem = hierarchical_of(campaign_of(campaign), errors, smoothing)
     folder = output.folder("identify")
 
-    from skred.diagnosis.detect.run import identify_table, identify_to
+    from skred.diagnosis.detect.run import identify_to
+    from skred.report.diagnosis.identify import identify_table
 
     document = identify_to(problem, law, folder, output.tell)
     output.show(document, identify_table, document["statement"], folder)

@@ -23,7 +23,6 @@ MaxMechanisms = Annotated[
         help="Mechanisms let in at most, one after the other; by default 2, with --quick 1.",
     ),
 ]
-MAX_MECHANISMS = {False: 2, True: 1}
 """Mechanisms let in where no number is asked for, by whether it is to be quick."""
 Quick = Annotated[
     bool,
@@ -143,5 +142,3 @@ class Sampling:
 
 SAMPLING = Sampling()
 """How a command samples unless told otherwise."""
-DIAGNOSIS_SAMPLING = Sampling(draws=600, tune=1000)
-"""How a diagnosis samples: enough to pass the gate nearly always; with more where it did not."""
