@@ -78,7 +78,7 @@ def campaign_of(case: Case) -> Any:
     return replace(campaign, sensors=tuple(sensors))
 
 
-def diagnose_case(case: Case, replicas: int) -> dict[str, Any]:
+def diagnose_case(case: Case, replicas: int, *, figures: bool = True) -> dict[str, Any]:
     """Diagnose one case; its verdict, and the evidence of each mechanism under other scales of its prior."""
     from skred.diagnosis.diagnose import diagnose
     from skred.diagnosis.effort import SAMPLING, Effort
@@ -102,13 +102,13 @@ def diagnose_case(case: Case, replicas: int) -> dict[str, Any]:
             name: {str(factor): _best_factor(found.comparison, name, factor) for factor in PRIOR_FACTORS}
             for name in found.comparison.under_each[0].candidates
         }
-    if case.name == case.base_model:
+    if figures and case.name == case.base_model:
         with TemporaryDirectory() as folder:
-            figures = save_diagnosis_figures(found, Path(folder))
+            written = save_diagnosis_figures(found, Path(folder))
             for name in SHOWN:
-                if name in figures:
-                    shutil.copy(figures[name], FIGURES / f"ryggfonn-{case.name}-{name}.png")
-    if case.name == "pcm" and isinstance(found, Diagnosis):
+                if name in written:
+                    shutil.copy(written[name], FIGURES / f"ryggfonn-{case.name}-{name}.png")
+    if figures and case.name == "pcm" and isinstance(found, Diagnosis):
         document["retardations"] = retardations(found)
         write_png(groups_figure(document["retardations"]), FIGURES / "ryggfonn-groups.png")
     return document
@@ -128,14 +128,21 @@ app = cyclopts.App(help=__doc__)
 def main(
     *,
     replicas: Annotated[int, cyclopts.Parameter(help="Clean campaigns simulated for each check.")] = 120,
+    out: Annotated[
+        Path | None,
+        cyclopts.Parameter(help="Folder for the answers; then page and figures stay as they are."),
+    ] = None,
 ) -> None:
     """Diagnose what has no result yet, and write the page."""
-    RESULTS.mkdir(parents=True, exist_ok=True)
+    folder = RESULTS if out is None else out
+    folder.mkdir(parents=True, exist_ok=True)
     for case in CASES:
-        file = RESULTS / f"{case.name}.json"
+        file = folder / f"{case.name}.json"
         if not file.exists():
             print(f"== {case.name}", flush=True)
-            write_json(file, diagnose_case(case, replicas))
+            write_json(file, diagnose_case(case, replicas, figures=out is None))
+    if out is not None:
+        return
     found = {
         case.name: json.loads((RESULTS / f"{case.name}.json").read_text(encoding="utf-8")) for case in CASES
     }

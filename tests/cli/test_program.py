@@ -48,7 +48,7 @@ def test_help_is_instant(command: list[str]) -> None:
 def test_help_imports_nothing_heavy() -> None:
     """What makes it instant, whatever the machine does meanwhile."""
     code = (
-        "import sys; from skred.cli.main import run_model\n"
+        "import sys; from skred.cli.run_model import run_model\n"
         "sys.argv = ['pcm', '--help']\n"
         "try: run_model('pcm')\n"
         "except SystemExit: pass\n"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, Parameter, validators
 
+from skred.cli.exit_codes import DONE
 from skred.cli.options import Json, Quiet
 from skred.cli.output import write_json
 from skred.errors import InputError
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from skred.prove.plan import Plan
     from skred.prove.pool import WorkerPool
 
-DONE = 0
 QUICK_TRIALS = 12
 _SHARE = validators.Number(gte=0.0, lte=1.0)
 Folder = Annotated[Path, Parameter(name="folder", help="Folder of the proof.")]
