@@ -80,9 +80,8 @@ def campaign_of(case: Case) -> Any:
 
 def diagnose_case(case: Case, replicas: int, *, figures: bool = True) -> dict[str, Any]:
     """Diagnose one case; its verdict, and the evidence of each mechanism under other scales of its prior."""
-    from skred.cli.options import DIAGNOSIS_SAMPLING
     from skred.diagnosis.diagnose import diagnose
-    from skred.diagnosis.effort import Effort
+    from skred.diagnosis.effort import SAMPLING, Effort
     from skred.diagnosis.outcome import Diagnosis
     from skred.diagnosis.repeated import outer_folds
     from skred.diagnosis.verdict.document import verdict
@@ -92,7 +91,7 @@ def diagnose_case(case: Case, replicas: int, *, figures: bool = True) -> dict[st
     from skred.report.shared.style import write_png
 
     problem = hierarchical_problem(campaign_of(case), error_model=case.errors, smoothing_m=case.smoothing_m)
-    settings = DIAGNOSIS_SAMPLING.settings("hierarchical")
+    settings = SAMPLING
     law, effort = load_law(case.base_model), Effort(replicas=replicas, exact_loo=case.folds > 0)
     found = diagnose(problem, law, settings, effort, print)
     document = verdict(found) | {"case": case._asdict()}

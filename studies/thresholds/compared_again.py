@@ -27,11 +27,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign, read_campaign, write_campaign
-from skred.cli.options import DIAGNOSIS_SAMPLING
 from skred.diagnosis.compare.comparison import Comparison, compare
 from skred.diagnosis.diagnose import as_diagnosed
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS
+from skred.diagnosis.effort import SAMPLING
 from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.population_draws import population_draws, typical
 from skred.diagnosis.evidence.prior_odds import POWER, UNLISTED, prior_odds, stated
@@ -62,7 +62,7 @@ def base_and_draws(campaign: Campaign, law_id: str) -> tuple[Base, tuple[FloatAr
     """And draws of its populations, means and factors."""
     law = load_law(law_id)
     problem = as_diagnosed(hierarchical_problem(campaign))
-    calibration = calibrate_surely(problem, law, DIAGNOSIS_SAMPLING.settings("hierarchical"))
+    calibration = calibrate_surely(problem, law, SAMPLING)
     if not calibration.gate.passed:
         return None
     assert isinstance(calibration.problem, HierarchicalProblem)

@@ -21,8 +21,8 @@ app = cyclopts.App(help=__doc__)
 def main(*, law: str = "pcm", errors: str = "scaled", seed: int = 0) -> None:
     """Score Ryggfonn's avalanches, each by the others."""
     from skred.campaign import find_campaign, read_campaign
-    from skred.cli.options import DIAGNOSIS_SAMPLING
     from skred.diagnosis.diagnose import as_diagnosed
+    from skred.diagnosis.effort import SAMPLING
     from skred.diagnosis.evidence.coefficient import fit_base
     from skred.diagnosis.evidence.population_draws import population_draws, typical
     from skred.diagnosis.predict.held_out import held_out
@@ -34,7 +34,7 @@ def main(*, law: str = "pcm", errors: str = "scaled", seed: int = 0) -> None:
     campaign = read_campaign(find_campaign("ryggfonn"))
     problem = as_diagnosed(hierarchical_problem(campaign, error_model=errors))
     base_law = load_law(law)
-    calibration = calibrate_surely(problem, base_law, DIAGNOSIS_SAMPLING.settings("hierarchical"))
+    calibration = calibrate_surely(problem, base_law, SAMPLING)
     used: Any = calibration.problem
     routes = {
         "smoothed weights": held_out(calibration, seed),

@@ -22,7 +22,6 @@ from skred.diagnosis.detect.run import (
     base_of,
     identifiability,
     identify_document,
-    identify_table,
     identify_to,
 )
 from skred.diagnosis.detect.score_test import placed_mechanisms
@@ -32,6 +31,7 @@ from skred.diagnosis.outcome import NotDiagnosed
 from skred.diagnosis.verdict.document import verdict
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.physics.laws import load_law
+from skred.report.diagnosis.identify import identify_table
 from skred.report.diagnosis.report import diagnosis_table
 
 RYGGFONN = read_campaign(find_campaign("ryggfonn"))

@@ -24,7 +24,8 @@ def identify(
     law = load_law(base_model)
     problem = hierarchical_of(campaign_of(campaign), likelihood.errors, likelihood.smoothing)
     with output.results("identify") as results:
-        from skred.diagnosis.detect.run import identify_table, identify_to
+        from skred.diagnosis.detect.run import identify_to
+        from skred.report.diagnosis.identify import identify_table
 
         document = identify_to(problem, law, results.unfinished, output.tell)
     output.show(document, identify_table, document["statement"], results.path)

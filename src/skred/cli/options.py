@@ -24,8 +24,6 @@ MaxMechanisms = Annotated[
         help="Mechanisms added at most, one after the other; by default 2, with --quick 1.",
     ),
 ]
-MAX_MECHANISMS = {False: 2, True: 1}
-"""Mechanisms added where no number is asked for, by whether it is to be quick."""
 Quick = Annotated[
     bool,
     Parameter(
@@ -145,10 +143,6 @@ class Sampling:
 
 SAMPLING = Sampling()
 """How a command samples unless told otherwise."""
-DIAGNOSIS_SAMPLING = Sampling(draws=600, tune=1000)
-"""How a diagnosis samples: enough to converge nearly always; with more where it did not."""
-
-
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Hierarchical:
@@ -182,14 +176,18 @@ class Diagnosing:
 
     def settings(self) -> "SamplerSettings":
         """As the sampler wants them."""
-        return replace(DIAGNOSIS_SAMPLING, seed=self.seed).settings("hierarchical")
+        from skred.diagnosis.effort import SAMPLING
+
+        return replace(SAMPLING, seed=self.seed)
 
     def effort(self) -> "Effort":
         """As the diagnosis wants it."""
-        from skred.diagnosis.effort import QUICK_REPLICAS, Effort
+        from skred.diagnosis.effort import effort_of
 
-        replicas = QUICK_REPLICAS if self.quick else Effort.replicas
-        return Effort(replicas, self.max_mechanisms or MAX_MECHANISMS[self.quick], self.exact_loo)
+        effort = replace(effort_of(self.quick), exact_loo=self.exact_loo)
+        if self.max_mechanisms is None:
+            return effort
+        return replace(effort, max_mechanisms=self.max_mechanisms)
 
 
 HIERARCHICAL, LIKELIHOOD, DIAGNOSING = Hierarchical(), Likelihood(), Diagnosing()

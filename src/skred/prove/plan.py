@@ -123,15 +123,13 @@ def _shares(plan: Plan) -> dict[str, float]:
 
 def diagnosis_settings(quick: bool) -> dict[str, Any]:
     """How ``skred diagnose`` diagnoses for a user who sets nothing, or only ``--quick``."""
-    from skred.cli.options import DIAGNOSIS_SAMPLING, MAX_MECHANISMS
-    from skred.diagnosis.effort import QUICK_REPLICAS, Effort
+    from skred.diagnosis.effort import SAMPLING, effort_of
     from skred.inference.error_model import DEFAULT_ERRORS
     from skred.physics.terrain import SMOOTHING_M
 
-    effort = Effort(QUICK_REPLICAS if quick else Effort.replicas, MAX_MECHANISMS[quick])
     return {
-        "sampler": DIAGNOSIS_SAMPLING.settings("hierarchical").as_dict(),
-        "effort": asdict(effort),
+        "sampler": SAMPLING.as_dict(),
+        "effort": asdict(effort_of(quick)),
         "errors": DEFAULT_ERRORS,
         "smoothing_m": SMOOTHING_M,
     }
