@@ -27,7 +27,7 @@ from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.output import write_json
 from skred.prove.scoring.standards import LOG_SCORE_FLOOR
 from skred.simulator.draw import SHARES
-from studies.proof.record import RECORD, sealed_of
+from studies.proof.record import Batch, sealed_of
 from studies.thresholds.compared_again import CLASSES, found_trials, stated_of
 
 FloatArray = NDArray[np.float64]
@@ -69,7 +69,7 @@ def cases() -> list[Case]:
     # Of these batches alone: what is opened later must not change what was frozen before.
     batches = sorted({key.partition(":")[0] for key in again})
     drawn = Counter(
-        _class(one["truth"]["hidden"]) for batch in batches for one in sealed_of(RECORD / batch).values()
+        _class(one["truth"]["hidden"]) for batch in batches for one in sealed_of(Batch(batch)).values()
     )
     of_these = found_trials(tuple(map(int, batches)), CLASSES)
     found = Counter(_class(sealed["truth"]["hidden"]) for sealed in of_these.values())

@@ -25,7 +25,7 @@ from skred.physics.mechanisms import mechanisms
 from skred.prove.scoring.answers import Pair
 from skred.prove.scoring.intervals import share
 from skred.prove.scoring.naming import honesty, naming
-from studies.proof.record import diagnosed, ledger_of, opened_batches
+from studies.proof.record import Batch, diagnosed, ledger_of, opened_batches
 
 RESULTS = Path(__file__).resolve().parent / "results" / "tie_rules.json"
 BEFORE = "2026-11-23T14:00"
@@ -70,7 +70,7 @@ def told(pairs: Sequence[Pair], nats: float) -> dict[str, Any]:
     }
 
 
-def names(batches: Sequence[Path]) -> list[str]:
+def names(batches: Sequence[Batch]) -> list[str]:
     """Their seeds."""
     return [batch.name for batch in batches]
 
