@@ -27,6 +27,7 @@ from skred.prove.plan import KINDS
 from skred.prove.scorecard import DIAGNOSIS, scorecard
 from skred.prove.scoring.answers import UNLISTED
 from skred.prove.scoring.standards import SNR_BINS
+from studies.files import FIGURES, ROOT, shrink
 from studies.proof.record import (
     Batch,
     add,
@@ -40,8 +41,6 @@ from studies.proof.record import (
 )
 
 FAILED = ("crash", "timeout")
-ROOT = Path(__file__).resolve().parents[2]
-FIGURES = ROOT / "docs" / "figures"
 Found = Mapping[str, Any]
 _HEAD = """# The record of concealed trials
 
@@ -344,6 +343,7 @@ def main(
     with TemporaryDirectory() as folder:
         figures = save_scorecard_figures(run, Path(folder))
         for name, file in figures.items():
+            shrink(file)
             shutil.copy(file, FIGURES / f"proof-{name}.png")
     write_text(ROOT / "docs" / "proof.md", page(every, run, document, list(figures)))
 

@@ -3,19 +3,20 @@
 A batch is one ledger. All batches are in one archive, ``studies/results/proof.tar.xz``; of each it has
 ``<seed>/ledger.json`` as it was published, ``<seed>/sealed.json``, what the ledger's hashes are of, and
 ``<seed>/answers/<method>.json``. What was sealed is kept to the last digit, in columns: one list for each
-key, with one entry a trial. Answers have one trial a line and six digits. ``notes/<seed>.md`` is what was
-written about a batch after it was opened, or why it was given up.
+key, with one entry a trial (a tenth smaller: salts stand by salts). Answers have one trial a line and six
+digits. ``notes/<seed>.md`` is what was written about a batch after it was opened, or why it was given up.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from benchmarks.files import as_columns, as_rows, rounded
 from skred.output import plain
 from skred.prove.scorecard import DIAGNOSIS
 from skred.prove.scoring.answers import Pair, pairs_of
@@ -23,8 +24,6 @@ from studies.proof.archive import read_archive, write_archive
 
 ARCHIVE = Path(__file__).resolve().parents[1] / "results" / "proof.tar.xz"
 NOTES = Path(__file__).resolve().parent / "notes"
-DIGITS = 6
-"""Significant digits of what is kept of an answer; what is sealed is kept to the last, for its hash."""
 LEFT_OUT = (
     "predictors",
     "identifiability",
@@ -142,36 +141,6 @@ def by_line(trials: Mapping[str, Any]) -> str:
     """A JSON object with one trial a line."""
     lines = (f"{json.dumps(name)}: {json.dumps(one, allow_nan=False)}" for name, one in trials.items())
     return "{\n" + ",\n".join(lines) + "\n}\n"
-
-
-def as_columns(rows: Sequence[Any]) -> Any:
-    """Objects with equal keys as one object of columns, and so on within; anything else as the list it is.
-
-    Salts stand by salts then, and numbers by numbers of one kind: a tenth less to keep.
-    """
-    first = rows[0] if rows else None
-    if not isinstance(first, dict) or not first:
-        return list(rows)
-    if any(not isinstance(row, dict) or row.keys() != first.keys() for row in rows):
-        return list(rows)
-    return {key: as_columns([row[key] for row in rows]) for key in first}
-
-
-def as_rows(columns: Any) -> list[Any]:
-    """What `as_columns` was given."""
-    if not isinstance(columns, dict):
-        return list(columns)
-    parts = {key: as_rows(column) for key, column in columns.items()}
-    return [dict(zip(parts, row, strict=True)) for row in zip(*parts.values(), strict=True)]
-
-
-def rounded(value: Any) -> Any:
-    """Plain data with `DIGITS` significant digits."""
-    if isinstance(value, float):
-        return float(f"{value:.{DIGITS}g}")
-    if isinstance(value, dict):
-        return {key: rounded(item) for key, item in value.items()}
-    return [rounded(item) for item in value] if isinstance(value, list) else value
 
 
 def _read(name: str) -> Any:

@@ -1,7 +1,7 @@
 """How much the form of a term adds to the uncertainty of its strength: what `strength.FORM` is set on.
 
-``python benchmarks/strength_forms.py`` reads the opened batches whose answers state strengths without it, and
-prints how many true strengths the 90 % intervals hold for several values.
+``python -m studies.thresholds.strength_forms`` reads the opened batches whose answers state strengths without
+it, and prints how many true strengths the 90 % intervals hold for several values.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from benchmarks.files import as_columns, as_rows
 from skred.prove.folder import METHOD
 from skred.prove.hashes import document_sha256
 from skred.prove.ledger import ledger_sha256
@@ -20,8 +21,6 @@ from studies.proof.archive import ArchiveError, read_archive, write_archive
 from studies.proof.record import (
     Batch,
     answers_of,
-    as_columns,
-    as_rows,
     kept_of,
     ledger_of,
     opened_batches,
