@@ -1,19 +1,18 @@
 """The left-out score of a base law by three routes: smoothed weights, refits by sampling, by importance.
 
-``python benchmarks/left_out.py [--law pcm]`` writes ``results/left_out.json``. The third is what the force
-profile of an unexplained diagnosis is tried by; the first is what every diagnosis uses.
+``python -m studies.thresholds.left_out [--law pcm]`` writes ``results/left_out.json``. The third is what the
+force profile of an unexplained diagnosis is tried by; the first is what every diagnosis uses.
 """
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import cyclopts
 
-from skred.output import write_json
+from studies.files import RESULTS, write
 
-RESULT = Path(__file__).resolve().parent / "results" / "left_out.json"
+RESULT = RESULTS / "left_out.json"
 app = cyclopts.App(help=__doc__)
 
 
@@ -47,7 +46,7 @@ def main(*, law: str = "pcm", errors: str = "scaled", seed: int = 0) -> None:
         name: {"elpd": one.elpd, "pointwise": one.pointwise.tolist(), "refitted": list(one.refitted)}
         for name, one in routes.items()
     }
-    write_json(RESULT, {"law": law, "errors": errors, "seed": seed, "routes": found})
+    write(RESULT, {"law": law, "errors": errors, "seed": seed, "routes": found})
     for name, one in routes.items():
         print(f"{name}: {one.elpd:.2f}")
 

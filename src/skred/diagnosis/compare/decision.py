@@ -22,7 +22,7 @@ ALARMS = ((LIMIT, NOTHING_AT_MOST), (1.0, NOTHING_ALONE))
 """The alarm is raised where, for any of these, the check's p-value is at most the first and the probability
 of nothing below the second: the check, unless the comparison denies it; the comparison alone. By the evidence
 alone a clean campaign falls below the latter with at most a sixth of probability (Markov's inequality for a
-Bayes factor); it is far rarer (``benchmarks/alarm_limit.py``)."""
+Bayes factor); it is far rarer (``studies.thresholds.alarm_limit``)."""
 
 
 @dataclass(frozen=True)
