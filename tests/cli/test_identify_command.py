@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 import json
 import sys
@@ -160,6 +161,52 @@ def test_the_command_on_too_few_avalanches(folder: Path, capsys: pytest.CaptureF
     out = capsys.readouterr().out
     assert "cannot tell: only 5 avalanches" in " ".join(out.split()) and "[bold]few" in out
     assert json.loads((folder / "told" / "identify.json").read_text())["reason"].startswith("only 5")
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (KeyboardInterrupt, 130, "interrupted; what was finished is in {left}"),
+        (OSError, 2, "what was finished is in {left}"),
+        (ZeroDivisionError, 3, "the traceback is in {left}/traceback.txt"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("command", "module", "function", "file"),
+    [
+        ("identify", "skred.diagnosis.detect.run", "identify_to", "identify.json"),
+        ("diagnose", "skred.diagnosis.run", "diagnose_to", "verdict.json"),
+        ("predict", "skred.prediction.predict", "predict", "predict.json"),
+        ("compare", "skred.model_selection.compare", "compare", "compare.json"),
+    ],
+)
+def test_a_command_that_breaks_off_leaves_earlier_results(
+    command: str,
+    module: str,
+    function: str,
+    file: str,
+    error: type[BaseException],
+    code: int,
+    said: str,
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And says where what it had written is: a verdict is not lost because a figure cannot be drawn."""
+    (folder / "out").mkdir()
+    (folder / "out" / file).write_text("earlier")
+
+    def breaks_off(*given: Any, **more: Any) -> None:
+        (where,) = (one for one in given if isinstance(one, Path))
+        (where / file).write_text("new")
+        raise error
+
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")  # no helpers: they would start for nothing
+    monkeypatch.setattr(importlib.import_module(module), function, breaks_off)
+    assert run([command, "--out", "out", "--force", "--quiet"]) == code
+    left = Path("out") / ".skred-unfinished"
+    assert said.format(left=left) in capsys.readouterr().err
+    assert (folder / "out" / file).read_text() == "earlier" and (left / file).read_text() == "new"
 
 
 BAD = [

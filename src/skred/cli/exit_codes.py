@@ -10,3 +10,8 @@ FAULT = 3
 """A fault of skred; its traceback is in a file."""
 INTERRUPTED = 130
 """Ctrl-C."""
+MEANING = (
+    "Ends with 0: an answer, cannot_tell included; 1: the chains did not converge; 2: something given cannot "
+    "be used; 3: a fault of skred."
+)
+"""As the help tells it."""

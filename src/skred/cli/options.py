@@ -116,7 +116,7 @@ Force = Annotated[
         name="--force",
         negative="",
         help="Use a folder that holds files, and replace or remove what the same command wrote there before. "
-        "Until the run is done, the earlier results stay.",
+        "The earlier results stay until the run is done.",
     ),
 ]
 Quiet = Annotated[bool, Parameter(name="--quiet", negative="", help="Write nothing but errors.")]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from cyclopts import App, CycloptsError
 
-from skred.cli.exit_codes import BAD_INPUT, DONE, FAULT, INTERRUPTED
+from skred.cli.exit_codes import BAD_INPUT, DONE, FAULT, INTERRUPTED, MEANING
 from skred.cli.terminal import write_what_it_can
 from skred.errors import InputError
 
@@ -25,7 +25,7 @@ def new_program(name: str, purpose: str) -> App:
     """A command line; `exit_code_of` decides what an interruption means, the same for every command."""
     return App(
         name=name,
-        help=purpose,
+        help=f"{purpose}\n\n{MEANING}",
         version=lambda: version("skred"),
         result_action="return_value",
         suppress_keyboard_interrupt=False,
@@ -130,5 +130,8 @@ def _write(file: Path | None, text: str) -> Path:
 
 
 def _discard_output() -> None:
-    """Send what is still in stdout's buffer nowhere; Python would fail again to write it at exit."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    """Where stdout cannot be written, send what is in its buffer nowhere; Python would fail again at exit."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
