@@ -91,6 +91,14 @@ class ErrorModel:
         readings: FloatArray = predictions + sd * noise
         return readings
 
+    @property
+    def variance(self) -> float:
+        """Variance of an error that `draw` makes, in stated variances."""
+        errors = self.errors
+        widened = 1.0 + errors.shares * (OUTLIER_FACTOR**2 - 1.0)
+        tails = errors.degrees / (errors.degrees - 2.0) if errors.degrees > 0.0 else 1.0
+        return float(tails * (errors.weights @ (errors.scales**2 * widened)))
+
 
 def _errors(
     weights: Any = 1.0, scales: Any = 1.0, shares: Any = 0.0, degrees: float = 0.0, common: float = 0.0
