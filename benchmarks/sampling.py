@@ -41,7 +41,7 @@ import skred.physics
 from models.pcm import LAW
 from peers.common import PARAMETERS, Drawn
 from skred.campaign import find_campaign, read_campaign
-from skred.inference.problem import PooledProblem, pooled_problem
+from skred.inference.pooled.problem import PooledProblem, pooled_problem
 from skred.output import write_text
 
 Run = dict[str, Any]

@@ -23,7 +23,7 @@ from peers.forward import Track, cross, march_step, read, track_of
 from scipy.special import roots_legendre
 
 from models.pcm import DRAG, DRY
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 
 CHAINS = 4
 _NODE, _WEIGHT = roots_legendre(40)

@@ -16,8 +16,9 @@ from scipy.special import logsumexp
 from scipy.stats import halfnorm, lognorm, norm
 
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
-from skred.diagnosis.augment.augmented import AugmentedProblem, augmented_problem
+from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.augment.coefficient_grid import finer, locate
+from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.augment.tables import highest
 from skred.diagnosis.augment.tabulated_op import TabulatedLogDensity, tabulated_log_density
 from skred.diagnosis.compare.screening import curve

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from skred.diagnosis.augment.augmented import CLAIM_LIMIT, AugmentedProblem, augmented_problem
+from skred.diagnosis.augment.augmented import augmented_problem
+from skred.diagnosis.augment.problem import CLAIM_LIMIT, AugmentedProblem
 from skred.diagnosis.augment.reference import Reference
 from skred.diagnosis.check.bootstrap_test import BootstrapTest, bootstrap_test
 from skred.diagnosis.clock import Clock, Tell

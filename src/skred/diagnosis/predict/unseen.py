@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from skred.campaign import Campaign
-from skred.diagnosis.augment.augmented import AugmentedProblem
+from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.augment.tables import exact_nodes
 from skred.diagnosis.discrepancy.profile import Kind, Profile, entering, hats
 from skred.diagnosis.evidence.conditional_map import Population, Rows, campaign_rows, event_modes, log_joint
