@@ -37,7 +37,7 @@ from models.pcm import LAW
 from benchmarks.peers import scan_model
 from benchmarks.peers.performed import expect_warnings, performed
 from skred.campaign import find_campaign, read_campaign
-from skred.inference.problem import PooledProblem, pooled_problem
+from skred.inference.pooled.problem import PooledProblem, pooled_problem
 
 FloatArray = NDArray[np.float64]
 TOLERANCE = 1e-8

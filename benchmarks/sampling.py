@@ -41,7 +41,7 @@ import skred.physics
 from models.pcm import LAW
 from benchmarks.peers.common import PARAMETERS, Drawn
 from skred.campaign import find_campaign, read_campaign
-from skred.inference.problem import PooledProblem, pooled_problem
+from skred.inference.pooled.problem import PooledProblem, pooled_problem
 from benchmarks.files import rounded, write
 
 Run = dict[str, Any]

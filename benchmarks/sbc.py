@@ -39,7 +39,7 @@ from skred.errors import InputError
 from skred.inference.gate import check_gate
 from skred.inference.joint_metropolis import JointMetropolis
 from skred.inference.pooled.density import PooledArrays
-from skred.inference.problem import PooledProblem, pooled_problem
+from skred.inference.pooled.problem import PooledProblem, pooled_problem
 from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior
 from skred.output import plain
 from skred.physics.law import Law

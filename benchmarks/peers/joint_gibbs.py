@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.inference.hierarchical.problem import HierarchicalProblem
-from skred.inference.hierarchical.reading_density import log_likelihoods
+from skred.inference.reading_density import log_likelihoods
 from skred.physics.kernel.fronts import simulate
 from skred.physics.law import Law
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from benchmarks.peers import pymc_run
 from benchmarks.peers.common import Drawn
 from skred.inference.joint_metropolis import JointMetropolis
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 
 
 def sample(problem: PooledProblem, seed: int, *, draws: int, tune: int) -> Drawn:

@@ -6,7 +6,7 @@ import pymc as pm
 
 from benchmarks.peers import pymc_run
 from benchmarks.peers.common import Drawn
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 
 
 def sample(problem: PooledProblem, seed: int, *, draws: int, tune: int) -> Drawn:

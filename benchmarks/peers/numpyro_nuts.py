@@ -23,7 +23,7 @@ from scipy.special import roots_legendre
 from benchmarks.peers.common import PARAMETERS, Drawn, FloatArray, cpu_seconds, near_the_mode
 from benchmarks.peers.forward import Track, cross, march_step, read, track_of
 from models.pcm import DRAG, DRY
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 
 CHAINS = 4
 _NODE, _WEIGHT = roots_legendre(40)

@@ -6,7 +6,7 @@ import nutpie
 
 from benchmarks.peers.common import Drawn, cpu_seconds, draws_of, near_the_mode
 from models.pcm import LAW
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 
 CHAINS = 4
 

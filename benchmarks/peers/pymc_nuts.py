@@ -6,7 +6,7 @@ from typing import Any
 
 from benchmarks.peers import pymc_run
 from benchmarks.peers.common import Drawn, near_the_mode
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 
 
 def sample(problem: PooledProblem, seed: int, *, draws: int, tune: int, start: str) -> Drawn:

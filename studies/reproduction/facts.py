@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 from skred.physics.geometry import contributions_of
 from skred.physics.kernel.columns import GRAVITY
 from skred.physics.kernel.fronts import simulate

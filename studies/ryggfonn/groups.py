@@ -14,7 +14,7 @@ from skred.diagnosis.discrepancy.profile import combined, most_probable
 from skred.diagnosis.evidence.coefficient import Fit
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.prior_odds import UNLISTED
-from skred.inference.problem import pooled_problem
+from skred.inference.pooled.problem import pooled_problem
 from skred.report.shared.style import GREY, RECORDED, legend_below, new_figure, styled
 from studies.reproduction.facts import RecordedRetardation, mean_retardation, recorded_retardation
 

@@ -153,7 +153,7 @@ def many() -> tuple[Base, Rows, np.ndarray, np.ndarray]:
         np.tile(base.population.mean, (n_groups, 1)),
         np.tile(factor, (n_groups, 1, 1)),
         np.random.default_rng(3),
-        ERROR_MODELS["normal"].errors,
+        ERROR_MODELS["normal"],
     )
     return base, rows, points, extension.predict(rows.event, points, NONE)
 
@@ -209,7 +209,7 @@ def test_replicas_under_other_errors(model: str) -> None:
     factor = np.linalg.cholesky(base.population.covariance)
     rows, points = bootstrap_campaigns(
         extension, NONE, np.tile(base.population.mean, (n_groups, 1)),
-        np.tile(factor, (n_groups, 1, 1)), np.random.default_rng(5), errors,
+        np.tile(factor, (n_groups, 1, 1)), np.random.default_rng(5), ERROR_MODELS[model],
     )  # fmt: skip
     z = standardised(rows, extension.predict(rows.event, points, NONE))
     first, second = z[:, 0], z[:, 1]

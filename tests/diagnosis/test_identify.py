@@ -65,7 +65,7 @@ def test_detection_limit_by_simulation(base: Base, table: dict[str, Detectabilit
     n_groups, strength = 200, table[name].limit
     means = np.tile(base.population.mean, (n_groups, 1))
     factors = np.tile(np.linalg.cholesky(base.population.covariance), (n_groups, 1, 1))
-    errors, found = ERROR_MODELS["normal"].errors, []
+    errors, found = ERROR_MODELS["normal"], []
     for value in (0.0, strength):
         rng = np.random.default_rng(4)
         rows, points = bootstrap_campaigns(with_it, np.array([value]), means, factors, rng, errors)

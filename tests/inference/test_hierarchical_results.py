@@ -12,7 +12,7 @@ import xarray as xr
 
 from skred.inference.calibrate import Calibration, calibrate
 from skred.inference.hierarchical.problem import INTEGRATION_LIMIT, HierarchicalProblem, hierarchical_problem
-from skred.inference.results import save
+from skred.inference.results import predictive, save
 from skred.inference.sampling import SamplerSettings
 from skred.output import plain
 from skred.physics.laws import load_law
@@ -85,6 +85,6 @@ def test_many_events_thin_the_draws(calibrated: Calibration, monkeypatch: pytest
     monkeypatch.setattr(module, "MOST_AVALANCHES", 22 * 100)
     tree = calibrated.tree
     posterior, prior = tree["posterior"].to_dataset(), tree["prior"].to_dataset()
-    groups = calibrated.problem.predictive(calibrated.law, posterior, prior, 0)
+    groups = predictive(calibrated.problem, calibrated.law, posterior, prior, 0)
     assert groups["event_posterior"].sizes["draw"] * 4 <= 100
     assert groups["event_posterior"]["draw"].values[1] == 20

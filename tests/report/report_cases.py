@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from skred.campaign import Campaign, Sensor, find_campaign, read_campaign
-from skred.inference.problem import PooledProblem, pooled_problem
+from skred.inference.pooled.problem import PooledProblem, pooled_problem
 from skred.physics.law import Law
 
 DRAWS = {

@@ -13,7 +13,7 @@ from skred.cli.output import OUTPUT, Output
 
 if TYPE_CHECKING:
     from skred.inference.hierarchical.problem import HierarchicalProblem
-    from skred.inference.problem import PooledProblem
+    from skred.inference.pooled.problem import PooledProblem
     from skred.physics.law import Law
 
 

@@ -62,12 +62,14 @@ def calibrate_law(
         output.tell(f"{law_id}: sampling")
 
         from skred.inference.calibrate import calibrate, write_calibration
+        from skred.report.calibration.figures import save_model_figures
         from skred.report.shared.tables import summary_table
 
         settings = sampling.settings(problem.likelihood, sampler)
         calibration = calibrate(problem, law, settings, progress=output.progress)
         output.tell(f"{law_id}: writing {results.path}")
         write_calibration(calibration, results.unfinished)
+        save_model_figures(calibration.tree, law, problem, results.unfinished)
     gate = calibration.gate
     verdict = "the chains converged" if gate.passed else "THE CHAINS DID NOT CONVERGE: do not use this result"
     measured = f"r-hat at most {gate.r_hat_max:.3f}, effective draws at least {gate.ess_bulk_min:.0f}"

@@ -8,7 +8,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from skred.diagnosis.augment.add import add_mechanisms
-from skred.diagnosis.augment.augmented import CLAIM_LIMIT
+from skred.diagnosis.augment.problem import CLAIM_LIMIT
 from skred.diagnosis.augment.reference import Reference
 from skred.diagnosis.augment.step import Augmented, NotAugmented
 from skred.diagnosis.check.bootstrap_test import bootstrap_test

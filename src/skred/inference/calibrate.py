@@ -13,11 +13,13 @@ import arviz_stats as az
 import pymc as pm
 import xarray as xr
 
+import skred.inference.hierarchical.results  # noqa: F401 - registers what it says of readings
+import skred.inference.pooled.results  # noqa: F401 - likewise
 from skred.inference.gate import Gate, check_gate
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY, interval
 from skred.inference.joint_metropolis import JointMetropolis
 from skred.inference.problem import Problem
-from skred.inference.results import assemble, save
+from skred.inference.results import assemble, save, summary
 from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior
 from skred.output import write_json
 from skred.physics.law import Law, Parameter
@@ -67,7 +69,7 @@ class Calibration:
             "equation": self.law.equation,
             "gate": self.gate.as_dict(),
             "parameters": _parameter_rows(self.tree, self.problem.parameters(self.law)),
-            **self.problem.summary(self.law, self.tree),
+            **summary(self.problem, self.law, self.tree),
         }
 
 
@@ -111,13 +113,10 @@ def calibrate_surely(problem: Problem, law: Law, settings: SamplerSettings) -> C
 
 
 def write_calibration(calibration: Calibration, folder: Path) -> None:
-    """Write ``posterior.nc``, ``summary.json`` and the figures of one calibration."""
-    from skred.report.calibration.figures import save_model_figures
-
+    """Write the documents of one calibration: ``posterior.nc`` and ``summary.json``."""
     save(calibration.tree, folder / "posterior.nc")
-    save_model_figures(calibration.tree, calibration.law, calibration.problem, folder)
     attributes = calibration.tree.attrs
-    summary = {
+    document = {
         "format": 1,
         "campaign": attributes["campaign"],
         "campaign_fingerprint": attributes["campaign_fingerprint"],
@@ -128,7 +127,7 @@ def write_calibration(calibration: Calibration, folder: Path) -> None:
         "interval": {"kind": INTERVAL_KIND, "probability": INTERVAL_PROBABILITY},
         **calibration.entry(),
     }
-    write_json(folder / "summary.json", summary)
+    write_json(folder / "summary.json", document)
 
 
 def _parameter_rows(tree: xr.DataTree, parameters: Sequence[Parameter]) -> list[dict[str, Any]]:

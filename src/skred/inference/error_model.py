@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign, Status
+from skred.inference.reading_density import OUTLIER_FACTOR
 
 FloatArray = NDArray[np.float64]
 DEFAULT_ERRORS = "robust"
@@ -58,6 +59,45 @@ class ErrorModel:
     id: str
     title: str
     errors: Errors
+
+    def draw(
+        self,
+        predictions: FloatArray,
+        sd: FloatArray,
+        is_velocity: NDArray[np.bool_],
+        rng: np.random.Generator,
+    ) -> FloatArray:
+        """Readings of avalanches, with errors.
+
+        Parameters
+        ----------
+        predictions : (..., n_sensors) array, m/s or m
+            Readings without errors. A row is one avalanche: its readings share what the model has in common.
+        sd : (..., n_sensors) array
+            Stated standard deviations, as `EventReadings.sd` gives them.
+        is_velocity : (n_sensors,) boolean array
+        rng : numpy Generator
+        """
+        errors, shape = self.errors, predictions.shape
+        case = rng.choice(len(errors.weights), size=shape[:-1], p=errors.weights)[..., None]
+        noise = rng.standard_normal(shape)
+        if errors.common > 0.0:
+            shared = np.sqrt(errors.common) * rng.standard_normal((*shape[:-1], 1))
+            noise = np.where(is_velocity, shared + np.sqrt(1.0 - errors.common) * noise, noise)
+        if errors.degrees > 0.0:
+            noise = noise * np.sqrt(errors.degrees / rng.chisquare(errors.degrees, shape))
+        outlying = rng.random(shape) < errors.shares[case]
+        noise = noise * np.where(outlying, OUTLIER_FACTOR, 1.0) * errors.scales[case]
+        readings: FloatArray = predictions + sd * noise
+        return readings
+
+    @property
+    def variance(self) -> float:
+        """Variance of an error that `draw` makes, in stated variances."""
+        errors = self.errors
+        widened = 1.0 + errors.shares * (OUTLIER_FACTOR**2 - 1.0)
+        tails = errors.degrees / (errors.degrees - 2.0) if errors.degrees > 0.0 else 1.0
+        return float(tails * (errors.weights @ (errors.scales**2 * widened)))
 
 
 def _errors(
@@ -125,6 +165,22 @@ class EventReadings(NamedTuple):
     reached: FloatArray
     not_reached: FloatArray
     place_sd: float
+
+    def sd(self, event: int | NDArray[np.int64], predictions: FloatArray) -> FloatArray:
+        """Stated standard deviations of events' readings: their own where they state one, else the sensor's.
+
+        Parameters
+        ----------
+        event : int or (n,) integer array
+        predictions : (n, n_sensors) array, m/s or m
+        """
+        own = self.stated_sd[event]
+        return np.where(own > 0.0, own, self.sensor_sd(predictions))
+
+    def sensor_sd(self, predictions: FloatArray) -> FloatArray:
+        """Standard deviations as the sensors state them, (..., n_sensors)."""
+        sd: FloatArray = np.hypot(self.relative_sd * predictions, self.absolute_sd)
+        return sd
 
 
 def event_readings(campaign: Campaign, place_sd_m: float = PLACE_SD_M) -> EventReadings:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Sequence
+from functools import singledispatch
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,23 @@ from skred.physics.law import Law, Parameter
 _PACKAGES = ("skred", "pymc", "pytensor", "arviz", "numba", "numpy", "scipy", "xarray")
 
 
+@singledispatch
+def predictive(
+    problem: Problem, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
+) -> dict[str, xr.Dataset]:
+    """Groups of a result that are a likelihood's own, from draws of the parameters.
+
+    Registered for each kind of problem where its results are made: import that module to have it.
+    """
+    raise TypeError(f"nobody says what a posterior of a {type(problem).__name__} predicts")
+
+
+@singledispatch
+def summary(problem: Problem, law: Law, tree: xr.DataTree) -> dict[str, Any]:
+    """What a summary says beside the parameters: plain data, from the whole result. Registered likewise."""
+    raise TypeError(f"nobody sums up a posterior of a {type(problem).__name__}")
+
+
 def assemble(
     problem: Problem,
     law: Law,
@@ -34,7 +52,7 @@ def assemble(
     Groups
     ------
     posterior, prior : parameters of the law, and of the population in a hierarchical calibration
-    posterior_predictive, prior_predictive, event_posterior : see `pooled_results`, `hierarchical_results`
+    posterior_predictive, prior_predictive, event_posterior : see `predictive`
     log_likelihood : ``recordings`` (chain, draw, event)
     observed_data : ``reading`` (event, sensor), NaN where there is none
     constant_data : status, covariance of the recordings, sensors, track, terrain
@@ -51,7 +69,7 @@ def assemble(
             coords={**chain_and_draw(parameters), "event": problem.coords["event"]},
         ),
         "prior": _with_units(prior, own, law),
-        **problem.predictive(law, parameters, prior, settings.seed),
+        **predictive(problem, law, parameters, prior, settings.seed),
         "observed_data": _observed(problem),
         "constant_data": _constant(problem),
     }

@@ -21,7 +21,8 @@ from skred.inference.evidence import SMC_DRAWS, evidence
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY
 from skred.inference.leave_one_out import ExactLoo, exact_leave_one_out
 from skred.inference.paired import best_first, paired_difference, sum_se
-from skred.inference.problem import PooledProblem, Problem
+from skred.inference.pooled.problem import PooledProblem
+from skred.inference.problem import Problem
 from skred.inference.results import save
 from skred.inference.sampling import SamplerSettings
 from skred.inference.waic import waic

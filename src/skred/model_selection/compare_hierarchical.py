@@ -11,7 +11,7 @@ from skred.inference.calibrate import calibrate
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.paired import best_first, paired_difference
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 from skred.inference.sampling import SamplerSettings
 from skred.model_selection.compare import Tell, score, scores, write_comparison
 from skred.model_selection.statement import changes

@@ -52,7 +52,7 @@ class Law:
     parameters : tuple of Parameter
         The free random variables of its model.
     build : callable
-        ``build(problem) -> pymc.Model``, see `skred.inference.problem.PooledProblem`.
+        ``build(problem) -> pymc.Model``, see `skred.inference.problem.Problem`.
     reference : str
         Where the law comes from.
     strengths : callable

@@ -133,7 +133,8 @@ def prediction_of(
     places = _places(problem, track)
     seed = int(tree.attrs["seed"])
     fronts = new_fronts(law, populations, track.terrain, track.releases, places, simulation.avalanches, seed)
-    velocity, runout = (reading_error(problem.campaign, runout=which) for which in (False, True))
+    campaign, errors = problem.campaign, problem.error_model
+    velocity, runout = (reading_error(campaign, errors, runout=which) for which in (False, True))
     recorded = recorded_runouts(problem, track)
     shortest = recorded[0] if recorded else None
     data = prediction_dataset(fronts, velocity, runout, shortest)

@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.augment.augmented import AugmentedProblem
+from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.augment.step import Step
 from skred.inference.calibrate import Calibration
 from skred.physics.mechanisms.spec import Group

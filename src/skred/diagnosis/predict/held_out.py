@@ -10,8 +10,8 @@ from arviz_stats.base import array_stats
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from skred.diagnosis.augment.augmented import AugmentedProblem
 from skred.diagnosis.augment.coefficient import added_draws
+from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.predictive import Predicted, predict_event
 from skred.inference.calibrate import Calibration

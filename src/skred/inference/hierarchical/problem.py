@@ -141,30 +141,6 @@ class HierarchicalProblem(Problem):
             result[k] = integrated_log_density(np.tile(mean, (n_events, 1)), factor, *surfaces.nodes)
         return result
 
-    def predictive(
-        self, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
-    ) -> dict[str, xr.Dataset]:
-        """Each recorded avalanche's own strengths, and new avalanches from the population."""
-        from skred.inference.hierarchical.results import predictive_groups
-
-        return predictive_groups(self, law, posterior, prior, seed)
-
-    def summary(self, law: Law, tree: xr.DataTree) -> dict[str, Any]:
-        """The error model, a new avalanche at each sensor, and each event's own strengths."""
-        from skred.inference.hierarchical.results import event_rows, new_avalanche_rows
-
-        return {
-            "error_model": {"id": self.error_model.id, "title": self.error_model.title},
-            "place_sd_m": self.place_sd_m,
-            "integration": {
-                "largest_error_of_an_event": float(np.abs(self._errors[_key(law.mechanisms)]).max()),
-                "largest_error_of_22_events": float(_of_22_events(self._errors[_key(law.mechanisms)])),
-                "checked_events": int(self._errors[_key(law.mechanisms)].shape[1]),
-            },
-            "new_avalanche": new_avalanche_rows(self, tree),
-            "events": event_rows(self, law, tree),
-        }
-
     def numerical_problems(self, law: Law, posterior: xr.Dataset) -> tuple[str, ...]:
         """Whether the integration over events is good enough, at draws of the posterior."""
         draws = {p.name: posterior[p.name].values.ravel() for p in self.parameters(law)}
@@ -178,6 +154,21 @@ class HierarchicalProblem(Problem):
             f"the integration over events is wrong by {_of_22_events(errors):.2f} nats in 22 events (limit"
             f" {self.integration_limit}): are recordings stated with errors far below what is possible?",
         )
+
+    def integration(self, law: Law) -> dict[str, float]:
+        """Errors of the log likelihood [nats] that `numerical_problems` found last.
+
+        Raises
+        ------
+        KeyError
+            If it did not look at this law.
+        """
+        errors = self._errors[_key(law.mechanisms)]
+        return {
+            "largest_error_of_an_event": float(np.abs(errors).max()),
+            "largest_error_of_22_events": _of_22_events(errors),
+            "checked_events": errors.shape[1],
+        }
 
     def constants(self) -> dict[str, Any]:
         """How well the releases are known."""

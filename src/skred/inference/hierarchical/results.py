@@ -16,6 +16,7 @@ from skred.inference.hierarchical.event_draws import (
 )
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import interval
+from skred.inference.results import predictive, summary
 from skred.physics.law import Law
 
 MOST_AVALANCHES = 200_000
@@ -23,7 +24,8 @@ MOST_AVALANCHES = 200_000
 _READING = {"units": "m s-1; m for the runout"}
 
 
-def predictive_groups(
+@predictive.register
+def hierarchical_predictive(
     problem: HierarchicalProblem, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
 ) -> dict[str, xr.Dataset]:
     """Predictive groups of a result; draws are thinned where there are many events.
@@ -97,6 +99,18 @@ def avalanche_dataset(
     variables["front"] = ((*dims, "sensor"), fronts[..., :-1].reshape(*sizes, -1), _READING)
     coords = {"chain": draws["chain"].values, "draw": draws["draw"].values, **problem.coords}
     return xr.Dataset(variables, coords=coords)
+
+
+@summary.register
+def hierarchical_summary(problem: HierarchicalProblem, law: Law, tree: xr.DataTree) -> dict[str, Any]:
+    """The error model, a new avalanche at each sensor, and each event's own strengths."""
+    return {
+        "error_model": {"id": problem.error_model.id, "title": problem.error_model.title},
+        "place_sd_m": problem.place_sd_m,
+        "integration": problem.integration(law),
+        "new_avalanche": new_avalanche_rows(problem, tree),
+        "events": event_rows(problem, law, tree),
+    }
 
 
 def new_avalanche_rows(problem: HierarchicalProblem, tree: xr.DataTree) -> list[dict[str, Any]]:

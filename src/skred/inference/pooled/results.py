@@ -8,12 +8,13 @@ import numpy as np
 import xarray as xr
 
 from skred.inference.intervals import interval
-from skred.inference.problem import PooledProblem
-from skred.inference.results import chain_and_draw
+from skred.inference.pooled.problem import PooledProblem
+from skred.inference.results import chain_and_draw, predictive, summary
 from skred.physics.law import Law
 
 
-def predictive_groups(
+@predictive.register
+def pooled_predictive(
     problem: PooledProblem, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
 ) -> dict[str, xr.Dataset]:
     """Predictive groups of a result.
@@ -57,6 +58,12 @@ def _response(problem: PooledProblem, law: Law, parameters: xr.Dataset) -> xr.Da
         },
         attrs={"units": "m s-1; m for the runout"},
     )
+
+
+@summary.register
+def pooled_summary(problem: PooledProblem, law: Law, tree: xr.DataTree) -> dict[str, Any]:
+    """Mean response at each sensor."""
+    return {"response": response_rows(problem, tree)}
 
 
 def response_rows(problem: PooledProblem, tree: xr.DataTree) -> list[dict[str, Any]]:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from skred.inference.problem import PooledProblem
+    from skred.inference.pooled.problem import PooledProblem
     from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]

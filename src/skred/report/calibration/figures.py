@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from skred.inference.problem import PooledProblem, Problem
+    from skred.inference.pooled.problem import PooledProblem
+    from skred.inference.problem import Problem
     from skred.physics.law import Law
 
 __all__ = [

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from skred.campaign import Campaign, Sensor
-    from skred.inference.problem import PooledProblem, Problem
+    from skred.inference.pooled.problem import PooledProblem
+    from skred.inference.problem import Problem
 
 FloatArray = NDArray[np.float64]
 
