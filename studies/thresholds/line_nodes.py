@@ -1,7 +1,7 @@
 """Nodes on a line beside importance nodes: what the comparison's evidences are wrong by, and what that costs.
 
 ``python -m studies.thresholds.line_nodes`` keeps one in eight of the integrations of Ryggfonn's
-comparison, under each error model that is raced, and does each again by both rules with the comparison's
+comparison, under each candidate error model, and does each again by both rules with the comparison's
 budgets, and with nodes on a line sixteen times as close, which stand for exact. Importance nodes, as many as
 a minute or so allows, are the second route to those.
 """

@@ -1,4 +1,4 @@
-"""How far log scores of avalanches left out are off, by the nodes that each draw's strengths get.
+"""How far log scores of held-out avalanches are off, by the nodes that each draw's strengths get.
 
 ``python -m studies.thresholds.unseen_nodes``: Ryggfonn under PCM with the most probable force profile,
 each avalanche scored by 200 draws, with three sets of random shifts of the nodes; against sixteen times the
