@@ -11,7 +11,7 @@ from skred.output import plain, write_text
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
-DIGITS = 6
+DIGITS = 8
 """Significant digits that are kept."""
 
 
@@ -43,13 +43,13 @@ def _text(value: Any) -> str:
     return json.dumps(value, allow_nan=False)
 
 
-def rounded(value: Any) -> Any:
-    """Plain data with `DIGITS` significant digits."""
+def rounded(value: Any, digits: int = DIGITS) -> Any:
+    """Plain data with so many significant digits."""
     if isinstance(value, float):
-        return float(f"{value:.{DIGITS}g}")
+        return float(f"{value:.{digits}g}")
     if isinstance(value, dict):
-        return {key: rounded(item) for key, item in value.items()}
-    return [rounded(item) for item in value] if isinstance(value, list) else value
+        return {key: rounded(item, digits) for key, item in value.items()}
+    return [rounded(item, digits) for item in value] if isinstance(value, list) else value
 
 
 def as_columns(rows: Sequence[Any]) -> Any:

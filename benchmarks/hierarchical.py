@@ -83,7 +83,7 @@ def to_the_gate(problem: HierarchicalProblem, law: Law, seed: int) -> Row:
         if gate.passed:
             break
     sampling_s = time.perf_counter() - started
-    posterior = tree["posterior"]
+    posterior = tree["posterior"].to_dataset()
     draws = {name: posterior[name].values.ravel() for name in names}
     chosen = np.linspace(0, posterior[names[0]].size - 1, CHECKED_DRAWS).astype(int)
     errors, check_s = timed(
@@ -196,7 +196,7 @@ def joint(seed: int) -> Row:
         "compared": None,
     }
     if drawn.tree is not None:
-        posterior, stats = drawn.tree["posterior"], drawn.tree["sample_stats"]
+        posterior, stats = (drawn.tree[group].to_dataset() for group in ("posterior", "sample_stats"))
         row["compared"] = {
             "chains": posterior.sizes["chain"],
             "draws": posterior.sizes["draw"],

@@ -24,7 +24,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pymc as pm
@@ -189,8 +189,8 @@ class Calibrator:
         )
         # The law's own model, with the recordings in shared variables that every simulation sets anew.
         template = replace(problem)
-        self._shared = PooledArrays(*(pytensor.shared(array) for array in problem.arrays))
-        template.__dict__["arrays"] = self._shared
+        self._shared = [pytensor.shared(array) for array in problem.arrays]
+        template.__dict__["arrays"] = PooledArrays(*self._shared)
         self.model: pm.Model = law.build(template)
         self.step = JointMetropolis(model=self.model, pointwise="recordings")
         self.truths = sample_prior(self.model, law, seed, PRIOR_ROWS)
@@ -261,7 +261,14 @@ def recorded(problem: PooledProblem, latent: FloatArray) -> PooledProblem:
 # Many simulations
 
 
-def simulations(calibrator: Calibrator, numbers: Sequence[int]) -> Iterator[dict[str, Any]]:
+class Calibrates(Protocol):
+    """What analyses one simulation after the other."""
+
+    def calibrate(self, number: int) -> dict[str, Any]:
+        """Ranks and diagnostics of one simulation."""
+
+
+def simulations(calibrator: Calibrates, numbers: Sequence[int]) -> Iterator[dict[str, Any]]:
     """Calibrate simulation after simulation; one that raises an error says so in its record."""
     for number in numbers:
         try:

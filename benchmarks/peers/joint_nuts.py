@@ -56,7 +56,7 @@ def joint_model(problem: HierarchicalProblem, law: Law) -> pm.Model:
     """
     if problem.error_model.id != "normal" or problem.releases.sd.any():
         raise ValueError("normal errors and certain releases only")
-    return law.build(_Joint(problem))  # type: ignore[no-any-return]
+    return law.build(_Joint(problem))
 
 
 class _Joint:

@@ -36,7 +36,8 @@ def readings(track: Track, mu: Any, drag: Any) -> Any:
     v, distance = cross(jnp, jnp.zeros(()), tuple(track.cells[:, 0]), mu, drag)
 
     def step(carry: Any, cell: Any) -> Any:
-        ahead = march_step(jnp, *carry, cell, mu, drag)
+        v, s = carry
+        ahead = march_step(jnp, v, s, cell, mu, drag)
         return ahead, ahead[0]
 
     start = (v, track.release + distance)

@@ -1,7 +1,7 @@
 """What masked effects lose: opened trials, each at its true place, by how fast the relief that masks it is.
 
 ``python -m studies.masked.relief [--workers 2]`` draws the opened trials again in which a drag or snow
-taken up is opposed by a relief, fits the base law, and lets the hidden mechanism in where it is, opposed by
+taken up is opposed by a relief, fits the base law, and adds the hidden mechanism where it is, opposed by
 a relief that equals it at the speed that a diagnosis takes for typical, times several factors. Beside that
 stands the best that the trial's own diagnosis found for the mechanism, whose place it had to look for. Kept
 trial by trial in ``results/masked_relief.json``; the same command goes on with a run that was ended.

@@ -24,6 +24,8 @@ from studies.proof.archive import read_archive, write_archive
 
 ARCHIVE = Path(__file__).resolve().parents[1] / "results" / "proof.tar.xz"
 NOTES = Path(__file__).resolve().parent / "notes"
+DIGITS = 6
+"""Significant digits of what is kept of an answer."""
 LEFT_OUT = (
     "predictors",
     "identifiability",
@@ -134,7 +136,7 @@ def kept_of(folder: Path) -> dict[str, bytes]:
 
 def kept(answer: Mapping[str, Any]) -> Found:
     """What is kept of an answer."""
-    return {key: rounded(plain(value)) for key, value in answer.items() if key not in LEFT_OUT}
+    return {key: rounded(plain(value), DIGITS) for key, value in answer.items() if key not in LEFT_OUT}
 
 
 def by_line(trials: Mapping[str, Any]) -> str:

@@ -38,6 +38,7 @@ def main(
     """
     # Here, so that --help does not wait for PyMC.
     from skred.output import write_text
+    from studies.files import shrink
     from studies.reproduction.figures import save_reproduction_figures
     from studies.reproduction.page import page
     from studies.reproduction.study import run_study
@@ -50,7 +51,8 @@ def main(
     study = run_study(seed, quick=quick, tell=tell)
     out.parent.mkdir(parents=True, exist_ok=True)
     tell("figures")
-    save_reproduction_figures(study, out.parent / "figures")
+    for picture in save_reproduction_figures(study, out.parent / "figures"):
+        shrink(picture)
     command = f"python -m studies.reproduction --seed {seed}" + (" --quick" if quick else "")
     versions = {"python": platform.python_version(), **{name: version(name) for name in PACKAGES}}
     text = page(study, command=command, seed=seed, versions=versions, seconds=time.monotonic() - started)

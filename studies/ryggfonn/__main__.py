@@ -23,7 +23,8 @@ from studies.ryggfonn.groups import groups_figure, retardations
 ANSWERS = RESULTS / "ryggfonn"
 MOVED = ("LC", "CD")
 PRIOR_FACTORS = (0.5, 1.0, 2.0)
-SHOWN = ("where", "probabilities", "places")
+SHOWN = ("where",)
+"""Figures of the page."""
 
 
 class Case(NamedTuple):

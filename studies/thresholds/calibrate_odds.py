@@ -1,10 +1,10 @@
 """To which power Bayes factors are to count, so that what is stated means what it says.
 
-``python -m studies.thresholds.calibrate_odds`` takes opened trials in which something was found, raced again
-(``studies.thresholds.compared_again``), and scores what would be stated of them by the log probability of the
-truth, with Bayes factors among all but nothing to one power after the other. Each class of trials has the
-share that it has where trials are drawn by default, masked effects within that of listed ones. Chosen is the
-weakest change whose score is within one standard error of the best one's; what it gains is told by powers
+``python -m studies.thresholds.calibrate_odds`` takes opened trials in which something was found, compared
+again (``studies.thresholds.compared_again``), and scores what would be stated of them by the log probability
+of the truth, with Bayes factors among all but nothing to one power after the other. Each class of trials has
+the share that it has where trials are drawn by default, masked effects within that of listed ones. Chosen is
+the weakest change whose score is within one standard error of the best one's; what it gains is told by powers
 chosen without each batch. Result: ``results/calibrate_odds.json``; the power is frozen in
 ``skred.diagnosis.evidence.prior_odds``.
 """
@@ -35,7 +35,7 @@ app = cyclopts.App(help=__doc__)
 
 @dataclass(frozen=True)
 class Case:
-    """A trial raced again.
+    """A trial compared again.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Case:
 
 
 def cases() -> list[Case]:
-    """All trials that were raced again; a class weighs what is found of it where it is drawn by default."""
+    """All trials compared again; a class weighs what is found of it where it is drawn by default."""
     again = read(RESULTS / "compared_again.json")
     again = {key: one for key, one in again.items() if "failed" not in one}
     # Of these batches alone: what is opened later must not change what was frozen before.
@@ -70,9 +70,9 @@ def cases() -> list[Case]:
     )
     of_these = found_trials(tuple(map(int, batches)), CLASSES)
     found = Counter(_class(sealed["truth"]["hidden"]) for sealed in of_these.values())
-    raced = Counter(_class(one["hidden"]) for one in again.values())
-    weight = {name: SHARES[name] * found[name] / drawn[name] / n for name, n in raced.items()}
-    total = sum(weight[name] * n for name, n in raced.items())
+    compared = Counter(_class(one["hidden"]) for one in again.values())
+    weight = {name: SHARES[name] * found[name] / drawn[name] / n for name, n in compared.items()}
+    total = sum(weight[name] * n for name, n in compared.items())
     return [
         Case(
             key.partition(":")[0],

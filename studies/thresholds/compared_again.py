@@ -1,8 +1,8 @@
-"""Opened trials raced again by the present code: what it says of forces that are in no list.
+"""Opened trials compared again by the present code: what it says of forces that are in no list.
 
 ``python -m studies.thresholds.compared_again [--batches SEED ...] [--hidden CLASS ...] [--workers 2]`` draws
-trials of opened batches in which something was found again from their seeds and comparisons them. The leading
-listed mechanism is let in at its best strength, and the unlisted force fitted about it: each kind, its
+trials of opened batches in which something was found again from their seeds and compares them. The leading
+listed mechanism is added at its best strength, and the unlisted force fitted about it: each kind, its
 amplitude, smoothness and place open. What its most probable profile gains, before any price of its freedom,
 is about all that could tell a force that is in no list from the listed one that passes for it; beside it
 stands the same for trials whose truth is listed. Results are kept trial by trial in
@@ -83,9 +83,9 @@ def base_of(sealed: dict[str, Any]) -> Base | None:
     return base_on(campaign, truth["base_model"])
 
 
-def beyond(raced: Comparison, name: str) -> float:
+def beyond(compared: Comparison, name: str) -> float:
     """What the unlisted force gains about a listed mechanism at its best strength, in nats, at most."""
-    under_errors = raced.leading(name)
+    under_errors = compared.leading(name)
     best = under_errors.candidates[name].best
     top = int(np.argmax(best.log_evidence))
     about = replace(
@@ -111,12 +111,12 @@ def look(sealed: dict[str, Any]) -> dict[str, Any]:
         base = base_of(sealed)
         if base is None:
             return told | {"failed": "gate"}
-        raced = compare(base)
-        name = leading_name(raced)
-        gain = beyond(raced, name)
+        compared = compare(base)
+        name = leading_name(compared)
+        gain = beyond(compared, name)
     except np.linalg.LinAlgError as error:
         return told | {"failed": repr(error)}
-    return told | {"leader": name, "log_bayes_factors": raced.log_factors, "gain_about_leader": gain}
+    return told | {"leader": name, "log_bayes_factors": compared.log_factors, "gain_about_leader": gain}
 
 
 def found_trials(batches: Sequence[int], hidden: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -181,8 +181,8 @@ def summarise(found: Collection[dict[str, Any]]) -> None:
 
 def stated_of(log_factors: Mapping[str, float], power: float = POWER) -> dict[str, float]:
     """Probabilities as they are stated of a comparison, or would be with another power."""
-    raced = [mechanisms()[name] for name in log_factors if name in mechanisms()]
-    return stated(log_factors, prior_odds(raced), power)
+    compared = [mechanisms()[name] for name in log_factors if name in mechanisms()]
+    return stated(log_factors, prior_odds(compared), power)
 
 
 if __name__ == "__main__":

@@ -46,14 +46,14 @@ Importance nodes by the thousand, the second route, agree with those that stand 
 
 
 def unseen_nodes() -> str:
-    """How far scores of avalanches left out are off, by nodes."""
+    """How far scores of held-out avalanches are off, by nodes."""
     rows = "".join(
         f"| {row['nodes']} | {row['of a draw']} | {row['root mean square']:.3f} | {row['sum']:+.2f}"
         f" | {format(row['seconds'], '.1f') if 'seconds' in row else '-'} |\n"
         for row in read(RESULTS / "unseen_nodes.json")["rows"]
     )
     return f"""
-## Scores of avalanches left out
+## Scores of held-out avalanches
 
 `python -m studies.thresholds.unseen_nodes`: Ryggfonn's 22 avalanches
 under PCM with the force profile, each scored by 200 draws of populations and profiles. What log scores [nats]

@@ -22,7 +22,7 @@ from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.physics.mechanisms import mechanisms
 from skred.prove.scoring.answers import Pair
 from skred.prove.scoring.intervals import share
-from skred.prove.scoring.naming import honesty, naming
+from skred.prove.scoring.naming import naming, selectivity
 from studies.files import RESULTS, write
 from studies.proof.record import Batch, diagnosed, ledger_of, opened_batches
 
@@ -62,7 +62,7 @@ def told(pairs: Sequence[Pair], nats: float) -> dict[str, Any]:
     ]
     return {
         "nats": nats,
-        **honesty(after),
+        **selectivity(after),
         "right_set_of_3_around_7": naming(after)["around_7"]["right_set_of_3"],
         "sets_of_4_and_more": sum(len(pair.names) > 3 for pair in after),
         "no_longer_alone_was_right": share([pair.right_name for pair in no_longer]),

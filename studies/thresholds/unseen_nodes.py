@@ -1,4 +1,4 @@
-"""How far log scores of avalanches left out are off, by the nodes that each draw's strengths get.
+"""How far log scores of held-out avalanches are off, by the nodes that each draw's strengths get.
 
 ``python -m studies.thresholds.unseen_nodes``: Ryggfonn under PCM with the most probable force profile,
 each avalanche scored by 200 draws, with three sets of random shifts of the nodes; against sixteen times the
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from typing import Any
+from unittest.mock import patch
 
 import cyclopts
 import numpy as np
@@ -36,12 +37,14 @@ BUDGETS = {
 EXACT, SHIFTS = USED.times(16), 3
 
 
-def score(base: Base, event: int, let_in: Any, budget: Budget, seed: int) -> float:
+def score(base: Base, event: int, added: Any, budget: Budget, seed: int) -> float:
     """Log score of an avalanche."""
-    extension, draws = let_in
-    unseen._NODES = budget
+    extension, draws = added
     rows = base.rows.take(np.array([event]))
-    densities = unseen.log_densities(extension, rows, *draws, seed)[:, 0]
+    with patch.object(unseen, "_NODES", budget):
+        densities = unseen.log_densities(extension, rows, draws.means, draws.factors, draws.strengths, seed)[
+            :, 0
+        ]
     return float(np.logaddexp.reduce(densities) - np.log(len(densities)))
 
 
