@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import runpy
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-SCRIPT = Path(__file__).parents[2] / "scripts" / "thresholds.py"
+ROOT = Path(__file__).parents[2]
+SCRIPT, METHOD = ROOT / "scripts" / "thresholds.py", ROOT / "docs" / "method.md"
 MODULE = '''"""A module."""
 
 import math
@@ -64,6 +66,26 @@ def test_every_threshold_has_a_reason(script: SimpleNamespace) -> None:
 
 def test_page_is_what_the_source_says(script: SimpleNamespace) -> None:
     assert script.PAGE.read_text(encoding="utf-8") == script.page(script.all_constants())
+
+
+def numbers(text: str) -> list[float]:
+    """All numbers in a text that are not part of a name."""
+    return [float(one) for one in re.findall(r"(?<![\w.])\d+(?:\.\d+)?", text)]
+
+
+def test_limits_on_the_page_of_the_method_are_those_of_the_source(script: SimpleNamespace) -> None:
+    values: dict[str, list[float]] = {}
+    for one in script.all_constants():
+        found = numbers(one.value)
+        each = len(one.names) > 1 and len(found) == len(one.names)
+        values |= {name: [found[k]] if each else found for k, name in enumerate(one.names)}
+    rows = re.findall(
+        r"^\| (`[A-Z_]+`(?:, `[A-Z_]+`)*) \| ([^|]*) \|", METHOD.read_text(encoding="utf-8"), re.M
+    )
+    assert len(rows) >= 8
+    for names, shown in rows:
+        expected = [value for name in re.findall(r"[A-Z_]+", names) for value in values[name]]
+        assert numbers(shown) == expected, names
 
 
 def test_numbers_are_found_with_their_reasons(script: SimpleNamespace, package: Path) -> None:
