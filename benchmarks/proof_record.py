@@ -1,8 +1,9 @@
 """The published record on disk: ledgers, opened truths with their salts, answers.
 
 A batch is one ledger, in ``results/proof/<seed>/``: ``ledger.json`` as it was published, ``sealed.json`` what
-the ledger's hashes are of, and ``answers/<method>.json``. The latter two have one trial a line, so that they
-stay small and a line is what changes.
+the ledger's hashes are of, ``answers/<method>.json``, and ``notes.md`` with what was written about it
+afterwards. Sealed trials and answers stand one a line, so that a line is what changes. Beside the batches,
+``missed.md`` says why the largest one missed some criteria.
 """
 
 from __future__ import annotations
@@ -25,14 +26,25 @@ LEFT_OUT = ("predictors", "identifiability", "detection_limits")
 Found = dict[str, Any]
 
 
+def names() -> list[str]:
+    """Names of all files of the record, such as ``36048904/ledger.json``."""
+    return sorted(file.relative_to(RECORD).as_posix() for file in RECORD.rglob("*") if file.is_file())
+
+
+def text_of(name: str) -> str:
+    """What is in a file of the record; this and `names` alone know how the record is kept."""
+    return (RECORD / name).read_text(encoding="utf-8")
+
+
 def batches() -> list[Path]:
     """The folders of all batches, by seed."""
-    return sorted((one for one in RECORD.iterdir() if one.is_dir()), key=lambda one: int(one.name))
+    seeds = {name.partition("/")[0] for name in names() if "/" in name}
+    return [RECORD / seed for seed in sorted(seeds, key=int)]
 
 
 def is_open(batch: Path) -> bool:
-    """Whether a batch has been revealed; until then its folder holds the ledger alone."""
-    return (batch / "sealed.json").exists()
+    """Whether a batch has been revealed; until then there is the ledger alone."""
+    return f"{batch.name}/sealed.json" in names()
 
 
 def opened_batches() -> list[Path]:
@@ -42,18 +54,25 @@ def opened_batches() -> list[Path]:
 
 def ledger_of(batch: Path) -> Found:
     """What was published before the first diagnosis."""
-    return dict(json.loads((batch / "ledger.json").read_text(encoding="utf-8")))
+    return dict(json.loads(text_of(f"{batch.name}/ledger.json")))
 
 
 def sealed_of(batch: Path) -> dict[str, Found]:
     """What was sealed, by trial; each with its ``truth`` and its salt."""
-    return dict(json.loads((batch / "sealed.json").read_text(encoding="utf-8")))
+    return dict(json.loads(text_of(f"{batch.name}/sealed.json")))
 
 
 def answers_of(batch: Path) -> dict[str, dict[str, Found]]:
     """What each method answered, by trial."""
-    files = sorted((batch / "answers").glob("*.json"))
-    return {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in files}
+    folder = f"{batch.name}/answers/"
+    found = [name for name in names() if name.startswith(folder)]
+    return {name.removeprefix(folder).removesuffix(".json"): json.loads(text_of(name)) for name in found}
+
+
+def notes_of(batch: Path) -> str:
+    """What was written about a batch after it was opened or given up; empty where nothing was."""
+    name = f"{batch.name}/notes.md"
+    return text_of(name) if name in names() else ""
 
 
 def diagnosed(batch: Path) -> list[Pair]:
