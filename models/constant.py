@@ -33,6 +33,6 @@ LAW = Law(
 )
 
 if __name__ == "__main__":
-    from skred.cli.main import run_model
+    from skred.cli.run_model import run_model
 
     run_model("constant")

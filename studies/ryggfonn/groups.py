@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from skred.diagnosis.diagnose import Diagnosis
+    from skred.diagnosis.outcome import Diagnosis
     from skred.physics.mechanisms.spec import Direction
 
 FloatArray = NDArray[np.float64]
@@ -33,11 +33,10 @@ _MOST_OF_IT = 50.0
 
 
 def retardations(found: Diagnosis) -> list[dict[str, Any]]:
-    """Of each avalanche with both speeds: recorded, and of its most probable front by either law [m s-2].
+    """Of each avalanche with both speeds: recorded, and of its most probable front by either law [m/s²].
 
     Those on the far side of the widest gap between recorded ones are the group that retards more.
     """
-    assert found.comparison is not None
     campaign, under_errors = found.problem.campaign, found.comparison.leading(UNLISTED)
     recorded = recorded_retardation(pooled_problem(campaign), FIRST, LAST)
     more, _, _ = recorded.groups()
@@ -64,7 +63,7 @@ def retardations(found: Diagnosis) -> list[dict[str, Any]]:
 def _retardations(
     found: Diagnosis, fit: Fit, directions: Sequence[Direction], between: RecordedRetardation
 ) -> FloatArray:
-    """Of the events' most probable fronts on the way between the sensors [m s-2]."""
+    """Of the events' most probable fronts on the way between the sensors [m/s²]."""
     law = extended(found.problem, found.law, tuple(directions))
     sensor = found.problem.campaign.sensors[found.problem.campaign.sensor_ids.index(FIRST)]
     ends = np.array([sensor.s_from_m, sensor.s_from_m + between.length_m], dtype=float)

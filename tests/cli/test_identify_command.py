@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 import json
 import sys
@@ -22,14 +23,16 @@ from skred.diagnosis.detect.run import (
     base_of,
     identifiability,
     identify_document,
-    identify_table,
     identify_to,
 )
 from skred.diagnosis.detect.score_test import placed_mechanisms
-from skred.diagnosis.diagnose import QUICK_REPLICAS, Diagnosis, Effort, too_little
+from skred.diagnosis.detect.too_little import too_little
+from skred.diagnosis.effort import QUICK_REPLICAS, Effort
+from skred.diagnosis.outcome import NotDiagnosed
 from skred.diagnosis.verdict.document import verdict
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.physics.laws import load_law
+from skred.report.diagnosis.identify import identify_table
 from skred.report.diagnosis.report import diagnosis_table
 
 RYGGFONN = read_campaign(find_campaign("ryggfonn"))
@@ -139,7 +142,7 @@ def test_the_command(folder: Path, capsys: pytest.CaptureFixture[str], ryggfonn:
     assert "pcm: fitting" in told.err
     plain = json.loads(json.dumps(ryggfonn))
     assert json.loads((folder / "told" / "identify.json").read_text()) == plain
-    assert [file.name for file in (folder / "told").iterdir()] == ["identify.json"]
+    assert [file.name for file in (folder / "told").glob("[!.]*")] == ["identify.json"]
     assert run(["identify", "--out", "told"]) == 2
     assert "--force" in capsys.readouterr().err
     assert run(["identify", "--out", "told", "--force", "--json"]) == 0
@@ -154,10 +157,56 @@ def test_the_command(folder: Path, capsys: pytest.CaptureFixture[str], ryggfonn:
 
 def test_the_command_on_too_few_avalanches(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_campaign(first_events(5), folder / "few")
-    assert run(["identify", "few", "--out", "told"]) == 1
+    assert run(["identify", "few", "--out", "told"]) == 0
     out = capsys.readouterr().out
     assert "cannot tell: only 5 avalanches" in " ".join(out.split()) and "[bold]few" in out
     assert json.loads((folder / "told" / "identify.json").read_text())["reason"].startswith("only 5")
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (KeyboardInterrupt, 130, "interrupted; what was finished is in {left}"),
+        (OSError, 2, "what was finished is in {left}"),
+        (ZeroDivisionError, 3, "the traceback is in {left}/traceback.txt"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("command", "module", "function", "file"),
+    [
+        ("identify", "skred.diagnosis.detect.run", "identify_to", "identify.json"),
+        ("diagnose", "skred.diagnosis.run", "diagnose_to", "verdict.json"),
+        ("predict", "skred.prediction.predict", "predict", "predict.json"),
+        ("compare", "skred.model_selection.compare", "compare", "compare.json"),
+    ],
+)
+def test_a_command_that_breaks_off_leaves_earlier_results(
+    command: str,
+    module: str,
+    function: str,
+    file: str,
+    error: type[BaseException],
+    code: int,
+    said: str,
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And says where what it had written is: a verdict is not lost because a figure cannot be drawn."""
+    (folder / "out").mkdir()
+    (folder / "out" / file).write_text("earlier")
+
+    def breaks_off(*given: Any, **more: Any) -> None:
+        (where,) = (one for one in given if isinstance(one, Path))
+        (where / file).write_text("new")
+        raise error
+
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")  # no helpers: they would start for nothing
+    monkeypatch.setattr(importlib.import_module(module), function, breaks_off)
+    assert run([command, "--out", "out", "--force", "--quiet"]) == code
+    left = Path("out") / ".skred-unfinished"
+    assert said.format(left=left) in capsys.readouterr().err
+    assert (folder / "out" / file).read_text() == "earlier" and (left / file).read_text() == "new"
 
 
 BAD = [
@@ -221,7 +270,7 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch) -> Diagnosed:
 
 def test_a_diagnosis_is_told_with_its_statement() -> None:
     problem = hierarchical_problem(first_events(5))
-    document = verdict(Diagnosis(problem, load_law("pcm"), cannot=too_little(problem)))
+    document = verdict(NotDiagnosed(problem, load_law("pcm"), too_little(problem)))
     told = io.StringIO()
     Console(width=80, file=told).print(diagnosis_table(document))
     assert " ".join(told.getvalue().split()).count(document["statement"]) == 1

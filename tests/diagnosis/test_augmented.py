@@ -30,8 +30,8 @@ from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_pri
 from skred.inference.calibrate import calibrate
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.problem import hierarchical_problem
-from skred.inference.hierarchical.reading_density import log_likelihoods
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
+from skred.inference.reading_density import log_likelihoods
 from skred.inference.sampling import SamplerSettings
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms

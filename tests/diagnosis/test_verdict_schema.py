@@ -12,7 +12,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from skred.campaign import find_campaign, read_campaign
-from skred.diagnosis.diagnose import Diagnosis
+from skred.diagnosis.outcome import NotDiagnosed
 from skred.diagnosis.verdict.document import verdict
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.output import plain
@@ -232,7 +232,7 @@ def test_verdicts_that_are_not(kind: str, path: str, value: Any) -> None:
 @pytest.mark.parametrize("law_id", ["pcm", "constant"])
 def test_what_is_written_where_no_diagnosis_was_possible(law_id: str) -> None:
     problem = hierarchical_problem(read_campaign(find_campaign("ryggfonn")))
-    found = Diagnosis(problem, load_law(law_id), cannot="only 3 avalanches with a reading")
+    found = NotDiagnosed(problem, load_law(law_id), "only 3 avalanches with a reading")
     document = plain(verdict(found))
     assert problems(document) == []
     assert document["verdict"] == "cannot_tell" and "only 3 avalanches" in document["statement"]

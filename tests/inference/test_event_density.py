@@ -25,7 +25,7 @@ from skred.inference.hierarchical.event_density import (
     integrated_log_density_pullback,
 )
 from skred.inference.hierarchical.integrated_op import IntegratedLogDensity, IntegratedLogDensityPullback
-from skred.inference.hierarchical.reading_density import assess, log_likelihood_bounds, log_likelihoods
+from skred.inference.reading_density import assess, log_likelihood_bounds, log_likelihoods
 
 # The readings given a front, written down again.
 

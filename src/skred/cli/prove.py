@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import App, Parameter, validators
 
+from skred.cli.exit_codes import DONE
 from skred.cli.options import Json, Quiet
 from skred.cli.output import write_json
 from skred.errors import InputError
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from skred.prove.plan import Plan
     from skred.prove.pool import WorkerPool
 
-DONE = 0
 QUICK_TRIALS = 12
 _SHARE = validators.Number(gte=0.0, lte=1.0)
 Folder = Annotated[Path, Parameter(name="folder", help="Folder of the proof.")]
@@ -72,8 +72,8 @@ class Sealing:
         float | None,
         Parameter(
             validator=_SHARE,
-            help="Share of trials, to the nearest whole number, that hide nothing, half of them nasty; "
-            "by default each is drawn so with probability 0.35.",
+            help="Share of trials, to the nearest whole number, that hide nothing, half of them contaminated "
+            "(by a bad reading, say); by default each is drawn so with probability 0.35.",
         ),
     ] = None
     unlisted_share: Annotated[
@@ -249,7 +249,7 @@ def _begun(out: Path) -> bool:
 def _new(out: Path | None) -> Path:
     from skred.output import output_folder
 
-    return output_folder(out, "prove", force=False)
+    return output_folder(out, "prove")
 
 
 def _seal(folder: "ProofFolder", sealing: Sealing, working: Working, silent: bool) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign, Status
-from skred.inference.hierarchical.reading_density import OUTLIER_FACTOR
+from skred.inference.reading_density import OUTLIER_FACTOR
 
 FloatArray = NDArray[np.float64]
 DEFAULT_ERRORS = "robust"

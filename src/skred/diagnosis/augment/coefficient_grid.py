@@ -106,7 +106,6 @@ class Located(NamedTuple):
     def populations_near(self, added: FloatArray, rng: np.random.Generator, wider: float = 1.0) -> FloatArray:
         """Draw the population's coordinates at each of some added strengths.
 
-
         Parameters
         ----------
         added : (n, n_added) array

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.score_information import reading_slopes
 from skred.inference.error_model import Errors, EventReadings
-from skred.inference.hierarchical.reading_density import log_likelihoods
+from skred.inference.reading_density import log_likelihoods
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from skred.diagnosis.compiled import compiled
-from skred.inference.hierarchical.reading_density import (
+from skred.inference.reading_density import (
     OBSERVED,
     OUTLIER_FACTOR,
     RELATIVE,

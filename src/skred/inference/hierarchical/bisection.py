@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from skred.inference.error_model import Errors, EventReadings
-from skred.inference.hierarchical.reading_density import assess, log_likelihoods
+from skred.inference.reading_density import assess, log_likelihoods
 from skred.physics.kernel.fronts import simulate
 from skred.physics.kernel.inputs import Contributions, Path
 

@@ -1,0 +1,57 @@
+"""``skred diagnose``: what physics a law leaves out.
+
+Everything heavy is imported inside the functions, so that ``--help`` is instant.
+"""
+
+from typing import Any
+
+from skred.cli.exit_codes import DONE, NOT_CONVERGED
+from skred.cli.inputs import campaign_of, hierarchical_of
+from skred.cli.options import (
+    DIAGNOSING,
+    HIERARCHICAL,
+    Campaigns,
+    DiagnosedModel,
+    Diagnosing,
+    Hierarchical,
+)
+from skred.cli.output import OUTPUT, Output
+
+
+def diagnose(
+    campaign: Campaigns = "ryggfonn",
+    /,
+    *,
+    base_model: DiagnosedModel = "pcm",
+    diagnosing: Diagnosing = DIAGNOSING,
+    likelihood: Hierarchical = HIERARCHICAL,
+    output: Output = OUTPUT,
+) -> int:
+    """Say what physics a law leaves out, where and how surely, model it, and show what that improves."""
+    from skred.parallel.processes import helpers
+
+    recorded = campaign_of(campaign)
+    with helpers("skred.diagnosis.diagnose"):  # they load packages while this process loads its own
+        from skred.physics.laws import load_law
+
+        law = load_law(base_model)
+        problem = hierarchical_of(recorded, likelihood.errors, likelihood.smoothing)
+        with output.results("diagnose") as results:
+            from skred.diagnosis.run import diagnose_to
+            from skred.report.diagnosis.report import diagnosis_table
+
+            settings, effort = diagnosing.settings(), diagnosing.effort()
+            lock, folds = diagnosing.lock or 0, diagnosing.outer_folds or 0
+            document = diagnose_to(
+                problem, law, settings, effort, results.unfinished, output.tell, lock=lock, folds=folds
+            )
+    output.show(document, diagnosis_table, [], results.path)  # the statement is in the table
+    return DONE if converged(document) else NOT_CONVERGED
+
+
+def converged(document: dict[str, Any]) -> bool:
+    """Whether every number of a verdict rests on chains that converged.
+
+    A document from before there was a key for it says only whether something stood in the way.
+    """
+    return bool(document.get("converged", document["reason"] is None))
