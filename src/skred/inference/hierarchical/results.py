@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from skred.inference.fit import fit_entries
 from skred.inference.hierarchical.event_draws import (
     fronts_of,
     new_avalanches,
@@ -19,6 +20,7 @@ from skred.inference.intervals import interval
 from skred.inference.results import predictive, summary
 from skred.physics.law import Law
 
+FloatArray = NDArray[np.float64]
 MOST_AVALANCHES = 200_000
 """Draws times events kept of single avalanches; beyond that draws are thinned."""
 _READING = {"units": "m s-1; m for the runout"}
@@ -103,14 +105,31 @@ def avalanche_dataset(
 
 @summary.register
 def hierarchical_summary(problem: HierarchicalProblem, law: Law, tree: xr.DataTree) -> dict[str, Any]:
-    """The error model, a new avalanche at each sensor, and each event's own strengths."""
+    """The error model, the check of fit, a new avalanche at each sensor, each event's own strengths."""
     return {
         "error_model": {"id": problem.error_model.id, "title": problem.error_model.title},
         "place_sd_m": problem.place_sd_m,
         "integration": problem.integration(law),
+        **fit_entries(problem, predicted_readings(problem, tree)),
         "new_avalanche": new_avalanche_rows(problem, tree),
         "events": event_rows(problem, law, tree),
     }
+
+
+def predicted_readings(problem: HierarchicalProblem, tree: xr.DataTree) -> FloatArray:
+    """Recordings that the model predicts, (n, n_events, n_sensors), for the check of fit.
+
+    Of the new avalanches of the result, each read with the errors that the recorded avalanche of the same
+    release states; 0 where the front does not come.
+    """
+    groups, data = tree["posterior_predictive"].to_dataset(), problem.readings
+    shape = (-1, problem.campaign.n_events, problem.campaign.n_sensors)
+    fronts, reached = (groups[name].values.reshape(shape) for name in ("front", "reached"))
+    rng = np.random.default_rng([int(tree.attrs["seed"]), 3])
+    sd = data.sd(np.arange(problem.campaign.n_events), fronts)
+    readings = problem.error_model.draw(fronts, sd, data.is_velocity, rng)
+    came = np.where(reached, np.maximum(readings, 0.0), 0.0)
+    return np.where(data.is_velocity, came, readings)
 
 
 def new_avalanche_rows(problem: HierarchicalProblem, tree: xr.DataTree) -> list[dict[str, Any]]:
