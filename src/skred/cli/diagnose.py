@@ -22,6 +22,7 @@ from skred.cli.options import (
     Smoothing,
 )
 from skred.cli.output import OUTPUT, Output
+from skred.cli.refused import tell_refused_mechanisms
 
 
 def diagnose(
@@ -47,6 +48,7 @@ def diagnose(
         from skred.physics.laws import load_law
 
         law = load_law(base_model)
+        tell_refused_mechanisms()
         problem = hierarchical_of(recorded, errors, smoothing)
         folder = output.folder("diagnose")
 

@@ -7,6 +7,7 @@ from skred.cli.exit_codes import DONE, NOT_CONVERGED
 from skred.cli.inputs import campaign_of, hierarchical_of
 from skred.cli.options import Campaigns, DiagnosedModel, Errors, IdleSeed, Smoothing
 from skred.cli.output import OUTPUT, Output
+from skred.cli.refused import tell_refused_mechanisms
 
 
 def identify(
@@ -23,6 +24,7 @@ def identify(
     from skred.physics.laws import load_law
 
     law = load_law(base_model)
+    tell_refused_mechanisms()
     problem = hierarchical_of(campaign_of(campaign), errors, smoothing)
     folder = output.folder("identify")
 
