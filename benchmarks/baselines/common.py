@@ -1,6 +1,6 @@
 """What every baseline returns, and how evidence, probabilities or a guess become a verdict.
 
-What is tuned is tuned on development trials and frozen: ``python benchmarks/development_set.py`` with
+What is tuned is tuned on development trials and frozen: ``python -m benchmarks.development_set`` with
 ``--n 30 --seed 5000``, ``--n 60 --seed 5100 --hidden nothing`` and ``--n 40 --seed 5200 --hidden listed``.
 Limits of the alarm are apart for sparse and dense recordings, each the 95 % quantile of the scores of those
 trials in which nothing is hidden (32 sparse, 36 dense; nasty ones left out). Temperatures give the best mean

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from peers import pymc_run
-from peers.common import Drawn
-
+from benchmarks.peers import pymc_run
+from benchmarks.peers.common import Drawn
 from skred.inference.joint_metropolis import JointMetropolis
 from skred.inference.problem import PooledProblem
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pymc as pm
-from peers import pymc_run
-from peers.common import Drawn
 
+from benchmarks.peers import pymc_run
+from benchmarks.peers.common import Drawn
 from skred.inference.problem import PooledProblem
 
 

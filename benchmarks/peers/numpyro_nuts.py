@@ -18,10 +18,10 @@ from jax import lax
 from jax.scipy.special import log_ndtr, ndtr
 from numpy.typing import NDArray
 from numpyro.infer import NUTS, init_to_value
-from peers.common import PARAMETERS, Drawn, FloatArray, cpu_seconds, near_the_mode
-from peers.forward import Track, cross, march_step, read, track_of
 from scipy.special import roots_legendre
 
+from benchmarks.peers.common import PARAMETERS, Drawn, FloatArray, cpu_seconds, near_the_mode
+from benchmarks.peers.forward import Track, cross, march_step, read, track_of
 from models.pcm import DRAG, DRY
 from skred.inference.problem import PooledProblem
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import nutpie
-from peers.common import Drawn, cpu_seconds, draws_of, near_the_mode
 
+from benchmarks.peers.common import Drawn, cpu_seconds, draws_of, near_the_mode
 from models.pcm import LAW
 from skred.inference.problem import PooledProblem
 

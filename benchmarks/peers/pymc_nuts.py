@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from peers import pymc_run
-from peers.common import Drawn, near_the_mode
-
+from benchmarks.peers import pymc_run
+from benchmarks.peers.common import Drawn, near_the_mode
 from skred.inference.problem import PooledProblem
 
 

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 import pymc as pm
-from peers.common import Drawn, cpu_seconds, draws_of
 
+from benchmarks.peers.common import Drawn, cpu_seconds, draws_of
 from models.pcm import LAW
 from skred.inference.problem import PooledProblem
 

@@ -8,8 +8,8 @@ import numpy as np
 import pymc as pm
 import pytensor
 import pytensor.tensor as pt
-from peers.forward import Track, cross, march_step, read, track_of
 
+from benchmarks.peers.forward import Track, cross, march_step, read, track_of
 from models.pcm import DRAG, DRY
 from skred.inference.pooled.model import observe
 from skred.inference.problem import PooledProblem

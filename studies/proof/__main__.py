@@ -1,11 +1,11 @@
 """The published record: concealed trials that were sealed, diagnosed, revealed; and docs/proof.md.
 
-``python benchmarks/proof_page.py --add DIR`` takes a revealed proof folder into the record
-(``proof_record.py`` has its form); without ``--add`` it only writes the page anew. The page scores the
+``python -m studies.proof --add DIR`` takes a revealed proof folder into the record
+(``record.py`` has its form); without ``--add`` it only writes the page anew. The page scores the
 largest batch, which one version of the code diagnosed from first to last, and then all batches together.
 
 A batch is one ledger. Batches are added as time allows, each with a seed of its own. One that is given up
-keeps its ledger, and its ``notes.md`` says why.
+keeps its ledger, and its notes say why.
 """
 
 from __future__ import annotations
@@ -27,20 +27,29 @@ from skred.prove.plan import KINDS
 from skred.prove.scorecard import DIAGNOSIS, scorecard
 from skred.prove.scoring.answers import UNLISTED
 from skred.prove.scoring.standards import SNR_BINS
-from studies.proof.record import RECORD, add, answers_of, batches, is_open, ledger_of, sealed_of
+from studies.files import FIGURES, ROOT, shrink
+from studies.proof.record import (
+    Batch,
+    add,
+    answers_of,
+    batches,
+    is_open,
+    ledger_of,
+    missed,
+    notes_of,
+    sealed_of,
+)
 
 FAILED = ("crash", "timeout")
-ROOT = Path(__file__).resolve().parent.parent
-FIGURES = ROOT / "docs" / "figures"
 Found = Mapping[str, Any]
 _HEAD = """# The record of concealed trials
 
-Written by `python benchmarks/proof_page.py` from `benchmarks/results/proof/`. Each batch was sealed before
-its first diagnosis (`skred prove seal`: salted SHA-256 of truth, campaign, settings and source), diagnosed by
+Written by `python -m studies.proof` from `studies/results/proof.tar.xz`. Each batch was sealed before its
+first diagnosis (`skred prove seal`: salted SHA-256 of truth, campaign, settings and source), diagnosed by
 processes that were given the campaign alone (`skred prove run`), then opened and verified (`skred prove
 reveal`). A crash or a time-out is a wrong answer; every trial of every opened batch is counted, and a
 batch that was given up is listed with its reason. Scores are defined
-in `src/skred/prove/scores*.py`.
+in `src/skred/prove/scoring/`.
 """
 _RUN = """Seed {seed}: {n} trials, {nothing} of them with nothing hidden ({nasty} nasty), all diagnosed by one
 version of the code, which was frozen before the seed was chosen. With the source of that version the same
@@ -50,7 +59,7 @@ trials, with other salts, are drawn, diagnosed and scored by
 skred prove seal DIR --trials {n} --nothing-share {share:g} --seed {seed}
 skred prove run DIR
 skred prove reveal DIR
-python benchmarks/run_baselines.py --trials DIR
+python -m benchmarks.run_baselines --trials DIR
 skred prove reveal DIR
 ```
 """
@@ -64,7 +73,7 @@ _WEAK, _STRONG = 4.0, 5.5
 """Signal-to-noise from which on effects should be found."""
 
 
-def gathered(batches: Sequence[Path]) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
+def gathered(batches: Sequence[Batch]) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
     """Trials with their truths, and answers by method, of all batches, named by seed and trial."""
     trials, answers = [], dict[str, dict[str, Any]]()
     for batch in filter(is_open, batches):
@@ -76,13 +85,13 @@ def gathered(batches: Sequence[Path]) -> tuple[list[dict[str, Any]], dict[str, d
     return trials, answers
 
 
-def page(batches: Sequence[Path], run: Found, document: Found, figures: Sequence[str]) -> str:
+def page(batches: Sequence[Batch], run: Found, document: Found, figures: Sequence[str]) -> str:
     """The whole page: the largest batch's scores are `run`, those of all together `document`."""
     parts = [_HEAD, "## Batches\n", _batches(batches)]
     parts += ["## One blind run\n", _about(_largest(batches)), bars_table(run)]
     parts += [f"![{name.replace('_', ' ')}](figures/proof-{name}.png)\n" for name in figures]
     parts += ["### Open and masked\n", _masked(run), "### By what was hidden\n", _by_hidden(run)]
-    parts += ["### Why bars are missed\n", (RECORD / "missed.md").read_text(encoding="utf-8")]
+    parts += ["### Why bars are missed\n", missed()]
     parts += ["## The newest batch\n", _newest(batches)]
     parts += ["## All batches together\n", _IN_ORDER, _by_batch(batches, document), bars_table(document)]
     parts += [_later(batches, document), _by_hidden(document)]
@@ -90,19 +99,19 @@ def page(batches: Sequence[Path], run: Found, document: Found, figures: Sequence
     return "\n".join(parts)
 
 
-def _newest(batches: Sequence[Path]) -> str:
+def _newest(batches: Sequence[Batch]) -> str:
     """Goals of the batch that was sealed last, by the code of that day."""
     seed = str(_in_order(batches)[-1]["seed"])
-    bars = bars_table(_scores([RECORD / seed]))
+    bars = bars_table(_scores([Batch(seed)]))
     return f"Seed {seed}; what is to be said about it stands at the end.\n\n{bars}"
 
 
-def _largest(batches: Sequence[Path]) -> Path:
+def _largest(batches: Sequence[Batch]) -> Batch:
     """The opened batch with most trials."""
     return max(filter(is_open, batches), key=lambda batch: int(ledger_of(batch)["n"]))
 
 
-def _about(batch: Path) -> str:
+def _about(batch: Batch) -> str:
     """What a batch consists of, and how to repeat it."""
     ledger = ledger_of(batch)
     trials, _ = gathered([batch])
@@ -128,7 +137,7 @@ def _masked(document: Found) -> str:
     return "\n".join([*head, *rows, f"\nFrom {_STRONG:g} on: {_open_and_masked(document['trials'])}."]) + "\n"
 
 
-def _later(batches: Sequence[Path], document: Found) -> str:
+def _later(batches: Sequence[Batch], document: Found) -> str:
     """The same of the batches whose code looked for what is nil on average."""
     later = {ledger["seed"] for ledger in _in_order(batches)[_BEFORE_OPPOSED:]}
     lines = [one for one in document["trials"] if int(one["trial"].partition("/")[0]) in later]
@@ -177,13 +186,13 @@ def _open_and_masked(lines: Sequence[Found]) -> str:
     return f"{found_of(open_ones)} open effects were found, {found_of(masked)} masked ones"
 
 
-def _in_order(batches: Sequence[Path]) -> list[Found]:
+def _in_order(batches: Sequence[Batch]) -> list[Found]:
     """Ledgers of the opened batches as they were sealed."""
     ledgers = [ledger_of(one) for one in batches if is_open(one)]
     return sorted(ledgers, key=lambda one: str(one["created_utc"]))
 
 
-def _by_batch(batches: Sequence[Path], document: Found) -> str:
+def _by_batch(batches: Sequence[Batch], document: Found) -> str:
     """What each version of the code did on its own trials, in the order in which they were sealed."""
     rows = [
         "| seed | trials | clean: false alarms, failures | found from 5.5 on: open | masked | one name: right"
@@ -241,13 +250,13 @@ def _share(found: Found) -> str:
     return f"{found['hits']} of {found['n']} ({found['low']:.2f} to {found['high']:.2f})"
 
 
-def _notes(batch: Path) -> str:
+def _notes(batch: Batch) -> str:
     """What is to be said about a batch, written by hand after it was opened."""
-    file = batch / "notes.md"
-    return f"## About batch {batch.name}\n\n{file.read_text(encoding='utf-8')}" if file.exists() else ""
+    notes = notes_of(batch)
+    return f"## About batch {batch.name}\n\n{notes}" if notes else ""
 
 
-def _batches(batches: Sequence[Path]) -> str:
+def _batches(batches: Sequence[Batch]) -> str:
     rows = [
         "| seed | trials | sealed (UTC) | SHA-256 of the ledger | source | |",
         "| --- | --- | --- | --- | --- | --- |",
@@ -262,10 +271,10 @@ def _batches(batches: Sequence[Path]) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _state(batch: Path) -> str:
+def _state(batch: Batch) -> str:
     if is_open(batch):
         return "opened"
-    return "given up unopened, see below" if (batch / "notes.md").exists() else "not opened yet"
+    return "given up unopened, see below" if notes_of(batch) else "not opened yet"
 
 
 def bars_table(document: Found) -> str:
@@ -285,7 +294,7 @@ def bars_table(document: Found) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _wrong(batches: Sequence[Path]) -> str:
+def _wrong(batches: Sequence[Batch]) -> str:
     """Every trial in which something was alarmed, named or missed wrongly."""
     rows = [
         "| trial | what was hidden | signal-to-noise | verdict | named | P(nothing) |",
@@ -311,7 +320,7 @@ def _wrong(batches: Sequence[Path]) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _scores(batches: Sequence[Path]) -> Found:
+def _scores(batches: Sequence[Batch]) -> Found:
     trials, answers = gathered(batches)
     return scorecard({"n": len(trials)}, trials, answers)
 
@@ -334,6 +343,7 @@ def main(
     with TemporaryDirectory() as folder:
         figures = save_scorecard_figures(run, Path(folder))
         for name, file in figures.items():
+            shrink(file)
             shutil.copy(file, FIGURES / f"proof-{name}.png")
     write_text(ROOT / "docs" / "proof.md", page(every, run, document, list(figures)))
 

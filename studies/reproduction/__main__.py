@@ -1,4 +1,4 @@
-"""Write the comparison with the paper: ``python scripts/reproduction.py``.
+"""Write the comparison with the paper: ``python -m studies.reproduction``.
 
 Every number of ``docs/reproduction.md`` and of its figures is computed here, in a few minutes.
 """
@@ -12,7 +12,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter, validators
 
-DEFAULT_OUT = Path(__file__).resolve().parent.parent / "docs" / "reproduction.md"
+DEFAULT_OUT = Path(__file__).resolve().parents[2] / "docs" / "reproduction.md"
 PACKAGES = ("skred", "pymc", "pytensor", "arviz", "numba", "numpy", "scipy")
 
 app = App(help="Compare the pooled calibration on Ryggfonn with the paper's statements.")
@@ -51,7 +51,7 @@ def main(
     out.parent.mkdir(parents=True, exist_ok=True)
     tell("figures")
     save_reproduction_figures(study, out.parent / "figures")
-    command = f"python scripts/reproduction.py --seed {seed}" + (" --quick" if quick else "")
+    command = f"python -m studies.reproduction --seed {seed}" + (" --quick" if quick else "")
     versions = {"python": platform.python_version(), **{name: version(name) for name in PACKAGES}}
     text = page(study, command=command, seed=seed, versions=versions, seconds=time.monotonic() - started)
     write_text(out, text)

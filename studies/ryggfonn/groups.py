@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from skred.diagnosis.diagnose import Diagnosis
+    from skred.diagnosis.outcome import Diagnosis
     from skred.physics.mechanisms.spec import Direction
 
 FloatArray = NDArray[np.float64]
@@ -37,7 +37,6 @@ def retardations(found: Diagnosis) -> list[dict[str, Any]]:
 
     Those on the far side of the widest gap between recorded ones are the group that retards more.
     """
-    assert found.comparison is not None
     campaign, under_errors = found.problem.campaign, found.comparison.leading(UNLISTED)
     recorded = recorded_retardation(pooled_problem(campaign), FIRST, LAST)
     more, _, _ = recorded.groups()

@@ -19,7 +19,7 @@ UNSEEN = "-unseen"
 """What the names of those cases end in that repeat the diagnosis without some avalanches."""
 _HEAD = """# Ryggfonn: what the block models leave out
 
-Written by `python benchmarks/ryggfonn_diagnoses.py` from `benchmarks/results/ryggfonn/`; every figure below
+Written by `python -m studies.ryggfonn` from `studies/results/ryggfonn/`; every figure below
 is the tool's own. 22 avalanches on the natural terrain, the catching dam (15 m high, crown at s = 1940 m,
 upstream foot at 1910 m) withheld. Log Bayes factors are against nothing, in nats, shapes and strengths
 integrated over, under the error models that were raced; probabilities use the prior odds of the campaign

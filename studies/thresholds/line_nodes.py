@@ -1,6 +1,6 @@
 """Nodes on a line beside importance nodes: what the comparison's evidences are wrong by, and what that costs.
 
-``python benchmarks/line_nodes.py [--json FILE]`` keeps one in eight of the integrations of Ryggfonn's
+``python -m studies.thresholds.line_nodes`` keeps one in eight of the integrations of Ryggfonn's
 comparison, under each error model that is raced, and does each again by both rules with the comparison's
 budgets, and with nodes on a line sixteen times as close, which stand for exact. Importance nodes, as many as
 a minute or so allows, are the second route to those.
@@ -11,8 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import cyclopts
 import numpy as np
@@ -31,10 +30,11 @@ from skred.diagnosis.evidence.event_quadrature import (
     on_a_line,
 )
 from skred.diagnosis.evidence.marginal import coordinates, evidence
-from skred.output import write_json
+from studies.files import RESULTS, write
 from studies.thresholds.compared_again import base_on
 
 app = cyclopts.App(help=__doc__)
+RESULT = RESULTS / "line_nodes.json"
 LAWS = ("coulomb", "constant")
 BUDGETS = {"first round": FIRST, "first look": FRONTS, "usual": USUAL, "fine": FINE}
 EXACT, MANY = USUAL.times(256), USUAL.times(32)
@@ -102,13 +102,10 @@ def measured(law_id: str) -> dict[str, Any]:
 
 
 @app.default
-def main(
-    *, out: Annotated[Path | None, cyclopts.Parameter(name="--json", help="File for the figures.")] = None
-) -> None:
+def main() -> None:
     """Measure."""
     found = [measured(law_id) for law_id in LAWS]
-    if out is not None:
-        write_json(out, found)
+    write(RESULT, {"laws": found})
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """How much the form of a term adds to the uncertainty of its strength: what `strength.FORM` is set on.
 
-``python benchmarks/strength_forms.py`` reads the opened batches whose answers state strengths without it, and
-prints how many true strengths the 90 % intervals hold for several values.
+``python -m studies.thresholds.strength_forms`` reads the opened batches whose answers state strengths without
+it, and prints how many true strengths the 90 % intervals hold for several values.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import cyclopts
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group
 from skred.prove.scoring.places import CREDIBLE, comparable
-from studies.proof.record import RECORD, diagnosed
+from studies.proof.record import Batch, diagnosed
 
 BATCHES = (1471600277, 1152334902, 60796182)
 app = cyclopts.App(help=__doc__)
@@ -24,7 +24,7 @@ def main() -> None:
     """Count."""
     known = []
     for seed in BATCHES:
-        for pair in diagnosed(RECORD / str(seed)):
+        for pair in diagnosed(Batch(str(seed))):
             truth = comparable(pair) if pair.right_name else None
             if truth is not None and mechanisms()[str(pair.name)].group is Group.PHYSICS:
                 known.append(

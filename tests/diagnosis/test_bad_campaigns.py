@@ -17,7 +17,8 @@ from skred.diagnosis.compare.decision import decide
 from skred.diagnosis.compare.location import locate
 from skred.diagnosis.detect.detectability import told
 from skred.diagnosis.detect.score_test import ScoreTest
-from skred.diagnosis.diagnose import Effort, diagnose
+from skred.diagnosis.diagnose import diagnose
+from skred.diagnosis.effort import Effort
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.prior_odds import UNLISTED

@@ -12,7 +12,8 @@ import xarray as xr
 
 import skred.diagnosis.run as module
 from skred.campaign.parts import of_events
-from skred.diagnosis.diagnose import Diagnosis, Effort
+from skred.diagnosis.effort import Effort
+from skred.diagnosis.outcome import Diagnosis, MechanismsAdded
 from skred.diagnosis.run import diagnose_to
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
 from skred.inference.sampling import SamplerSettings
@@ -55,7 +56,9 @@ def test_draws_are_in_their_files(
     }
     step: Any = SimpleNamespace(calibration=made["augmented"])
     law = load_law("constant")
-    found = Diagnosis(few, law, "", made["base"], steps=(step,), reference=made["reference"])
+    none: Any = None
+    added = MechanismsAdded((step,), made["reference"], none)
+    found = Diagnosis(few, law, made["base"], none, none, none, none, none, none, added, none)
 
     def drawn(*_: Any) -> dict[str, Path]:
         if broken:

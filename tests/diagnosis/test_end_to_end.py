@@ -13,8 +13,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skred.campaign import Campaign, Status
 from skred.diagnosis.augment.reference import Reference
-from skred.diagnosis.diagnose import Diagnosis, Effort, diagnose
+from skred.diagnosis.diagnose import diagnose
+from skred.diagnosis.effort import Effort
 from skred.diagnosis.evidence.predictive import Predicted
+from skred.diagnosis.outcome import Diagnosis, MechanismsAdded, NothingAdded
 from skred.diagnosis.predict.held_out import HeldOut, errors, paired
 from skred.diagnosis.verdict.document import verdict
 from skred.inference.error_model import ERROR_MODELS
@@ -42,7 +44,9 @@ def clean_campaign() -> Campaign:
 def diagnosed(campaign: Campaign) -> Diagnosis:
     settings = SamplerSettings("metropolis", 500, 500, 4, 0)
     effort = Effort(replicas=40, max_mechanisms=1)
-    return diagnose(hierarchical_problem(campaign), load_law("constant"), settings, effort)
+    found = diagnose(hierarchical_problem(campaign), load_law("constant"), settings, effort)
+    assert isinstance(found, Diagnosis)
+    return found
 
 
 @pytest.fixture(scope="module")
@@ -98,9 +102,9 @@ def test_a_program_can_follow_the_probabilities(which: str, request: pytest.Fixt
 def test_nothing_is_named_where_nothing_is(clean: Diagnosis) -> None:
     document = verdict(clean)
     assert document["verdict"] in ("nothing_missing", "cannot_tell")
-    assert (document["verdict"] == "nothing_missing") == clean.table.can_tell  # type: ignore[union-attr]
+    assert (document["verdict"] == "nothing_missing") == clean.table.can_tell
     assert document["mechanism"] is None and document["mechanisms"] == [] and document["strength"] is None
-    assert document["evidence"]["p_value"] > 0.01 and clean.steps == () and clean.after is None
+    assert document["evidence"]["p_value"] > 0.01 and isinstance(clean.finding, NothingAdded)
     assert document["held_out"]["rmse_velocity_after"] is None
 
 
@@ -119,7 +123,6 @@ def test_a_biased_sensor_is_named(biased: Diagnosis) -> None:
 
 
 def test_limits_are_those_of_the_table(clean: Diagnosis) -> None:
-    assert clean.table is not None
     for row in clean.table.rows:
         found = verdict(clean)["detection_limits"][row.mechanism.id]
         assert found["unit"] == row.mechanism.strength.unit
@@ -129,7 +132,7 @@ def test_limits_are_those_of_the_table(clean: Diagnosis) -> None:
 
 def test_importance_sampling_agrees_with_refits(clean: Diagnosis) -> None:
     calibration: Any = clean.calibration
-    assert clean.before is not None and clean.before.refitted == ()
+    assert clean.before.refitted == ()
     events = list(clean.problem.campaign.event_ids)
     exact = exact_leave_one_out(calibration.model, calibration.step, events, 5, which=[1, 4])
     assert exact.failed == ()
@@ -138,7 +141,6 @@ def test_importance_sampling_agrees_with_refits(clean: Diagnosis) -> None:
 
 def test_predictions_are_of_the_readings(clean: Diagnosis) -> None:
     found, problem = clean.before, clean.problem
-    assert found is not None
     seen = problem.observed
     for values in found.predicted:
         assert np.isfinite(values[seen]).all() and np.isnan(values[~seen]).all()
@@ -162,7 +164,9 @@ def test_before_and_after_stand_under_one_error_model(biased: Diagnosis, name: s
     assert found.gate.passed and cannot == ""
     assert problem.error_model.id == name
     assert (found is calibration) == (name == "robust")
-    assert verdict(replace(biased, steps=(step,)))["error_model"] == name
+    assert isinstance(biased.finding, MechanismsAdded)
+    finding = replace(biased.finding, steps=(step,))
+    assert verdict(replace(biased, finding=finding))["error_model"] == name
     if name != "robust":
         # Fewer than the 400 effective draws the gate asks for, even sixteen times as many from four chains.
         few = replace(calibration, settings=replace(calibration.settings, draws=5, tune=5))

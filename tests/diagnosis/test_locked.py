@@ -18,7 +18,8 @@ from skred.campaign import Campaign, Status
 from skred.campaign.parts import of_events, without_silent_sensors
 from skred.cli.main import run
 from skred.diagnosis.compare.decision import Decision
-from skred.diagnosis.diagnose import Diagnosis, Effort, Step
+from skred.diagnosis.effort import Effort
+from skred.diagnosis.outcome import Diagnosis, MechanismsAdded, NotDiagnosed, NothingAdded, Outcome
 from skred.diagnosis.predict.unseen import Predictor, Term, log_scores
 from skred.errors import InputError
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
@@ -57,13 +58,14 @@ def seen(monkeypatch: pytest.MonkeyPatch, problem: HierarchicalProblem) -> Itera
     def made_up(problem: Any, law: Any, settings: Any, effort: Any, tell: Any = None) -> Diagnosis:
         campaigns.append(problem.campaign)
         step: Any = SimpleNamespace(candidate=candidate)
-        steps: tuple[Step, ...] = (step,) if len(campaigns) % 2 else ()
         held: Any = object()
-        verdict = Decision("instrument" if steps else "nothing_missing", ())
-        return Diagnosis(problem, law, steps=steps, before=held, decision=verdict)
+        added = MechanismsAdded((step,), held, held) if len(campaigns) % 2 else NothingAdded()
+        decision = Decision("instrument" if len(campaigns) % 2 else "nothing_missing", ())
+        return Diagnosis(problem, law, held, held, held, held, held, decision, held, added, held)
 
-    def predictors(found: Diagnosis) -> tuple[Predictor, Predictor | None]:
-        return predictor(problem), predictor(problem, 0.05) if found.steps else None
+    def predictors(found: Outcome) -> tuple[Predictor, Predictor | None]:
+        added = isinstance(found, Diagnosis) and found.steps
+        return predictor(problem), predictor(problem, 0.05) if added else None
 
     monkeypatch.setattr(module, "diagnose", made_up)
     monkeypatch.setattr(module, "predictors_of", predictors)
@@ -107,14 +109,16 @@ def test_locked_avalanches_are_opened(problem: HierarchicalProblem, seen: list[C
 
 def test_nothing_let_in_leaves_nothing_to_compare(problem: HierarchicalProblem, seen: list[Campaign]) -> None:
     others, aside = module.set_aside(problem, 1, 3)
-    nothing = replace(module.diagnose(others, load_law("constant"), SETTINGS, EFFORT), steps=())
+    found = module.diagnose(others, load_law("constant"), SETTINGS, EFFORT)
+    assert isinstance(found, Diagnosis)
+    nothing = replace(found, finding=NothingAdded())
     document = module.open_locked(nothing, aside, 0)
     valid("locked", document)
     assert len(document["log_score_before"]) == 1 and document["coverage_90_before"] is not None
     assert {document[key] for key in ("log_score_after", "elpd_diff", "elpd_se", "rmse_velocity_after")} == {
         None
     }
-    unopened = module.open_locked(replace(nothing, before=None), aside, 0)
+    unopened = module.open_locked(NotDiagnosed(others, found.law, "too few"), aside, 0)
     valid("locked", unopened)
     assert unopened["events"] == list(aside.event_ids) and unopened["log_score_before"] is None
     told = locked({"locked": unopened})

@@ -12,15 +12,16 @@ from diagnosis_cases import base_of, first_events, trial, with_sensors
 from numpy.testing import assert_array_equal
 
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
-from skred.diagnosis.diagnose import Diagnosis, Effort, _before
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, combined, knots
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.extension import extended, setting_of
-from skred.diagnosis.predict.gain import predictors_of, promised_gain
+from skred.diagnosis.outcome import Diagnosis, ProfileAdded
+from skred.diagnosis.predict.held_out import held_out
 from skred.diagnosis.predict.predictor_document import as_dict, from_dict
 from skred.diagnosis.predict.profile_law import ProfileLaw, _left_out, profile_law
 from skred.diagnosis.predict.unseen import ProfileTerm, log_scores
+from skred.diagnosis.verdict.predictors import predictors_of, promised_gain
 from skred.errors import InputError
 from skred.inference.calibrate import calibrate
 from skred.inference.sampling import SamplerSettings
@@ -44,15 +45,15 @@ def hidden() -> Base:
 
 
 @pytest.fixture(scope="module")
-def add_mechanisms(hidden: Base) -> ProfileLaw:
+def added(hidden: Base) -> ProfileLaw:
     return law_of(hidden)
 
 
-def test_a_force_that_is_there_predicts_avalanches_left_out(let_in: ProfileLaw) -> None:
-    difference = let_in.after.pointwise - let_in.before.pointwise
+def test_a_force_that_is_there_predicts_avalanches_left_out(added: ProfileLaw) -> None:
+    difference = added.after.pointwise - added.before.pointwise
     assert difference.sum() > 10.0
-    assert difference.sum() < let_in.profile.gain + 5.0
-    assert let_in.check.p_value > 0.01
+    assert difference.sum() < added.profile.gain + 5.0
+    assert added.check.p_value > 0.01
 
 
 def test_a_force_that_is_not_there_does_not() -> None:
@@ -60,22 +61,19 @@ def test_a_force_that_is_not_there_does_not() -> None:
     assert (clean.after.pointwise - clean.before.pointwise).sum() < 1.0
 
 
-def diagnosed(hidden: Base, let_in: ProfileLaw) -> Diagnosis:
-    under_errors = ComparisonUnderErrors("robust", hidden, {}, [let_in.profile], [])
+def diagnosed(hidden: Base, added: ProfileLaw) -> Diagnosis:
+    under_errors = ComparisonUnderErrors("robust", hidden, {}, [added.profile], [])
     comparison = Comparison((under_errors,), {}, {"robust": 0.0})
+    nothing: Any = None
     return Diagnosis(
-        hidden.problem,
-        hidden.law,
-        comparison=comparison,
-        profile=let_in,
-        before=let_in.before,
-        after=let_in.after,
-    )
+        hidden.problem, hidden.law, nothing, nothing, nothing, nothing, comparison, nothing, nothing,
+        ProfileAdded(added), added.before,
+    )  # fmt: skip
 
 
-def test_fresh_avalanches_are_scored_with_the_profile(hidden: Base, let_in: ProfileLaw) -> None:
+def test_fresh_avalanches_are_scored_with_the_profile(hidden: Base, added: ProfileLaw) -> None:
     """As plain data and back; what they gain is about what those left out promise."""
-    found = diagnosed(hidden, let_in)
+    found = diagnosed(hidden, added)
     document = json.loads(json.dumps([as_dict(one) for one in predictors_of(found) if one is not None]))
     before, after = (from_dict(one) for one in document)
     assert before.profile is None and after.profile is not None
@@ -88,13 +86,13 @@ def test_fresh_avalanches_are_scored_with_the_profile(hidden: Base, let_in: Prof
 
 
 @pytest.mark.parametrize("kind", range(len(KINDS)))
-def test_a_predictor_s_profile_is_that_which_was_fitted(hidden: Base, let_in: ProfileLaw, kind: int) -> None:
+def test_a_predictor_s_profile_is_that_which_was_fitted(hidden: Base, added: ProfileLaw, kind: int) -> None:
     """Readings with any values at the knots, also where the force refers to the typical speed."""
     setting, own = hidden.setting, KINDS[kind]
     at = knots(setting)
     values = own.amplitude * np.sin(np.arange(len(at)))
     fitted = extended(hidden.problem, hidden.law, [combined(setting, own, at, values)])
-    profile = replace(let_in.profile, kind=own)
+    profile = replace(added.profile, kind=own)
     directions = ProfileTerm.of(profile, setting).directions(setting_of(hidden.problem, hidden.law))
     told = extended(hidden.problem, hidden.law, directions)
     events, points = hidden.rows.event, hidden.fit.points
@@ -128,26 +126,26 @@ def test_a_profile_that_cannot_be_is_refused(key: str, value: Any, words: str) -
         from_dict(document | {"profile": term | {key: value}})
 
 
-def test_an_avalanche_has_no_say_in_what_is_predicted_of_it(hidden: Base, let_in: ProfileLaw) -> None:
+def test_an_avalanche_has_no_say_in_what_is_predicted_of_it(hidden: Base, added: ProfileLaw) -> None:
     """Other readings of one avalanche change its scores and nothing that is predicted."""
     event, readings = 3, hidden.rows.readings
     values = readings.values.copy()
     values[event] *= 1.3
     changed = hidden.rows._replace(readings=readings._replace(values=values))
-    one = _left_out(hidden, let_in.profile, event, 0)
-    other = _left_out(replace(hidden, rows=changed), let_in.profile, event, 0)
+    one = _left_out(hidden, added.profile, event, 0)
+    other = _left_out(replace(hidden, rows=changed), added.profile, event, 0)
     for a, b in zip(one, other, strict=True):
         assert_array_equal(a.predicted.mean, b.predicted.mean)
         assert abs(a.log_score - b.log_score) > 1.0
 
 
-def test_before_is_what_sampling_and_refits_say(hidden: Base, let_in: ProfileLaw) -> None:
+def test_before_is_what_sampling_and_refits_say(hidden: Base, added: ProfileLaw) -> None:
     """Populations by importance sampling against Metropolis, avalanche by avalanche."""
-    calibration: Any = calibrate(hidden.problem, hidden.law, SamplerSettings("metropolis", 800, 1500, 4, 0))
-    sampled = _before(calibration, 0, Effort(exact_loo=True))
-    np.testing.assert_allclose(let_in.before.pointwise, sampled.pointwise, atol=0.5)
-    assert let_in.before.elpd == pytest.approx(sampled.elpd, abs=1.0)
+    calibration = calibrate(hidden.problem, hidden.law, SamplerSettings("metropolis", 800, 1500, 4, 0))
+    sampled = held_out(calibration, 0, exact=True)
+    np.testing.assert_allclose(added.before.pointwise, sampled.pointwise, atol=0.5)
+    assert added.before.elpd == pytest.approx(sampled.elpd, abs=1.0)
     # Sampling weights its draws for this, few of which count for an avalanche that is unlike the others.
     seen = hidden.problem.observed
-    ratio = let_in.before.predicted.mean[seen] / sampled.predicted.mean[seen]
+    ratio = added.before.predicted.mean[seen] / sampled.predicted.mean[seen]
     assert abs(np.median(ratio) - 1.0) < 0.02 and np.all(np.abs(ratio - 1.0) < 0.12)

@@ -17,9 +17,9 @@ from scipy.stats import norm
 from skred.campaign import Campaign, Status
 from skred.campaign.parts import of_events
 from skred.diagnosis.augment.augmented import augmented_problem
-from skred.diagnosis.diagnose import population_draws, typical
 from skred.diagnosis.evidence.coefficient import curve_at, fit_base
 from skred.diagnosis.evidence.covariates import Standard
+from skred.diagnosis.evidence.population_draws import population_draws, typical
 from skred.diagnosis.predict.gain import realised_gain
 from skred.diagnosis.predict.predictor_document import as_dict, from_dict
 from skred.diagnosis.predict.unseen import (

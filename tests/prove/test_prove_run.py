@@ -17,9 +17,10 @@ import pytest
 from prove_cases import PLAN, Alone, fake, silent
 
 from skred.errors import InputError
+from skred.output import alone_in
 from skred.prove.folder import ProofFolder, read_object
 from skred.prove.ledger import read_ledger, trial_names
-from skred.prove.pool import WorkerPool, alone_in
+from skred.prove.pool import WorkerPool
 from skred.prove.run import Limits, run
 
 DRIVER = Path(__file__).parent / "prove_driver.py"
@@ -125,15 +126,14 @@ def test_a_campaign_that_is_gone_is_told(proof: ProofFolder, diagnosed: Diagnose
 
 
 def test_one_command_at_a_time(proof: ProofFolder, diagnosed: Diagnosed) -> None:
-    with alone_in(proof.path), pytest.raises(InputError, match="another"):
+    with alone_in(proof.path, "test"), pytest.raises(InputError, match="another"):
         diagnosed(proof, "quick")
     assert diagnosed(proof, "quick")["answered"] == 3
 
 
-def test_no_scheduler(proof: ProofFolder, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("skred.prove.pool._PATIENCE_S", 1)
+def test_no_scheduler(proof: ProofFolder) -> None:
     with pytest.raises(InputError, match="no Dask scheduler"):
-        run(proof, WorkerPool(1, "nonsense://x"), silent, silent)
+        run(proof, WorkerPool(1, "nonsense://x", patience_s=1.0), silent, silent)
     with pytest.raises(ValueError, match="No clients"):
         distributed.default_client()
 

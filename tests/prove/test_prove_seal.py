@@ -68,7 +68,7 @@ def test_seeds_of_development_are_refused() -> None:
 
 
 def test_settings_are_those_of_a_user() -> None:
-    from skred.diagnosis.diagnose import QUICK_REPLICAS, Effort
+    from skred.diagnosis.effort import QUICK_REPLICAS, Effort
 
     settings, quick = diagnosis_settings(False), diagnosis_settings(True)
     assert Effort(**settings["effort"]) == Effort()

@@ -8,18 +8,26 @@ import numpy as np
 import xarray as xr
 from hierarchical_cases import hierarchical_calibration, hierarchical_ryggfonn
 
+from skred.diagnosis.augment.step import Step
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
 from skred.diagnosis.compare.decision import Decision
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Detectability, Identifiability
-from skred.diagnosis.diagnose import Diagnosis, Step
 from skred.diagnosis.discrepancy.profile import KINDS, Prior, Profile
 from skred.diagnosis.evidence.coefficient import Curve, Fit
 from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.predictive import Predicted
 from skred.diagnosis.evidence.prior_odds import prior_odds
+from skred.diagnosis.outcome import (
+    Diagnosis,
+    MechanismsAdded,
+    NotDiagnosed,
+    NothingAdded,
+    Outcome,
+    ProfileAdded,
+)
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.predict.profile_law import Draws, ProfileLaw
 from skred.inference.gate import Gate
@@ -139,15 +147,15 @@ def calibration(problem: HierarchicalProblem, added: tuple = (), gate: Gate = GA
 
 
 @cache
-def diagnosis(kind: str, text: str = "") -> Diagnosis:
+def diagnosis(kind: str, text: str = "") -> Outcome:
     """A diagnosis of each kind; of a campaign with hostile names where `text` is given."""
     problem = hostile_problem(text) if text else hierarchical_ryggfonn()
     if kind == "cannot":
-        return Diagnosis(problem, LAW, "only 3 avalanches with a reading; at least 6 are needed")
+        return NotDiagnosed(problem, LAW, "only 3 avalanches with a reading; at least 6 are needed")
     if kind == "gate":
         failed = Gate(1.3, 12.0, 9.0, 0, ("r-hat 1.300 exceeds 1.01: more --tune",))
         why = "the gate of the base law's calibration failed"
-        return Diagnosis(problem, LAW, why, calibration(problem, gate=failed), seconds={"base": 3.0})
+        return NotDiagnosed(problem, LAW, why, calibration(problem, gate=failed), seconds={"base": 3.0})
     tops = {
         "tie": {"entrainment": 40.0, "segment_drag": 39.6},
         "two": {"covariate_friction": 40.0},
@@ -166,14 +174,21 @@ def diagnosis(kind: str, text: str = "") -> Diagnosis:
     steps = _steps(problem, comparison, names, clean, second=kind == "two")
     alarm = kind in ("tie", "two", "sensor", "unexplained")
     table = told(problem, 0.3 if kind == "silent" else 0.8)
+    finding = NothingAdded()
+    if steps:
+        finding = MechanismsAdded(steps, calibration(problem), held(problem, 1.1))
+    if kind == "unexplained":
+        finding = ProfileAdded(profile_law(problem, clean))
     return Diagnosis(
-        problem, LAW, "", calibration(problem), SimpleNamespace(), table,
+        problem, LAW, calibration(problem), SimpleNamespace(), table,
         BootstrapTest(30.0 if alarm else 0.3, clean), comparison, Decision(verdicts[kind], names),
-        location() if alarm else None, steps,
-        profile=profile_law(problem, clean) if kind == "unexplained" else None,
-        before=held(problem, 0.0), after=held(problem, 1.1) if alarm else None,
-        seconds={"base": 12.3, "comparison": 45.6},
+        location(), finding, held(problem, 0.0), {"base": 12.3, "comparison": 45.6},
     )  # fmt: skip
+
+
+def with_finding(found: Diagnosis, **changes: object) -> Diagnosis:
+    """The same with something else about what was added."""
+    return replace(found, finding=replace(found.finding, **changes))
 
 
 def profile_law(problem: HierarchicalProblem, clean: np.ndarray) -> ProfileLaw:

@@ -3,12 +3,13 @@ import json
 import re
 
 import pytest
-from diagnosis_report_cases import diagnosis, location
+from diagnosis_report_cases import diagnosis
 from rich.console import Console
 from test_report_html import Page, nulls
 
 from skred.diagnosis.verdict.document import verdict
 from skred.report.diagnosis.equation import equations, formula
+from skred.report.diagnosis.flat import flat
 from skred.report.diagnosis.report import FIGURES, diagnosis_table, render_diagnosis, save_diagnosis_figures
 
 KINDS = ("cannot", "gate", "nothing", "silent", "unexplained", "sensor", "tie", "two")
@@ -16,8 +17,7 @@ HOSTILE = "<script>alert(1)</script>$\\frac{[red]&'\""
 
 
 @pytest.fixture(autouse=True)
-def quick_profile(monkeypatch):
-    monkeypatch.setattr("skred.diagnosis.compare.location.locate", lambda under_errors: location())
+def coarse_figures(monkeypatch):
     monkeypatch.setattr("skred.report.shared.style.DPI", 40)
 
 
@@ -92,14 +92,14 @@ def test_two_mechanisms_and_a_covariate():
     assert "A second mechanism, given the first" in text
     assert "Associated with, not necessarily caused by" in text
     assert text.count("its crown, here") == 1
-    assert len(equations(found)["terms"]) == 2
+    assert len(equations(flat(found))["terms"]) == 2
 
 
 def test_an_instrument_changes_no_equation_of_motion():
     found = diagnosis("sensor")
     text = Page(render_diagnosis(found, document_of(found), {})).text
     assert "keeps its terms; what changes is how the recordings are read" in text
-    assert "reads 1" in text and "% too high" in text and equations(found)["terms"] == []
+    assert "reads 1" in text and "% too high" in text and equations(flat(found))["terms"] == []
 
 
 def test_what_is_silent_says_so():

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_report_cases import diagnosis
+from diagnosis_report_cases import diagnosis, with_finding
 
 from skred.diagnosis.augment.coefficient import FORM, strength_of
+from skred.diagnosis.augment.step import Left
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.compare.decision import Decision
-from skred.diagnosis.diagnose import Left
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.verdict.document import verdict
 from skred.diagnosis.verdict.statement import statement
@@ -28,7 +28,6 @@ def document(probability: dict[str, float]) -> dict:
 @pytest.mark.parametrize("kind", ["nothing", "silent"])
 def test_a_lean_that_the_check_does_not_bear_out_is_told_and_not_claimed(kind: str) -> None:
     found = replace(diagnosis(kind), decision=Decision("cannot_tell", ()))
-    assert found.check is not None and found.table is not None
     leaning = statement(found, document({"nothing": 0.2, "obstacle": 0.5, "unlisted": 0.3}))
     assert f"{100.0 * found.table.power:.0f} % of cases" in leaning
     assert ("no silence either" in leaning) == found.table.can_tell == (kind == "nothing")
@@ -51,13 +50,13 @@ def test_what_a_last_race_leaned_to_is_told() -> None:
     """Also that it was not let in, and why; and nothing where it leaned to nothing, or was not run."""
     found = diagnosis("tie")
     assert verdict(found)["left"] is None and "Another comparison" not in verdict(found)["statement"]
-    leaning = replace(found, left=Left(diagnosis("two").comparison, "the gate failed"))
+    leaning = with_finding(found, left=Left(diagnosis("two").comparison, "the gate failed"))
     document = verdict(leaning)
     assert document["left"]["most_probable"] == "covariate_friction"
     assert document["left"]["nothing"] == leaning.left.comparison.probability["nothing"]
     assert "leans to friction that goes with a property" in document["statement"]
     assert "it was not let in (the gate failed)" in document["statement"]
-    nothing = verdict(replace(found, left=Left(diagnosis("nothing").comparison)))
+    nothing = verdict(with_finding(found, left=Left(diagnosis("nothing").comparison)))
     assert nothing["left"]["most_probable"] == "nothing" and "Another comparison" not in nothing["statement"]
 
 
@@ -66,7 +65,6 @@ def test_what_a_last_race_leaned_to_is_told() -> None:
 )
 def test_whom_an_unlisted_force_brakes(sign: float, said: str) -> None:
     found = diagnosis("unexplained")
-    assert found.location is not None
     plain = verdict(found)["statement"]
     assert "On average there is nothing" not in plain and "comes closest (" in plain
     location = replace(found.location, opposed=True, mean=sign * found.location.mean)
@@ -83,7 +81,7 @@ def test_a_relief_that_opposes_a_named_drag_is_told() -> None:
         for one in candidate.curves
     )
     step = replace(found.steps[0], candidate=replace(candidate, curves=curves))
-    document = verdict(replace(found, steps=(step,)))
+    document = verdict(with_finding(found, steps=(step,)))
     assert "a relief equals it at about the typical speed (31 to 24 m/s)" in document["statement"]
     assert "(U^2 - U_0^2)" in document["equation"] and document["mechanisms"][0]["constants"][U_1] == 31.0
 
@@ -98,7 +96,8 @@ def test_physics_and_instruments_tied_are_both_told(monkeypatch: pytest.MonkeyPa
     found, tied = diagnosis("sensor"), ("obstacle", UNLISTED)
     step = replace(found.steps[0], tied=tied)
     alone = verdict(found)
-    found = replace(found, decision=Decision("instrument", ("sensor_bias", *tied)), steps=(step,))
+    found = replace(found, decision=Decision("instrument", ("sensor_bias", *tied)))
+    found = with_finding(found, steps=(step,))
     document = verdict(found)
     assert document["indistinguishable"] == document["mechanisms"][0]["tied_with"] == list(tied)
     bias, dam = "one sensor reads too high or too low", "an obstacle"
@@ -120,7 +119,7 @@ def test_what_no_further_speed_splits(tied: tuple[str, ...]) -> None:
     found = diagnosis("tie")
     step = replace(found.steps[0], tied=tied)
     decision = Decision("missing_physics", (found.decision.names[0], *tied))
-    document = verdict(replace(found, steps=(step,), decision=decision))
+    document = verdict(with_finding(replace(found, decision=decision), steps=(step,)))
     assert document["next_sensor"] is None and "cannot tell it from" in document["statement"]
     same = "No further speed would split off extra drag on a stretch: the term is the same."
     assert (same in document["statement"]) == ("segment_drag" in tied)
@@ -141,7 +140,6 @@ def test_a_candidate_that_is_not_excluded_is_told() -> None:
 
 def test_how_sure_a_force_in_no_list_is() -> None:
     found = diagnosis("unexplained")
-    assert found.comparison is not None
     document, factors = verdict(found), found.comparison.log_factors
     listed = [name for name in factors if name not in (NOTHING, UNLISTED)]
     closest = max(listed, key=lambda name: factors[name])
@@ -159,16 +157,16 @@ def test_the_force_profile_let_in_is_told() -> None:
     """What avalanches left out gain by it, its equation and its numbers; nothing is named."""
     found = diagnosis("unexplained")
     document = verdict(found)
-    assert found.profile is not None
+    law = found.finding.law
     assert document["mechanism"] is None and document["equation"] is None and document["strength"] is None
     assert document["evidence"]["elpd_diff"] == pytest.approx(1.1 * found.problem.campaign.n_events)
     assert "For avalanches left out the log score changes by +24.2" in document["statement"]
     profile = document["profile"]
     assert profile["equation"] == "-f(s)" and profile["unit"] == "m s-2"
-    assert profile["s_m"] == found.profile.profile.knots_m.tolist() and max(profile["mean"]) > 0.45
-    assert document["p_value_augmented"] == found.profile.check.p_value
-    failed = replace(found.profile, check=BootstrapTest(30.0, found.profile.check.simulated))
-    assert "still fails the check" in verdict(replace(found, profile=failed))["statement"]
+    assert profile["s_m"] == law.profile.knots_m.tolist() and max(profile["mean"]) > 0.45
+    assert document["p_value_augmented"] == law.check.p_value
+    failed = replace(law, check=BootstrapTest(30.0, law.check.simulated))
+    assert "still fails the check" in verdict(with_finding(found, law=failed))["statement"]
     assert "still fails the check" not in document["statement"]
 
 

@@ -3,8 +3,7 @@
 import io
 import re
 
-import pytest
-from diagnosis_report_cases import diagnosis, location
+from diagnosis_report_cases import diagnosis
 from rich.console import Console
 from test_report_html import Page
 
@@ -34,11 +33,6 @@ FOLDS = {
     "elpd_diff": 8.0,
     "elpd_se": 2.5,
 }
-
-
-@pytest.fixture(autouse=True)
-def quick_profile(monkeypatch):
-    monkeypatch.setattr("skred.diagnosis.compare.location.locate", lambda under_errors: location())
 
 
 def text_of(**more):

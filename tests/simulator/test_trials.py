@@ -135,7 +135,7 @@ def test_integration_over_events_against_a_grid() -> None:
 
 
 def test_each_mechanism_in_turn_sparse_and_dense(tmp_path: Path) -> None:
-    command = [sys.executable, str(ROOT / "benchmarks" / "development_set.py"), "--each", "--n", "4"]
+    command = [sys.executable, "-m", "benchmarks.development_set", "--each", "--n", "4"]
     subprocess.run([*command, "--seed", "1000", "--out", str(tmp_path)], check=True, capture_output=True)
     truths = [json.loads((tmp_path / "truth" / f"trial-000{k}.json").read_text()) for k in (1, 2, 3, 4)]
     assert [one["kind"] for one in truths] == ["sparse", "dense"] * 2
@@ -144,7 +144,7 @@ def test_each_mechanism_in_turn_sparse_and_dense(tmp_path: Path) -> None:
 
 
 def test_the_development_set_resumes(tmp_path: Path) -> None:
-    command = [sys.executable, str(ROOT / "benchmarks" / "development_set.py"), "--seed", "1000"]
+    command = [sys.executable, "-m", "benchmarks.development_set", "--seed", "1000"]
     command += ["--hidden", "nothing", "--out", str(tmp_path)]
     first = subprocess.run([*command, "--n", "2"], capture_output=True, text=True, check=True).stdout
     again = subprocess.run([*command, "--n", "3"], capture_output=True, text=True, check=True).stdout

@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from skred.cli.inputs import problem_of
-from skred.cli.options import SAMPLING, Campaigns, Errors, Likelihoods, Samplers, Sampling, Smoothing
+from skred.cli.options import LIKELIHOOD, SAMPLING, Campaigns, Likelihood, Samplers, Sampling
 from skred.cli.output import OUTPUT, Output
 from skred.cli.run_model import calibrate_law
 
@@ -20,16 +20,14 @@ def calibrate(
     campaign: Campaigns = "ryggfonn",
     /,
     *,
-    likelihood: Likelihoods = "pooled",
-    errors: Errors = None,
+    likelihood: Likelihood = LIKELIHOOD,
     sampler: Samplers = "metropolis",
     sampling: Sampling = SAMPLING,
-    smoothing: Smoothing = 10.0,
     output: Output = OUTPUT,
 ) -> int:
     """Calibrate one law: sample the posterior, check it, and write summary.json, posterior.nc and figures."""
     from skred.physics.laws import load_law
 
     load_law(law)  # before a campaign is read: a wrong name is told at once
-    problem = problem_of(campaign, likelihood, errors, smoothing)
+    problem = problem_of(campaign, likelihood.likelihood, likelihood.errors, likelihood.smoothing)
     return calibrate_law(law, problem, sampling, sampler, output)

@@ -1,25 +1,19 @@
 """``skred diagnose``: what physics a law leaves out.
 
-Everything heavy is imported inside the function, so that ``--help`` is instant.
+Everything heavy is imported inside the functions, so that ``--help`` is instant.
 """
 
-from dataclasses import replace
+from typing import Any
 
 from skred.cli.exit_codes import DONE, NOT_CONVERGED
 from skred.cli.inputs import campaign_of, hierarchical_of
 from skred.cli.options import (
-    DIAGNOSIS_SAMPLING,
-    MAX_MECHANISMS,
+    DIAGNOSING,
+    HIERARCHICAL,
     Campaigns,
     DiagnosedModel,
-    Errors,
-    ExactHeldOut,
-    Lock,
-    MaxMechanisms,
-    OuterFolds,
-    Quick,
-    Seed,
-    Smoothing,
+    Diagnosing,
+    Hierarchical,
 )
 from skred.cli.output import OUTPUT, Output
 from skred.cli.refused import tell_refused_mechanisms
@@ -30,14 +24,8 @@ def diagnose(
     /,
     *,
     base_model: DiagnosedModel = "pcm",
-    max_mechanisms: MaxMechanisms = None,
-    exact_loo: ExactHeldOut = False,
-    outer_folds: OuterFolds = None,
-    lock: Lock = None,
-    quick: Quick = False,
-    errors: Errors = None,
-    seed: Seed = 0,
-    smoothing: Smoothing = 10.0,
+    diagnosing: Diagnosing = DIAGNOSING,
+    likelihood: Hierarchical = HIERARCHICAL,
     output: Output = OUTPUT,
 ) -> int:
     """Say what physics a law leaves out, where and how surely, model it, and show what that improves."""
@@ -49,18 +37,23 @@ def diagnose(
 
         law = load_law(base_model)
         tell_refused_mechanisms()
-        problem = hierarchical_of(recorded, errors, smoothing)
-        folder = output.folder("diagnose")
+        problem = hierarchical_of(recorded, likelihood.errors, likelihood.smoothing)
+        with output.results("diagnose") as results:
+            from skred.diagnosis.run import diagnose_to
+            from skred.report.diagnosis.report import diagnosis_table
 
-        from skred.diagnosis.diagnose import QUICK_REPLICAS, Effort
-        from skred.diagnosis.run import diagnose_to
-        from skred.report.diagnosis.report import diagnosis_table
+            settings, effort = diagnosing.settings(), diagnosing.effort()
+            lock, folds = diagnosing.lock or 0, diagnosing.outer_folds or 0
+            document = diagnose_to(
+                problem, law, settings, effort, results.unfinished, output.tell, lock=lock, folds=folds
+            )
+    output.show(document, diagnosis_table, [], results.path)  # the statement is in the table
+    return DONE if converged(document) else NOT_CONVERGED
 
-        replicas = QUICK_REPLICAS if quick else Effort.replicas
-        effort = Effort(replicas, max_mechanisms or MAX_MECHANISMS[quick], exact_loo)
-        settings = replace(DIAGNOSIS_SAMPLING, seed=seed).settings("hierarchical")
-        document = diagnose_to(
-            problem, law, settings, effort, folder, output.tell, lock=lock or 0, folds=outer_folds or 0
-        )
-    output.show(document, diagnosis_table, [], folder)  # the statement is in the table
-    return DONE if document["reason"] is None else NOT_CONVERGED
+
+def converged(document: dict[str, Any]) -> bool:
+    """Whether every number of a verdict rests on chains that converged.
+
+    A document from before there was a key for it says only whether something stood in the way.
+    """
+    return bool(document.get("converged", document["reason"] is None))

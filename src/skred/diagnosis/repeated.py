@@ -14,11 +14,14 @@ import numpy as np
 
 from skred.campaign import Campaign
 from skred.campaign.parts import of_events, without_silent_sensors
-from skred.diagnosis.diagnose import Diagnosis, Effort, diagnose, too_little
+from skred.diagnosis.detect.too_little import too_little
+from skred.diagnosis.diagnose import diagnose
+from skred.diagnosis.effort import Effort
 from skred.diagnosis.evidence.prior_odds import UNLISTED
-from skred.diagnosis.predict.gain import predictors_of
+from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
 from skred.diagnosis.predict.held_out import HeldOut, errors
 from skred.diagnosis.predict.unseen import log_scores, problem_of, unseen
+from skred.diagnosis.verdict.predictors import predictors_of
 from skred.errors import InputError
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.paired import sum_se
@@ -52,13 +55,13 @@ def set_aside(problem: HierarchicalProblem, n: int, seed: int) -> tuple[Hierarch
     return others, of_events(campaign, chosen.tolist())
 
 
-def open_locked(found: Diagnosis, locked: Campaign, seed: int) -> dict[str, Any]:
+def open_locked(found: Outcome, locked: Campaign, seed: int) -> dict[str, Any]:
     """What locked avalanches make of a diagnosis; null where nothing was let in, or calibrated at all."""
     document: dict[str, Any] = {"events": list(locked.event_ids)}
     keys = ("log_score", *_ERRORS)
     document |= {f"{key}_{when}": None for when in ("before", "after") for key in keys}
     document |= {"elpd_diff": None, "elpd_se": None}
-    if found.before is None:
+    if isinstance(found, NotDiagnosed):
         return document
     scored = [unseen(one, locked, seed) for one in predictors_of(found) if one is not None]
     problem = problem_of(predictors_of(found)[0], locked)
@@ -120,26 +123,31 @@ def outer_folds(
     return {"k": k, "folds": entries, **_difference(np.array(pairs))}
 
 
-def _fold(found: Diagnosis, left_out: Campaign, seed: int) -> tuple[dict[str, Any], list[float]]:
+def _fold(found: Outcome, left_out: Campaign, seed: int) -> tuple[dict[str, Any], list[float]]:
     """One fold, and the differences of its avalanches."""
     before, after = predictors_of(found)
     first = log_scores(before, left_out, seed)
     second = first if after is None else log_scores(after, left_out, seed)
     difference = second - first
-    names = [step.candidate.mechanism.id for step in found.steps]
-    if found.profile is not None:
-        names = [UNLISTED]
+    names = _added(found) if isinstance(found, Diagnosis) else []
     entry = {
         "events": list(left_out.event_ids),
         "verdict": found.decision.verdict,
         "mechanism": names[0] if names else None,
         "mechanisms": names,
-        "reason": found.cannot or None,
+        "reason": found.reason or None,
         "log_score_before": first.tolist(),
         "log_score_after": second.tolist(),
         "elpd_diff": float(difference.sum()),
     }
     return entry, difference.tolist()
+
+
+def _added(found: Diagnosis) -> list[str]:
+    """Ids of what was added."""
+    if isinstance(found.finding, ProfileAdded):
+        return [UNLISTED]
+    return [step.candidate.mechanism.id for step in found.steps]
 
 
 def _without(problem: HierarchicalProblem, rows: Sequence[int], option: str) -> HierarchicalProblem:

@@ -9,7 +9,9 @@ from typing import Any
 
 import xarray as xr
 
-from skred.diagnosis.diagnose import Diagnosis, Effort, diagnose
+from skred.diagnosis.diagnose import diagnose
+from skred.diagnosis.effort import Effort
+from skred.diagnosis.outcome import NotDiagnosed, Outcome
 from skred.diagnosis.repeated import folds_of, open_locked, outer_folds, set_aside
 from skred.diagnosis.verdict.document import verdict
 from skred.inference.hierarchical.problem import HierarchicalProblem
@@ -73,11 +75,11 @@ def diagnose_to(
     return document
 
 
-def _draws_of(found: Diagnosis) -> dict[str, xr.DataTree]:
+def _draws_of(found: Outcome) -> dict[str, xr.DataTree]:
     """Draws of every calibration of a diagnosis, by the name of their file."""
-    kept = {
-        "base.nc": found.calibration,
-        "base_same_errors.nc": found.reference if found.reference is not found.calibration else None,
-        "augmented.nc": found.steps[-1].calibration if found.steps else None,
-    }
+    kept = {"base.nc": found.calibration}
+    if not isinstance(found, NotDiagnosed) and found.steps:
+        if found.reference is not found.calibration:
+            kept["base_same_errors.nc"] = found.reference
+        kept["augmented.nc"] = found.steps[-1].calibration
     return {name: one.tree for name, one in kept.items() if one is not None}

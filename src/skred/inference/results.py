@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import platform
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -16,6 +15,7 @@ import xarray as xr
 from skred.inference.gate import Gate
 from skred.inference.problem import Problem
 from skred.inference.sampling import SamplerSettings
+from skred.output import write_bytes
 from skred.physics.law import Law, Parameter
 
 _PACKAGES = ("skred", "pymc", "pytensor", "arviz", "numba", "numpy", "scipy", "xarray")
@@ -68,10 +68,18 @@ def chain_and_draw(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def save(tree: xr.DataTree, file: Path) -> None:
-    """Write a tree as netCDF, whole or not at all."""
-    partial = file.with_name(f".{file.name}.partial")
-    tree.to_netcdf(partial, engine="h5netcdf")
-    os.replace(partial, file)
+    """Write a tree as netCDF, whole or not at all.
+
+    By way of memory: where the disk is full, HDF5 ends the whole process instead of raising an error.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    content = tree.to_netcdf(engine="h5netcdf")
+    assert isinstance(content, memoryview)
+    write_bytes(file, content)
 
 
 def _with_units(parameters: xr.Dataset, own: Sequence[Parameter], law: Law) -> xr.Dataset:

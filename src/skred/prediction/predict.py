@@ -99,7 +99,7 @@ def predict(
         tell(f"{law.id}: the gate failed: {'; '.join(calibration.gate.problems)}")
     document = prediction_document(calibration, track, data)
     document["seconds"] = time.monotonic() - started
-    tell(f"writing {folder}")
+    tell("writing the results")
     write_prediction(document, data, problem, law, folder)
     return document
 

@@ -1,4 +1,4 @@
-"""The scorecard of concealed trials: scores, bars and comparisons as data, page and figures."""
+"""The scorecard of concealed trials: scores, criteria and comparisons as data, page and figures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 from skred.output import plain, write_json, write_text
 from skred.prove.scoring.answers import Pair, pairs_of
-from skred.prove.scoring.criteria import bars
+from skred.prove.scoring.criteria import acceptance_criteria
 from skred.prove.scoring.intervals import LEVEL, RESAMPLES, SEED
 from skred.prove.scoring.paired import compare
 from skred.prove.scoring.places import right_stretch
@@ -79,7 +79,7 @@ def scorecard(
             "interval": {"probability": LEVEL, "n_resamples": RESAMPLES, "seed": SEED},
             "standards": as_plain(),
             "ledger": {key: value for key, value in ledger.items() if _is_single(value)},
-            "bars": bars(methods[DIAGNOSIS]["open"], paired),
+            "bars": acceptance_criteria(methods[DIAGNOSIS]["open"], paired),
             "methods": methods,
             "paired": paired,
             "trials": [_line(pair) for pair in pairs[DIAGNOSIS]],

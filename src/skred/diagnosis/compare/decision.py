@@ -22,7 +22,7 @@ ALARMS = ((LIMIT, NOTHING_AT_MOST), (1.0, NOTHING_ALONE))
 """The alarm is raised where, for any of these, the check's p-value is at most the first and the probability
 of nothing below the second: the check, unless the comparison denies it; the comparison alone. By the evidence
 alone a clean campaign falls below the latter with at most a sixth of probability (Markov's inequality for a
-Bayes factor); it is far rarer (``benchmarks/alarm_limit.py``)."""
+Bayes factor); it is far rarer (``studies.thresholds.alarm_limit``)."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,14 @@ class Decision:
 def alarmed(probability: Mapping[str, float], p_value: float) -> bool:
     """Whether something is wrong, by the check and the comparison together."""
     return any(p_value <= most and probability[NOTHING] < below for most, below in ALARMS)
+
+
+def alarm_by(probability: Mapping[str, float], p_value: float) -> str | None:
+    """Which of the rules of the alarm hold: ``check``, ``evidence``, ``both``; None where none does."""
+    check, evidence = (p_value <= most and probability[NOTHING] < below for most, below in ALARMS)
+    if check and evidence:
+        return "both"
+    return "check" if check else "evidence" if evidence else None
 
 
 def _silent(probability: Mapping[str, float], p_value: float) -> bool:

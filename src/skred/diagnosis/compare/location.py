@@ -7,10 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.compare.comparison import ComparisonUnderErrors
+from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
+from skred.diagnosis.compare.decision import Decision
 from skred.diagnosis.discrepancy.profile import Kind, Profile, hats, most_probable
 from skred.diagnosis.evidence.extension import extended
+from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.physics.kernel.columns import Column
+from skred.physics.mechanisms.stretches import is_opposed
 
 FloatArray = NDArray[np.float64]
 _DRAWS = 4000
@@ -82,6 +85,15 @@ def locate(under_errors: ComparisonUnderErrors, opposed: bool | None = None) -> 
         work=work,
         log_bayes_factor=profile.log_bayes_factor,
     )
+
+
+def location_of(comparison: Comparison, decision: Decision) -> Location:
+    """Where: of what is named the profile that goes with speed as that does, else the most probable."""
+    under_errors = comparison.leading(UNLISTED)
+    if not decision.names:
+        return locate(under_errors)
+    named = comparison.leading(decision.names[0]).candidates[decision.names[0]]
+    return locate(under_errors, is_opposed(named.best.shape))
 
 
 def _per_unit(kind: Kind, squares: FloatArray, here: NDArray[np.bool_]) -> FloatArray:

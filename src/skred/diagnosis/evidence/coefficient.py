@@ -95,6 +95,10 @@ class Base:
         """The most probable population."""
         return self.fit.found.population(len(self.law.mechanisms))
 
+    def plain(self) -> Base:
+        """The base law without what was added before."""
+        return replace(self, directions=(), strengths=np.empty(0))
+
     def with_nothing(self, budget: Budget) -> Fit:
         """Refitted with nothing added, as `curve_at` does with something: the same for all mechanisms."""
         if budget not in self._nothing:

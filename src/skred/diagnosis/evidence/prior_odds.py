@@ -17,7 +17,7 @@ CALIBRATION_VERSION = 1
 POWER = 0.75
 """Of Bayes factors between whatever may be missing. Every model is wrong in edges and exponents, and evidence
 says more for the less wrong one than trials bear out. Frozen from opened trials, by
-``benchmarks/calibrate_odds.py``, before those that claims are made from."""
+``studies.thresholds.calibrate_odds``, before those that claims are made from."""
 
 
 def prior_odds(raced: Iterable[Mechanism]) -> dict[str, float]:

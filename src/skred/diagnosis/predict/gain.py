@@ -1,4 +1,4 @@
-"""What a diagnosis promises of avalanches to come, kept with its answer, and what they made of it later.
+"""What fresh avalanches make of a diagnosis' predictors.
 
 The process that diagnoses must not see those avalanches: it leaves predictors, which are scored elsewhere.
 """
@@ -11,64 +11,9 @@ from typing import Any
 import numpy as np
 
 from skred.campaign import Campaign
-from skred.diagnosis.diagnose import Diagnosis
-from skred.diagnosis.evidence.prior_odds import UNLISTED
-from skred.diagnosis.predict.predictor_document import as_dict, from_dict
-from skred.diagnosis.predict.profile_law import ProfileLaw
-from skred.diagnosis.predict.unseen import Predictor, ProfileTerm, log_scores, predictor_of
+from skred.diagnosis.predict.predictor_document import from_dict
+from skred.diagnosis.predict.unseen import log_scores
 from skred.errors import InputError
-from skred.inference.calibrate import Calibration
-
-
-def predictors_of(diagnosis: Diagnosis) -> tuple[Predictor, Predictor | None]:
-    """What the base law says of avalanches to come, and what it says with what was let in, if anything was.
-
-    Raises
-    ------
-    ValueError
-        If the diagnosis did not get as far as a calibration.
-    """
-    if diagnosis.profile is not None:
-        return _with_profile(diagnosis, diagnosis.profile)
-    before = calibration_before(diagnosis)
-    if before is None:
-        raise ValueError(f"nothing was calibrated: {diagnosis.cannot}")
-    after = predictor_of(diagnosis.steps[-1].calibration) if diagnosis.steps else None
-    return predictor_of(before), after
-
-
-def _with_profile(diagnosis: Diagnosis, law: ProfileLaw) -> tuple[Predictor, Predictor]:
-    """Without the force profile that was let in and with it, under one error model."""
-    problem = diagnosis.problem
-    assert diagnosis.comparison is not None
-    term = ProfileTerm.of(law.profile, diagnosis.comparison.leading(UNLISTED).base.setting)
-    common = diagnosis.law.id, law.error_model, problem.place_sd_m, problem.terrain.smoothing_m
-    before, after = law.draws_before, law.draws_after
-    return (
-        Predictor(*common, before.means, before.factors, (), before.strengths),
-        Predictor(*common, after.means, after.factors, (), after.strengths, term),
-    )
-
-
-def calibration_before(diagnosis: Diagnosis) -> Calibration | None:
-    """The base law's, under the error model of what was let in, if anything was."""
-    return diagnosis.reference if diagnosis.reference is not None else diagnosis.calibration
-
-
-def predictors(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    """Predictors before and after as plain data; None where nothing was calibrated."""
-    if calibration_before(diagnosis) is None:
-        return None
-    before, after = predictors_of(diagnosis)
-    return {"before": as_dict(before), "after": None if after is None else as_dict(after)}
-
-
-def promised_gain(diagnosis: Diagnosis) -> float | None:
-    """Gain of the log score for each avalanche, by those left out; None if nothing was let in."""
-    before, after = diagnosis.before, diagnosis.after
-    if before is None or after is None:
-        return None
-    return float(np.mean(after.pointwise - before.pointwise))
 
 
 def realised_gain(document: Any, campaign: Campaign, fresh: Campaign) -> dict[str, Any] | None:
@@ -77,7 +22,7 @@ def realised_gain(document: Any, campaign: Campaign, fresh: Campaign) -> dict[st
     Parameters
     ----------
     document : mapping
-        As `predictors` gives it.
+        As `skred.diagnosis.verdict.predictors.predictors` gives it.
     campaign : Campaign
         That was diagnosed.
     fresh : Campaign
@@ -87,7 +32,7 @@ def realised_gain(document: Any, campaign: Campaign, fresh: Campaign) -> dict[st
     -------
     dict or None
         ``realised``: mean over fresh avalanches of the log score after less before; ``se`` of it;
-        ``n_fresh``; None if nothing was let in.
+        ``n_fresh``; None if nothing was added.
 
     Raises
     ------
@@ -106,13 +51,6 @@ def realised_gain(document: Any, campaign: Campaign, fresh: Campaign) -> dict[st
     n = len(difference)
     se = float(difference.std(ddof=1) / np.sqrt(n)) if n > 1 else None
     return {"realised": float(difference.mean()), "se": se, "n_fresh": n}
-
-
-def gain(diagnosis: Diagnosis, fresh: Campaign) -> dict[str, Any] | None:
-    """Promised and realised gain of a diagnosis at hand; None if nothing was let in."""
-    promised = promised_gain(diagnosis)
-    realised = realised_gain(predictors(diagnosis), diagnosis.problem.campaign, fresh)
-    return None if promised is None or realised is None else {"promised": promised, **realised}
 
 
 def check_same_path(campaign: Campaign, other: Campaign) -> None:

@@ -10,9 +10,13 @@ from arviz_stats.base import array_stats
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.augment.augmented import AugmentedProblem
+from skred.diagnosis.augment.coefficient import added_draws
+from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.predictive import Predicted, predict_event
+from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.population import population_of
+from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.leave_one_out import exact_leave_one_out
 
 FloatArray = NDArray[np.float64]
@@ -55,21 +59,16 @@ class HeldOut:
         return float(self.pointwise.sum())
 
 
-def held_out(
-    calibration: Any, extension: Extension, added: FloatArray, seed: int, *, exact: bool = False
-) -> HeldOut:
-    """Leave each event out in turn.
+def held_out(calibration: Calibration, seed: int, *, exact: bool = False) -> HeldOut:
+    """Leave each avalanche out in turn.
 
     Parameters
     ----------
-    calibration : skred.inference.calibrate.Calibration
+    calibration : Calibration
         Of the base law, or of the augmented one.
-    extension : Extension
-        What its fronts do.
-    added : (n_draws, n_directions) array
-        Strengths of what is added, for all draws, chain after chain.
+    seed : int
     exact : bool
-        Refit without every event instead of only where importance sampling is unreliable.
+        Refit without every avalanche instead of only where importance sampling is unreliable.
     """
     problem, tree = calibration.problem, calibration.tree
     log_likelihood = tree["log_likelihood"]["recordings"]
@@ -85,7 +84,7 @@ def held_out(
         refits = exact_leave_one_out(calibration.model, calibration.step, events, seed, which=again)
         pointwise[again] = refits.pointwise
         failed = refits.failed
-    predicted, covered = _predictions(calibration, extension, added, weights, seed)
+    predicted, covered = _predictions(calibration, weights, seed)
     return HeldOut(pointwise, k, tuple(events[e] for e in again), failed, predicted, covered)
 
 
@@ -98,11 +97,12 @@ def _smoothed(densities: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.asarray(log_weights, dtype=float).T, np.asarray(k, dtype=float)
 
 
-def _predictions(
-    calibration: Any, extension: Extension, added: FloatArray, weights: FloatArray, seed: int
-) -> tuple[Predicted, FloatArray]:
+def _predictions(calibration: Calibration, weights: FloatArray, seed: int) -> tuple[Predicted, FloatArray]:
     """Predictions of each event's readings by the others, and whether 90 % intervals hold them."""
     problem, law = calibration.problem, calibration.law
+    assert isinstance(problem, HierarchicalProblem)
+    extension = problem.extension if isinstance(problem, AugmentedProblem) else extended(problem, law)
+    added = added_draws(calibration)
     posterior = calibration.tree["posterior"].to_dataset()
     names = [parameter.name for parameter in problem.parameters(law)]
     samples = {name: posterior[name].transpose("chain", "draw").values.ravel() for name in names}

@@ -40,7 +40,7 @@ FloatArray = NDArray[np.float64]
 N_DRAWS = 200
 _NODES = Budget(32, 32, 0, 1.5, 1.8)
 """Nodes of an event for each draw; their errors average out over the draws. None are adapted: where those go
-depends on the others' weights, and few of them are too low in the mean (``benchmarks/unseen_nodes.py``)."""
+depends on the others' weights, and few of them are too low in the mean (``studies.thresholds.unseen_nodes``)."""
 _SHARED = 16
 """As many times the nodes where all draws share them."""
 _AT_ONCE = 20

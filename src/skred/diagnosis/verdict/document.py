@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from skred.diagnosis.augment.coefficient import strength_of
+from skred.diagnosis.augment.coefficient import augmented_of, strength_of
+from skred.diagnosis.augment.step import Left, Step
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison
-from skred.diagnosis.compare.decision import alarmed
-from skred.diagnosis.detect.detectability import Detectability
-from skred.diagnosis.diagnose import Diagnosis
+from skred.diagnosis.compare.location import Location
+from skred.diagnosis.detect.detectability import Detectability, Identifiability
 from skred.diagnosis.evidence.covariates import standard_of
 from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER
-from skred.diagnosis.predict.held_out import errors, paired
+from skred.diagnosis.outcome import (
+    Diagnosis,
+    Finding,
+    MechanismsAdded,
+    NotDiagnosed,
+    NothingAdded,
+    Outcome,
+    ProfileAdded,
+)
+from skred.diagnosis.predict.held_out import HeldOut, errors, paired
 from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.next_sensor import next_sensor
 from skred.diagnosis.verdict.statement import statement
+from skred.inference.calibrate import Calibration
+from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.mechanisms.spec import Mechanism
 from skred.physics.mechanisms.stretches import equation_of
 
@@ -25,54 +37,84 @@ _NO_LIMIT = 20.0
 """Strengths so many prior scales large are no limit: these recordings say nothing of the mechanism."""
 
 
-def verdict(found: Diagnosis) -> dict[str, Any]:
+def verdict(found: Outcome) -> dict[str, Any]:
     """The verdict of a diagnosis, as `verdict.json` holds it."""
+    document = _told_nothing(found) if isinstance(found, NotDiagnosed) else _told(found)
+    document["statement"] = statement(found, document)
+    return document | _more(found)
+
+
+def _told_nothing(found: NotDiagnosed) -> dict[str, Any]:
+    """Every key of the format, where no diagnosis was possible."""
+    return {
+        "format": 1,
+        "campaign": found.problem.campaign.name,
+        "base_model": found.law.id,
+        "verdict": found.decision.verdict,
+        "mechanism": None,
+        "mechanisms": [],
+        "probability": {},
+        "indistinguishable": [],
+        **dict.fromkeys(("location", "strength", "covariate", "sensor", "equation")),
+        "evidence": dict.fromkeys(("elpd_diff", "elpd_se", "log_bayes_factor", "p_value")),
+        "held_out": _held_out(None, None, found.problem),
+        "detection_limits": {},
+        "next_sensor": None,
+        "diagnostics": _diagnostics([found.calibration] if found.calibration is not None else [], []),
+        "left": None,
+    }
+
+
+def _told(found: Diagnosis) -> dict[str, Any]:
+    """Every key of the format."""
     candidate = found.steps[0].candidate if found.steps else None
+    shape = candidate.best.shape if candidate is not None else None
     names = found.decision.names if found.steps else ()
-    document = {
+    after = None if isinstance(found.finding, NothingAdded) else found.finding.after
+    return {
         "format": 1,
         "campaign": found.problem.campaign.name,
         "base_model": found.law.id,
         "verdict": found.decision.verdict,
         "mechanism": names[0] if names else None,
         "mechanisms": [_mechanism(found, number) for number in range(len(found.steps))],
-        "probability": found.comparison.probability if found.comparison is not None else {},
+        "probability": found.comparison.probability,
         "indistinguishable": list(names[1:]),
         "location": _location(found, candidate),
-        "strength": _strength(found, 0) if found.steps else None,
-        "covariate": candidate.best.shape.covariate if candidate is not None else None,
-        "sensor": candidate.best.shape.sensor if candidate is not None else None,
+        "strength": _strength(found.steps, 0) if found.steps else None,
+        "covariate": shape.covariate if shape is not None else None,
+        "sensor": shape.sensor if shape is not None else None,
         "equation": equation_of(candidate.mechanism, candidate.best.shape) if candidate is not None else None,
-        "evidence": _evidence(found),
-        "held_out": _held_out(found),
-        "detection_limits": _detection_limits(found),
+        "evidence": _evidence(found, after),
+        "held_out": _held_out(found.before, after, found.problem),
+        "detection_limits": _detection_limits(found.table),
         "next_sensor": next_sensor(found),
-        "diagnostics": _diagnostics(found),
-        "left": _left(found),
+        "diagnostics": _diagnostics(
+            [found.calibration, found.reference, *(step.calibration for step in found.steps)],
+            [found.before] if after is None else [found.before, after],
+        ),
+        "left": _left(found.left),
     }
-    document["statement"] = statement(found, document)
-    return document | _more(found)
 
 
 def _location(found: Diagnosis, candidate: Candidate | None) -> dict[str, float] | None:
     if candidate is not None:
         stretch = candidate.stretch()
-    elif found.decision.verdict == "unexplained" and found.location is not None:
+    elif found.decision.verdict == "unexplained":
         stretch = found.location.stretch_m
     else:
         stretch = None
     return None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]}
 
 
-def _strength(found: Diagnosis, number: int) -> dict[str, Any]:
-    problem: Any = found.steps[-1].calibration.problem
-    added = problem.added[number]
-    mean, sd = strength_of(found.steps, number)
+def _strength(steps: Sequence[Step], number: int) -> dict[str, Any]:
+    added = augmented_of(steps[-1].calibration).added[number]
+    mean, sd = strength_of(steps, number)
     return {"parameter": added.name, "unit": added.mechanism.strength.unit, "mean": mean, "sd": sd}
 
 
 def _mechanism(found: Diagnosis, number: int) -> dict[str, Any]:
-    """One mechanism let in, its strength as the last calibration has it."""
+    """One mechanism added, its strength as the last calibration has it."""
     step = found.steps[number]
     candidate = step.candidate
     stretch = candidate.stretch()
@@ -80,7 +122,7 @@ def _mechanism(found: Diagnosis, number: int) -> dict[str, Any]:
     return {
         "id": candidate.mechanism.id,
         **_kind(candidate.mechanism),
-        "strength": _strength(found, number),
+        "strength": _strength(found.steps, number),
         "location": None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]},
         "equation": equation_of(candidate.mechanism, shape),
         "covariate": shape.covariate,
@@ -104,39 +146,37 @@ def _standard(found: Diagnosis, covariate: str | None) -> dict[str, Any] | None:
     return None if standard is None else standard.as_dict()
 
 
-def _evidence(found: Diagnosis) -> dict[str, float | None]:
-    p_value = found.check.p_value if found.check is not None else None
-    factor = None
-    if found.comparison is not None and found.steps:
+def _evidence(found: Diagnosis, after: HeldOut | None) -> dict[str, float | None]:
+    factor = found.comparison.log_odds
+    if found.steps:
         factor = found.comparison.log_factors[found.steps[0].candidate.mechanism.id]
-    elif found.comparison is not None:
-        factor = found.comparison.log_odds
-    difference, se = None, None
-    if found.before is not None and found.after is not None:
-        difference, se = paired(found.after, found.before)
-    return {"elpd_diff": difference, "elpd_se": se, "log_bayes_factor": factor, "p_value": p_value}
+    difference, se = (None, None) if after is None else paired(after, found.before)
+    return {
+        "elpd_diff": difference,
+        "elpd_se": se,
+        "log_bayes_factor": factor,
+        "p_value": found.check.p_value,
+    }
 
 
-def _held_out(found: Diagnosis) -> dict[str, Any]:
+def _held_out(before: HeldOut | None, after: HeldOut | None, problem: HierarchicalProblem) -> dict[str, Any]:
     keys = ("rmse_velocity", "rmse_runout", "coverage_90")
     result: dict[str, Any] = {"unit": "event"}
-    for when, one in (("before", found.before), ("after", found.after)):
-        values = errors(one, found.problem) if one is not None else dict.fromkeys(keys)
+    for when, one in (("before", before), ("after", after)):
+        values = errors(one, problem) if one is not None else dict.fromkeys(keys)
         result |= {f"{key}_{when}": values[key] for key in keys}
     return result
 
 
-def _detection_limits(found: Diagnosis) -> dict[str, Any]:
+def _detection_limits(table: Identifiability) -> dict[str, Any]:
     """The smallest strength found in 90 % of cases at a typical place."""
-    if found.table is None:
-        return {}
     return {
         row.mechanism.id: {
             "parameter": row.mechanism.strength.name,
             "unit": row.mechanism.strength.unit,
             "value": row.limit if row.limit < _NO_LIMIT * _scale(row) else None,
         }
-        for row in found.table.rows
+        for row in table.rows
     }
 
 
@@ -145,20 +185,16 @@ def _scale(row: Detectability) -> float:
     return row.mechanism.added.scale
 
 
-def _diagnostics(found: Diagnosis) -> dict[str, float | int | None]:
-    calibrations = [
-        one
-        for one in (found.calibration, found.reference, *(s.calibration for s in found.steps))
-        if one is not None
-    ]
-    if not calibrations:
-        return {"r_hat_max": None, "ess_min": None, "pareto_k_max": None, "divergences": None}
+def _diagnostics(
+    calibrations: Sequence[Calibration], held: Sequence[HeldOut]
+) -> dict[str, float | int | None]:
     gates = [one.gate for one in calibrations]
-    held = [one.pareto_k.max() for one in (found.before, found.after) if one is not None]
+    if not gates:
+        return {"r_hat_max": None, "ess_min": None, "pareto_k_max": None, "divergences": None}
     return {
         "r_hat_max": max(gate.r_hat_max for gate in gates),
         "ess_min": min(min(gate.ess_bulk_min, gate.ess_tail_min) for gate in gates),
-        "pareto_k_max": float(np.max(held)) if held else None,
+        "pareto_k_max": float(np.max([one.pareto_k.max() for one in held])) if held else None,
         "divergences": sum(gate.divergences for gate in gates),
     }
 
@@ -185,17 +221,17 @@ def _candidate(comparison: Comparison, name: str) -> dict[str, Any]:
     }
 
 
-def _left(found: Diagnosis) -> dict[str, Any] | None:
+def _left(left: Left | None) -> dict[str, Any] | None:
     """What a comparison of the augmented law leaned to and was not added; None where there was none."""
-    if found.left.comparison is None:
+    if left is None:
         return None
-    probability = found.left.comparison.probability
+    probability = left.comparison.probability
     first = max(probability, key=lambda name: probability[name])
     return {
         "most_probable": first,
         "probability": probability[first],
         "nothing": probability[NOTHING],
-        "reason": found.left.reason or None,
+        "reason": left.reason or None,
     }
 
 
@@ -215,46 +251,73 @@ def _profile(law: ProfileLaw) -> dict[str, Any]:
     }
 
 
-def _more(found: Diagnosis) -> dict[str, Any]:
+def _more(found: Outcome) -> dict[str, Any]:
     """Keys beyond the format's."""
-    more: dict[str, Any] = {"reason": found.cannot or None, "seconds": found.seconds}
-    if found.comparison is not None and found.check is not None:
-        more["alarm"] = alarmed(found.comparison.probability, found.check.p_value)
-        more["log_bayes_factors"] = found.comparison.log_factors
-        more["calibration"] = {"version": CALIBRATION_VERSION, "power": POWER}
-        more["error_models"] = [under_errors.error_model for under_errors in found.comparison.under_each]
-        more["candidates"] = [
-            _candidate(found.comparison, name) for name in found.comparison.under_each[0].candidates
-        ]
-    if found.steps:
-        problem: Any = found.steps[-1].calibration.problem
-        more["error_model"] = problem.error_model.id
-        more["p_value_augmented"] = found.steps[-1].check.p_value
-        more["refitted_events"] = list(found.after.refitted) if found.after is not None else []
-    if found.profile is not None:
-        more["error_model"] = found.profile.error_model
-        more["p_value_augmented"] = found.profile.check.p_value
-        more["profile"] = _profile(found.profile)
-    if found.table is not None:
-        more["identifiability"] = [
-            {
-                "id": row.mechanism.id,
-                "kept": row.kept,
-                "limit": row.limit,
-                "best_limit": row.best_limit,
-                "best_stretch_m": row.limit_m,
-                "relevant": row.mechanism.added.relevant if row.mechanism.added is not None else None,
-                "unit": row.mechanism.strength.unit,
-                "power": row.power,
-                "alike": list(row.alike),
+    more: dict[str, Any] = {"reason": found.reason or None, "seconds": found.seconds}
+    if isinstance(found, NotDiagnosed):
+        return more
+    return (
+        more
+        | {
+            "alarm": found.alarm_by is not None,
+            "log_bayes_factors": found.comparison.log_factors,
+            "calibration": {"version": CALIBRATION_VERSION, "power": POWER},
+            "error_models": [under_errors.error_model for under_errors in found.comparison.under_each],
+            "candidates": [
+                _candidate(found.comparison, name) for name in found.comparison.under_each[0].candidates
+            ],
+        }
+        | _of_finding(found.finding)
+        | {
+            "identifiability": [_detectability(row) for row in found.table.rows],
+            "power": found.table.power,
+        }
+        | (_missing_work(found.location) if found.alarm_by is not None else {})
+    )
+
+
+def _of_finding(finding: Finding) -> dict[str, Any]:
+    """Under which errors something was added, and what the check says of the law with it."""
+    match finding:
+        case MechanismsAdded():
+            problem = augmented_of(finding.last.calibration)
+            return {
+                "error_model": problem.error_model.id,
+                "p_value_augmented": finding.last.check.p_value,
+                "refitted_events": list(finding.after.refitted),
             }
-            for row in found.table.rows
-        ]
-        more["power"] = found.table.power
-    if found.location is not None:
-        more["missing_work_of"] = "fast front" if found.location.opposed else "typical front"
-        more["missing_work"] = [
+        case ProfileAdded(law):
+            return {
+                "error_model": law.error_model,
+                "p_value_augmented": law.check.p_value,
+                "profile": _profile(law),
+            }
+        case NothingAdded():
+            return {}
+
+
+def _detectability(row: Detectability) -> dict[str, Any]:
+    """What the recordings can tell of one mechanism."""
+    assert row.mechanism.added is not None
+    return {
+        "id": row.mechanism.id,
+        "kept": row.kept,
+        "limit": row.limit,
+        "best_limit": row.best_limit,
+        "best_stretch_m": row.limit_m,
+        "relevant": row.mechanism.added.relevant,
+        "unit": row.mechanism.strength.unit,
+        "power": row.power,
+        "alike": list(row.alike),
+    }
+
+
+def _missing_work(location: Location) -> dict[str, Any]:
+    """Specific work that is missing between neighbouring sensors."""
+    return {
+        "missing_work_of": "fast front" if location.opposed else "typical front",
+        "missing_work": [
             {"s_from_m": a, "s_to_m": b, "mean": mean, "sd": sd, "unit": "J kg-1"}
-            for a, b, mean, sd in found.location.work.tolist()
-        ]
-    return more
+            for a, b, mean, sd in location.work.tolist()
+        ],
+    }

@@ -7,18 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from skred.diagnosis.augment.step import Step
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.detect.detectability import with_sensors
-from skred.diagnosis.diagnose import Diagnosis, Step
 from skred.diagnosis.evidence.extension import extended
+from skred.diagnosis.outcome import Diagnosis
 
 _PLACES = 16
 
 
 def next_sensor(found: Diagnosis) -> dict[str, Any] | None:
     """A velocity sensor in the words of the campaign format; None where nothing is to be split or seen."""
-    if found.table is None:
-        return None
     if found.steps and (rival := _rival(found.steps[0])) is not None:
         named = found.steps[0].candidate
         return _sensor(_splitting(found, named, rival), [named.mechanism.id, rival.mechanism.id])

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from skred.diagnosis.augment.step import Step
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.compare.decision import NOTHING_AT_MOST, Decision
 from skred.diagnosis.compare.location import Location
-from skred.diagnosis.diagnose import Diagnosis, Step
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
+from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
+from skred.diagnosis.words import percent
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.stretches import U_1, U_2
@@ -17,8 +19,10 @@ _RIVAL = 0.05
 """Probability from which another candidate than those named is told of."""
 
 
-def statement(found: Diagnosis, document: dict[str, Any]) -> str:
+def statement(found: Outcome, document: dict[str, Any]) -> str:
     """One paragraph in plain words."""
+    if isinstance(found, NotDiagnosed) or found.reason:
+        return f"These recordings cannot tell: {found.reason}."
     parts = {
         "missing_physics": _named,
         "instrument": _named,
@@ -36,13 +40,6 @@ def _title(name: str) -> str:
 def _short(name: str) -> str:
     """Its title without examples, which have commas of their own."""
     return _title(name).partition(":")[0]
-
-
-def _share(probability: float) -> str:
-    """A probability that is never rounded to certainty."""
-    if probability > 0.995:
-        return "more than 99 %"
-    return "less than 1 %" if probability < 0.005 else f"{100.0 * probability:.0f} %"
 
 
 def _where(location: dict[str, float] | None) -> str:
@@ -71,8 +68,8 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     about = f" ({subject}{by_logarithm})" if subject else ""
     sentences = [
         f"{_what(found.decision)}: {_title(name)}{about}{_where(document['location'])}, with a probability of"
-        f" {_share(probability[name])} (nothing: {_share(probability[NOTHING])}; a force not in the list:"
-        f" {_share(probability[UNLISTED])}).",
+        f" {percent(probability[name])} (nothing: {percent(probability[NOTHING])}; a force not in the list:"
+        f" {percent(probability[UNLISTED])}).",
         f"Its {strength['parameter'].replace('_', ' ')} is {strength['mean']:.3g} +- {strength['sd']:.2g}"
         f"{_unit(strength['unit'])}.",
     ]
@@ -80,7 +77,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     if document["covariate"]:
         sentences.append("Associated with, not necessarily caused by.")
     if ties:
-        others = ", ".join(f"{_short(other)} ({_share(probability[other])})" for other in ties)
+        others = ", ".join(f"{_short(other)} ({percent(probability[other])})" for other in ties)
         sentences.append(f"These recordings cannot tell it from: {others}.")
         sentences.append(_split(found.steps[0], document))
     sentences.append(_rival(document))
@@ -102,7 +99,7 @@ def _rival(document: dict[str, Any]) -> str:
     name = max(others, key=lambda one: others[one], default="")
     if not name or others[name] < _RIVAL:
         return ""
-    return f"Not excluded: {_title(name)} ({_share(others[name])})."
+    return f"Not excluded: {_title(name)} ({percent(others[name])})."
 
 
 def _still_fired(check: BootstrapTest) -> str:
@@ -134,8 +131,8 @@ def _left(document: dict[str, Any]) -> str:
     name = left["most_probable"]
     why = f" ({left['reason']})" if left["reason"] else ""
     return (
-        f"Another comparison, of the augmented law, leans to {_title(name)} ({_share(left['probability'])};"
-        f" nothing more: {_share(left['nothing'])}); it was not let in{why}."
+        f"Another comparison, of the augmented law, leans to {_title(name)} ({percent(left['probability'])};"
+        f" nothing more: {percent(left['nothing'])}); it was not let in{why}."
     )
 
 
@@ -170,24 +167,23 @@ def _improvement(document: dict[str, Any]) -> str:
 
 
 def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
-    assert found.check is not None
     probability = document["probability"]
     doubt = 1.0 - probability[NOTHING] - probability[UNLISTED] >= _RIVAL
     return [
         f"Something is missing{_where(document['location'])} that {'most probably ' if doubt else ''}no"
-        f" listed mechanism accounts for (a force not in the list: {_share(probability[UNLISTED])}; nothing:"
-        f" {_share(probability[NOTHING])}; check: p = {found.check.p_value:.2g}).",
+        f" listed mechanism accounts for (a force not in the list: {percent(probability[UNLISTED])}; nothing:"
+        f" {percent(probability[NOTHING])}; check: p = {found.check.p_value:.2g}).",
         _unlisted_way(found.location),
         _closest(found, document),
         "The force profile is the answer: see where it stands out and how much work it does.",
         _improvement(document),
-        _still_fired(found.profile.check) if found.profile is not None else "",
+        _still_fired(found.finding.law.check) if isinstance(found.finding, ProfileAdded) else "",
     ]
 
 
-def _unlisted_way(location: Location | None) -> str:
+def _unlisted_way(location: Location) -> str:
     """Whom an unlisted force brakes where it stands out, if it is nil at the typical speed."""
-    if location is None or not location.opposed:
+    if not location.opposed:
         return ""
     first, last = location.stretch_m
     there = location.mean[(location.s_m >= first) & (location.s_m <= last)]
@@ -200,12 +196,11 @@ def _unlisted_way(location: Location | None) -> str:
 
 def _closest(found: Diagnosis, document: dict[str, Any]) -> str:
     """The listed candidate of the highest evidence, beside the unlisted force."""
-    assert found.comparison is not None
     factors = found.comparison.log_factors
     listed = {name: value for name, value in factors.items() if name not in (NOTHING, UNLISTED)}
     name = max(listed, key=lambda one: listed[one])
     return (
-        f"Of what is listed, {_title(name)} comes closest ({_share(document['probability'][name])}): log"
+        f"Of what is listed, {_title(name)} comes closest ({percent(document['probability'][name])}): log"
         f" Bayes factor {listed[name]:.1f} against nothing, where a force not in the list has"
         f" {factors[UNLISTED]:.1f}."
     )
@@ -213,21 +208,19 @@ def _closest(found: Diagnosis, document: dict[str, Any]) -> str:
 
 def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
     """What the comparison would say alone, where it says something and the check does not."""
-    assert found.check is not None
     probability = document["probability"]
     if probability[NOTHING] >= NOTHING_AT_MOST:
         return ""
     first = max((name for name in probability if name != NOTHING), key=lambda name: probability[name])
     return (
         f"Of what could be missing, {_title(first)} would be the most probable"
-        f" ({_share(probability[first])}); but to the check"
+        f" ({percent(probability[first])}); but to the check"
         f" {100.0 * found.check.p_value:.0f} % of clean campaigns look as odd, so none is claimed."
     )
 
 
 def _odd(found: Diagnosis) -> str:
     """What the check would say alone, where it says something and the comparison does not."""
-    assert found.check is not None
     if not found.check.fired:
         return ""
     return (
@@ -237,22 +230,18 @@ def _odd(found: Diagnosis) -> str:
 
 
 def _nothing(found: Diagnosis, document: dict[str, Any]) -> list[str]:
-    assert found.check is not None and found.table is not None
     return [
         f"The recordings do not bear out that anything is missing (p = {found.check.p_value:.2g}; probability"
-        f" of nothing {_share(document['probability'][NOTHING])}).",
+        f" of nothing {percent(document['probability'][NOTHING])}).",
         f"A relevant strength of what is listed would have been found in {100.0 * found.table.power:.0f} % of"
         " cases on average; the table of detection limits says from where on each would have been seen.",
     ]
 
 
 def _cannot(found: Diagnosis, document: dict[str, Any]) -> list[str]:
-    if found.cannot:
-        return [f"These recordings cannot tell: {found.cannot}."]
-    assert found.check is not None and found.table is not None
     alarm = (
         f"No alarm (p = {found.check.p_value:.2g}; probability of nothing"
-        f" {_share(document['probability'][NOTHING])}), but"
+        f" {percent(document['probability'][NOTHING])}), but"
     )
     power = f"{100.0 * found.table.power:.0f} % of cases on average"
     silence = (

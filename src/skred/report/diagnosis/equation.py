@@ -16,10 +16,11 @@ from skred.report.shared.numbers import decimals_for, rounded
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-    from skred.diagnosis.diagnose import Diagnosis, Step
+    from skred.diagnosis.augment.step import Step
     from skred.diagnosis.discrepancy.profile import Profile
     from skred.inference.calibrate import Calibration
     from skred.physics.law import Law
+    from skred.report.diagnosis.flat import Flat as Diagnosis
 
 _HEAD = "dU^2/(2 ds) ="
 _SIMPLE = [

@@ -29,10 +29,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from skred.diagnosis.augment.step import Step
     from skred.diagnosis.check.bootstrap_test import BootstrapTest
     from skred.diagnosis.compare.comparison import Comparison
-    from skred.diagnosis.diagnose import Diagnosis, Step
     from skred.diagnosis.evidence.coefficient import Curve
+    from skred.report.diagnosis.flat import Flat as Diagnosis
 
 FloatArray = NDArray[np.float64]
 _DEPTH = 25.0

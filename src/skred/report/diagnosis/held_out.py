@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from skred.diagnosis.diagnose import Diagnosis
     from skred.diagnosis.predict.held_out import HeldOut
+    from skred.report.diagnosis.flat import Flat as Diagnosis
 
 FloatArray = NDArray[np.float64]
 _MOST_NAMED = 60

@@ -34,7 +34,7 @@ from skred.report.shared.numbers import fixed
 
 if TYPE_CHECKING:
     from skred.diagnosis.compare.location import Location
-    from skred.diagnosis.diagnose import Diagnosis
+    from skred.report.diagnosis.flat import Flat as Diagnosis
 
 _NO_FORCE = 1e-6
 """Retardation that is none [m s-2]."""

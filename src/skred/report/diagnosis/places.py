@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from skred.diagnosis.compare.candidate import Candidate
     from skred.diagnosis.compare.comparison import Comparison
     from skred.diagnosis.compare.location import Location
-    from skred.diagnosis.diagnose import Diagnosis
     from skred.inference.hierarchical.problem import HierarchicalProblem
     from skred.physics.mechanisms.spec import Shape
+    from skred.report.diagnosis.flat import Flat as Diagnosis
 
 _LOCAL = ("obstacle", "segment_drag", "segment_friction", "sensor_bias")
 _DEPTH = 40.0

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from skred.report.diagnosis.evidence import check_figure, probabilities_figure, strength_figure
+from skred.report.diagnosis.flat import flat
 from skred.report.diagnosis.held_out import left_out_figure, scores_figure
 from skred.report.diagnosis.places import local_names, places_figure, where_figure
 from skred.report.diagnosis.terminal import diagnosis_table
@@ -18,7 +19,7 @@ from skred.report.shared.style import write_png
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from skred.diagnosis.diagnose import Diagnosis
+    from skred.diagnosis.outcome import Outcome
 
 __all__ = ["FIGURES", "diagnosis_table", "render_diagnosis", "save_diagnosis_figures"]
 _OF_RACES = ("probabilities", "strength", "places")
@@ -26,12 +27,12 @@ FIGURES = ("check", "where", *_OF_RACES, *(f"{name}_2" for name in _OF_RACES), "
 """Names of all figures that there may be."""
 
 
-def save_diagnosis_figures(found: Diagnosis, folder: Path) -> dict[str, Path]:
+def save_diagnosis_figures(outcome: Outcome, folder: Path) -> dict[str, Path]:
     """Write the figures of a diagnosis as PNG.
 
     Parameters
     ----------
-    found : Diagnosis
+    outcome : Outcome
     folder : Path
         An existing folder.
 
@@ -40,6 +41,7 @@ def save_diagnosis_figures(found: Diagnosis, folder: Path) -> dict[str, Path]:
     dict of str to Path
         Those of `FIGURES` that apply; with _2 those of a second comparison.
     """
+    found = flat(outcome)
     makers: dict[str, Callable[[], Figure]] = {}
     if found.check is not None:
         makers["check"] = partial(check_figure, found)
@@ -57,12 +59,12 @@ def save_diagnosis_figures(found: Diagnosis, folder: Path) -> dict[str, Path]:
     return {name: write_png(make(), folder / f"{name}.png") for name, make in makers.items()}
 
 
-def render_diagnosis(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) -> str:
+def render_diagnosis(outcome: Outcome, document: doc.Document, figures: Mapping[str, Path]) -> str:
     """Render the report of a diagnosis.
 
     Parameters
     ----------
-    found : Diagnosis
+    outcome : Outcome
     document : mapping
         The verdict that is also written as ``verdict.json``.
     figures : mapping of str to Path
@@ -75,4 +77,4 @@ def render_diagnosis(found: Diagnosis, document: doc.Document, figures: Mapping[
     """
     from skred.report.diagnosis.page import page
 
-    return page(found, document, figures)
+    return page(flat(outcome), document, figures)

@@ -19,8 +19,8 @@ from skred.report.shared.numbers import decimals_for, fixed, is_number, rounded,
 
 if TYPE_CHECKING:
     from skred.diagnosis.compare.comparison import Comparison
-    from skred.diagnosis.diagnose import Diagnosis
     from skred.physics.mechanisms.spec import Mechanism
+    from skred.report.diagnosis.flat import Flat as Diagnosis
 
 Rows = list[dict[str, Any]]
 _HOPELESS = 1000.0

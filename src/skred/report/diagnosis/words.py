@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from skred.diagnosis.compare.candidate import Candidate
     from skred.diagnosis.compare.comparison import Comparison
     from skred.diagnosis.compare.location import Location
-    from skred.diagnosis.diagnose import Diagnosis
+    from skred.report.diagnosis.flat import Flat as Diagnosis
 
 FloatArray = NDArray[np.float64]
 BEFORE, AFTER, MISMATCH = GREY, "#0072B2", "#D55E00"
@@ -116,11 +116,7 @@ def factor_at(candidate: Candidate, relative: float) -> float:
 
 def profile_of(found: Diagnosis) -> Location | None:
     """The missing force along the track; where there is no alarm, that in which nothing stands out."""
-    if found.location is not None or found.comparison is None:
-        return found.location
-    from skred.diagnosis.compare.location import locate
-
-    return locate(found.comparison.leading(UNLISTED))
+    return found.location or found.quiet
 
 
 def stretch_of(found: Diagnosis) -> tuple[float, float] | None:

@@ -1,0 +1,82 @@
+"""Mechanisms added to a law one after the other: the named one, and a second only if it earns its place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from skred.diagnosis.augment.augmented import augmented_problem
+from skred.diagnosis.augment.check_again import check_again
+from skred.diagnosis.augment.reference import Reference
+from skred.diagnosis.augment.step import Augmented, Left, NotAugmented, Step
+from skred.diagnosis.compare.comparison import Comparison, compare
+from skred.diagnosis.compare.decision import decide
+from skred.diagnosis.effort import Run
+from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.inference.calibrate import Calibration, calibrate_surely
+
+COMPARE_AGAIN = 0.2
+"""P-value of the augmented law's check below which a second mechanism is looked for.
+
+The check sees little of a second one beside the first; the alarm is raised by the same rule as for the first.
+"""
+
+
+def add_mechanisms(
+    base: Base, comparison: Comparison, names: Sequence[str], reference: Reference, run: Run
+) -> Augmented | NotAugmented:
+    """Add the named mechanism, check again, and a second one only if it earns its place given the first.
+
+    Parameters
+    ----------
+    base : Base
+        The fitted base law.
+    comparison : Comparison
+        That named something.
+    names : sequence of str
+        What is named, and what is tied with it.
+    reference : Reference
+        Asked for the base law under the error model of what is added.
+    run : Run
+    """
+    run.clock.stage("augment", f"{base.law.id} + {names[0]}: calibrating the augmented law")
+    steps: list[Step] = []
+    left: Left | None = None
+    chosen = list[Curve]()
+    for number in range(run.effort.max_mechanisms):
+        under_errors = comparison.leading(names[0])
+        candidate = under_errors.candidates[names[0]]
+        chosen.append(candidate.best)
+        reference.begin(under_errors.base.problem)
+        calibration = _calibrated(under_errors.base, chosen, run)
+        if not calibration.gate.passed:
+            problems = "; ".join(calibration.gate.problems)
+            reason = f"the gate of {base.law.id} + {names[0]} failed: {problems}"
+            if left is None:
+                return NotAugmented(reason)
+            left = replace(left, reason=reason)
+            break
+        run.clock.stage("check again", "is anything wrong with the augmented law")
+        check, next_base = check_again(under_errors.base, calibration, chosen, run)
+        steps.append(Step(candidate, tuple(names[1:]), comparison, calibration, check))
+        left, problem = None, under_errors.base.problem
+        if check.p_value > COMPARE_AGAIN or number + 1 == run.effort.max_mechanisms:
+            break
+        run.clock.stage("second comparison", "something may be left: every candidate refitted again")
+        comparison = compare(next_base)
+        left = Left(comparison)
+        second = decide(comparison.probability, check.p_value, True)
+        if not second.names:
+            break
+        names = second.names
+        run.clock.stage("augment", f"calibrating with {names[0]} as well")
+    # The base law under the same errors as the last step: before and after then differ by what was added.
+    same_errors, reason = reference.on(problem)
+    return NotAugmented(reason, left) if reason else Augmented(tuple(steps), same_errors, left)
+
+
+def _calibrated(base: Base, chosen: Sequence[Curve], run: Run) -> Calibration:
+    """The law with what is chosen added, calibrated."""
+    problem = augmented_problem(base.plain(), chosen)
+    # Its chains start around the posterior: half the tuning does.
+    return calibrate_surely(problem, base.law, replace(run.settings, tune=run.settings.tune // 2))

@@ -1,0 +1,36 @@
+"""Populations drawn from the posterior of a calibration."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.evidence.conditional_map import Population
+from skred.inference.calibrate import Calibration
+from skred.inference.hierarchical.population import population_of
+
+FloatArray = NDArray[np.float64]
+
+
+def population_draws(calibration: Calibration, n: int, seed: int) -> tuple[FloatArray, FloatArray]:
+    """Means and factors of populations from a posterior, drawn at random without replacement.
+
+    Returns
+    -------
+    means : (n, n_base) array
+    factors : (n, n_base, n_base) array
+        Lower Cholesky factors of the covariances.
+    """
+    posterior = calibration.tree["posterior"].to_dataset()
+    names = [parameter.name for parameter in calibration.problem.parameters(calibration.law)]
+    samples = {name: posterior[name].transpose("chain", "draw").values.ravel() for name in names}
+    means, factors = population_of(calibration.law, samples)
+    chosen = np.random.default_rng([seed, 41]).choice(len(means), size=min(n, len(means)), replace=False)
+    return means[chosen], factors[chosen]
+
+
+def typical(draws: tuple[FloatArray, FloatArray]) -> Population:
+    """Roughly the middle of a posterior of populations."""
+    means, factors = draws
+    covariance = np.einsum("gij,gkj->gik", factors, factors)
+    return Population(means.mean(axis=0)[None], np.median(covariance, axis=0)[None])

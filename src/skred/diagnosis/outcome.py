@@ -1,0 +1,179 @@
+"""What a diagnosis returns: what it found, or why there could be none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from skred.diagnosis.augment.step import Left, Step
+from skred.diagnosis.check.bootstrap_test import BootstrapTest
+from skred.diagnosis.compare.comparison import Comparison
+from skred.diagnosis.compare.decision import Decision, alarm_by
+from skred.diagnosis.compare.location import Location
+from skred.diagnosis.detect.detectability import Identifiability
+from skred.diagnosis.detect.score_test import ScoreTest
+from skred.diagnosis.predict.held_out import HeldOut
+from skred.diagnosis.predict.profile_law import ProfileLaw
+from skred.inference.calibrate import Calibration
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.physics.law import Law
+
+
+@dataclass(frozen=True, eq=False)
+class NothingAdded:
+    """Nothing was added to the law.
+
+    Attributes
+    ----------
+    reason : str
+        Why what the comparison named could not be added; empty where it named nothing.
+    left : Left or None
+        A comparison of an augmented law that was given up.
+    """
+
+    reason: str = ""
+    left: Left | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class MechanismsAdded:
+    """One mechanism was added to the law, or two.
+
+    Attributes
+    ----------
+    steps : tuple of Step
+        In order of discovery.
+    reference : Calibration
+        Of the base law under the error model of the last step.
+    after : HeldOut
+        Avalanches left out, as the law with what was added predicts them.
+    left : Left or None
+        What a last comparison found and was not added; None where there was none.
+    """
+
+    steps: tuple[Step, ...]
+    reference: Calibration
+    after: HeldOut
+    left: Left | None = None
+
+    @property
+    def last(self) -> Step:
+        """The step with the law that everything was added to."""
+        return self.steps[-1]
+
+
+@dataclass(frozen=True, eq=False)
+class ProfileAdded:
+    """A force that is not in the list was added, as a profile along the track.
+
+    Attributes
+    ----------
+    law : ProfileLaw
+    """
+
+    law: ProfileLaw
+
+    @property
+    def after(self) -> HeldOut:
+        """Avalanches left out, as the law with the profile predicts them."""
+        return self.law.after
+
+
+Finding = NothingAdded | MechanismsAdded | ProfileAdded
+
+
+@dataclass(frozen=True, eq=False)
+class NotDiagnosed:
+    """No diagnosis was possible.
+
+    Attributes
+    ----------
+    problem, law :
+        What was asked about.
+    reason : str
+        Why not.
+    calibration : Calibration or None
+        Of the base law, which did not converge; None where nothing was sampled, or numerics broke down.
+    converged : bool
+        False where numerics are the reason; true where the recordings are too few.
+    seconds : dict
+        Of each stage.
+    """
+
+    problem: HierarchicalProblem
+    law: Law
+    reason: str
+    calibration: Calibration | None = None
+    converged: bool = False
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def decision(self) -> Decision:
+        """That the recordings cannot tell."""
+        return Decision("cannot_tell", ())
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """Everything that a diagnosis found.
+
+    Attributes
+    ----------
+    problem, law :
+        What was asked about.
+    calibration : Calibration
+        Of the base law.
+    score_test : ScoreTest
+    table : Identifiability
+    check : BootstrapTest
+    comparison : Comparison
+    decision : Decision
+        ``cannot_tell`` also where what the comparison named could not be added.
+    location : Location
+        Where something is missing; where there is no alarm, the force in which nothing stands out.
+    finding : NothingAdded, MechanismsAdded or ProfileAdded
+    before : HeldOut
+        Avalanches left out, as the base law predicts them, under the error model of what was added.
+    seconds : dict
+        Of each stage.
+    """
+
+    problem: HierarchicalProblem
+    law: Law
+    calibration: Calibration
+    score_test: ScoreTest
+    table: Identifiability
+    check: BootstrapTest
+    comparison: Comparison
+    decision: Decision
+    location: Location
+    finding: Finding
+    before: HeldOut
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def alarm_by(self) -> str | None:
+        """What raised the alarm: ``check``, ``evidence``, ``both``, or None where there is no alarm."""
+        return alarm_by(self.comparison.probability, self.check.p_value)
+
+    @property
+    def reason(self) -> str:
+        """Why what the comparison named could not be added; empty where there is no such reason."""
+        return self.finding.reason if isinstance(self.finding, NothingAdded) else ""
+
+    @property
+    def steps(self) -> tuple[Step, ...]:
+        """The mechanisms added, none or more."""
+        return self.finding.steps if isinstance(self.finding, MechanismsAdded) else ()
+
+    @property
+    def reference(self) -> Calibration:
+        """The base law's calibration that before refers to."""
+        return self.finding.reference if isinstance(self.finding, MechanismsAdded) else self.calibration
+
+    @property
+    def left(self) -> Left | None:
+        """What a last comparison of the augmented law found and was not added."""
+        return None if isinstance(self.finding, ProfileAdded) else self.finding.left
+
+
+Outcome = Diagnosis | NotDiagnosed
