@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.resources import files
 from typing import Any
 
@@ -17,7 +18,8 @@ from skred.diagnosis.verdict.document import verdict
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.output import plain
 from skred.physics.laws import load_law
-from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms import Mechanism, mechanisms
+from skred.physics.mechanisms.spec import BoundTo, Group
 
 SCHEMA = json.loads((files("skred") / "verdict.schema.json").read_text(encoding="utf-8"))
 VALIDATOR = Draft202012Validator(SCHEMA)
@@ -65,8 +67,19 @@ def nothing_missing() -> dict[str, Any]:
 
 
 def named(mechanism: str, kind: str = "missing_physics", **more: Any) -> dict[str, Any]:
-    equation = mechanisms()[mechanism].equation
-    local = {"id": mechanism, "strength": STRENGTH, "location": more.get("location"), "equation": equation}
+    spec = mechanisms()[mechanism]
+    return found(mechanism, kind, spec, **more)
+
+
+def found(mechanism: str, kind: str, spec: Mechanism, **more: Any) -> dict[str, Any]:
+    """A verdict that names a mechanism, in the library or not."""
+    assert spec.added is not None
+    equation = spec.equation
+    local = {
+        "id": mechanism, "group": str(spec.group), "bound_to": str(spec.added.bound_to), "strength": STRENGTH,
+        "location": more.get("location"), "equation": equation, "covariate": more.get("covariate"),
+        "sensor": more.get("sensor"),
+    }  # fmt: skip
     return nothing_missing() | {
         "verdict": kind,
         "mechanism": mechanism,
@@ -85,7 +98,8 @@ def tie() -> dict[str, Any]:
 
 def two() -> dict[str, Any]:
     document = named("segment_drag", location=STRETCH)
-    second = document["mechanisms"][0] | {"id": "sensor_bias", "location": None}
+    fault = {"id": "sensor_bias", "group": "instrument", "bound_to": "sensor", "sensor": "LC"}
+    second = document["mechanisms"][0] | fault | {"location": None}
     return document | {"mechanisms": [*document["mechanisms"], second]}
 
 
@@ -202,6 +216,12 @@ def test_numbers_may_be_null_but_not_left_out(part: str, key: str) -> None:
         ("named", "mechanisms", []),
         ("named", "mechanisms.0.strength", None),
         ("named", "mechanisms.0.equation", ""),
+        ("named", "mechanisms.0.group", "people"),
+        ("named", "mechanisms.0.group", "instrument"),
+        ("named", "mechanisms.0.bound_to", "sensor"),
+        ("named", "mechanisms.0.location", None),
+        ("two", "mechanisms.1.sensor", None),
+        ("named", "location", None),
         ("named", "strength", None),
         ("named", "strength", {"parameter": "segment_drag", "unit": "m-1", "mean": 0.002}),
         ("named", "strength.sd", -1.0),
@@ -213,6 +233,7 @@ def test_numbers_may_be_null_but_not_left_out(part: str, key: str) -> None:
         ("covariate", "covariate", None),
         ("sensor", "sensor", None),
         ("sensor", "verdict", "missing_physics"),
+        ("release", "verdict", "missing_physics"),
         ("tie", "indistinguishable", ["obstacle", "obstacle"]),
         ("tie", "next_sensor.quantity", "temperature"),
         ("tie", "next_sensor.s_from_m", None),
@@ -227,6 +248,32 @@ def test_verdicts_that_are_not(kind: str, path: str, value: Any) -> None:
     document = VALID[kind]()
     assert problems(document) == []
     assert problems(changed(document, path, value))
+
+
+@pytest.mark.parametrize("bound_to", BoundTo)
+@pytest.mark.parametrize(
+    ("group", "kind"), [(Group.PHYSICS, "missing_physics"), (Group.INSTRUMENT, "instrument")]
+)
+def test_a_mechanism_of_any_other_package(bound_to: BoundTo, group: Group, kind: str) -> None:
+    """Whatever it is called: its group decides the verdict, and what it is bound to must be named."""
+    like = mechanisms()["viscous_drag"]
+    assert like.added is not None
+    spec = replace(like, group=group, added=replace(like.added, bound_to=bound_to))
+    named_at = {
+        BoundTo.PLACE: ("location", STRETCH),
+        BoundTo.SENSOR: ("sensor", "LC"),
+        BoundTo.COVARIATE: ("covariate", "t_degC"),
+    }
+    key, value = named_at.get(bound_to, ("location", None))
+    document = found("snow_of_my_own", kind, spec, **{key: value})
+    assert problems(document) == []
+    other = {"missing_physics": "instrument", "instrument": "missing_physics"}[kind]
+    assert problems(changed(document, "verdict", other))
+    if value is not None:
+        assert problems(changed(document, key, None))
+    for other_key, other_value in named_at.values():
+        if other_key not in (key, "location"):
+            assert problems(changed(document, other_key, other_value))
 
 
 @pytest.mark.parametrize("law_id", ["pcm", "constant"])

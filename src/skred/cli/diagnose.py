@@ -16,6 +16,7 @@ from skred.cli.options import (
     Hierarchical,
 )
 from skred.cli.output import OUTPUT, Output
+from skred.cli.refused import tell_refused_mechanisms
 
 
 def diagnose(
@@ -35,6 +36,7 @@ def diagnose(
         from skred.physics.laws import load_law
 
         law = load_law(base_model)
+        tell_refused_mechanisms()
         problem = hierarchical_of(recorded, likelihood.errors, likelihood.smoothing)
         with output.results("diagnose") as results:
             from skred.diagnosis.run import diagnose_to

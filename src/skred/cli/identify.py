@@ -7,6 +7,7 @@ from skred.cli.exit_codes import DONE
 from skred.cli.inputs import campaign_of, hierarchical_of
 from skred.cli.options import HIERARCHICAL, Campaigns, DiagnosedModel, Hierarchical, IdleSeed
 from skred.cli.output import OUTPUT, Output
+from skred.cli.refused import tell_refused_mechanisms
 
 
 def identify(
@@ -22,6 +23,7 @@ def identify(
     from skred.physics.laws import load_law
 
     law = load_law(base_model)
+    tell_refused_mechanisms()
     problem = hierarchical_of(campaign_of(campaign), likelihood.errors, likelihood.smoothing)
     with output.results("identify") as results:
         from skred.diagnosis.detect.run import identify_to

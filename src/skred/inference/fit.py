@@ -99,16 +99,18 @@ def sensor_fits(problem: Problem, predicted: FloatArray) -> list[SensorFit]:
         has_mean, has_sd = testable[:, k]
         rows.append(
             SensorFit(
-                sensor.id,
-                "m" if sensor.is_runout else "m/s",
-                int(n_known[k]),
-                *(_or_none(of_recorded[i, k], testable[i, k]) for i in range(2)),
-                *(_or_none(centre[i, k], testable[i, k]) for i in range(2)),
-                _or_none(scale[0, k], has_mean),
-                _or_none(p[0, k], has_mean),
-                _or_none(p[1, k], has_sd),
-                _or_none(inside[k], has_mean),
-                bool(p[:, k].min() > FIT_LEVEL),
+                sensor=sensor.id,
+                unit="m" if sensor.is_runout else "m/s",
+                n_recorded=int(n_known[k]),
+                recorded_mean=_or_none(of_recorded[0, k], has_mean),
+                recorded_sd=_or_none(of_recorded[1, k], has_sd),
+                predicted_mean=_or_none(centre[0, k], has_mean),
+                predicted_sd=_or_none(centre[1, k], has_sd),
+                predicted_mean_se=_or_none(scale[0, k], has_mean),
+                p_mean=_or_none(p[0, k], has_mean),
+                p_sd=_or_none(p[1, k], has_sd),
+                inside=_or_none(inside[k], has_mean),
+                fits=bool(p[:, k].min() > FIT_LEVEL),
             )
         )
     return rows

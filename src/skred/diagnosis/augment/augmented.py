@@ -21,7 +21,7 @@ from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.marginal import population_at
 
 MOST_ADDED = 2
-_ROUGH_DRAWS, _ROUGH_RUNS, _ENOUGH = 8, 8 * 22, 0.2
+_ROUGH_DRAWS, _ROUGH_RUNS, _ENOUGH = 8, 176, 0.2
 
 
 def augmented_problem(base: Base, curves: Sequence[Curve]) -> AugmentedProblem:
@@ -78,7 +78,7 @@ def _named(curves: Sequence[Curve]) -> tuple[AddedStrength, ...]:
 
 
 def _rough_error(problem: AugmentedProblem, located: Located) -> float:
-    """Error of 22 events [nats], at populations as the fits have them."""
+    """Error of the log likelihood per event [nats], at populations as the fits have them."""
     rng = np.random.default_rng(17)
     reach = rng.uniform(-2.0, 2.0, (_ROUGH_DRAWS, len(located.mean))) @ located.factor.T
     added = np.clip(located.mean + reach, *problem.range)
@@ -86,6 +86,4 @@ def _rough_error(problem: AugmentedProblem, located: Located) -> float:
     means, covariances = population_at(psi, len(problem.base.law.mechanisms))
     factors = np.linalg.cholesky(covariances)
     chosen = np.sort(rng.permutation(problem.campaign.n_events)[:CHECKED_EVENTS])
-    return float(
-        22.0 * np.abs(problem.errors_at(means, factors, added, chosen, _ROUGH_RUNS).mean(axis=1)).max()
-    )
+    return float(np.abs(problem.errors_at(means, factors, added, chosen, _ROUGH_RUNS).mean(axis=1)).max())

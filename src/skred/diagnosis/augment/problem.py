@@ -34,14 +34,15 @@ from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Direction, Mechanism, Shape
 
 FloatArray = NDArray[np.float64]
-CLAIM_LIMIT = 1.0
-"""Largest error of the log likelihood over 22 events in a diagnosis, in nats, at the worst of some draws.
+CLAIM_LIMIT = 0.0455
+"""Largest error of the log likelihood per event in a diagnosis, in nats, at the worst of some draws: one nat
+for 22 events.
 
 A claim of a mechanism rests on several nats; where fronts stop on a stretch that is added, an event's
 likelihood bends sharply with the strength, and more nodes do not help.
 """
 _EXACT = Budget(512, 256, 1024, 1.5, 1.8)
-_EXACT_RUNS = 16 * 22
+_EXACT_RUNS = 352
 """Events times draws up to which there are so many nodes; where there are fewer, more."""
 _EXACT_DRAWS = 16
 CHECKED_EVENTS = 24

@@ -18,6 +18,7 @@ import numpy as np
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
 from skred.diagnosis.evidence.event_quadrature import Budget
+from skred.physics.mechanisms.placed import parts_of
 from skred.physics.mechanisms.spec import Shape
 from skred.physics.mechanisms.stretches import shares
 
@@ -128,13 +129,12 @@ def _split(
 def _parts(base: Base, place: Place, number: int, steps: float) -> list[Shape]:
     """The finer shapes that a part stands for beside its own; steps are in those of the whole place."""
     part, whole = place.curves[number], place.curves[0].shape
-    added, shape = part.mechanism.added, part.shape
-    assert added is not None
+    mechanism, shape = part.mechanism, part.shape
     if shape.s_from_m is not None and shape.s_to_m is not None:
         assert whole.s_from_m is not None and whole.s_to_m is not None
         steps *= (whole.s_to_m - whole.s_from_m) / (shape.s_to_m - shape.s_from_m)
     known = {one.shape for one in place.curves}
-    return [one for one in dict.fromkeys(added.split(base.setting, shape, steps)) if one not in known]
+    return [one for one in dict.fromkeys(parts_of(mechanism, base.setting, shape, steps)) if one not in known]
 
 
 def leading(curves: Sequence[Curve], places: Mapping[int, Place]) -> list[int]:

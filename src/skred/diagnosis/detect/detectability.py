@@ -12,18 +12,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
 from skred.campaign import Sensor, Status
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, campaign_rows
 from skred.diagnosis.evidence.linear_mixed_model import Scores, efficient_scores, without
 from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Added, Group, Mechanism
 
 FloatArray = NDArray[np.float64]
-LIMIT_Z = 2.85
-"""Score at which one of about 18 distinguishable candidates stands out in 1 % of clean campaigns."""
+LIMIT_Z, LIMIT_FOR = 2.85, 13
+"""Score above which a mechanism counts as seen, and for a library of how many it was calculated."""
 _NINE_IN_TEN = 1.2816
 ALIKE = 0.9
 """Size of the cosine between two efficient scores above which mechanisms look alike."""
@@ -103,6 +104,15 @@ def identify(
     return Identifiability(tuple(table), float(places[best]), power, powers[best])
 
 
+def limit_z(n_mechanisms: int) -> float:
+    """Score above which a mechanism of a library of so many counts as seen.
+
+    In a longer list more of them stand out by chance. The limit rises with its length, so that some mechanism
+    stands out in as many clean campaigns as with the list that `LIMIT_Z` was calculated for.
+    """
+    return -float(ndtri(ndtr(-LIMIT_Z) * LIMIT_FOR / n_mechanisms))
+
+
 def mean_power(table: list[Detectability]) -> float:
     """Mean power over the listed physics."""
     powers = [row.power for row in table if row.mechanism.group is Group.PHYSICS]
@@ -140,7 +150,7 @@ def told(score_test: ScoreTest, scores: Scores) -> list[Detectability]:
                 _limit(information[0, typical], informed[typical]),
                 _limit(information[0, best], informed[best]),
                 stretch,
-                float(np.mean(ndtr(np.sqrt(own) * added.relevant - LIMIT_Z))),
+                float(np.mean(ndtr(np.sqrt(own) * added.relevant - limit_z(len(mechanisms()))))),
                 tuple(sorted(alike)),
             )
         )
@@ -154,7 +164,9 @@ def _added(mechanism: Mechanism) -> Added:
 
 def _limit(information: float, informed: bool) -> float:
     """Strength found in 90 % of cases; infinite where the recordings say nothing."""
-    return (LIMIT_Z + _NINE_IN_TEN) / float(np.sqrt(information)) if informed else float("inf")
+    if not informed:
+        return float("inf")
+    return (limit_z(len(mechanisms())) + _NINE_IN_TEN) / float(np.sqrt(information))
 
 
 def extra_sensors(

@@ -30,6 +30,7 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.kernel.columns import Column
 from skred.physics.law import Law
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import can_join, direction_of, shapes_of
 from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
 from skred.physics.mechanisms.stretches import shares
 
@@ -52,14 +53,14 @@ class PlacedMechanism:
 
 def placed_mechanisms(setting: Setting, *, ties: bool = True) -> list[PlacedMechanism]:
     """All that could be missing from a base law; without `ties`, one of each two that are the same term."""
-    found = []
-    for mechanism in mechanisms().values():
-        added = mechanism.added
-        if added is None or not added.joins(setting.base) or (mechanism.same_term_as and not ties):
-            continue
-        for shape in added.shapes(setting):
-            found.append(PlacedMechanism(mechanism, shape, added.direction(setting, shape)))
-    return found
+    could = [one for one in mechanisms().values() if can_join(one, setting.base)]
+    shapes = {one.id: shapes_of(one, setting) for one in could}
+    return [
+        PlacedMechanism(one, shape, direction_of(one, setting, shape))
+        for one in could
+        if ties or not shapes.get(one.same_term_as)
+        for shape in shapes[one.id]
+    ]
 
 
 @dataclass(frozen=True, eq=False)

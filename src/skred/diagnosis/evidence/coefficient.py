@@ -31,6 +31,7 @@ from skred.diagnosis.evidence.marginal import Evidence, coordinates, evidence, p
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.hierarchical.surface import Nodes
 from skred.physics.law import Law
+from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
 
 FloatArray = NDArray[np.float64]
@@ -326,7 +327,7 @@ def curve_at(
     """
     added = mechanism.added
     assert added is not None
-    direction = added.direction(base.setting, shape)
+    direction = direction_of(mechanism, base.setting, shape)
     extension = extended(base.problem, base.law, (*base.directions, direction))
     strengths = np.sort(strengths[np.abs(strengths) > 1e-3 * added.scale_of(shape)])
     place = int(np.searchsorted(strengths, 0.0))

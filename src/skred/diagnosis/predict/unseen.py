@@ -32,6 +32,7 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.law import Law
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Direction, Setting, Shape
 from skred.physics.terrain import build_terrain
 
@@ -272,10 +273,9 @@ def _direction(term: Term, problem: HierarchicalProblem, law: Law) -> Direction:
         if np.abs(values).max(initial=0.0) > _FARTHEST:
             raise InputError(f"{campaign.name}: {shape.covariate!r} is far off what the predictor knows")
         covariates = {shape.covariate: values}
-    added = mechanisms()[term.mechanism].added
-    assert added is not None
+    setting = replace(setting_of(problem, law), covariates=covariates)
     try:
-        return added.direction(replace(setting_of(problem, law), covariates=covariates), shape)
+        return direction_of(mechanisms()[term.mechanism], setting, shape)
     except (AssertionError, KeyError, TypeError, ValueError) as error:
         raise InputError(f"the predictor's {term.mechanism} has a shape that it cannot have") from error
 

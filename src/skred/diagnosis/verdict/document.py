@@ -30,6 +30,7 @@ from skred.diagnosis.verdict.next_sensor import next_sensor
 from skred.diagnosis.verdict.statement import statement
 from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.physics.mechanisms.spec import Mechanism
 from skred.physics.mechanisms.stretches import equation_of
 
 _NO_LIMIT = 20.0
@@ -120,6 +121,7 @@ def _mechanism(found: Diagnosis, number: int) -> dict[str, Any]:
     shape = candidate.best.shape
     return {
         "id": candidate.mechanism.id,
+        **_kind(candidate.mechanism),
         "strength": _strength(found.steps, number),
         "location": None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]},
         "equation": equation_of(candidate.mechanism, shape),
@@ -130,6 +132,12 @@ def _mechanism(found: Diagnosis, number: int) -> dict[str, Any]:
         "tied_with": list(step.tied),
         "log_bayes_factor": step.comparison.log_factors[candidate.mechanism.id],
     }
+
+
+def _kind(mechanism: Mechanism) -> dict[str, str]:
+    """What a mechanism says is wrong and what it is bound to: a reader need not know its id."""
+    assert mechanism.added is not None
+    return {"group": str(mechanism.group), "bound_to": str(mechanism.added.bound_to)}
 
 
 def _standard(found: Diagnosis, covariate: str | None) -> dict[str, Any] | None:
@@ -198,6 +206,7 @@ def _candidate(comparison: Comparison, name: str) -> dict[str, Any]:
     stretch, shape = candidate.stretch(), candidate.best.shape
     return {
         "id": name,
+        **_kind(candidate.mechanism),
         "log_bayes_factor": comparison.log_factors[name],
         "strength": {
             "parameter": candidate.mechanism.strength.name,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -53,7 +54,7 @@ def _splitting(found: Diagnosis, first: Candidate, second: Candidate) -> float:
         direction = curve.direction
         if direction.log_readings is not None:
             padded = np.concatenate([direction.log_readings, np.zeros(_PLACES)])
-            direction = type(direction)(log_readings=padded)
+            direction = replace(direction, log_readings=padded)
         extension = extended(problem, found.law, [direction])
         points = curve.fits[at].points
         events = np.arange(len(points))
