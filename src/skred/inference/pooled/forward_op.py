@@ -39,6 +39,7 @@ class _ForwardMap(ArrayOp):
     @staticmethod
     def _arguments(inputs: Sequence[Any]) -> tuple[Any, ...]:
         strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors = inputs
+        # PyTensor passes the inputs of an Op one by one.
         path = Path(edge, ground, barriers, limits)
         law = Contributions(columns, profiles, float(u_c), bool(terms))
         return strengths, releases, path, law, sensors
@@ -88,6 +89,7 @@ def _funcify_readings(op: FrontReadings, node: Any = None, **kwargs: Any) -> Any
     def front_readings(  # type: ignore[no-untyped-def]
         strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors
     ):
+        # PyTensor passes the inputs of an Op one by one.
         path = Path(edge, ground, barriers, limits)
         law = Contributions(columns, profiles, u_c.item(), terms.item())
         return simulate(strengths, releases, path, law, sensors)
