@@ -39,7 +39,6 @@ class _ForwardMap(ArrayOp):
     @staticmethod
     def _arguments(inputs: Sequence[Any]) -> tuple[Any, ...]:
         strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors = inputs
-        # PyTensor passes the inputs of an Op one by one.
         path = Path(edge, ground, barriers, limits)
         law = Contributions(columns, profiles, float(u_c), bool(terms))
         return strengths, releases, path, law, sensors
@@ -103,6 +102,7 @@ def _funcify_jacobian(op: FrontReadingsJacobian, node: Any = None, **kwargs: Any
     def front_readings_jacobian(  # type: ignore[no-untyped-def]
         strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors
     ):
+        # PyTensor passes the inputs of an Op one by one.
         path = Path(edge, ground, barriers, limits)
         law = Contributions(columns, profiles, u_c.item(), terms.item())
         return simulate_with_jacobian(strengths, releases, path, law, sensors)[1]
