@@ -35,6 +35,7 @@ def predict(
     law = load_law(base_model)
     problem = hierarchical_of(campaign_of(campaign), likelihood.errors, likelihood.smoothing)
 
+    from skred.inference.calibrate import calibrate
     from skred.prediction.predict import predict as predict_avalanches
     from skred.prediction.track import prediction_track
     from skred.report.prediction.figures import prediction_table
@@ -42,8 +43,8 @@ def predict(
     where = prediction_track(problem, track, release)
     settings = sampling.settings("hierarchical")
     with output.results("predict") as results:
-        prediction = predict_avalanches(
-            problem, law, settings, results.unfinished, where, output.tell, progress=output.progress
-        )
+        output.tell(f"{law.id}: calibrating on {problem.campaign.name}")
+        calibration = calibrate(problem, law, settings, progress=output.progress)
+        prediction = predict_avalanches(calibration, results.unfinished, where, output.tell)
     output.show(prediction, prediction_table, prediction["statement"], results.path)
     return DONE if prediction["gate"]["passed"] else NOT_CONVERGED

@@ -62,6 +62,7 @@ def calibrate_law(
         output.tell(f"{law_id}: sampling")
 
         from skred.inference.calibrate import calibrate, write_calibration
+        from skred.inference.fit import calibration_statement
         from skred.report.calibration.figures import save_model_figures
         from skred.report.shared.tables import summary_table
 
@@ -70,8 +71,6 @@ def calibrate_law(
         output.tell(f"{law_id}: writing {results.path}")
         write_calibration(calibration, results.unfinished)
         save_model_figures(calibration.tree, law, problem, results.unfinished)
-    gate = calibration.gate
-    verdict = "the chains converged" if gate.passed else "THE CHAINS DID NOT CONVERGE: do not use this result"
-    measured = f"r-hat at most {gate.r_hat_max:.3f}, effective draws at least {gate.ess_bulk_min:.0f}"
-    output.show(calibration.entry(), summary_table, [f"{verdict} ({measured})", *gate.problems], results.path)
-    return DONE if gate.passed else NOT_CONVERGED
+    entry = calibration.entry()
+    output.show(entry, summary_table, calibration_statement(entry), results.path)
+    return DONE if calibration.gate.passed else NOT_CONVERGED

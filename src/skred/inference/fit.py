@@ -139,6 +139,30 @@ def adjusted_p_values(recorded: FloatArray, predicted: FloatArray, testable: NDA
     return np.where(testable, (exceeding + 1.0) / (len(largest) + 1.0), 1.0)
 
 
+def calibration_statement(entry: dict[str, Any]) -> list[str]:
+    """Whether the chains of a calibration converged, and whether the model fits: two questions.
+
+    Parameters
+    ----------
+    entry : dict
+        As `skred.inference.calibrate.Calibration.entry` makes it.
+    """
+    gate = entry["gate"]
+    measured = f"r-hat at most {gate['r_hat_max']:.3f}, effective draws at least {gate['ess_bulk_min']:.0f}"
+    if not gate["passed"]:
+        return [f"THE CHAINS DID NOT CONVERGE: do not use this result ({measured})", *gate["problems"]]
+    if entry["fits"]:
+        return [
+            f"The chains converged ({measured}).",
+            "The model fits: at no sensor do the mean or the standard deviation of the recordings lie beyond"
+            f" what it predicts (level {100 * entry['fit_level']:g} % over all sensors).",
+        ]
+    return [
+        f"The chains converged ({measured}), but the model misses the recordings at {missed_sensors(entry)}.",
+        *fit_sentences(entry),
+    ]
+
+
 def fit_sentences(entry: dict[str, Any]) -> list[str]:
     """Where a model misses the recordings, the largest deviations first; none where it fits.
 

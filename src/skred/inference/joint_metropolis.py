@@ -88,6 +88,7 @@ def _run_chain(  # type: ignore[no-untyped-def]
     pointwise terms there in `terms` unless that is empty. Returns the share of all moves that was
     accepted and the mean probability of acceptance of the walks.
     """
+    # Eleven parameters: compiled for a signature of plain arrays, some of which it fills.
     n_draws, n_moves, n = noise.shape
     accepted, acceptance, n_walks = 0, 0.0, 0
     proposal, z = np.empty(n), np.empty(n)

@@ -158,6 +158,7 @@ def _log_two_cases(table, event, low, high, run, cases, a, b):  # type: ignore[n
     One logarithm for many readings, and exponentials that the cases share: this is what most of the time of a
     calibration goes into.
     """
+    # Eight parameters, because packing them takes time in the innermost loop.
     scale_a, scale_b = cases[a, _SCALE], cases[b, _SCALE]
     share_a, share_b = cases[a, _SHARE], cases[b, _SHARE]
     product_a, product_b, product_sd = 1.0, 1.0, 1.0
@@ -322,6 +323,7 @@ def assess(events, predictions, readings, errors, envelope, change, bound, top, 
 
     `predictions` is (n_boxes, n_corners, n_sensors + 1); bit j of a corner's number is its side on axis j.
     """
+    # Nine parameters: four of them are arrays that it fills.
     n_boxes, n_corners, n_columns = predictions.shape
     low, high = np.empty((n_boxes, n_columns)), np.empty((n_boxes, n_columns))
     for box in range(n_boxes):

@@ -68,7 +68,7 @@ def compare(
     folder : Path
         Gets a folder for each law, ``compare.json``, figures and ``report.html``.
     tell : callable
-        Detectability one line for each stage.
+        Takes one line for each stage.
 
     Returns
     -------
@@ -104,7 +104,7 @@ def score(
             entry |= scores(calibration, exact=exact)
             trees[law.id] = calibration.tree
         else:
-            tell(f"{law.id}: the gate failed: {'; '.join(calibration.gate.problems)}")
+            tell(f"{law.id}: the chains did not converge: {'; '.join(calibration.gate.problems)}")
             entry |= dict.fromkeys(("loo", "waic", "exact", "difference", "evidence", "weight"))
         entries.append(entry)
         law_folder = folder / law.id

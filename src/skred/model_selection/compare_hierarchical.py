@@ -18,7 +18,10 @@ from skred.model_selection.statement import changes
 from skred.physics.law import Law
 
 _ERROR_MODEL_SEEDS, _ERROR_MODEL_SMC_DRAWS = 1, 500
-_SHOWN = ("id", "title", "gate", "parameters", "loo", "waic", "exact", "difference", "evidence", "weight")
+_SHOWN = (
+    "id", "title", "gate", "parameters", "fit", "fits", "fit_level",
+    "loo", "waic", "exact", "difference", "evidence", "weight",
+)  # fmt: skip
 
 
 def compare_hierarchical(
@@ -43,7 +46,7 @@ def compare_hierarchical(
     folder : Path
         Gets a folder for each law, ``pooled`` with the same, ``compare.json``, figures and ``report.html``.
     tell : callable
-        Detectability one line for each stage.
+        Takes one line for each stage.
     exact : bool
         Refit without every event in turn, not only where importance sampling is unreliable.
 

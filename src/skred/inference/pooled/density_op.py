@@ -71,6 +71,7 @@ def _funcify_density(op: PooledLogDensity, node: Any = None, **kwargs: Any) -> A
     def pooled_density(  # type: ignore[no-untyped-def]
         response, release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional
     ):
+        # PyTensor passes the inputs of an Op one by one.
         data = PooledArrays(
             release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional
         )
@@ -94,6 +95,7 @@ def _funcify_pullback(op: PooledLogDensityPullback, node: Any = None, **kwargs: 
         regression,
         conditional,
     ):
+        # PyTensor passes the inputs of an Op one by one.
         data = PooledArrays(
             release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional
         )

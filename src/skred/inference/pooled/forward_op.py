@@ -88,6 +88,7 @@ def _funcify_readings(op: FrontReadings, node: Any = None, **kwargs: Any) -> Any
     def front_readings(  # type: ignore[no-untyped-def]
         strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors
     ):
+        # PyTensor passes the inputs of an Op one by one.
         path = Path(edge, ground, barriers, limits)
         law = Contributions(columns, profiles, u_c.item(), terms.item())
         return simulate(strengths, releases, path, law, sensors)
@@ -101,6 +102,7 @@ def _funcify_jacobian(op: FrontReadingsJacobian, node: Any = None, **kwargs: Any
     def front_readings_jacobian(  # type: ignore[no-untyped-def]
         strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors
     ):
+        # PyTensor passes the inputs of an Op one by one.
         path = Path(edge, ground, barriers, limits)
         law = Contributions(columns, profiles, u_c.item(), terms.item())
         return simulate_with_jacobian(strengths, releases, path, law, sensors)[1]
