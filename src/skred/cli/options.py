@@ -143,6 +143,8 @@ class Sampling:
 
 SAMPLING = Sampling()
 """How a command samples unless told otherwise."""
+
+
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Hierarchical:
