@@ -26,7 +26,7 @@ from pymc.pytensorf import join_nonshared_inputs
 from pymc.step_methods.metropolis import MetropolisState
 from pymc.step_methods.state import dataclass_state
 
-from skred.inference.compiled import compiled
+from skred.parallel.compile_cache import compiled, inner
 
 FloatArray = NDArray[np.float64]
 MOVES_PER_DRAW = 4
@@ -41,7 +41,7 @@ _FORGET_UNTIL = 10
 """Adaptation steps after which the chain's past counts in full (the start is forgotten)."""
 
 
-@compiled()
+@inner()
 def _weighted_sum(rest, pointwise, weights):  # type: ignore[no-untyped-def]
     """Log density of the model with every pointwise term weighted; NaN becomes -inf."""
     total = rest.item()
@@ -51,7 +51,7 @@ def _weighted_sum(rest, pointwise, weights):  # type: ignore[no-untyped-def]
     return -np.inf if np.isnan(total) else total
 
 
-@compiled()
+@inner()
 def _log_t(z):  # type: ignore[no-untyped-def]
     """Log density of a multivariate Student t at standardised z, but for its constant."""
     square = 0.0
@@ -60,7 +60,7 @@ def _log_t(z):  # type: ignore[no-untyped-def]
     return -0.5 * (DEGREES_OF_FREEDOM + z.size) * np.log1p(square / DEGREES_OF_FREEDOM)
 
 
-@compiled()
+@inner()
 def _standardise(x, mean, factor, z):  # type: ignore[no-untyped-def]
     """Solve x = mean + factor z."""
     for i in range(x.size):
@@ -70,7 +70,7 @@ def _standardise(x, mean, factor, z):  # type: ignore[no-untyped-def]
         z[i] /= factor[i, i]
 
 
-@compiled()
+@inner()
 def _add_product(start, factor, z, result):  # type: ignore[no-untyped-def]
     """Write start + factor z to `result`."""
     for i in range(z.size):

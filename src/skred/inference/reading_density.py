@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from skred.inference.compiled import compiled
+from skred.parallel.compile_cache import compiled, inner
 
 OUTLIER_FACTOR = 6.0
 """How much wider than its stated error an outlying reading scatters."""
@@ -22,7 +22,7 @@ _SCALE, _SHARE, _LOG_WEIGHT, _LOG_SCALE = range(4)
 """A case of the mixture, as `_cases_of` has it."""
 
 
-@compiled()
+@inner()
 def tabled(readings):  # type: ignore[no-untyped-def]
     """All readings in one array, (n_events, n_sensors, 5).
 
@@ -45,7 +45,7 @@ def tabled(readings):  # type: ignore[no-untyped-def]
     return table
 
 
-@compiled()
+@inner()
 def _cases_of(errors):  # type: ignore[no-untyped-def]
     """All cases of the mixture in one array, (n_cases, 4)."""
     cases = np.empty((errors.weights.size, 4))
@@ -54,14 +54,14 @@ def _cases_of(errors):  # type: ignore[no-untyped-def]
     return cases
 
 
-@compiled()
+@inner()
 def reading_sd(table, event, j, prediction):  # type: ignore[no-untyped-def]
     """Standard deviation of a reading [m/s or m]."""
     relative, absolute = table[event, j, RELATIVE] * prediction, table[event, j, ABSOLUTE]
     return math.sqrt(relative * relative + absolute * absolute)
 
 
-@compiled()
+@inner()
 def _log_stop(stop, reached, not_reached, place_sd):  # type: ignore[no-untyped-def]
     """Log probability that a front that stops at `stop` is seen to stop between two places."""
     above = (reached - stop) / place_sd * _SQRT_HALF
@@ -73,7 +73,7 @@ def _log_stop(stop, reached, not_reached, place_sd):  # type: ignore[no-untyped-
     return math.log(max(probability, _LEAST))
 
 
-@compiled()
+@inner()
 def _unshifted(table, event, j, shift):  # type: ignore[no-untyped-def]
     """The prediction whose reading, `shift` standard deviations higher, is the value.
 
@@ -91,7 +91,7 @@ def _unshifted(table, event, j, shift):  # type: ignore[no-untyped-def]
     return value - shift * reading_sd(table, event, j, value)
 
 
-@compiled()
+@inner()
 def _nearest(table, event, j, low, high, shift):  # type: ignore[no-untyped-def]
     """The residual of smallest size, and its standard deviation, for predictions between two values.
 
@@ -108,7 +108,7 @@ def _nearest(table, event, j, low, high, shift):  # type: ignore[no-untyped-def]
     return value - prediction - shift * sd, sd
 
 
-@compiled()
+@inner()
 def _put_away(product, total):  # type: ignore[no-untyped-def]
     """A product and a sum of logarithms: the product moved into the sum where it gets out of range."""
     if _SMALL < product < 1.0 / _SMALL:
@@ -116,7 +116,7 @@ def _put_away(product, total):  # type: ignore[no-untyped-def]
     return 1.0, total + math.log(product)
 
 
-@compiled()
+@inner()
 def _log_student(table, event, low, high, run, scale, degrees):  # type: ignore[no-untyped-def]
     """Log likelihood of the observed readings under Student's t, in one case of the mixture."""
     n = 0
@@ -135,7 +135,7 @@ def _log_student(table, event, low, high, run, scale, degrees):  # type: ignore[
     return n * constant - log_sd - 0.5 * (degrees + 1.0) * log_tail
 
 
-@compiled()
+@inner()
 def _multiplied(product, total, usual, outlying, square, share):  # type: ignore[no-untyped-def]
     """A product of densities with one more: as a product, and a sum of logarithms where it is tiny.
 
@@ -151,7 +151,7 @@ def _multiplied(product, total, usual, outlying, square, share):  # type: ignore
     return _put_away(product, total)
 
 
-@compiled()
+@inner()
 def _log_two_cases(table, event, low, high, run, cases, a, b):  # type: ignore[no-untyped-def]
     """Log likelihood of the observed readings in two cases of the mixture, of the same scale or not.
 
@@ -184,7 +184,7 @@ def _log_two_cases(table, event, low, high, run, cases, a, b):  # type: ignore[n
     return log_a, log_b
 
 
-@compiled()
+@inner()
 def _normal_sums(table, event, low, high, run):  # type: ignore[no-untyped-def]
     """Of the observed readings: squares in standard deviations, minus the log constants, and how many."""
     squares, product_sd, total_sd, n = 0.0, 1.0, 0.0, 0
@@ -197,7 +197,7 @@ def _normal_sums(table, event, low, high, run):  # type: ignore[no-untyped-def]
     return squares, total_sd + math.log(product_sd) + n * _LOG_SQRT_2PI, n
 
 
-@compiled()
+@inner()
 def _log_independent(table, event, low, high, run, cases, degrees):  # type: ignore[no-untyped-def]
     """Log likelihood of the observed readings, independent within each case of the mixture."""
     n_cases, outliers = cases.shape[0], False
@@ -227,7 +227,7 @@ def _log_independent(table, event, low, high, run, cases, degrees):  # type: ign
     return most + math.log(total)
 
 
-@compiled()
+@inner()
 def _log_correlated(table, event, predictions, run, common):  # type: ignore[no-untyped-def]
     """Log likelihood of the observed readings with an error common to the velocities."""
     n_velocities, n, squares, total = 0, 0, 0.0, 0.0
@@ -250,7 +250,7 @@ def _log_correlated(table, event, predictions, run, common):  # type: ignore[no-
     return -0.5 * squares - log_sd - 0.5 * math.log(inflation) - n * _LOG_SQRT_2PI
 
 
-@compiled()
+@inner()
 def _bound_correlated(table, event, low, high, run, common):  # type: ignore[no-untyped-def]
     """Largest log likelihood for predictions between two values, over a grid of the common error."""
     most = -np.inf

@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
-from skred.diagnosis.compiled import compiled
 from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.line_quadrature import line_nodes
 from skred.inference.hierarchical.surface import Nodes
 from skred.inference.reading_density import log_likelihoods
+from skred.parallel.compile_cache import compiled
 
 FloatArray = NDArray[np.float64]
 _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)

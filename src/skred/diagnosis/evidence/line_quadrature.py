@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.compiled import compiled
+from skred.parallel.compile_cache import compiled, inner
 
 FloatArray = NDArray[np.float64]
 _PER_ROOT = 5.0
@@ -66,6 +66,21 @@ def line_nodes(
     return points, log_l + np.log(np.maximum(weights, np.finfo(float).tiny))
 
 
+@inner()
+def _add_changes(points, height, share, changes):  # type: ignore[no-untyped-def]
+    """What is between each point and the one before it counts for, of the share that they have together."""
+    most, total = height.max(), 0.0
+    own = np.zeros(points.size)
+    before = math.exp(height[0] - most)
+    for k in range(1, points.size):
+        after, apart = math.exp(height[k] - most), points[k] - points[k - 1]
+        own[k] = apart * (abs(after - before) + _AS_WIDE * max(after, before))
+        total += own[k]
+        before = after
+    if total > 0.0:
+        changes += share / total * own
+
+
 @compiled()
 def _between(points, log_l, means, sds, n):  # type: ignore[no-untyped-def]
     """New points of each row, (n_rows, n), between points in order whose log likelihoods are given."""
@@ -90,18 +105,3 @@ def _between(points, log_l, means, sds, n):  # type: ignore[no-untyped-def]
             share = (target - reached[k - 1]) / gap if gap > 0.0 else 0.5
             result[row, j] = points[row, k - 1] + share * (points[row, k] - points[row, k - 1])
     return result
-
-
-@compiled()
-def _add_changes(points, height, share, changes):  # type: ignore[no-untyped-def]
-    """What is between each point and the one before it counts for, of the share that they have together."""
-    most, total = height.max(), 0.0
-    own = np.zeros(points.size)
-    before = math.exp(height[0] - most)
-    for k in range(1, points.size):
-        after, apart = math.exp(height[k] - most), points[k] - points[k - 1]
-        own[k] = apart * (abs(after - before) + _AS_WIDE * max(after, before))
-        total += own[k]
-        before = after
-    if total > 0.0:
-        changes += share / total * own

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
-from skred.diagnosis.compiled import compiled
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.linear_mixed_model import MeanPrior
 from skred.inference.hierarchical.event_density import integrated_log_density, inverse_factor
 from skred.inference.hierarchical.population import LKJ_SHAPE
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 from skred.inference.hierarchical.surface import Nodes
+from skred.parallel.compile_cache import compiled, inner
 
 FloatArray = NDArray[np.float64]
 _LOG_MEDIAN, _LOG_SD, _SHAPE = math.log(SPREAD_MEDIAN), SPREAD_LOG_SD, LKJ_SHAPE
@@ -49,7 +49,7 @@ def _factor(psi, n):  # type: ignore[no-untyped-def]
     return factor
 
 
-@compiled()
+@inner()
 def _means(psi, n, n_events):  # type: ignore[no-untyped-def]
     """The population's mean, the same for each event."""
     means = np.empty((n_events, n))
@@ -89,7 +89,7 @@ def _log_target(psi, n, log_scale, first, points, log_weights):  # type: ignore[
     return total if total == total else -np.inf
 
 
-@compiled()
+@inner()
 def _fill_statistics(point, mean, whiten, statistics):  # type: ignore[no-untyped-def]
     """Statistics of a normal density: whitened strengths, then their products (0, 0), (1, 0), (1, 1), ...
 
@@ -108,7 +108,7 @@ def _fill_statistics(point, mean, whiten, statistics):  # type: ignore[no-untype
     return exponent
 
 
-@compiled()
+@inner()
 def _node_moments(psi, n, first, points, log_weights):  # type: ignore[no-untyped-def]
     """Sums over events: of log integrals, and of means and covariances of the statistics over the nodes.
 
@@ -139,7 +139,7 @@ def _node_moments(psi, n, first, points, log_weights):  # type: ignore[no-untype
     return density.sum(), mean, covariance
 
 
-@compiled()
+@inner()
 def _natural(psi, n, centre, whiten):  # type: ignore[no-untyped-def]
     """Natural parameters of a population in coordinates whitened about another, and its normalising term."""
     between = whiten @ _factor(psi, n)
@@ -154,7 +154,7 @@ def _natural(psi, n, centre, whiten):  # type: ignore[no-untyped-def]
     return found, 0.5 * offset @ found[:n] - log_determinant
 
 
-@compiled()
+@inner()
 def _smooth(psi, n, log_scale, mean, n_events, centre, whiten):  # type: ignore[no-untyped-def]
     """What the log target is beside its log integrals, those along a tangent; and natural parameters."""
     parameters, normaliser = _natural(psi, n, centre, whiten)
@@ -199,7 +199,7 @@ def _slopes(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-u
     return value, gradient, hessian - natural @ covariance @ natural.T
 
 
-@compiled()
+@inner()
 def _allowed(psi, n):  # type: ignore[no-untyped-def]
     """The nearest coordinates whose spreads are not too narrow."""
     allowed = psi.copy()
