@@ -44,7 +44,7 @@ def test_results_are_registered_with_the_calibration() -> None:
     assert calibrate.__module__ == "skred.inference.calibrate"
     for generic in (predictive, summary):
         assert {PooledProblem, HierarchicalProblem} <= generic.registry.keys()
-    with pytest.raises(TypeError, match="of a str"):
+    with pytest.raises(TypeError, match="of type str"):
         summary("no problem", None, None)
 
 

@@ -1,8 +1,8 @@
-"""How readings scatter about what one front does: the error models, and recordings as they read them.
+"""Error models: how readings scatter about what one front does; and recordings as they enter the likelihood.
 
-The relative part of an error is taken of the prediction, not of the noisy reading. Where a front
-stopped enters once, as an interval between the lowest sensor that it reached and the highest that
-it did not, softened by how well the places are known.
+The relative part of an error refers to the prediction, not to the noisy reading. The place where a front
+stopped enters once: as an interval between the lowest sensor that the front reached and the highest that it
+did not reach, with soft ends because places are uncertain.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from skred.inference.reading_density import OUTLIER_FACTOR
 FloatArray = NDArray[np.float64]
 DEFAULT_ERRORS = "robust"
 PLACE_SD_M = 8.0
-"""How well it is known where a front stopped relative to a sensor."""
+"""Standard deviation [m] of the place where a front stopped, relative to a sensor."""
 
 
 class Errors(NamedTuple):
-    """An error model as numba reads it: a mixture over what an event's errors are like.
+    """An error model for compiled code: a mixture of cases, one case for each event.
 
     Attributes
     ----------
@@ -109,8 +109,8 @@ def _errors(
 
 
 _NODES = np.linspace(-4.0, 4.0, 27)
-"""Of a standard normal variable, evenly: many readings tell an event's factor to a tenth, which Gauss-Hermite
-nodes would step over."""
+"""Evenly spaced nodes of a standard normal variable. Many readings determine an event's factor to a tenth;
+Gauss-Hermite nodes would be too far apart for that."""
 _WEIGHTS = np.exp(-0.5 * _NODES**2)
 ERROR_MODELS: dict[str, ErrorModel] = {
     model.id: model
@@ -134,11 +134,11 @@ ERROR_MODELS: dict[str, ErrorModel] = {
         ),
     )
 }
-"""Error models by name; compared, not assumed."""
+"""Error models by name. A comparison of laws compares them too."""
 
 
 class EventReadings(NamedTuple):
-    """The recordings as the error models read them, made by `event_readings`.
+    """The recordings as they enter the likelihood, made by `event_readings`.
 
     Attributes
     ----------

@@ -30,11 +30,11 @@ from skred.parallel.compile_cache import compiled, inner
 
 FloatArray = NDArray[np.float64]
 MOVES_PER_DRAW = 4
-"""Moves between two draws that are kept, half of them jumps; the others would be all but copies."""
+"""Moves between two draws that are kept, half of them jumps. Draws after fewer moves are nearly copies."""
 DEGREES_OF_FREEDOM = 6.0
-"""Of the jumps: tails heavier than the posterior's, so that no jump is too good to leave."""
+"""Degrees of freedom of the jumps. Their tails must be heavier than the posterior's, or chains get stuck."""
 _BLOCK = 100
-"""Draws made at once when tuning is over and the proposals are fixed."""
+"""Draws made in one call after tuning, when proposals are fixed."""
 TARGET_ACCEPTANCE = {1: 0.44, 2: 0.35}
 _TARGET_ELSE = 0.25
 _FORGET_UNTIL = 10
@@ -138,7 +138,7 @@ def _chain_for(density: types.FunctionType, data: types.BaseTuple) -> Callable[.
 
 
 class _WithoutDensity:
-    """A model for PyMC's own step, which would compile a density for moves that are not made here."""
+    """A model for PyMC's own step, without a density: PyMC would compile one that is not used here."""
 
     def __init__(self, model: pm.Model) -> None:
         self._model = model
@@ -155,7 +155,7 @@ class _WithoutDensity:
 
 @dataclass_state
 class JointMetropolisState(MetropolisState):
-    """PyMC's state and what the adaptation has learnt."""
+    """PyMC's state, and the state of the adaptation."""
 
     mean: np.ndarray
     covariance: np.ndarray
@@ -240,7 +240,7 @@ class JointMetropolis(pm.Metropolis):
         return tuple(np.require(container.storage[0], requirements=("C", "W")) for container in self._data)
 
     def reset_tuning(self) -> None:
-        """Forget what was learnt."""
+        """Reset the adaptation."""
         super().reset_tuning()
         if hasattr(self, "_start"):
             self.mean, self.covariance = np.zeros(len(self._start)), self._start.copy()
@@ -249,7 +249,7 @@ class JointMetropolis(pm.Metropolis):
             self._forget_block()
 
     def _forget_block(self) -> None:
-        """Drop the draws made ahead."""
+        """Drop draws that were made in advance."""
         self._block, self._used = np.empty((0, len(self._start))), 0
         self._stood, self._stats = np.empty(0), {"accept": 0.0, "accepted": 0.0}
 
@@ -266,7 +266,7 @@ class JointMetropolis(pm.Metropolis):
         return RaveledVars(q, q0.point_map_info), [stats]
 
     def _next_of_block(self, q: FloatArray) -> FloatArray:
-        """The draw after q from a block made at once, or from a new one if q is not where it stood."""
+        """The draw after q, from the present block of draws, or from a new block if q was changed."""
         if self._used >= len(self._block) or not np.array_equal(q, self._stood):
             self._block, _, accepted, acceptance = self._run(q, _BLOCK, self.rng, with_terms=False)
             self._stats = {"accept": acceptance, "accepted": accepted}

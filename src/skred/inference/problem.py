@@ -1,4 +1,4 @@
-"""What a calibration starts from: a campaign on its terrain, and how its recordings are compared."""
+"""What a calibration starts from: a campaign on its terrain, and a likelihood of its recordings."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ FloatArray = NDArray[np.float64]
 class Problem(ABC):
     """A campaign on its terrain, and a likelihood of its recordings.
 
-    What a posterior says of readings is told by the generic functions `predictive` and `summary` of
-    `skred.inference.results`.
+    The generic functions `predictive` and `summary` of `skred.inference.results` make predictions and
+    summaries from a posterior.
 
     Attributes
     ----------
@@ -62,15 +62,15 @@ class Problem(ABC):
         """Log density of each event for many parameter vectors: arrays by name to (n, n_events)."""
 
     def numerical_problems(self, law: Law, posterior: xr.Dataset) -> tuple[str, ...]:
-        """What is wrong with the numerics of the likelihood, and what to do."""
+        """Faults of the likelihood's numerics, and what to do about them."""
         return ()
 
     def finer(self, law: Law, posterior: xr.Dataset) -> Problem | None:
-        """The same problem with finer numerics where a posterior went; None where there are none."""
+        """The same problem with finer numerics around a posterior; None if they cannot be refined."""
         return None
 
     def to_start_from(self, law: Law, prior: dict[str, FloatArray], seed: int) -> dict[str, FloatArray]:
-        """Parameter vectors, among which chains find their starts: draws of the prior, as they are."""
+        """Parameter vectors from which chains choose their starts; here the draws of the prior."""
         return prior
 
     @abstractmethod

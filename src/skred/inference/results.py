@@ -1,4 +1,4 @@
-"""A calibration as one DataTree: named dims, units, and everything needed to trust or redo it."""
+"""A calibration as one DataTree: named dimensions, units, diagnostics, and what is needed to repeat it."""
 
 from __future__ import annotations
 
@@ -28,15 +28,15 @@ def predictive(
 ) -> dict[str, xr.Dataset]:
     """Groups of a result that are a likelihood's own, from draws of the parameters.
 
-    Registered for each kind of problem where its results are made: import that module to have it.
+    Each kind of problem registers its own in the module that makes its results.
     """
-    raise TypeError(f"nobody says what a posterior of a {type(problem).__name__} predicts")
+    raise TypeError(f"no predictive groups are registered for problems of type {type(problem).__name__}")
 
 
 @singledispatch
 def summary(problem: Problem, law: Law, tree: xr.DataTree) -> dict[str, Any]:
-    """What a summary says beside the parameters: plain data, from the whole result. Registered likewise."""
-    raise TypeError(f"nobody sums up a posterior of a {type(problem).__name__}")
+    """Plain data for a summary beside the parameters, from the whole result; registered likewise."""
+    raise TypeError(f"no summary is registered for problems of type {type(problem).__name__}")
 
 
 def assemble(

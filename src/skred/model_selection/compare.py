@@ -1,4 +1,4 @@
-"""Compare laws on one campaign: leave-one-event-out, information criteria, evidence, weights."""
+"""Compare laws on one campaign: leave-one-event-out, WAIC, evidence, stacking weights."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def compare(
     folder: Path,
     tell: Tell = lambda line: None,
 ) -> dict[str, Any]:
-    """Calibrate and compare by the pooled likelihood, writing each law's results as soon as they are there.
+    """Calibrate and compare laws by the pooled likelihood; each law's results are written at once.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def score(
     *,
     exact: bool,
 ) -> Scored:
-    """Calibrate laws and score their predictions; `exact` refits without every event in turn."""
+    """Calibrate laws and score their predictions; with `exact` all events are left out by refits."""
     from skred.report.calibration.figures import save_model_figures
 
     entries: list[dict[str, Any]] = []
@@ -116,7 +116,7 @@ def score(
 
 
 def write_comparison(scored: Scored, folder: Path, started: float, tell: Tell) -> dict[str, Any]:
-    """Say what came out, and write ``compare.json``, figures and ``report.html``; returns the document."""
+    """Add the statement, and write ``compare.json``, figures and ``report.html``; returns the document."""
     from skred.report.calibration.figures import save_comparison_figures
     from skred.report.comparison.html import render_comparison
 
@@ -137,9 +137,9 @@ def scores(
     evidence_seeds: int = EVIDENCE_SEEDS,
     evidence_draws: int = SMC_DRAWS,
 ) -> dict[str, Any]:
-    """Everything a law's entry says of its predictions.
+    """Scores of a law's predictions.
 
-    Events whose importance sampling is unreliable are refitted exactly, with `exact` all.
+    Events are left out by refits where importance sampling is unreliable; with `exact` all are.
     """
     events = calibration.problem.campaign.event_ids
     seed = calibration.settings.seed
@@ -199,7 +199,7 @@ def _exact_entry(
 def rank(entries: list[dict[str, Any]], trees: dict[str, Any]) -> list[dict[str, Any]]:
     """Entries, best first by exact elpd, with paired differences to the best and stacking weights.
 
-    Entries whose gate failed come last and are not compared.
+    Entries whose chains did not converge come last and are not compared.
     """
     valid, failed = best_first(entries, lambda entry: entry["exact"]["elpd"])
     weights = _stacking([e["id"] for e in valid], trees)
@@ -251,7 +251,7 @@ def _document(
 
 @contextmanager
 def _told_elsewhere() -> Iterator[None]:
-    """Silence ArviZ's warnings of large Pareto k: these are in the tables, and such events are refitted."""
+    """Silence ArviZ's warnings of large Pareto k: the tables show them, and such events are refitted."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Estimated shape parameter", category=UserWarning)
         yield

@@ -1,4 +1,4 @@
-"""Compare laws with every avalanche its own friction, beside the pooled comparison."""
+"""Compare laws by the hierarchical likelihood, beside the pooled comparison."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def compare_hierarchical(
     *,
     exact: bool = False,
 ) -> dict[str, Any]:
-    """Calibrate and compare by both likelihoods, and the error models under the best law.
+    """Calibrate and compare laws by both likelihoods, and error models under the best law.
 
     Parameters
     ----------

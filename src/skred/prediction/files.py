@@ -18,7 +18,7 @@ from skred.prediction.probabilities import PARTS
 FloatArray = NDArray[np.float64]
 TABLES = ("exceedance.csv", "runout.csv", "uncertainty.csv")
 FILES = (*TABLES, "prediction.nc", "prediction.png", "uncertainty.png", "prediction.json")
-"""What a prediction writes beside the posterior, the last one last."""
+"""Files that a prediction writes beside the posterior; ``prediction.json`` comes last."""
 
 
 def write_prediction(
@@ -48,7 +48,7 @@ def write_prediction(
 
 
 def tables(data: xr.Dataset) -> tuple[str, str, str]:
-    """The three tables as CSV: exceedance of speeds, of runout, and uncertainty by where it comes from."""
+    """The three tables as CSV: exceedance of speeds, exceedance of runouts, and parts of the uncertainty."""
     place = [[f"{value:.2f}" for value in data[name].values] for name in ("s", "x", "z")]
     rows = list(zip(*place, strict=True))
     speeds = data["speed"].values

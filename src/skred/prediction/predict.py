@@ -1,4 +1,4 @@
-"""Carry a calibrated population of avalanches to a track: how far, how fast, and how sure.
+"""Predict avalanches on a track from a calibrated population: runout, speed and their uncertainty.
 
 What is predicted is the next avalanche like those recorded. Three uncertainties are kept apart: that of the
 population (how well the recordings determine it), the variability between avalanches, and the reading error.
@@ -38,7 +38,7 @@ _MOST_STEPS = 150
 
 @dataclass(frozen=True)
 class Simulation:
-    """How much is simulated.
+    """Size of the simulation.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ def prediction_of(
     track: PredictionTrack,
     simulation: Simulation,
 ) -> xr.Dataset:
-    """What a calibration's populations do on a track.
+    """Avalanches of a calibration's populations on a track.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def _thinned(problem: HierarchicalProblem, law: Law, tree: xr.DataTree, most: in
 
 
 def _places(problem: HierarchicalProblem, track: PredictionTrack) -> FloatArray:
-    """Where fronts are looked at: every so many metres, at the sensors and the reference, at the end."""
+    """Places of the predictions: at even steps, at the sensors and the reference, and at the end."""
     length = track.length_m
     fitting = (step for step in _STEPS_M if length <= _MOST_STEPS * step)
     step = next(fitting, length / _MOST_STEPS)

@@ -1,4 +1,4 @@
-"""What a prediction says, in plain sentences, and what it does not say."""
+"""A prediction in sentences: its results, and the conditions they depend on."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 def prediction_statement(document: dict[str, Any]) -> list[str]:
-    """Sentences: how far, how fast, how sure, and on what all of it rests."""
+    """Sentences on runout, speed and uncertainty, and on the assumptions."""
     if not document["valid"]:
         problems = "; ".join(document["gate"]["problems"])
         return [f"The chains did not converge, so nothing is predicted: {problems}."]
@@ -93,7 +93,7 @@ def _conditions(document: dict[str, Any]) -> list[str]:
 
 
 def _outside(document: dict[str, Any]) -> str:
-    """How much of what is predicted lies outside of what was recorded."""
+    """Share of the predicted runouts outside the recorded range."""
     if not document["runout"]["beyond_recorded"]:
         return ""
     shortest, longest = document["runout"]["beyond_recorded"]

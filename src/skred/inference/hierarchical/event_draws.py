@@ -16,7 +16,7 @@ from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
 _FARTHEST = 230.0
-"""Largest logarithm of a strength, either way: its powers are numbers too."""
+"""Largest absolute logarithm of a coefficient; powers of it stay finite."""
 
 
 class Avalanches(NamedTuple):
@@ -60,7 +60,7 @@ def new_avalanches(
     wide = np.maximum(sd, 1e-9)  # cut off where the track ends, as in the likelihood
     low, high = ndtr(-mean / wide), ndtr((length - mean) / wide)
     deviation = ndtri(low + (high - low) * rng.random((len(means), n_events)))
-    # Where spreads are absurdly wide a strength can be beyond any number.
+    # Where spreads are extremely wide a coefficient can exceed the largest number.
     return Avalanches(np.exp(np.clip(logs, -_FARTHEST, _FARTHEST)), _on_track(problem, deviation))
 
 
@@ -81,7 +81,7 @@ def fronts_of(problem: HierarchicalProblem, law: Law, avalanches: Avalanches) ->
 def read_with_errors(
     problem: HierarchicalProblem, fronts: FloatArray, rng: np.random.Generator
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """What instruments would record of fronts.
+    """Readings that the instruments would record of fronts.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a hierarchical posterior says of avalanches: of each recorded one, and of the next one."""
+"""Results of a hierarchical posterior: the recorded avalanches themselves, and new ones."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
 MOST_AVALANCHES = 200_000
-"""Draws times events kept of single avalanches; beyond that draws are thinned."""
+"""Most avalanches kept, draws times events; with more, draws are thinned."""
 _READING = {"units": "m s-1; m for the runout"}
 
 
@@ -54,7 +54,7 @@ def hierarchical_predictive(
 
 
 def thinned(draws: xr.Dataset, n_events: int) -> xr.Dataset:
-    """Every so many draws, so that there are no more avalanches than are kept."""
+    """Draws, thinned evenly if there are more avalanches than are kept."""
     n = draws.sizes["chain"] * draws.sizes["draw"]
     return draws.isel(draw=slice(None, None, max(1, -(-n * n_events // MOST_AVALANCHES))))
 
@@ -145,7 +145,7 @@ def new_avalanche_rows(problem: HierarchicalProblem, tree: xr.DataTree) -> list[
             "sensor": sensor.id,
             "unit": "m" if sensor.is_runout else "m/s",
             "reached": float(reached.mean()),
-            # A velocity of 0 is no sign that the front came, here as in the likelihood.
+            # As in the likelihood, a velocity of 0 does not show that the front came.
             "recorded_reached": _share(recorded > 0.0, known) if not sensor.is_runout else 1.0,
             "n_recorded": len(recorded),
         }
@@ -159,7 +159,7 @@ def new_avalanche_rows(problem: HierarchicalProblem, tree: xr.DataTree) -> list[
 
 
 def _share(came: NDArray[np.bool_], known: NDArray[np.bool_]) -> float | None:
-    """How many of the events of which it is known came."""
+    """Share of events that came, of those for which it is known."""
     return float(came.sum() / known.sum()) if known.any() else None
 
 

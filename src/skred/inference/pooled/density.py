@@ -1,4 +1,4 @@
-"""The pooled log density in numba: one value per event, missing readings out, stops as information.
+"""The pooled log density in numba: one value for each event; missing readings drop out, stops are censored.
 
 For every event the observed readings are whitened by the Cholesky factor of their own block of
 Sigma. Sensors it did not reach add the probability that their latent readings, given the observed
@@ -27,7 +27,7 @@ _INV_SQRT_2PI = 1.0 / math.sqrt(2.0 * math.pi)
 
 
 class PooledArrays(NamedTuple):
-    """What the density needs to know of the recordings, made by `pooled_arrays`.
+    """The recordings as the density reads them, made by `pooled_arrays`.
 
     Attributes
     ----------

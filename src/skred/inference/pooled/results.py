@@ -1,4 +1,4 @@
-"""What a pooled posterior says of readings: the response of the path, and a new avalanche's readings."""
+"""Results of a pooled posterior: the mean response of the path, and readings of a new avalanche."""
 
 from __future__ import annotations
 
