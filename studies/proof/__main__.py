@@ -93,10 +93,10 @@ all batches, and what was written about each batch. The files are in `{kept}`:
 | --- | --- |
 | `ledger.json` | what was published before the first diagnosis |
 | `sealed.json` | truth, settings and salt of every trial, which the ledger's hashes are of |
-| `answers/skred.json`, `answers/<baseline>.json` | every answer, less what the campaign's seed draws again |
-| `notes.md` | what was written about the batch when it was opened, or why it was given up |
+| `answers/skred.json`, `answers/<baseline>.json` | every answer, less what is neither scored nor studied |
+| `studies/proof/notes/` | what was written about the batch when it was opened, or why it was given up |
 
-`tests/prove/test_record.py` recomputes every hash.
+`tests/studies/test_record.py` recomputes every hash.
 """
 _STRONG = 5.5
 """Signal-to-noise from which on effects should be found."""
