@@ -140,7 +140,7 @@ def test_no_scheduler(proof: ProofFolder) -> None:
 
 def test_a_dying_worker_is_replaced_and_its_trial_tried_once_more(proof: ProofFolder) -> None:
     proof.request("trial-0002").write_text('{"base_model": "murderous"}')
-    done = subprocess.run(command(proof, "murderous"), capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command(proof, "murderous"), capture_output=True, text=True, timeout=500)
     assert done.returncode == 0, done.stderr
     answers = answers_of(proof)
     assert {name: answer["verdict"] for name, answer in answers.items()} == {
@@ -162,7 +162,7 @@ def test_kill_and_go_on(proof: ProofFolder) -> None:
     assert 1 <= len(before) < PLAN.n
     wait_until(lambda: not still_there(proof))
     assert answers_of(proof) == before
-    done = subprocess.run(command(proof, "slow"), capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command(proof, "slow"), capture_output=True, text=True, timeout=500)
     assert done.returncode == 0, done.stderr
     assert f"diagnosing {PLAN.n - len(before)} of {PLAN.n} trials" in done.stderr
     after = answers_of(proof)
