@@ -25,6 +25,8 @@ FIT_LEVEL = 0.01
 """Probability, at most, that a right model is said to miss anywhere. It is the level of the bootstrap test of
 a diagnosis, so that both alarm equally rarely."""
 _MOST_NAMED = 3
+_MEAN, _SD = range(2)
+"""Statistics of a sensor, as `_moments` has them."""
 
 
 @dataclass(frozen=True)
@@ -94,26 +96,27 @@ def sensor_fits(problem: Problem, predicted: FloatArray) -> list[SensorFit]:
     p = adjusted_p_values(of_recorded, of_predicted, testable)
     inside = _inside(recorded, predicted, known)
     centre, scale = of_predicted.mean(axis=0), of_predicted.std(axis=0, ddof=1)
-    rows = []
-    for k, sensor in enumerate(problem.campaign.sensors):
-        has_mean, has_sd = testable[:, k]
-        rows.append(
-            SensorFit(
-                sensor=sensor.id,
-                unit="m" if sensor.is_runout else "m/s",
-                n_recorded=int(n_known[k]),
-                recorded_mean=_or_none(of_recorded[0, k], has_mean),
-                recorded_sd=_or_none(of_recorded[1, k], has_sd),
-                predicted_mean=_or_none(centre[0, k], has_mean),
-                predicted_sd=_or_none(centre[1, k], has_sd),
-                predicted_mean_se=_or_none(scale[0, k], has_mean),
-                p_mean=_or_none(p[0, k], has_mean),
-                p_sd=_or_none(p[1, k], has_sd),
-                inside=_or_none(inside[k], has_mean),
-                fits=bool(p[:, k].min() > FIT_LEVEL),
-            )
+
+    def of(values: FloatArray, statistic: int, sensor: int) -> float | None:
+        return float(values[statistic, sensor]) if testable[statistic, sensor] else None
+
+    return [
+        SensorFit(
+            sensor=sensor.id,
+            unit="m" if sensor.is_runout else "m/s",
+            n_recorded=int(n_known[k]),
+            recorded_mean=of(of_recorded, _MEAN, k),
+            recorded_sd=of(of_recorded, _SD, k),
+            predicted_mean=of(centre, _MEAN, k),
+            predicted_sd=of(centre, _SD, k),
+            predicted_mean_se=of(scale, _MEAN, k),
+            p_mean=of(p, _MEAN, k),
+            p_sd=of(p, _SD, k),
+            inside=float(inside[k]) if n_known[k] else None,
+            fits=bool(p[:, k].min() > FIT_LEVEL),
         )
-    return rows
+        for k, sensor in enumerate(problem.campaign.sensors)
+    ]
 
 
 def adjusted_p_values(recorded: FloatArray, predicted: FloatArray, testable: NDArray[np.bool_]) -> FloatArray:
@@ -228,7 +231,3 @@ def _inside(recorded: FloatArray, predicted: FloatArray, known: NDArray[np.bool_
         known.sum(axis=0), 1
     )
     return share
-
-
-def _or_none(value: float, there: bool) -> float | None:
-    return float(value) if there else None
