@@ -95,9 +95,8 @@ class Law:
         some = np.linspace(0.3, 0.7, len(self.parameters))
         if not np.allclose(self.inverse(*self.strengths(*some)), some):
             raise ValueError(f"{self.id}: inverse does not give back the parameters of strengths")
-        for mechanism in self.mechanisms:
-            others = [one for one in self.mechanisms if one is not mechanism]
-            self.check_symbols(mechanism.strength, mechanism.id, others)
+        for k, mechanism in enumerate(self.mechanisms):
+            self.check_symbols(mechanism.strength, mechanism.id, self.mechanisms[:k])
 
     def check_symbols(self, strength: Strength, owner: str, others: Iterable[Mechanism]) -> None:
         """Refuse a coefficient that has the name or the symbol of something else.

@@ -233,7 +233,7 @@ class Mechanism:
     signature : str
         Its diagnostic signature: what its presence looks like in recordings.
     reference, doi : str
-        Where it comes from.
+        Where it comes from; no doi where there is none.
     column : Column, optional
         The column of the kernel's table that it enters as a part of a base law; None where it can only be
         added to one.
@@ -253,7 +253,7 @@ class Mechanism:
     equation: str
     signature: str
     reference: str
-    doi: str
+    doi: str = ""
     column: Column | None = None
     profile: Profile | None = None
     added: Added | None = None
