@@ -60,4 +60,4 @@ def diagnose(
             problem, law, settings, effort, folder, output.tell, lock=lock or 0, folds=outer_folds or 0
         )
     output.show(document, diagnosis_table, [], folder)  # the statement is in the table
-    return DONE if document["reason"] is None else NOT_CONVERGED
+    return DONE if document["reason"] is None or document["converged"] else NOT_CONVERGED

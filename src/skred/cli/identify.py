@@ -3,7 +3,7 @@
 Everything heavy is imported inside the function, so that ``--help`` is instant.
 """
 
-from skred.cli.exit_codes import DONE, NOT_CONVERGED
+from skred.cli.exit_codes import DONE
 from skred.cli.inputs import campaign_of, hierarchical_of
 from skred.cli.options import Campaigns, DiagnosedModel, Errors, IdleSeed, Smoothing
 from skred.cli.output import OUTPUT, Output
@@ -31,4 +31,4 @@ def identify(
 
     document = identify_to(problem, law, folder, output.tell)
     output.show(document, identify_table, document["statement"], folder)
-    return DONE if document["reason"] is None else NOT_CONVERGED
+    return DONE
