@@ -13,7 +13,7 @@ from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
 
 from skred.diagnosis.compare import comparison
 from skred.diagnosis.compare import refinement as looking
-from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.candidate import FORM, Candidate
 from skred.diagnosis.compare.comparison import _first_looks, _that_count, _that_may_count, with_errors
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import Place, entrants_of, leading
@@ -200,7 +200,8 @@ def test_strengths_of_other_sensors_are_other_strengths() -> None:
     slope = 4.0 * np.arange(len(other.strengths))
     other = replace(other, log_evidence=0.9 + slope - slope.max(), shape=Shape(sensor="b"))
     (candidate,) = entrants_of([replace(one, shape=Shape(sensor="a")), other], {}).values()
-    assert candidate.strength_between_shapes() == 0.0
+    best = candidate.best.moments
+    assert candidate.strength() == pytest.approx(best)
 
 
 def test_finer_curves_share_the_weight_of_their_place() -> None:
@@ -271,18 +272,31 @@ def test_a_place_is_parted_where_one_part_holds_most(
     assert exact - error < candidate.log_bayes_factor < exact + 0.5
 
 
-def test_not_knowing_the_place_widens_a_strength() -> None:
-    """The variance of a mixture: within shapes, and between their means."""
+def test_a_strength_is_over_all_places() -> None:
+    """A mixture: within shapes, and between their means; and for the form of the term."""
     flat, steep = made("segment_drag", 0.0, 1.0), made("segment_drag", 100.0, 1.0)
     slope = 4.0 * np.arange(len(steep.strengths))
     steep = replace(steep, log_evidence=1.0 + slope - slope.max())
     (candidate,) = entrants_of([flat, steep], {}).values()
-    weights, between = candidate.shape_weights, candidate.strength_between_shapes()
-    within = weights @ np.array([one.moments[1] ** 2 for one in candidate.curves])
-    mean = candidate.strength()[0]
-    about_best = candidate.strength()[1] ** 2 + (mean - candidate.best.moments[0]) ** 2
-    assert between > 0.0 and about_best == pytest.approx(within + between**2)
-    assert entrants_of([flat], {})["segment_drag"].strength_between_shapes() == 0.0
+    weights = candidate.shape_weights
+    means = np.array([one.moments[0] for one in candidate.curves])
+    mean, sd = candidate.strength()
+    assert mean == pytest.approx(weights @ means) and abs(mean - candidate.best.moments[0]) > 1e-5
+    within, between = candidate.best.moments[1] ** 2, weights @ (means - mean) ** 2
+    assert sd**2 == pytest.approx(within + between + (FORM * mean) ** 2)
+    alone = entrants_of([flat], {})["segment_drag"].strength()
+    assert alone.mean == flat.moments[0]
+    assert alone.sd == pytest.approx(np.hypot(flat.moments[1], FORM * flat.moments[0]))
+
+
+def test_a_place_is_quantiles_over_the_places() -> None:
+    """Of equally probable ones: medians in the middle, and the ends of an interval at the outer ones."""
+    curves = [made("segment_drag", 100.0 * k, 1.0) for k in range(5)]
+    (candidate,) = entrants_of(curves, {}).values()
+    first = [one.shape.s_from_m for one in candidate.curves]
+    assert candidate.stretch() == (curves[2].shape.s_from_m, curves[2].shape.s_to_m)
+    (low, _), (high, _) = candidate.ends(0.05), candidate.ends(0.95)
+    assert (low, high) == (min(first), max(first))
 
 
 def test_other_error_models_start_from_any() -> None:

@@ -28,6 +28,8 @@ KEYS = (
     "indistinguishable", "location", "strength", "covariate", "sensor", "equation", "evidence", "held_out",
     "detection_limits", "next_sensor", "diagnostics", "statement",
 )  # fmt: skip
+MORE = ("alarm_by", "converged", "refits_not_converged")
+"""Keys that came later: they are written, and verdicts before them stay whole."""
 NULLABLE = {
     "evidence": ("elpd_diff", "elpd_se", "log_bayes_factor", "p_value"),
     "held_out": ("rmse_velocity_before", "rmse_velocity_after", "rmse_runout_before", "rmse_runout_after"),
@@ -134,6 +136,11 @@ VALID: dict[str, Callable[[], dict[str, Any]]] = {
     "cannot tell": cannot_tell,
     "failed": failed,
     "never seen": lambda: nothing_missing() | {"detection_limits": {"viscous_drag": LIMIT | {"value": None}}},
+    "alarm": lambda: named("segment_drag", location=STRETCH, alarm_by="both", converged=True),
+    "not converged": lambda: nothing_missing() | {"converged": False, "refits_not_converged": ["3"]},
+    "an interval of the place": lambda: named(
+        "segment_drag", location=STRETCH | {"s_from_interval_m": [1850.0, 1900.0], "s_to_interval_m": None}
+    ),
     "more keys": lambda: nothing_missing() | {"reason": None, "seconds": {"comparison": 3.0}},
 }
 
@@ -156,7 +163,7 @@ def changed(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
 def test_the_schema_is_one() -> None:
     Draft202012Validator.check_schema(SCHEMA)
     assert tuple(SCHEMA["required"]) == KEYS
-    assert tuple(SCHEMA["properties"]) == (*KEYS, "locked", "outer_folds")  # where they were asked for
+    assert tuple(SCHEMA["properties"]) == (*KEYS, *MORE, "locked", "outer_folds")  # where they were asked for
 
 
 @pytest.mark.parametrize("kind", VALID)
@@ -207,6 +214,10 @@ def test_numbers_may_be_null_but_not_left_out(part: str, key: str) -> None:
         ("nothing", "held_out.unit", None),
         ("nothing", "diagnostics.divergences", 0.5),
         ("nothing", "statement", " "),
+        ("alarm", "alarm_by", "race"),
+        ("not converged", "converged", None),
+        ("not converged", "refits_not_converged", [3]),
+        ("an interval of the place", "location.s_from_interval_m", [1850.0]),
         ("nothing", "indistinguishable", ["obstacle"]),
         ("named", "verdict", "nothing_missing"),
         ("named", "verdict", "instrument"),
@@ -283,4 +294,5 @@ def test_what_is_written_where_no_diagnosis_was_possible(law_id: str) -> None:
     document = plain(verdict(found))
     assert problems(document) == []
     assert document["verdict"] == "cannot_tell" and "only 3 avalanches" in document["statement"]
+    assert set(MORE) <= set(document) and document["alarm_by"] is None
     json.dumps(document, allow_nan=False)

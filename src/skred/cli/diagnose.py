@@ -3,8 +3,6 @@
 Everything heavy is imported inside the functions, so that ``--help`` is instant.
 """
 
-from typing import Any
-
 from skred.cli.exit_codes import DONE, NOT_CONVERGED
 from skred.cli.inputs import campaign_of, hierarchical_of
 from skred.cli.options import (
@@ -48,12 +46,4 @@ def diagnose(
                 problem, law, settings, effort, results.unfinished, output.tell, lock=lock, folds=folds
             )
     output.show(document, diagnosis_table, [], results.path)  # the statement is in the table
-    return DONE if converged(document) else NOT_CONVERGED
-
-
-def converged(document: dict[str, Any]) -> bool:
-    """Whether every number of a verdict rests on chains that converged.
-
-    A document from before there was a key for it says only whether something stood in the way.
-    """
-    return bool(document.get("converged", document["reason"] is None))
+    return DONE if document["reason"] is None or document["converged"] else NOT_CONVERGED

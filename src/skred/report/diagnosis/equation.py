@@ -6,6 +6,7 @@ import math
 import re
 from typing import TYPE_CHECKING, Any
 
+from skred.diagnosis.augment.coefficient import augmented_of, strength_of
 from skred.diagnosis.evidence.covariates import standard_of
 from skred.physics.mechanisms.spec import Group
 from skred.physics.mechanisms.stretches import U_1, U_2, equation_of, is_opposed
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from skred.physics.law import Law
     from skred.report.diagnosis.flat import Flat as Diagnosis
 
+INTERVAL_SDS = 1.645
+"""Standard deviations from the middle to the end of a 90 % interval."""
 _HEAD = "dU^2/(2 ds) ="
 _SIMPLE = [
     ("U", "m s-1", "speed of the front"),
@@ -99,8 +102,6 @@ def _row(symbol: str, unit: str, meaning: str, reference: str = "", doi: str = "
 def _added_rows(found: Diagnosis, step: Step, number: int) -> list[dict[str, Any]]:
     candidate = step.candidate
     mechanism, shape = candidate.mechanism, candidate.best.shape
-    from skred.diagnosis.augment.coefficient import strength_of
-
     mean, sd = strength_of(found.steps, number)
     decimals = decimals_for(sd)
     about = f"{name_text(mechanism.strength.name)}: {mechanism.title}"
@@ -118,15 +119,14 @@ def _added_rows(found: Diagnosis, step: Step, number: int) -> list[dict[str, Any
             True,
         )
     ]
-    if shape.s_from_m is not None and shape.s_to_m is not None:
+    if (stretch := candidate.stretch()) is not None:
+        first, last = stretch
         if mechanism.id == "obstacle":
-            middle = 0.5 * (shape.s_from_m + shape.s_to_m)
+            middle = 0.5 * (first + last)
             rows.append(_row("s_o", "m", f"its crown, here {middle:.0f}", new=True))
-            rows.append(
-                _row("w", "m", f"length of its climb, and of its descent, here {middle - shape.s_from_m:.0f}")
-            )
+            rows.append(_row("w", "m", f"length of its climb, and of its descent, here {middle - first:.0f}"))
         else:
-            ends = f"where the stretch begins and ends, here {shape.s_from_m:.0f} and {shape.s_to_m:.0f}"
+            ends = f"where the stretch begins and ends, here {first:.0f} and {last:.0f}"
             rows.append(_row("s_1, s_2", "m", ends, new=True))
     if is_opposed(shape):
         first, last = (dict(shape.constants)[name] for name in (U_1, U_2))
@@ -176,7 +176,17 @@ def parameter_rows(found: Diagnosis) -> list[dict[str, str]]:
                 "after": "",
             }
             rows.setdefault(parameter.name, shown)[when] = _interval_text(values)
+    # Of what was added the one interval that there is: over all places, not that of the chains at one.
+    for number, name in enumerate(_added_names(found)):
+        mean, sd = strength_of(found.steps, number)
+        decimals = decimals_for(sd)
+        ends = (rounded(mean + side * INTERVAL_SDS * sd, decimals) for side in (-1.0, 1.0))
+        rows[name]["after"] = f"{rounded(mean, decimals)} ({' to '.join(ends)})"
     return list(rows.values())
+
+
+def _added_names(found: Diagnosis) -> list[str]:
+    return [one.name for one in augmented_of(found.steps[-1].calibration).added] if found.steps else []
 
 
 def _role(name: str, calibration: Calibration) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from skred.diagnosis.compare.decision import Decision
-from skred.diagnosis.outcome import NotDiagnosed, NothingAdded, Outcome, ProfileAdded
+from skred.diagnosis.outcome import NotDiagnosed, Outcome, ProfileAdded
 
 if TYPE_CHECKING:
     from skred.diagnosis.augment.step import Step
@@ -58,6 +58,6 @@ def flat(found: Outcome) -> Flat:
         found.steps,
         found.finding.law if isinstance(found.finding, ProfileAdded) else None,
         found.before,
-        None if isinstance(found.finding, NothingAdded) else found.finding.after,
+        found.after,
         found.seconds,
     )

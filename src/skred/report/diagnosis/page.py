@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from skred.diagnosis.augment.coefficient import strength_of
 from skred.diagnosis.check.bootstrap_test import LIMIT
 from skred.diagnosis.compare.decision import NOTHING_ALONE, TIED_NATS, decide
 from skred.diagnosis.discrepancy.profile import AMPLITUDES, KINDS, LENGTHS_M, NEAR_M
@@ -118,13 +119,20 @@ def _comparison(found: Diagnosis, number: int, comparison: Any) -> dict[str, Any
     same = [one.id for one in listed if winner is not None and one.is_same_term(winner)]
     return {
         "ending": f"_{number + 1}" if number else "",
-        "rows": rows.comparison_rows(comparison),
+        "rows": rows.comparison_rows(comparison, _strength(found, number)),
         "errors": rows.error_rows(comparison),
         "winner": winner,
         "leading": leading_name(comparison),
         "ties": _in_words(ties),
         "same": same,
     }
+
+
+def _strength(found: Diagnosis, number: int) -> dict[str, tuple[float, float]]:
+    """The strength of what was added from a comparison, by its id."""
+    if number >= len(found.steps):
+        return {}
+    return {found.steps[number].candidate.mechanism.id: strength_of(found.steps, number)}
 
 
 def _flat(profile: Location | None) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -148,8 +149,8 @@ def work_rows(found: Diagnosis) -> Rows:
     return rows
 
 
-def comparison_rows(comparison: Comparison) -> Rows:
-    """Every candidate, most probable first."""
+def comparison_rows(comparison: Comparison, added: Mapping[str, tuple[float, float]]) -> Rows:
+    """Every candidate, most probable first; of what was added its strength as it was calibrated."""
     shares, factors = comparison.probability, comparison.log_factors
     rows = []
     for name in sorted(shares, key=lambda name: -shares[name]):
@@ -157,7 +158,7 @@ def comparison_rows(comparison: Comparison) -> Rows:
         lead = comparison.leading(name).candidates.get(name) if name in factors else None
         stretch = lead.stretch() if lead is not None else None
         shape = lead.best.shape if lead is not None else None
-        mean, sd = lead.strength() if lead is not None else (None, None)
+        mean, sd = added.get(name, lead.strength()) if lead is not None else (None, None)
         decimals = decimals_for(sd)
         rows.append(
             {
