@@ -20,7 +20,7 @@ from skred.diagnosis.evidence.marginal import (
     _factor,
     _log_correlation_constant,
     _log_prior,
-    _log_target,
+    _log_targets,
     _slopes,
     coordinates,
     evidence,
@@ -137,7 +137,7 @@ def test_slopes_of_the_log_target_are_its_differences(which: str) -> None:
     given = n, base.log_scale, *nodes
 
     def target(change: FloatArray) -> float:
-        return float(_log_target(psi + change, *given))
+        return float(_log_targets((psi + change)[None], *given)[0])
 
     value, gradient, hessian = _slopes(psi, *given)
     steps = 0.02 * np.diag(sd)

@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
+from skred.inference.error_model import Errors, EventReadings
 from skred.parallel.compile_cache import compiled, inner
 
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 OUTLIER_FACTOR = 6.0
 """How much wider than its stated error an outlying reading scatters."""
 _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
@@ -268,34 +272,11 @@ def _bound_correlated(table, event, low, high, run, common):  # type: ignore[no-
 
 
 @compiled()
-def log_likelihoods(events, predictions, readings, errors):  # type: ignore[no-untyped-def]
-    """Log likelihood of each event's readings given what its fronts do, (n,).
+def _log_between(events, low, high, exact, readings, errors):  # type: ignore[no-untyped-def]
+    """Log likelihood of what lies `exact` at `low`; without that, its bound for anything up to `high`.
 
-    Parameters
-    ----------
-    events : (n,) integer array
-    predictions : (n, n_sensors + 1) array
-        Readings of the fronts [m/s or m], spans up to the stop, and last their runouts [m].
-    readings : EventReadings
-    errors : Errors
+    One function for both: with two most of this module would be compiled twice.
     """
-    result = np.empty(events.size)
-    table, cases, degrees, common = tabled(readings), _cases_of(errors), errors.degrees, errors.common
-    reached, not_reached, place_sd = readings.reached, readings.not_reached, readings.place_sd
-    for run in range(events.size):
-        event = events[run]
-        stop = predictions[run, predictions.shape[1] - 1]
-        if common > 0.0:
-            found = _log_correlated(table, event, predictions, run, common)
-        else:
-            found = _log_independent(table, event, predictions, predictions, run, cases, degrees)
-        result[run] = found + _log_stop(stop, reached[event], not_reached[event], place_sd)
-    return result
-
-
-@compiled()
-def log_likelihood_bounds(events, low, high, readings, errors):  # type: ignore[no-untyped-def]
-    """Upper bounds of `log_likelihoods` over all predictions between two, each by itself."""
     result = np.empty(events.size)
     table, cases, degrees, common = tabled(readings), _cases_of(errors), errors.degrees, errors.common
     reached, not_reached, place_sd = readings.reached, readings.not_reached, readings.place_sd
@@ -306,35 +287,85 @@ def log_likelihood_bounds(events, low, high, readings, errors):  # type: ignore[
         if reached[event] == -np.inf and not_reached[event] == np.inf:
             best = low[run, last]
         stop = min(max(best, low[run, last]), high[run, last])
-        if common > 0.0:
-            found = _bound_correlated(table, event, low, high, run, common)
-        else:
+        if common == 0.0:
             found = _log_independent(table, event, low, high, run, cases, degrees)
+        elif exact:
+            found = _log_correlated(table, event, low, run, common)
+        else:
+            found = _bound_correlated(table, event, low, high, run, common)
         result[run] = found + _log_stop(stop, reached[event], not_reached[event], place_sd)
     return result
 
 
-@compiled()
-def assess(events, predictions, readings, errors, envelope, change, bound, top, mean):  # type: ignore[no-untyped-def]
-    """Fill, for each box, the change of its readings along each axis, and what its likelihood may be.
+def log_likelihoods(
+    events: IntArray, predictions: FloatArray, readings: EventReadings, errors: Errors
+) -> FloatArray:
+    """Log likelihood of each event's readings given what its fronts do, (n,).
 
-    That is its bound, its best corner and the corners' mean, all as logarithms and times the envelope.
-    `envelope` is (n_boxes, 1 + n_corners): its logarithm, at most within the box and at the corners.
+    Parameters
+    ----------
+    events : (n,) integer array
+    predictions : (n, n_sensors + 1) array
+        Readings of the fronts [m/s or m], spans up to the stop, and last their runouts [m].
+    readings : EventReadings
+    errors : Errors
+    """
+    fronts = np.ascontiguousarray(predictions)
+    result: FloatArray = _log_between(events, fronts, fronts, True, readings, errors)
+    return result
 
-    `predictions` is (n_boxes, n_corners, n_sensors + 1); bit j of a corner's number is its side on axis j.
+
+def log_likelihood_bounds(
+    events: IntArray, low: FloatArray, high: FloatArray, readings: EventReadings, errors: Errors
+) -> FloatArray:
+    """Upper bounds of `log_likelihoods` over all predictions between two, each by itself."""
+    result: FloatArray = _log_between(events, low, high, False, readings, errors)
+    return result
+
+
+def assess(
+    events: IntArray,
+    predictions: FloatArray,
+    readings: EventReadings,
+    errors: Errors,
+    envelope: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """What the likelihood may be in each box, and how its readings change along each axis.
+
+    Parameters
+    ----------
+    predictions : (n_boxes, n_corners, n_sensors + 1) array
+        Bit j of a corner's number is its side on axis j.
+    envelope : (n_boxes, 1 + n_corners) array
+        Its logarithm, at most within the box and at the corners; the likelihoods are times the envelope.
+
+    Returns
+    -------
+    change : (n_boxes, n_axes) array
+    bound, top, mean : (n_boxes,) arrays
+        Of the log likelihood: an upper bound, the best corner, and the logarithm of the corners' mean.
     """
     # Nine parameters: four of them are arrays that it fills.
     n_boxes, n_corners, n_columns = predictions.shape
-    low, high = np.empty((n_boxes, n_columns)), np.empty((n_boxes, n_columns))
-    for box in range(n_boxes):
-        for j in range(n_columns):
-            low[box, j], high[box, j] = predictions[box, :, j].min(), predictions[box, :, j].max()
-    bound[:] = envelope[:, 0] + log_likelihood_bounds(events, low, high, readings, errors)
+    low, high = predictions.min(axis=1), predictions.max(axis=1)
+    bound = envelope[:, 0] + log_likelihood_bounds(events, low, high, readings, errors)
     every = predictions.reshape(n_boxes * n_corners, n_columns)
-    at_corners = log_likelihoods(np.repeat(events, n_corners), every, readings, errors)
+    corners = log_likelihoods(np.repeat(events, n_corners), every, readings, errors)
+    corners = corners.reshape(n_boxes, n_corners) + envelope[:, 1:]
+    top = corners.max(axis=1)
+    mean = top + np.log(np.exp(corners - top[:, None]).mean(axis=1))
+    change = np.empty((n_boxes, n_corners.bit_length() - 1))
+    _fill_changes(events, predictions, low, high, readings, change)
+    return change, bound, top, mean
+
+
+@compiled()
+def _fill_changes(events, predictions, low, high, readings, change):  # type: ignore[no-untyped-def]
+    """Largest change of a box's readings along each axis, in standard deviations of their errors."""
+    n_boxes, n_corners, n_columns = predictions.shape
     table, place_sd = tabled(readings), readings.place_sd
     reached, not_reached = readings.reached, readings.not_reached
-    sd, corners = np.empty(n_columns), np.empty(n_corners)
+    sd = np.empty(n_columns)
     for box in range(n_boxes):
         event = events[box]
         uses_stop = reached[event] > -np.inf or not_reached[event] < np.inf
@@ -344,9 +375,6 @@ def assess(events, predictions, readings, errors, envelope, change, bound, top, 
                 _, sd[j] = _nearest(table, event, j, low[box, j], high[box, j], 0.0)
         if uses_stop:
             sd[n_columns - 1] = place_sd
-        corners[:] = at_corners[box * n_corners : (box + 1) * n_corners] + envelope[box, 1:]
-        top[box] = corners.max()
-        mean[box] = top[box] + math.log(np.exp(corners - top[box]).mean())
         for axis in range(change.shape[1]):
             largest = 0.0
             for corner in range(n_corners):

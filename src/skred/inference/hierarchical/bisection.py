@@ -261,13 +261,10 @@ class Bisection:
         settled = np.full(len(best), -np.inf)
         found, bounds = [], []
         while len(boxes.event):
-            n_boxes, n_axes = boxes.low.shape
-            change, (bound, top, mean) = np.empty((n_boxes, n_axes)), np.empty((3, n_boxes))
-            envelope, fronts = self.envelope_of(boxes), self.fronts
-            assess(
-                boxes.event, boxes.predictions, fronts.readings, fronts.errors, envelope,
-                change, bound, top, mean,
-            )  # fmt: skip
+            n_axes, envelope, fronts = boxes.low.shape[1], self.envelope_of(boxes), self.fronts
+            change, bound, top, mean = assess(
+                boxes.event, boxes.predictions, fronts.readings, fronts.errors, envelope
+            )
             np.maximum.at(best, boxes.event, top)
             narrow = (boxes.width <= self.narrowest(n_axes)).any(axis=1)
             bound = np.where(narrow, top, bound)
