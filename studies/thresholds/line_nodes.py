@@ -51,8 +51,8 @@ def watched(calls: list[tuple[Any, ...]]) -> Iterator[None]:
     rng, plain = np.random.default_rng(0), curves.event_nodes
 
     def watch(*given: Any, **more: Any) -> Any:
-        if given[5] in (USUAL, FRONTS) and rng.random() < KEPT:
-            calls.append((*given[:5], given[6]))
+        if given[3] in (USUAL, FRONTS) and rng.random() < KEPT:
+            calls.append((*given[:3], given[4]))
         return plain(*given, **more)
 
     curves.event_nodes = watch
@@ -65,7 +65,7 @@ def watched(calls: list[tuple[Any, ...]]) -> Iterator[None]:
 def evidences(rule: str, budget: Budget, call: tuple[Any, ...], log_scale: Any) -> tuple[Any, int, float]:
     """Log evidence of each group of rows; nodes of an event; seconds."""
     *given, reference = call
-    rows, population = given[1], given[3]
+    rows, population = given[0].rows, given[1]
     started = time.perf_counter()
     spread = RULES[rule](*given, budget, reference)
     seconds = time.perf_counter() - started

@@ -22,7 +22,7 @@ from skred.diagnosis.augment.tables import BUDGETS, Tables, build_tables, exact_
 from skred.diagnosis.augment.tabulated_op import tabulated_log_densities
 from skred.diagnosis.augment.truncated_normal import truncated_normal
 from skred.diagnosis.evidence.coefficient import Base, Curve
-from skred.diagnosis.evidence.conditional_map import Population, Rows, take_rows
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows, take_rows
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.marginal import population_at
@@ -264,7 +264,8 @@ class AugmentedProblem(HierarchicalProblem):
         given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
         more = 2 ** int(np.clip(np.log2(runs / (len(added) * len(chosen))), 0, 3))
         budget = _EXACT.times(more)
-        nodes = exact_nodes(self.extension, rows, given, population, start, budget, base.population)
+        likelihood = EventLikelihood(self.extension, rows, base.strengths).in_groups(given)
+        nodes = exact_nodes(likelihood, population, start, budget, base.population)
         errors = self._tabulated(means, factors, added)[:, chosen]
         for k in range(len(means)):
             first = nodes.first[k * len(chosen) : (k + 1) * len(chosen) + 1]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
-from skred.diagnosis.evidence.coefficient import Base, Curve, Fit, refit
+from skred.diagnosis.evidence.coefficient import Base, Curve, Fit, Rounds, refit
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.extension import Extension
 from skred.parallel.threads import in_parts, side_by_side
@@ -180,8 +180,8 @@ def _fitted(
 
     def fitted(part: slice) -> list[Fit]:
         if near is None:
-            return refit(extension, base.rows, given[part], start, base.log_scale)
-        return refit(extension, base.rows, given[part], start, base.log_scale, n_rounds=1, fits=near[part])
+            return refit(extension, base.rows, given[part], start)
+        return refit(extension, base.rows, given[part], start, Rounds(least=1), near[part])
 
     return [fit for found in side_by_side(fitted, in_parts(len(added))) for fit in found]
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.discrepancy.profile import KINDS, Profile
 from skred.diagnosis.discrepancy.sampled_evidence import sampled_log_factor
-from skred.diagnosis.evidence.coefficient import Base, Fit, refit
-from skred.diagnosis.evidence.conditional_map import event_modes
+from skred.diagnosis.evidence.coefficient import Base, Fit, Rounds, refit
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, event_modes
 from skred.diagnosis.evidence.event_quadrature import FINE, event_nodes
 from skred.diagnosis.evidence.extension import Extension, extended
 from skred.diagnosis.evidence.marginal import evidence, importance_evidence
@@ -95,10 +95,11 @@ def _at_top(base: Base, candidate: Candidate) -> tuple[float, float]:
 def _finely(base: Base, extension: Extension, strengths: FloatArray, fit: Fit) -> tuple[float, float]:
     """Log evidence with many nodes, from where a fit is: by Laplace's formula, by importance sampling."""
     start = (fit.found.population(len(base.law.mechanisms)), fit.points)
-    fits = refit(extension, base.rows, strengths[None, :], start, base.log_scale, FINE, n_rounds=2)
+    fits = refit(extension, base.rows, strengths[None, :], start, Rounds(FINE))
     population = fits[0].found.population(len(base.law.mechanisms))
-    modes = event_modes(extension, base.rows, fits[0].points, strengths, population)
-    nodes = event_nodes(extension, base.rows, strengths, population, modes, FINE, base.population).nodes
+    likelihood = EventLikelihood(extension, base.rows, strengths)
+    modes = event_modes(likelihood, fits[0].points, population)
+    nodes = event_nodes(likelihood, population, modes, FINE, base.population).nodes
     found = evidence(nodes, base.log_scale, fits[0].found.psi)
     sampled, _ = importance_evidence(nodes, base.log_scale, found, _DRAWS, seed=0)
     return found.log_evidence, sampled

@@ -13,7 +13,7 @@ from skred.diagnosis.detect.detectability import identify as look
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.detect.too_little import too_little
 from skred.diagnosis.evidence.coefficient import Base, fit_base
-from skred.diagnosis.evidence.conditional_map import campaign_rows
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
 from skred.diagnosis.words import percent
@@ -65,9 +65,8 @@ def base_of(problem: HierarchicalProblem, law: Law) -> Base:
     rows = campaign_rows(extension)
     points = np.zeros((len(rows.event), len(law.mechanisms) + 1))
     points[:, :-1] = population.mean[0]
-    start = fit_population(
-        extension, rows, np.empty(0), mean_prior(law), (population, points), n_rounds=_ROUNDS
-    )
+    likelihood = EventLikelihood(extension, rows, np.empty(0))
+    start = fit_population(likelihood, mean_prior(law), (population, points), n_rounds=_ROUNDS)
     return fit_base(problem, law, *start)
 
 

@@ -26,8 +26,8 @@ from skred.diagnosis.discrepancy.profile import (
     knots,
     priors_of,
 )
-from skred.diagnosis.evidence.coefficient import Base, Curve, Fit, refit
-from skred.diagnosis.evidence.conditional_map import Population, look_around
+from skred.diagnosis.evidence.coefficient import Base, Curve, Fit, Rounds, refit
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, look_around
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import efficient_scores, mean_prior
 
@@ -330,14 +330,14 @@ def _fit_at(
     direction = combined(base.setting, kind, at, values)
     extension = extended(base.problem, base.law, [*base.directions, direction])
     strengths = np.append(base.strengths, 1.0)[None, :]
-    return refit(extension, base.rows, strengths, start, base.log_scale, n_rounds=1)[0]
+    return refit(extension, base.rows, strengths, start, Rounds(least=1))[0]
 
 
 def _peak(base: Base, kind: Kind, at: FloatArray, values: FloatArray, fit: Fit) -> _Peak:
     """With efficient score and information of the knots' values at what they are."""
     wide = knot_by_knot(base, kind, at)
     population, points = _start(base, fit)
-    around = look_around(wide, base.rows, points, np.concatenate([base.strengths, values]))
+    around = look_around(EventLikelihood(wide, base.rows, np.concatenate([base.strengths, values])), points)
     found = efficient_scores(around, base.rows, population, mean_prior(base.law))
     n_before = len(base.directions)
     return _Peak(values, fit, found.score[0, n_before:], found.information[0, n_before:, n_before:])

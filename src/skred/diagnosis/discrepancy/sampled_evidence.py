@@ -18,7 +18,7 @@ from scipy.stats import multivariate_normal, multivariate_t
 
 from skred.diagnosis.discrepancy.fit import hill_at
 from skred.diagnosis.discrepancy.profile import KINDS, Hill, Profile, knot_by_knot, priors_of
-from skred.diagnosis.evidence.coefficient import Base, refit
+from skred.diagnosis.evidence.coefficient import Base, Rounds, refit
 from skred.diagnosis.evidence.event_quadrature import USUAL
 
 FloatArray = NDArray[np.float64]
@@ -183,5 +183,5 @@ def _log_evidence(base: Base, profile: Profile, values: FloatArray) -> FloatArra
     start = profile.fit.found.population(len(base.law.mechanisms)), profile.fit.points
     given = np.column_stack([np.tile(base.strengths, (len(values), 1)), values])
     # With as many nodes and rounds as the peak and nothing: what is left of integration errors is alike.
-    fits = refit(extension, base.rows, given, start, base.log_scale, USUAL, n_rounds=1)
+    fits = refit(extension, base.rows, given, start, Rounds(USUAL, least=1))
     return np.array([fit.found.log_evidence for fit in fits])
