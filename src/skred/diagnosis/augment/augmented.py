@@ -38,19 +38,31 @@ from skred.physics.mechanisms.stretches import equation_of
 
 FloatArray = NDArray[np.float64]
 MOST_ADDED = 2
+"""Mechanisms added at most: tables grow with the power of their number."""
 CLAIM_LIMIT = 1.0
 """Largest error of the log likelihood over 22 events in a diagnosis, in nats, at the worst of some draws.
 
 A claim of a mechanism rests on several nats; where fronts stop on a stretch that is added, an event's
-likelihood bends sharply with the strength, and more nodes do not help.
+likelihood bends sharply with the strength, and more quadrature points do not help.
 """
 _EXACT = Budget(512, 256, 1024, 1.5, 1.8)
+"""Quadrature points of what the tables are compared with: so many that their own error counts for little."""
 _EXACT_RUNS = 16 * 22
-"""Events times draws up to which there are so many nodes; where there are fewer, more."""
-_EXACT_EVENTS, _EXACT_DRAWS = 24, 16
-_START_WIDER, _INSIDE = 1.5, 0.02
-"""How much wider than the posterior chains start, and how far inside the range, as a share of it."""
-_ROUGH_DRAWS, _ROUGH_RUNS, _ENOUGH = 8, 8 * 22, 0.2
+"""Events times draws up to which there are so many points; where there are fewer, more."""
+_EXACT_EVENTS = 24
+"""Events compared at most, of larger campaigns a random choice: the error of all follows from theirs."""
+_EXACT_DRAWS = 16
+"""Draws compared, evenly over the posterior."""
+_START_WIDER = 1.5
+"""How much wider than the posterior chains start, as r-hat asks for."""
+_INSIDE = 0.02
+"""How far inside the range of a strength chains start, as a share of it: at its end steps shrink."""
+_ROUGH_DRAWS = 8
+"""Draws of the first look at the tables' error, before anything is sampled."""
+_ROUGH_RUNS = 8 * 22
+"""As above, of that look."""
+_ENOUGH = 0.2
+"""Share of the limit below which tables are good enough at that look: of few draws the worst is not seen."""
 
 
 @dataclass(frozen=True, eq=False)

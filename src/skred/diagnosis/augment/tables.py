@@ -18,6 +18,7 @@ from skred.parallel.threads import in_parts, side_by_side
 
 FloatArray = NDArray[np.float64]
 _LEAST = Budget(128, 128, 256, 1.5, 1.8)
+"""Of the first tables, tried before others of twice the cost."""
 BUDGETS = _LEAST, _LEAST.times(2)
 """Of the tables: each where the one before is not good enough."""
 

@@ -23,7 +23,9 @@ FloatArray = NDArray[np.float64]
 LIMIT = 0.01
 """Share of clean campaigns that may be called wrong."""
 _ENOUGH_ABOVE = 8
+"""Clean campaigns at least as odd after which sampling stops: the p-value is then known to a third of it."""
 _BATCH = 25
+"""Campaigns refitted together: large enough for arrays, small enough to stop early."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -43,6 +43,7 @@ Tell = Callable[[int, int], None]
 ERROR_SHARES = {"robust": 0.55, "student": 0.15, "correlated": 0.15, "scaled": 0.15}
 """Prior probability of each error model in the comparison."""
 _PREFERRED_BY = 1.0
+"""Nats by which another error model must be better for the base law alone to be compared under as well."""
 _FAR_BEHIND = 10.0
 """Nats behind its mechanism's best at which a place is not looked at under another error model: it counts for
 nothing."""

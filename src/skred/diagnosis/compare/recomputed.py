@@ -19,14 +19,18 @@ from skred.diagnosis.evidence.extension import Extension, extended
 from skred.diagnosis.evidence.marginal import evidence, importance_evidence
 
 FloatArray = NDArray[np.float64]
-_CHECKED, _DRAWS = 5, 500
-"""Mechanisms looked at, at most, and populations drawn for each."""
+_CHECKED = 5
+"""Mechanisms re-computed at most, which bounds the time."""
+_DRAWS = 500
+"""Populations drawn for each."""
 _BEHIND = 6.0
-"""Nats behind the best of all at which nothing is looked at: it counts for a ninetieth, as stated
-(`odds.POWER`), and a look changes what a mechanism has by a nat or so."""
-_COUNTS, _TOO_LOW = 4.0, 4.0
+"""Nats behind the best of all at which nothing is re-computed: it counts for a ninetieth, as stated
+(`prior_odds.POWER`), and what a mechanism has changes by a nat or so."""
+_COUNTS = 4.0
 """Nats behind the best at which what a force has need not be known better than its first draws tell: two nats
-more there are a tenth of a nat for all together. Nats that it may have more than by Laplace's formula."""
+more there are a tenth of a nat for all together."""
+_TOO_LOW = 4.0
+"""Nats that a force may have more than by the Laplace approximation, where fronts stop near sensors."""
 
 
 def recomputed(

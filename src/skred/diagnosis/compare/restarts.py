@@ -14,7 +14,7 @@ from skred.diagnosis.evidence.event_quadrature import FINE, event_nodes
 
 FloatArray = NDArray[np.float64]
 _GAINED = 1.0
-"""Nats by which another mode must be higher."""
+"""Nats by which another mode must be higher: less is what is left of integration errors."""
 
 
 def better_modes(likelihood: EventLikelihood, points: FloatArray, population: Population) -> FloatArray:

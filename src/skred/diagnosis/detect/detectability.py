@@ -25,11 +25,14 @@ FloatArray = NDArray[np.float64]
 LIMIT_Z = 2.85
 """Score at which one of about 18 distinguishable candidates stands out in 1 % of clean campaigns."""
 _NINE_IN_TEN = 1.2816
+"""Standard normal quantile of 0.9: how far above that score nine in ten scores are."""
 ALIKE = 0.9
-"""Size of the cosine between two efficient scores above which mechanisms look alike."""
+"""Size of the cosine between two efficient scores above which mechanisms look alike: then four fifths of the
+information about one is information about the other."""
 _PLACES = 12
+"""Places tried for one more sensor, evenly over the recorded part and a little above."""
 _NO_INFORMATION = 1e-6
-"""About a strength in scales of its prior."""
+"""About a strength in scales of its prior: rounding errors."""
 
 
 @dataclass(frozen=True, eq=False)

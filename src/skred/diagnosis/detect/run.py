@@ -24,8 +24,9 @@ from skred.physics.law import Law
 Tell = Callable[[str], None]
 FILE = "identify.json"
 _ROUNDS = 40
-_UNSEEN = 20.0
-"""In scales of the prior: a limit beyond is none, as in the verdict."""
+"""Rounds of expectation-maximisation at most: from the prior's medians more than from a posterior."""
+_NO_LIMIT = 20.0
+"""Prior scales from which on a detection limit is none, as in the verdict."""
 
 
 def identify_to(
@@ -115,7 +116,7 @@ def _row(told: Detectability) -> dict[str, Any]:
         "group": str(mechanism.group),
         "parameter": mechanism.strength.name,
         "unit": mechanism.strength.unit,
-        "kept": told.kept if told.limit < _UNSEEN * added.scale else 0.0,
+        "kept": told.kept if told.limit < _NO_LIMIT * added.scale else 0.0,
         "limit": _seen(told.limit, added.scale),
         "best_limit": _seen(told.best_limit, added.scale),
         "best_stretch_m": told.limit_m,
@@ -126,7 +127,7 @@ def _row(told: Detectability) -> dict[str, Any]:
 
 
 def _seen(limit: float, scale: float) -> float | None:
-    return limit if limit < _UNSEEN * scale else None
+    return limit if limit < _NO_LIMIT * scale else None
 
 
 def _next_sensor(table: Identifiability) -> dict[str, Any] | None:

@@ -22,18 +22,26 @@ from skred.diagnosis.evidence.coefficient import Base, Rounds, refit
 from skred.diagnosis.evidence.event_quadrature import USUAL
 
 FloatArray = NDArray[np.float64]
-_FEWEST, _MOST, _DRAWS = 2, 6, 64
-"""Turns of sampling, and draws of each."""
+_FEWEST = 2
+"""Turns of sampling in any case: the first proposals are rough, the second are adapted to what they found."""
+_MOST = 6
+"""Turns of sampling at most, which bounds the time."""
+_DRAWS = 64
+"""Draws of each turn: two lots of those fitted together, one for each of two cores."""
 _ENOUGH = 25.0
 """Effective draws that are enough: right to a fifth of a nat."""
-_ODD, _NEW_SHARE = 0.1, 0.3
-"""Share of all weight on one draw from which on a hill is looked for there, and of draws on it."""
+_ODD = 0.1
+"""Share of all weight on one draw from which on a mode is looked for there: the proposals have missed one."""
+_NEW_SHARE = 0.3
+"""Share of the draws on a mode that was found so: its weight is not known yet."""
 _AT_ONCE = 32
 """Draws fitted together."""
-_WIDER, _DEGREES = 1.1, 7
-"""Width of the proposals in that of Laplace's approximation, and their degrees of freedom."""
-_EVENED = 0.5
-"""Power of the hills' Bayes factors in how many draws each one has: what is known of them is rough."""
+_WIDER = 1.1
+"""Width of the proposals in that of the Laplace approximation, which is rather too narrow."""
+_DEGREES = 7
+"""Degrees of freedom of the proposals: tails heavy enough to bound the weights."""
+_TEMPERED = 0.5
+"""Tempering exponent of the modes' Bayes factors in how many draws each one has: they are rough."""
 
 
 class _Proposal(NamedTuple):
@@ -156,7 +164,7 @@ def _mean(log_weights: FloatArray) -> float:
 
 def _on_hills(profile: Profile) -> _Proposal:
     """Where the fit says that values are."""
-    evened = _EVENED * np.array([hill.log_factor for hill in profile.hills])
+    evened = _TEMPERED * np.array([hill.log_factor for hill in profile.hills])
     means = np.array([hill.mean for hill in profile.hills])
     covariances = _WIDER**2 * np.array([hill.covariance for hill in profile.hills])
     centred = [multivariate_t(shape=one, df=_DEGREES) for one in covariances]

@@ -35,14 +35,18 @@ from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
 
 FloatArray = NDArray[np.float64]
 _NEAR = (-3.5, -2.0, -1.0, 0.0, 1.0, 2.0, 3.5)
-"""Strengths around what was found before, in its standard deviations."""
+"""Strengths around what was found before, in its standard deviations: to two thousandths of the density."""
 _PASSES = 4
+"""Times that strengths are put around what was found at most, which bounds the time."""
 _MOST_ROUNDS = 6
+"""Rounds of a refit at most: a population could go to and fro."""
 _FAR_MEAN, _FAR_SPREAD = 0.7, 0.35
-"""Change of a population after which nodes are made anew: of its mean in spreads, of a log spread."""
+"""Change of a population after which quadrature points are made anew: of its mean in spreads, of a log
+spread."""
 _BETWEEN = 60
 """Points at which a curve is integrated between each two strengths."""
 _DEEP = 40.0
+"""Nats below the maximum from which on evidence counts as equally small: a spline through it is smooth."""
 
 
 class Fit(NamedTuple):

@@ -17,8 +17,11 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 _LARGEST_STEP = 1.0
+"""Largest change of a log strength in one step: tangents say nothing of a front three times as strong."""
 _STARTING_DAMPING = 1e-3
+"""Of the Levenberg-Marquardt steps, relative to the diagonal: nearly none."""
 _SETTLED = 1e-2
+"""Nats gained by a step below which a row has arrived."""
 _LOST, _GAINED = 20.0, 1.0
 """Nats less than at best that the readings of a lost row have, and that another place must have more."""
 _ASIDE = np.multiply.outer((-1.0, 1.0), (0.01, 0.03, 0.08, 0.2, 0.5, 1.0)).ravel()

@@ -67,14 +67,23 @@ class Budget(NamedTuple):
         )
 
 
-USUAL, FIRST, FINE = Budget(), Budget(32, 16, 0), Budget(256, 128, 512, 1.5, 1.8)
-ROUGH, FRONTS = Budget(32, 16, 0, linear=True), Budget(16, 32, 32)
-"""For a first look: along tangents, and with fronts where those mislead."""
+USUAL = Budget()
+"""Of every integral that counts: the same for all that is compared, so that errors left are alike."""
+FIRST = Budget(32, 16, 0)
+"""Of rounds that only move the population."""
+FINE = Budget(256, 128, 512, 1.5, 1.8)
+"""Of re-computed evidence, and of the base law under each error model."""
+ROUGH = Budget(32, 16, 0, linear=True)
+"""Of linearised screening."""
+FRONTS = Budget(16, 32, 32)
+"""Of screening with fronts, where tangents mislead."""
 _CENTRES = 16
 """Places that adapted nodes are put around, of each event."""
 _SHRUNK = 3.0
 """As how many effective nodes the linear model counts for the width around those places."""
 _ADAPTED_WIDER = 1.3
+"""Bandwidth around those places, in that of a kernel density of normal points: what is adapted to may be
+narrower than it."""
 
 
 class Spread(NamedTuple):

@@ -30,7 +30,9 @@ IntArray = NDArray[np.int64]
 MEDIAN_LOG_MEAN, MEDIAN_LOG_SD = -0.64, 1.1
 """Mean and standard deviation of the log of a half-normal variable of scale 1."""
 _PRIOR_EVENTS = 2.0
+"""Events that the prior's spread, without correlation, counts for in a covariance."""
 _STARTING_SPREAD = 0.3
+"""Spread of the population that a fit begins with: wider than most."""
 
 
 class MeanPrior(NamedTuple):

@@ -34,8 +34,12 @@ from skred.parallel.threads import side_by_side
 from skred.physics.mechanisms.spec import Direction
 
 FloatArray = NDArray[np.float64]
-_DRAWS, _FRONTS = 200, 1200
+_DRAWS = 200
+"""Populations and profiles drawn: as many as a predictor keeps."""
+_FRONTS = 1200
+"""New fronts for the predictions of an avalanche, as of mechanisms."""
 _BUDGET = USUAL.times(2)
+"""Quadrature points of a population fitted to the others: their draws are weighed, not only its maximum."""
 
 
 class Draws(NamedTuple):

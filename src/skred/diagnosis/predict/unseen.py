@@ -44,9 +44,11 @@ from skred.physics.terrain import build_terrain
 
 FloatArray = NDArray[np.float64]
 N_DRAWS = 200
+"""Draws that a predictor keeps: few enough to be written beside an answer."""
 _NODES = Budget(32, 32, 0, 1.5, 1.8)
-"""Nodes of an event for each draw; their errors average out over the draws. None are adapted: where those go
-depends on the others' weights, and few of them are too low in the mean (``benchmarks/unseen_nodes.py``)."""
+"""Quadrature points of an event for each draw; their errors average out over the draws. None are adapted:
+where those go depends on the others' weights, and few of them are too low in the mean
+(``studies/thresholds/unseen_nodes.py``)."""
 _SHARED = 16
 """As many times the nodes where all draws share them."""
 _AT_ONCE = 20
