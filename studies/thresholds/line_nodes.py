@@ -46,7 +46,7 @@ KEPT = 0.125
 """Share of the comparison's integrations that are done again."""
 MOST = 40
 QUANTILES = {"median": 0.5, "nine in ten": 0.9, "97 in 100": 0.97}
-RULES = {"line": on_a_line, "importance": importance_nodes}
+RULES: dict[str, Any] = {"line": on_a_line, "importance": importance_nodes}
 
 
 @contextmanager
@@ -55,8 +55,8 @@ def watched(calls: list[tuple[Any, ...]]) -> Iterator[None]:
     rng = np.random.default_rng(0)
 
     def watch(*given: Any, **more: Any) -> Any:
-        if given[5] in (USUAL, FRONTS) and rng.random() < KEPT:
-            calls.append((*given[:5], given[6]))
+        if given[3] in (USUAL, FRONTS) and rng.random() < KEPT:
+            calls.append((*given[:3], given[4]))
         return event_nodes(*given, **more)
 
     with patch.object(curves, "event_nodes", watch):
@@ -65,9 +65,10 @@ def watched(calls: list[tuple[Any, ...]]) -> Iterator[None]:
 
 def evidences(rule: str, budget: Budget, call: tuple[Any, ...], log_scale: Any) -> tuple[Any, int, float]:
     """Log evidence of each group of rows; nodes of an event; seconds."""
-    extension, rows, strengths, population, modes, reference = call
+    *given, reference = call
+    rows, population = given[0].rows, given[1]
     started = time.perf_counter()
-    spread = RULES[rule](extension, rows, strengths, population, modes, budget, reference)
+    spread = RULES[rule](*given, budget, reference)
     seconds = time.perf_counter() - started
     found = [
         evidence(nodes_of(spread.nodes, rows, k), log_scale, coordinates(population, k)).log_evidence

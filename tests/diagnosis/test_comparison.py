@@ -19,7 +19,7 @@ from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import Place, entrants_of, leading
 from skred.diagnosis.compare.screening import curve, screening_budget
 from skred.diagnosis.detect.score_test import ScoreTest, placed_mechanisms
-from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at, curve_near, refit
+from skred.diagnosis.evidence.coefficient import Base, Curve, Rounds, curve_at, curve_near, refit
 from skred.diagnosis.evidence.event_quadrature import FINE, FIRST, FRONTS, ROUGH, USUAL
 from skred.diagnosis.evidence.extension import extended
 from skred.physics.mechanisms import mechanisms
@@ -348,7 +348,7 @@ def test_nothing_is_the_same_whatever_is_not_added() -> None:
         extension = extended(base.problem, base.law, (*base.directions, job.direction))
         start = (base.population, base.fit.points)
         for budget, first in ((ROUGH, None), (FRONTS, FIRST)):
-            (zero,) = refit(extension, base.rows, np.zeros((1, 1)), start, base.log_scale, budget, first)
+            (zero,) = refit(extension, base.rows, np.zeros((1, 1)), start, Rounds(budget, first))
             found = base.with_nothing(budget)
             assert found.found.log_evidence == pytest.approx(zero.found.log_evidence, abs=1e-6)
             assert base.with_nothing(budget) is found

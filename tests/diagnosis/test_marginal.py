@@ -13,7 +13,7 @@ from scipy.stats import norm
 
 import skred.diagnosis.evidence.event_quadrature as event_nodes_module
 from skred.diagnosis.evidence.coefficient import Base
-from skred.diagnosis.evidence.conditional_map import Population, event_modes
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, event_modes
 from skred.diagnosis.evidence.event_quadrature import FINE, USUAL, Budget, event_nodes
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.marginal import (
@@ -36,8 +36,9 @@ NONE = np.zeros(0)
 
 def nodes_of(base: Base, budget: Budget) -> Nodes:
     extension, population = extended(base.problem, base.law), base.population
-    modes = event_modes(extension, base.rows, base.fit.points, NONE, population)
-    return event_nodes(extension, base.rows, NONE, population, modes, budget).nodes
+    likelihood = EventLikelihood(extension, base.rows, NONE)
+    modes = event_modes(likelihood, base.fit.points, population)
+    return event_nodes(likelihood, population, modes, budget).nodes
 
 
 @pytest.mark.parametrize("law_id", ["constant", "coulomb"])

@@ -1,4 +1,4 @@
-"""The page of mechanisms from other packages: its code is installed, listed, compared, and named in verdicts."""
+"""The page of mechanisms from other packages: its code is installed, listed, compared and named."""
 
 from __future__ import annotations
 

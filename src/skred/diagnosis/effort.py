@@ -12,7 +12,7 @@ SAMPLING = SamplerSettings("metropolis", draws=600, tune=1000, chains=4, seed=0)
 QUICK_MECHANISMS = 1
 """Mechanisms that a quick diagnosis adds at most: a second one takes another comparison, half of the time."""
 QUICK_REPLICAS = 100
-"""Bootstrap campaigns of a quick diagnosis: the fewest with which a p-value can reach 0.01."""
+"""Bootstrap campaigns of a quick diagnosis: nearly the fewest with which a p-value can reach 0.01."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,12 @@ from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.marginal import population_at
 
 MOST_ADDED = 2
-_ROUGH_DRAWS, _ROUGH_RUNS, _ENOUGH = 8, 176, 0.2
+_ROUGH_DRAWS = 8
+"""Draws of the first look at the tables' error, before anything is sampled."""
+_ROUGH_RUNS = 176
+"""Events times draws up to which that look has as many quadrature points as the check after sampling."""
+_ENOUGH = 0.2
+"""Share of the limit below which tables are good enough at that look: of few draws the worst is not seen."""
 
 
 def augmented_problem(base: Base, curves: Sequence[Curve]) -> AugmentedProblem:

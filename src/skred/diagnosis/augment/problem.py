@@ -21,7 +21,7 @@ from skred.diagnosis.augment.tables import Tables, build_tables, exact_nodes
 from skred.diagnosis.augment.tabulated_op import tabulated_log_densities
 from skred.diagnosis.augment.truncated_normal import truncated_normal
 from skred.diagnosis.evidence.coefficient import Base
-from skred.diagnosis.evidence.conditional_map import Population, Rows, take_rows
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows, take_rows
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.extension import Extension
 from skred.inference.hierarchical.event_density import integrated_log_density
@@ -39,16 +39,20 @@ CLAIM_LIMIT = 0.0455
 for 22 events.
 
 A claim of a mechanism rests on several nats; where fronts stop on a stretch that is added, an event's
-likelihood bends sharply with the strength, and more nodes do not help.
+likelihood bends sharply with the strength, and more quadrature points do not help.
 """
 _EXACT = Budget(512, 256, 1024, 1.5, 1.8)
+"""Quadrature points of what the tables are compared with: so many that their own error counts for little."""
 _EXACT_RUNS = 352
-"""Events times draws up to which there are so many nodes; where there are fewer, more."""
+"""Events times draws up to which there are so many points; where there are fewer, more."""
 _EXACT_DRAWS = 16
+"""Draws compared, evenly over the posterior."""
 CHECKED_EVENTS = 24
 """Events of larger campaigns that integration errors are looked for in, drawn at random."""
-_START_WIDER, _INSIDE = 1.5, 0.02
-"""How much wider than the posterior chains start, and how far inside the range, as a share of it."""
+_START_WIDER = 1.5
+"""How much wider than the posterior chains start, as r-hat asks for."""
+_INSIDE = 0.02
+"""How far inside the range of a strength chains start, as a share of it: at its end steps shrink."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +245,8 @@ class AugmentedProblem(HierarchicalProblem):
         given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
         more = 2 ** int(np.clip(np.log2(runs / (len(added) * len(chosen))), 0, 3))
         budget = _EXACT.times(more)
-        nodes = exact_nodes(self.extension, rows, given, population, start, budget, base.population)
+        likelihood = EventLikelihood(self.extension, rows, base.strengths).in_groups(given)
+        nodes = exact_nodes(likelihood, population, start, budget, base.population)
         errors = self._tabulated(means, factors, added)[:, chosen]
         for k in range(len(means)):
             first = nodes.first[k * len(chosen) : (k + 1) * len(chosen) + 1]

@@ -27,8 +27,8 @@ from skred.diagnosis.compare.screening import curve, screening_budget
 from skred.diagnosis.detect.score_test import ScoreTest, placed_mechanisms
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, alike, log_evidence_of
-from skred.diagnosis.evidence.coefficient import Base, Curve, refit
-from skred.diagnosis.evidence.conditional_map import campaign_rows
+from skred.diagnosis.evidence.coefficient import Base, Curve, Rounds, refit
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
 from skred.diagnosis.evidence.event_quadrature import FINE, USUAL, Budget
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds, stated
@@ -44,6 +44,7 @@ Tell = Callable[[int, int], None]
 ERROR_SHARES = {"robust": 0.55, "student": 0.15, "correlated": 0.15, "scaled": 0.15}
 """Prior probability of each error model in the comparison."""
 _PREFERRED_BY = 1.0
+"""Nats by which another error model must be better for the base law alone to be compared under as well."""
 _FAR_BEHIND = 10.0
 """Nats behind its mechanism's best at which a place is not looked at under another error model: it counts for
 nothing."""
@@ -178,12 +179,12 @@ def with_errors(base: Base, error_model: str) -> Base:
     extension = extended(problem, base.law, base.directions)
     rows = campaign_rows(extension)
     start = (base.population, base.fit.points)
-    fit = refit(extension, rows, base.strengths[None, :], start, base.log_scale, FINE, USUAL, 3)[0]
+    fit = refit(extension, rows, base.strengths[None, :], start, Rounds(FINE, USUAL, 3))[0]
     population = fit.found.population(len(base.law.mechanisms))
-    points = better_modes(extension, rows, fit.points, base.strengths, population)
+    points = better_modes(EventLikelihood(extension, rows, base.strengths), fit.points, population)
     if not np.array_equal(points, fit.points):
         start = (population, points)
-        fit = refit(extension, rows, base.strengths[None, :], start, base.log_scale, FINE, USUAL, 3)[0]
+        fit = refit(extension, rows, base.strengths[None, :], start, Rounds(FINE, USUAL, 3))[0]
     return replace(base, problem=problem, rows=rows, fit=fit)
 
 

@@ -17,8 +17,11 @@ from skred.physics.mechanisms.stretches import is_opposed
 
 FloatArray = NDArray[np.float64]
 _DRAWS = 4000
+"""Draws of the profile for the band: its factor is then known to about a hundredth."""
 _BAND = 0.9
+"""Probability that the band holds the whole profile, as of all intervals."""
 _STANDS_OUT = 1.5
+"""Standard deviations from 0 that knots of the stretch have: neighbours of the highest that go with it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,20 +22,26 @@ from skred.physics.mechanisms.placed import parts_of
 from skred.physics.mechanisms.spec import Shape
 from skred.physics.mechanisms.stretches import shares
 
-_WITHIN, _AT_MOST, _TURNS = 3.0, 2, 3
-"""Places of a mechanism that are looked at again: within so many nats of its best, so many, so many times
-after the leader's."""
+_WITHIN = 3.0
+"""Nats behind its mechanism's best within which a place is refined: screening is off by nats where fronts
+stop."""
+_AT_MOST = 2
+"""Places of a mechanism that are refined at most at a time, which bounds the time."""
+_TURNS = 3
+"""Turns after the leader's: others lead once a place has fallen behind."""
 _MORE, _MORE_OF_OWN = 20.0, 0.6
 """Nats that the parts of a place may have more than it, or share of its own if that is more: a place that
-does not come up to the best of all even so is not looked at again. Drag between the dam and the sensor above
-it has 71 nats at a first look and 112 in parts, under M1 at Ryggfonn."""
+does not come up to the best of all even so is not refined. Drag between the dam and the sensor above it has
+71 nats by screening and 112 in parts, under M1 at Ryggfonn."""
 _SPLIT_FROM = 1.0
 """Nats in favour of a place from which it is split: parts of a place without evidence have hardly any."""
-_HOLDS_MOST, _LEVELS = 0.5, 4
-"""Share of its place's evidence from which a part is parted itself, and how many times places are parted."""
+_HOLDS_MOST = 0.5
+"""Share of its place's evidence from which a part is parted itself: most of it then hangs on where it is."""
+_LEVELS = 4
+"""How many times places are parted: the last steps are an eighth of the first, some metres."""
 _SMALLER = 0.5
 """Steps within a part, in those that led to it. At 0.38 a part of a stretch would stand for as much of the
-prior as it has of the weight; half finds narrow peaks that 0.38 misses, and costs them up to 0.6 nats each
+prior as it has of the weight; half finds narrow maxima that 0.38 misses, and costs them up to 0.6 nats each
 time."""
 
 

@@ -13,7 +13,7 @@ from skred.diagnosis.detect.detectability import identify as look
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.detect.too_little import too_little
 from skred.diagnosis.evidence.coefficient import Base, fit_base
-from skred.diagnosis.evidence.conditional_map import campaign_rows
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
 from skred.diagnosis.words import percent
@@ -24,8 +24,9 @@ from skred.physics.law import Law
 Tell = Callable[[str], None]
 FILE = "identify.json"
 _ROUNDS = 40
-_UNSEEN = 20.0
-"""In scales of the prior: a limit beyond is none, as in the verdict."""
+"""Rounds of expectation-maximisation at most: from the prior's medians more than from a posterior."""
+_NO_LIMIT = 20.0
+"""Prior scales from which on a detection limit is none, as in the verdict."""
 
 
 def identify_to(
@@ -65,9 +66,8 @@ def base_of(problem: HierarchicalProblem, law: Law) -> Base:
     rows = campaign_rows(extension)
     points = np.zeros((len(rows.event), len(law.mechanisms) + 1))
     points[:, :-1] = population.mean[0]
-    start = fit_population(
-        extension, rows, np.empty(0), mean_prior(law), (population, points), n_rounds=_ROUNDS
-    )
+    likelihood = EventLikelihood(extension, rows, np.empty(0))
+    start = fit_population(likelihood, mean_prior(law), (population, points), n_rounds=_ROUNDS)
     return fit_base(problem, law, *start)
 
 
@@ -116,7 +116,7 @@ def _row(told: Detectability) -> dict[str, Any]:
         "group": str(mechanism.group),
         "parameter": mechanism.strength.name,
         "unit": mechanism.strength.unit,
-        "kept": told.kept if told.limit < _UNSEEN * added.scale else 0.0,
+        "kept": told.kept if told.limit < _NO_LIMIT * added.scale else 0.0,
         "limit": _seen(told.limit, added.scale),
         "best_limit": _seen(told.best_limit, added.scale),
         "best_stretch_m": told.limit_m,
@@ -127,7 +127,7 @@ def _row(told: Detectability) -> dict[str, Any]:
 
 
 def _seen(limit: float, scale: float) -> float | None:
-    return limit if limit < _UNSEEN * scale else None
+    return limit if limit < _NO_LIMIT * scale else None
 
 
 def _next_sensor(table: Identifiability) -> dict[str, Any] | None:

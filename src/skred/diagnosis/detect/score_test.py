@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
 from skred.diagnosis.discrepancy.profile import KINDS, entering, hats, knots, priors_of
-from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, look_around
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population, Rows, look_around
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.linear_mixed_model import (
     MeanPrior,
@@ -138,7 +138,7 @@ class ScoreTest:
         for part in self._parts:
             strengths = np.zeros(len(part.directions))
             strengths[:n_in] = self.strengths
-            around.append(look_around(part, rows, points, strengths))
+            around.append(look_around(EventLikelihood(part, rows, strengths), points))
         changes = [part.by_strengths[:, :, 0 if k == 0 else n_in :] for k, part in enumerate(around)]
         by_strengths = np.concatenate(changes, axis=2)
         return around[0]._replace(by_strengths=by_strengths)

@@ -26,20 +26,28 @@ from skred.diagnosis.discrepancy.profile import (
     knots,
     priors_of,
 )
-from skred.diagnosis.evidence.coefficient import Base, Curve, Fit, refit
-from skred.diagnosis.evidence.conditional_map import Population, look_around
+from skred.diagnosis.evidence.coefficient import Base, Curve, Fit, Rounds, refit
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, look_around
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import efficient_scores, mean_prior
 
 FloatArray = NDArray[np.float64]
 Start = tuple[FloatArray, tuple[Population, FloatArray]]
-_PRIORS_TRIED, _PRIORS_AGAIN = 12, 4
-"""Priors climbed under at most; again, by some of the avalanches: close to the best one of all, or those that
-lead then."""
-_ROUNDS, _SURE, _NO_FORCE = 6, 1.0, -0.5
+_PRIORS_TRIED = 12
+"""Priors climbed under at most, which bounds the time; climbs end before where those left hold little."""
+_PRIORS_AGAIN = 4
+"""The same where a fit to all avalanches is at hand: those close to its prior, and those that lead then."""
+_ROUNDS = 6
+"""Gauss-Newton steps at most: at kinks where fronts stop a climb could go to and fro."""
+_SURE = 1.0
+"""Nats that decide nothing: priors not climbed under that could add less together are left."""
+_NO_FORCE = -0.5
+"""Log Bayes factor below which the force is less probable than none under every prior, and climbs end."""
 _SHARES = (1.0, 0.4, 0.15, 0.05)
+"""Shares of a step that are tried one after the other: a full step can stop fronts that went on."""
 _SETTLED = 0.05
-_HILLS_WITHIN = 4.0
+"""Nats gained by a step below which a climb has arrived."""
+_MODES_WITHIN = 4.0
 """Nats behind the most probable prior from which on none is worth to be sampled under."""
 
 
@@ -201,7 +209,7 @@ class _Seen:
     def hills(self) -> tuple[Hill, ...]:
         """Where values may be, under each prior that is not far behind the most probable one."""
         factors = {prior: self.factor(prior, self._most) for prior in self.shares}
-        least = max(factors.values()) - _HILLS_WITHIN
+        least = max(factors.values()) - _MODES_WITHIN
         chosen = {prior: factor for prior, factor in factors.items() if factor > least}
         return tuple(
             self.promise(prior, self._most).hill(self._counted(prior, self._most), factor)
@@ -330,14 +338,14 @@ def _fit_at(
     direction = combined(base.setting, kind, at, values)
     extension = extended(base.problem, base.law, [*base.directions, direction])
     strengths = np.append(base.strengths, 1.0)[None, :]
-    return refit(extension, base.rows, strengths, start, base.log_scale, n_rounds=1)[0]
+    return refit(extension, base.rows, strengths, start, Rounds(least=1))[0]
 
 
 def _peak(base: Base, kind: Kind, at: FloatArray, values: FloatArray, fit: Fit) -> _Peak:
     """With efficient score and information of the knots' values at what they are."""
     wide = knot_by_knot(base, kind, at)
     population, points = _start(base, fit)
-    around = look_around(wide, base.rows, points, np.concatenate([base.strengths, values]))
+    around = look_around(EventLikelihood(wide, base.rows, np.concatenate([base.strengths, values])), points)
     found = efficient_scores(around, base.rows, population, mean_prior(base.law))
     n_before = len(base.directions)
     return _Peak(values, fit, found.score[0, n_before:], found.information[0, n_before:, n_before:])

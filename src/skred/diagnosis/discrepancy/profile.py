@@ -90,12 +90,21 @@ KINDS = (
     Kind(Column.QUADRATIC, False, "m-1", 1.5e-3, 0.5 * (1.0 - OPPOSED_SHARE), "-f(s) U^2"),
     Kind(Column.QUADRATIC, True, "m-1", OPPOSED_SCALES * 1.5e-3, OPPOSED_SHARE, "-f(s) (U^2 - U_0^2)"),
 )
-AMPLITUDES, LENGTHS_M = (1.0 / 3.0, 1.0, 3.0), (40.0, 120.0, 400.0)
-"""Amplitudes in typical ones, and correlation lengths, all of equal prior probability. With one amplitude, a
-profile pays for each of its freedoms what the amplitude is off by; a listed mechanism pays that once."""
-NEAR_M, _CENTRES_M = 120.0, 150.0
-"""Standard deviation of the window of a profile that is local, and the distance of the windows' centres."""
-MOST_KNOTS, _LEAST_STEP_M = 32, 30.0
+"""The ways to go with speed. Amplitudes and shares are those of listed mechanisms of the same kind, so that
+neither has an advantage by its prior."""
+AMPLITUDES = (1.0 / 3.0, 1.0, 3.0)
+"""Amplitudes in typical ones, all of equal prior probability. With one amplitude alone the Occam penalty
+applies to every coefficient of the profile, but only once to a one-parameter mechanism."""
+LENGTHS_M = (40.0, 120.0, 400.0)
+"""Correlation lengths, all of equal prior probability: from a dam to a good part of a track."""
+NEAR_M = 120.0
+"""Standard deviation of the window of a profile that is local: about the length of a listed stretch."""
+_CENTRES_M = 150.0
+"""Distance of the windows' centres, so that they overlap."""
+MOST_KNOTS = 32
+"""Coefficients at most: what the cost of a fit grows with."""
+_LEAST_STEP_M = 30.0
+"""Distance of the knots at least: below it recordings do not tell one from the next."""
 
 
 class Hill(NamedTuple):

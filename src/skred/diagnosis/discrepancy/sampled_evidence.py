@@ -18,22 +18,30 @@ from scipy.stats import multivariate_normal, multivariate_t
 
 from skred.diagnosis.discrepancy.fit import hill_at
 from skred.diagnosis.discrepancy.profile import KINDS, Hill, Profile, knot_by_knot, priors_of
-from skred.diagnosis.evidence.coefficient import Base, refit
+from skred.diagnosis.evidence.coefficient import Base, Rounds, refit
 from skred.diagnosis.evidence.event_quadrature import USUAL
 
 FloatArray = NDArray[np.float64]
-_FEWEST, _MOST, _DRAWS = 2, 6, 64
-"""Turns of sampling, and draws of each."""
+_FEWEST = 2
+"""Turns of sampling in any case: the first proposals are rough, the second are adapted to what they found."""
+_MOST = 6
+"""Turns of sampling at most, which bounds the time."""
+_DRAWS = 64
+"""Draws of each turn: two lots of those fitted together, one for each of two cores."""
 _ENOUGH = 25.0
 """Effective draws that are enough: right to a fifth of a nat."""
-_ODD, _NEW_SHARE = 0.1, 0.3
-"""Share of all weight on one draw from which on a hill is looked for there, and of draws on it."""
+_ODD = 0.1
+"""Share of all weight on one draw from which on a mode is looked for there: the proposals have missed one."""
+_NEW_SHARE = 0.3
+"""Share of the draws on a mode that was found so: its weight is not known yet."""
 _AT_ONCE = 32
 """Draws fitted together."""
-_WIDER, _DEGREES = 1.1, 7
-"""Width of the proposals in that of Laplace's approximation, and their degrees of freedom."""
-_EVENED = 0.5
-"""Power of the hills' Bayes factors in how many draws each one has: what is known of them is rough."""
+_WIDER = 1.1
+"""Width of the proposals in that of the Laplace approximation, which is rather too narrow."""
+_DEGREES = 7
+"""Degrees of freedom of the proposals: tails heavy enough to bound the weights."""
+_TEMPERED = 0.5
+"""Tempering exponent of the modes' Bayes factors in how many draws each one has: they are rough."""
 
 
 class _Proposal(NamedTuple):
@@ -156,7 +164,7 @@ def _mean(log_weights: FloatArray) -> float:
 
 def _on_hills(profile: Profile) -> _Proposal:
     """Where the fit says that values are."""
-    evened = _EVENED * np.array([hill.log_factor for hill in profile.hills])
+    evened = _TEMPERED * np.array([hill.log_factor for hill in profile.hills])
     means = np.array([hill.mean for hill in profile.hills])
     covariances = _WIDER**2 * np.array([hill.covariance for hill in profile.hills])
     centred = [multivariate_t(shape=one, df=_DEGREES) for one in covariances]
@@ -183,5 +191,5 @@ def _log_evidence(base: Base, profile: Profile, values: FloatArray) -> FloatArra
     start = profile.fit.found.population(len(base.law.mechanisms)), profile.fit.points
     given = np.column_stack([np.tile(base.strengths, (len(values), 1)), values])
     # With as many nodes and rounds as the peak and nothing: what is left of integration errors is alike.
-    fits = refit(extension, base.rows, given, start, base.log_scale, USUAL, n_rounds=1)
+    fits = refit(extension, base.rows, given, start, Rounds(USUAL, least=1))
     return np.array([fit.found.log_evidence for fit in fits])

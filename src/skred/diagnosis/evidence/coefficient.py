@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from scipy.interpolate import Akima1DInterpolator
 
 from skred.diagnosis.evidence.conditional_map import (
+    EventLikelihood,
     Population,
     Rows,
     campaign_rows,
     event_modes,
     log_joint,
-    take_rows,
 )
 from skred.diagnosis.evidence.event_quadrature import FIRST, USUAL, Budget, event_nodes
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of, typical_speed
@@ -36,14 +36,18 @@ from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
 
 FloatArray = NDArray[np.float64]
 _NEAR = (-3.5, -2.0, -1.0, 0.0, 1.0, 2.0, 3.5)
-"""Strengths around what was found before, in its standard deviations."""
+"""Strengths around what was found before, in its standard deviations: to two thousandths of the density."""
 _PASSES = 4
-_ROUNDS, _MOST_ROUNDS = 2, 6
+"""Times that strengths are put around what was found at most, which bounds the time."""
+_MOST_ROUNDS = 6
+"""Rounds of a refit at most: a population could go to and fro."""
 _FAR_MEAN, _FAR_SPREAD = 0.7, 0.35
-"""Change of a population after which nodes are made anew: of its mean in spreads, of a log spread."""
+"""Change of a population after which quadrature points are made anew: of its mean in spreads, of a log
+spread."""
 _BETWEEN = 60
 """Points at which a curve is integrated between each two strengths."""
 _DEEP = 40.0
+"""Nats below the maximum from which on evidence counts as equally small: a spline through it is smooth."""
 
 
 class Fit(NamedTuple):
@@ -107,15 +111,33 @@ class Base:
         return self._nothing[budget]
 
 
+class Rounds(NamedTuple):
+    """How a refit goes on.
+
+    Attributes
+    ----------
+    budget : Budget
+        Quadrature points of the last round.
+    first : Budget or None
+        Of the rounds before, which only move the population there; None for the same.
+    least : int
+        Rounds that there are in any case; more where the population has moved far.
+    """
+
+    budget: Budget = USUAL
+    first: Budget | None = None
+    least: int = 2
+
+
+USUAL_ROUNDS = Rounds()
+
+
 def refit(
     extension: Extension,
     rows: Rows,
     strengths: FloatArray,
     start: tuple[Population, FloatArray],
-    log_scale: FloatArray,
-    budget: Budget = USUAL,
-    first_budget: Budget | None = None,
-    n_rounds: int = _ROUNDS,
+    rounds: Rounds = USUAL_ROUNDS,
     fits: Sequence[Fit] | None = None,
 ) -> list[Fit]:
     """Refit population and events at some strengths, one group of rows each.
@@ -126,24 +148,22 @@ def refit(
         The campaign's rows.
     strengths : (n_groups, n_directions) array
     start : (Population, (n_events, n_base + 1) array)
-        Of one group: where to begin, and a population that nodes cover in any case.
-    first_budget : Budget, optional
-        Of the rounds before the last, which only move the population there.
+        Of one group: where to begin, and a population that quadrature points cover in any case.
     fits : sequence of Fit, optional
         Where to begin instead, one for each group.
     """
     n_groups, n_events, n = len(strengths), len(rows.event), start[0].mean.shape[1]
+    log_scale = prior_log_scale(mean_prior(extension.law))
     state = list(fits) if fits is not None else [Fit(_unfitted(start[0]), start[1])] * n_groups
     active = list(range(n_groups))
     for number in range(_MOST_ROUNDS):
-        many = repeated(rows, len(active))
-        given = np.repeat(strengths[active], n_events, axis=0)
+        likelihood = EventLikelihood(extension, rows, np.empty(0)).in_groups(strengths[active])
         parts = [state[k].found.population(n) for k in active]
         population = Population(*(np.concatenate([part[a] for part in parts]) for a in range(2)))
         points = np.concatenate([state[k].points for k in active])
-        modes = event_modes(extension, many, points, given, population, n_steps=6)
-        spent = budget if number > 0 or first_budget is None else first_budget
-        nodes = event_nodes(extension, many, given, population, modes, spent, start[0]).nodes
+        modes = event_modes(likelihood, points, population, n_steps=6)
+        spent = rounds.budget if number > 0 or rounds.first is None else rounds.first
+        nodes = event_nodes(likelihood, population, modes, spent, start[0]).nodes
         moved = []
         for k, part, own in zip(
             active,
@@ -154,7 +174,7 @@ def refit(
             before = state[k].found.psi
             found = evidence(part, log_scale, before)
             state[k] = Fit(found, own)
-            if number + 1 < n_rounds or _moved(before, found.psi, n):
+            if number + 1 < rounds.least or _moved(before, found.psi, n):
                 moved.append(k)
         active = moved
         if not active:
@@ -173,15 +193,6 @@ def _moved(before: FloatArray, after: FloatArray, n: int) -> bool:
     mean = np.abs(after[:n] - before[:n]) / np.exp(before[n : 2 * n])
     spread = np.abs(after[n : 2 * n] - before[n : 2 * n])
     return bool(mean.max() > _FAR_MEAN or spread.max() > _FAR_SPREAD)
-
-
-def repeated(rows: Rows, n_groups: int) -> Rows:
-    """The same rows for each of several groups."""
-    n = len(rows.event)
-    group_rows = np.tile(np.arange(n), n_groups)
-    repeated = take_rows(rows.readings, group_rows)
-    group = np.repeat(np.arange(n_groups), n)
-    return Rows(np.tile(rows.event, n_groups), group, repeated, rows.errors)
 
 
 def _split(nodes: Nodes, n_groups: int, n_events: int) -> list[Nodes]:
@@ -354,8 +365,8 @@ def _refit_from(
         given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
     start = (base.population, base.fit.points)
     first = None if budget.linear or fits is not None else FIRST
-    n_rounds = _ROUNDS if fits is None else 1
-    return refit(extension, base.rows, given, start, base.log_scale, budget, first, n_rounds, fits)
+    rounds = Rounds(budget, first) if fits is None else Rounds(budget, first, 1)
+    return refit(extension, base.rows, given, start, rounds, fits)
 
 
 def fit_base(
@@ -376,15 +387,16 @@ def fit_base(
         points = np.zeros((len(rows.event), len(law.mechanisms) + 1))
         points[:, :-1] = population.mean[0]
     given = np.empty(0) if strengths is None else strengths
-    log_scale = prior_log_scale(mean_prior(law))
     if directions:
-        fit = refit(extension, rows, given[None, :], (population, points), log_scale, n_rounds=4)[0]
+        fit = refit(extension, rows, given[None, :], (population, points), Rounds(least=4))[0]
     else:
+        log_scale = prior_log_scale(mean_prior(law))
         found = evidence(problem.surfaces(law.mechanisms).nodes, log_scale, coordinates(population), 30)
         exact = found.population(len(law.mechanisms))
         starts = (points, _best_nodes(problem.surfaces(law.mechanisms).nodes, exact))
-        tried = [event_modes(extension, rows, start, given, exact, n_steps=20).points for start in starts]
-        heights = [log_joint(extension, rows, one, given, exact) for one in tried]
+        likelihood = EventLikelihood(extension, rows, given)
+        tried = [event_modes(likelihood, start, exact, n_steps=20).points for start in starts]
+        heights = [log_joint(likelihood, one, exact) for one in tried]
         fit = Fit(found, np.where((heights[1] > heights[0])[:, None], tried[1], tried[0]))
     setting = setting_of(problem, law, typical_speed(extension.speeds(fit.points, given)))
     return Base(problem, law, setting, rows, fit, directions, given)

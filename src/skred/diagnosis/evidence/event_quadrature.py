@@ -19,8 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
-from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows
-from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population, Rows
 from skred.diagnosis.evidence.line_quadrature import line_nodes
 from skred.inference.hierarchical.surface import Nodes
 from skred.inference.reading_density import log_likelihoods
@@ -68,14 +67,23 @@ class Budget(NamedTuple):
         )
 
 
-USUAL, FIRST, FINE = Budget(), Budget(32, 16, 0), Budget(256, 128, 512, 1.5, 1.8)
-ROUGH, FRONTS = Budget(32, 16, 0, linear=True), Budget(16, 32, 32)
-"""For a first look: along tangents, and with fronts where those mislead."""
+USUAL = Budget()
+"""Of every integral that counts: the same for all that is compared, so that errors left are alike."""
+FIRST = Budget(32, 16, 0)
+"""Of rounds that only move the population."""
+FINE = Budget(256, 128, 512, 1.5, 1.8)
+"""Of re-computed evidence, and of the base law under each error model."""
+ROUGH = Budget(32, 16, 0, linear=True)
+"""Of linearised screening."""
+FRONTS = Budget(16, 32, 32)
+"""Of screening with fronts, where tangents mislead."""
 _CENTRES = 16
 """Places that adapted nodes are put around, of each event."""
 _SHRUNK = 3.0
 """As how many effective nodes the linear model counts for the width around those places."""
 _ADAPTED_WIDER = 1.3
+"""Bandwidth around those places, in that of a kernel density of normal points: what is adapted to may be
+narrower than it."""
 
 
 class Spread(NamedTuple):
@@ -172,9 +180,7 @@ def _normal_numbers(n_events: int, n: int, n_axes: int, seed: int) -> FloatArray
 
 
 def event_nodes(
-    extension: Extension,
-    rows: Rows,
-    strengths: FloatArray,
+    likelihood: EventLikelihood,
     population: Population,
     modes: Modes,
     budget: Budget = USUAL,
@@ -185,8 +191,7 @@ def event_nodes(
 
     Parameters
     ----------
-    strengths : (n_directions,) or (n_rows, n_directions) array
-        Of what is added.
+    likelihood : EventLikelihood
     population : Population
         Roughly where the events' strengths are.
     modes : Modes
@@ -199,15 +204,13 @@ def event_nodes(
         rows, not differences: what is left of the integration errors then averages out. On a line there are
         no such numbers, and nothing is moved.
     """
-    if _axes(extension, rows) == 1:
-        return on_a_line(extension, rows, strengths, population, modes, budget, reference)
-    return importance_nodes(extension, rows, strengths, population, modes, budget, reference, shifts)
+    if _axes(likelihood) == 1:
+        return on_a_line(likelihood, population, modes, budget, reference)
+    return importance_nodes(likelihood, population, modes, budget, reference, shifts)
 
 
 def importance_nodes(
-    extension: Extension,
-    rows: Rows,
-    strengths: FloatArray,
+    likelihood: EventLikelihood,
     population: Population,
     modes: Modes,
     budget: Budget,
@@ -219,7 +222,8 @@ def importance_nodes(
     All are weighted by the mixture of all that was proposed, what was found by adaptation included (adaptive
     multiple importance sampling: Cornuet and others, 2012, doi 10.1111/j.1467-9469.2011.00756.x).
     """
-    n, axes = population.mean.shape[1], _axes(extension, rows)
+    rows = likelihood.rows
+    n, axes = population.mean.shape[1], _axes(likelihood)
     cover = _cover(rows, population, modes, axes)
     parts = [
         _Part(budget.around_mode, modes.points[:, None, :axes], budget.wider * np.linalg.cholesky(cover))
@@ -233,9 +237,10 @@ def importance_nodes(
 
     def spread(part: _Part, seed: int) -> tuple[FloatArray, FloatArray]:
         """Nodes of a part, and the log likelihoods there, the release's prior included."""
-        numbers = _normal_numbers(extension.problem.campaign.n_events, part.size, axes, seed)[rows.event]
+        n_events = likelihood.extension.problem.campaign.n_events
+        numbers = _normal_numbers(n_events, part.size, axes, seed)[rows.event]
         points = part.points(_rotated(numbers, shifts))
-        return points, _log_likelihoods(extension, rows, strengths, modes, points, budget.linear)
+        return points, _log_likelihoods(likelihood, modes, points, budget.linear)
 
     found = [spread(part, seed) for seed, part in enumerate(parts)]
     points, log_l = (np.concatenate([one[k] for one in found], axis=1) for k in range(2))
@@ -254,15 +259,14 @@ def importance_nodes(
 
 
 def on_a_line(
-    extension: Extension,
-    rows: Rows,
-    strengths: FloatArray,
+    likelihood: EventLikelihood,
     population: Population,
     modes: Modes,
     budget: Budget,
     reference: Population | None = None,
 ) -> Spread:
     """As `event_nodes`, where one strength is all that is free; see `line_nodes`."""
+    rows = likelihood.rows
     cover = _cover(rows, population, modes, 1)
     over = [_over(one, rows, 1, 1.0) for one in _covered(population, reference)]
     centres = np.column_stack([modes.points[:, 0], *(centre[:, 0] for centre, _ in over)])
@@ -270,7 +274,7 @@ def on_a_line(
     widths += [budget.population_wider * factor[:, 0, 0] for _, factor in over]
 
     def log_likelihoods_at(points: FloatArray) -> FloatArray:
-        return _log_likelihoods(extension, rows, strengths, modes, points[:, :, None], budget.linear)
+        return _log_likelihoods(likelihood, modes, points[:, :, None], budget.linear)
 
     populations = centres[:, 1:], np.column_stack([factor[:, 0, 0] for _, factor in over])
     points, log_weights = line_nodes(
@@ -281,9 +285,10 @@ def on_a_line(
     return Spread(full, log_weights)
 
 
-def _axes(extension: Extension, rows: Rows) -> int:
+def _axes(likelihood: EventLikelihood) -> int:
     """How many there are to integrate over: the base's strengths, and the release where it is uncertain."""
-    return extension.n_base + int((extension.problem.releases.sd[rows.event] > 0.0).any())
+    extension = likelihood.extension
+    return extension.n_base + int((extension.problem.releases.sd[likelihood.rows.event] > 0.0).any())
 
 
 def _covered(population: Population, reference: Population | None) -> list[Population]:
@@ -299,19 +304,18 @@ def _cover(rows: Rows, population: Population, modes: Modes, axes: int) -> Float
 
 
 def _log_likelihoods(
-    extension: Extension, rows: Rows, strengths: FloatArray, modes: Modes, points: FloatArray, linear: bool
+    likelihood: EventLikelihood, modes: Modes, points: FloatArray, linear: bool
 ) -> FloatArray:
     """At nodes, (n_rows, k, n_axes) to (n_rows, k); with the prior of a release that is an axis."""
     n_rows, size, axes = points.shape
-    n = extension.n_base
+    extension, rows, n = likelihood.extension, likelihood.rows, likelihood.extension.n_base
     flat = np.zeros((n_rows * size, n + 1))
     flat[:, :axes] = points.reshape(-1, axes)
     which = np.repeat(np.arange(n_rows), size)
     if linear:
         predictions = _linear_predictions(modes, flat.reshape(n_rows, size, n + 1))
     else:
-        given = np.broadcast_to(strengths, (n_rows, len(extension.directions)))
-        predictions = extension.predict(rows.event[which], flat, given[which])
+        predictions = extension.predict(rows.event[which], flat, likelihood.given[which])
     log_l: FloatArray = log_likelihoods(which, predictions, rows.readings, rows.errors)
     if axes > n:
         log_l = log_l - 0.5 * flat[:, n] ** 2 - _LOG_SQRT_2PI

@@ -22,6 +22,7 @@ _PER_ROOT = 5.0
 _REACH = 3.0
 """How far the first nodes go from each centre, in widths."""
 _TURNS = 2
+"""Turns in which half of the points are put between those before: a second one closes in on spikes."""
 _AS_WIDE = 0.1
 """What width alone counts for, against a change as large as what is there."""
 

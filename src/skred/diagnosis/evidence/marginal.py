@@ -28,7 +28,11 @@ _HALF_LOG_2PI = 0.5 * _LOG_2PI
 _NEGLIGIBLE = -25.0
 """Log share of an event's integral below which a node does not count for slopes."""
 _STEP = 2e-3
-_DEGREES, _RESAMPLED_FROM = 5.0, 8
+"""Of the differences that a curvature is taken from, in the population's coordinates."""
+_DEGREES = 5.0
+"""Degrees of freedom of the importance proposal: tails heavy enough to bound the weights."""
+_RESAMPLED_FROM = 8
+"""Draws for each population that is kept: so many that resampling repeats few."""
 _NARROWEST = _LOG_MEDIAN - 6.0 * _LOG_SD
 """Least log of a spread, six standard deviations of its prior below the median: 0.0036. Narrower populations
 are between the nodes, whose sums then promise what is not there, tens of nats."""

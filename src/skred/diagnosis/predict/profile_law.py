@@ -22,8 +22,8 @@ from skred.diagnosis.compare.comparison import ComparisonUnderErrors
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, combined, knot_by_knot, most_probable
-from skred.diagnosis.evidence.coefficient import Base, Fit, refit
-from skred.diagnosis.evidence.conditional_map import event_modes
+from skred.diagnosis.evidence.coefficient import Base, Fit, Rounds, refit
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, event_modes
 from skred.diagnosis.evidence.event_quadrature import USUAL, event_nodes
 from skred.diagnosis.evidence.extension import Extension, extended
 from skred.diagnosis.evidence.marginal import evidence, importance_draws, population_at
@@ -34,8 +34,12 @@ from skred.parallel.threads import side_by_side
 from skred.physics.mechanisms.spec import Direction
 
 FloatArray = NDArray[np.float64]
-_DRAWS, _FRONTS = 200, 1200
+_DRAWS = 200
+"""Populations and profiles drawn: as many as a predictor keeps."""
+_FRONTS = 1200
+"""New fronts for the predictions of an avalanche, as of mechanisms."""
 _BUDGET = USUAL.times(2)
+"""Quadrature points of a population fitted to the others: their draws are weighed, not only its maximum."""
 
 
 class Draws(NamedTuple):
@@ -168,7 +172,7 @@ def _without(base: Base, event: int) -> Base:
     rows, start = base.rows.take(others), (base.population, base.fit.points[others])
     extension = extended(base.problem, base.law, base.directions)
     given = base.strengths[None, :]
-    fit = refit(extension, rows, given, start, base.log_scale, _BUDGET, USUAL)[0]
+    fit = refit(extension, rows, given, start, Rounds(_BUDGET, USUAL))[0]
     return replace(base, rows=rows, fit=fit)
 
 
@@ -183,8 +187,9 @@ def _draws(
     """Populations by the base's events at the middle strengths, as many as there are draws of strengths."""
     n = len(base.law.mechanisms)
     population = fit.found.population(n)
-    modes = event_modes(extension, base.rows, fit.points, middle, population)
-    nodes = event_nodes(extension, base.rows, middle, population, modes, _BUDGET, base.population).nodes
+    likelihood = EventLikelihood(extension, base.rows, middle)
+    modes = event_modes(likelihood, fit.points, population)
+    nodes = event_nodes(likelihood, population, modes, _BUDGET, base.population).nodes
     found = evidence(nodes, base.log_scale, fit.found.psi)
     drawn = population_at(importance_draws(nodes, base.log_scale, found, len(strengths), rng), n)
     return Draws(drawn.mean, np.linalg.cholesky(drawn.covariance), strengths)

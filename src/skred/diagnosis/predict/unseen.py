@@ -17,7 +17,14 @@ from skred.campaign import Campaign
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.augment.tables import exact_nodes
 from skred.diagnosis.discrepancy.profile import Kind, Profile, entering, hats
-from skred.diagnosis.evidence.conditional_map import Population, Rows, campaign_rows, event_modes, log_joint
+from skred.diagnosis.evidence.conditional_map import (
+    EventLikelihood,
+    Population,
+    Rows,
+    campaign_rows,
+    event_modes,
+    log_joint,
+)
 from skred.diagnosis.evidence.covariates import Standard, standard_of
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of
@@ -38,6 +45,7 @@ from skred.physics.terrain import build_terrain
 
 FloatArray = NDArray[np.float64]
 N_DRAWS = 200
+"""Draws that a predictor keeps: few enough to be written beside an answer."""
 _NODES = Budget(32, 32, 0, 1.5, 1.8)
 """Quadrature points of an event for each draw; their errors average out over the draws. None are adapted:
 where those go depends on the others' weights, and few of them are too low in the mean
@@ -295,13 +303,13 @@ def log_densities(
     covariances = np.einsum("nij,nkj->nik", factors, factors)
     typical = Population(means.mean(axis=0)[None], covariances.mean(axis=0)[None])
     rng = np.random.default_rng([seed, 35])
-    start = _points(extension, rows, typical, strengths.mean(axis=0), rng)
+    start = _points(EventLikelihood(extension, rows, strengths.mean(axis=0)), typical, rng)
     n_events = len(rows.event)
     result = np.empty((len(means), n_events))
     if (strengths == strengths[0]).all():
         # Readings are then as likely at a node whichever draw it is: one set of many nodes serves all.
-        given, at = strengths[:1], start[None]
-        nodes = exact_nodes(extension, rows, given, typical, at, _NODES.times(_SHARED), typical)
+        shared = EventLikelihood(extension, rows, strengths[0])
+        nodes = exact_nodes(shared, typical, start[None], _NODES.times(_SHARED), typical)
         for k, mean in enumerate(means):
             result[k] = integrated_log_density(np.tile(mean, (n_events, 1)), factors[k], *nodes)
         return result
@@ -310,7 +318,8 @@ def log_densities(
         population = Population(means[part], covariances[part])
         starts = np.tile(start, (len(population.mean), 1, 1))
         shifts = rng.random((starts.shape[0] * n_events, starts.shape[2]))
-        nodes = exact_nodes(extension, rows, strengths[part], population, starts, _NODES, typical, shifts)
+        likelihood = EventLikelihood(extension, rows, strengths[0]).in_groups(strengths[part])
+        nodes = exact_nodes(likelihood, population, starts, _NODES, typical, shifts)
         for k in range(len(population.mean)):
             of_draw = nodes.first[k * n_events : (k + 1) * n_events + 1]
             mean = np.tile(population.mean[k], (n_events, 1))
@@ -320,23 +329,15 @@ def log_densities(
     return result
 
 
-def _points(
-    extension: Extension,
-    rows: Rows,
-    population: Population,
-    strengths: FloatArray,
-    rng: np.random.Generator,
-) -> FloatArray:
+def _points(likelihood: EventLikelihood, population: Population, rng: np.random.Generator) -> FloatArray:
     """Each event's most probable point, (n_events, n_base + 1): climbed to from the best of many."""
-    n_events, n = len(rows.event), population.mean.shape[1]
+    n_events, n = len(likelihood.rows.event), population.mean.shape[1]
     tried = np.zeros((_TRIED, n + 1))
     tried[1:] = rng.standard_normal((_TRIED - 1, n + 1))
     tried[:, :n] = tried[:, :n] @ (_TRIED_WIDER * np.linalg.cholesky(population.covariance[0])).T
     tried[:, :n] += population.mean[0]
-    many = rows.take(np.repeat(np.arange(n_events), _TRIED))
-    points = np.tile(tried, (n_events, 1))
-    given = np.broadcast_to(strengths, (len(points), len(strengths)))
-    heights = log_joint(extension, many, points, given, population).reshape(n_events, _TRIED)
+    many = likelihood.take(np.repeat(np.arange(n_events), _TRIED))
+    heights = log_joint(many, np.tile(tried, (n_events, 1)), population).reshape(n_events, _TRIED)
     start = tried[heights.argmax(axis=1)]
-    found: FloatArray = event_modes(extension, rows, start, strengths, population, n_steps=20).points
+    found: FloatArray = event_modes(likelihood, start, population, n_steps=20).points
     return found

@@ -36,7 +36,7 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.mechanisms.stretches import equation_of
 
 _NO_LIMIT = 20.0
-"""Strengths so many prior scales large are no limit: these recordings say nothing of the mechanism."""
+"""Prior scales from which on a detection limit is none: no strength that could be is so large."""
 
 
 def verdict(found: Outcome) -> dict[str, Any]:
