@@ -7,7 +7,7 @@ from report_cases import HOSTILE, comparison, gate
 from test_report_html import Page, hostile, nulls
 from test_report_tables import shown
 
-from skred.report.comparison.html import render_comparison
+from skred.report.comparison.page import render_comparison
 from skred.report.shared.document import is_hierarchical, side_by_side
 from skred.report.shared.relative import relative_new_avalanche
 from skred.report.shared.tables import comparison_table, summary_table

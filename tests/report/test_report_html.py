@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 import pytest
 from report_cases import HOSTILE, comparison
 
-from skred.report.comparison.html import render_comparison
+from skred.report.comparison.page import render_comparison
 from skred.report.shared.numbers import decimals_for, fixed, floats, rounded, share
 
 

@@ -53,6 +53,7 @@ def diagnose(
         from skred.diagnosis.effort import QUICK_REPLICAS, Effort
         from skred.diagnosis.run import diagnose_to
         from skred.report.diagnosis.report import diagnosis_table
+        from skred.report.folders import write_reports
 
         replicas = QUICK_REPLICAS if quick else Effort.replicas
         effort = Effort(replicas, max_mechanisms or MAX_MECHANISMS[quick], exact_loo)
@@ -60,5 +61,7 @@ def diagnose(
         document = diagnose_to(
             problem, law, settings, effort, folder, output.tell, lock=lock or 0, folds=outer_folds or 0
         )
+        output.tell("writing the report")
+        write_reports(folder)
     output.show(document, diagnosis_table, [], folder)  # the statement is in the table
     return DONE if document["reason"] is None else NOT_CONVERGED

@@ -15,6 +15,7 @@ import xarray as xr
 
 from skred.inference.gate import Gate
 from skred.inference.problem import Problem
+from skred.inference.recorded_data import recorded_groups
 from skred.inference.sampling import SamplerSettings
 from skred.physics.law import Law, Parameter
 
@@ -36,8 +37,7 @@ def assemble(
     posterior, prior : parameters of the law, and of the population in a hierarchical calibration
     posterior_predictive, prior_predictive, event_posterior : see `pooled_results`, `hierarchical_results`
     log_likelihood : ``recordings`` (chain, draw, event)
-    observed_data : ``reading`` (event, sensor), NaN where there is none
-    constant_data : status, covariance of the recordings, sensors, track, terrain
+    observed_data, constant_data : see `skred.inference.recorded_data.recorded_groups`
     """
     parameters = posterior["posterior"].to_dataset()
     own = problem.parameters(law)
@@ -52,8 +52,7 @@ def assemble(
         ),
         "prior": _with_units(prior, own, law),
         **problem.predictive(law, parameters, prior, settings.seed),
-        "observed_data": _observed(problem),
-        "constant_data": _constant(problem),
+        **recorded_groups(problem),
     }
     if "sample_stats" in posterior.children:
         groups["sample_stats"] = _storable(posterior["sample_stats"].to_dataset())
@@ -81,37 +80,6 @@ def _with_units(parameters: xr.Dataset, own: Sequence[Parameter], law: Law) -> x
             continue  # the prior holds the free variables only
         labelled[parameter.name].attrs.update(units=parameter.unit, symbol=parameter.symbol)
     return labelled
-
-
-def _observed(problem: Problem) -> xr.Dataset:
-    return xr.Dataset(
-        {"reading": (("event", "sensor"), problem.values, {"units": "m s-1; m for the runout"})},
-        coords=problem.coords,
-    )
-
-
-def _constant(problem: Problem) -> xr.Dataset:
-    campaign, terrain = problem.campaign, problem.terrain
-    sensor = problem.coords["sensor"]
-    return xr.Dataset(
-        {
-            "status": (
-                ("event", "sensor"),
-                campaign.status,
-                {"flag_values": [0, 1, 2], "flag_meanings": "observed not_reached missing"},
-            ),
-            "s_from": ("sensor", [s.s_from_m for s in campaign.sensors], {"units": "m"}),
-            "s_to": ("sensor", [s.s_to_m for s in campaign.sensors], {"units": "m"}),
-            "release_s": ("event", [e.release_s_m for e in campaign.events], {"units": "m"}),
-            "track_x": ("point", campaign.track.x_m, {"units": "m"}),
-            "track_z": ("point", campaign.track.z_m, {"units": "m"}),
-            "cell_edge": ("edge", terrain.edge_s_m, {"units": "m"}),
-            "slope": ("cell", terrain.slope_rad, {"units": "rad"}),
-            "curvature": ("cell", terrain.curvature, {"units": "m-1"}),
-            **problem.constants(),
-        },
-        coords={"event": problem.coords["event"], "sensor": sensor, "sensor_bis": sensor},
-    )
 
 
 def _storable(stats: xr.Dataset) -> xr.Dataset:

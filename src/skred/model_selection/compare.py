@@ -117,7 +117,7 @@ def score(
 def write_comparison(scored: Scored, folder: Path, started: float, tell: Tell) -> dict[str, Any]:
     """Say what came out, and write ``compare.json``, figures and ``report.html``; returns the document."""
     from skred.report.calibration.figures import save_comparison_figures
-    from skred.report.comparison.html import render_comparison
+    from skred.report.comparison.page import render_comparison
 
     comparison = scored.document
     comparison["statement"] = statement(comparison)

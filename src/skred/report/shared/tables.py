@@ -22,7 +22,7 @@ def comparison_table(comparison: doc.Document) -> Table:
     Parameters
     ----------
     comparison : mapping
-        As `skred.report.comparison.html.render_comparison` takes it.
+        As `skred.report.comparison.page.render_comparison` takes it.
     """
     own = "with every avalanche its own friction" if doc.is_hierarchical(comparison) else ""
     name = shortened(doc.get(comparison, "campaign", "name"), 36 if own else 60)
