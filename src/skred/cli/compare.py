@@ -29,6 +29,7 @@ def compare(
     from skred.inference.hierarchical.problem import HierarchicalProblem
     from skred.model_selection.compare import compare as compare_pooled
     from skred.model_selection.compare_hierarchical import compare_hierarchical
+    from skred.report.folders import write_reports
     from skred.report.shared.tables import comparison_table
 
     settings, tell = sampling.settings(likelihood), output.tell
@@ -37,5 +38,7 @@ def compare(
         comparison = compare_hierarchical(problem, pooled, laws, settings, folder, tell, exact=exact_loo)
     else:
         comparison = compare_pooled(problem, laws, settings, folder, tell)
+    tell("writing the report")
+    write_reports(folder)
     output.show(comparison, comparison_table, comparison["statement"], folder / "report.html")
     return DONE if all(model["gate"]["passed"] for model in comparison["models"]) else NOT_CONVERGED

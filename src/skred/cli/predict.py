@@ -38,6 +38,7 @@ def predict(
 
     from skred.prediction.predict import predict as predict_avalanches
     from skred.prediction.track import prediction_track
+    from skred.report.folders import write_reports
     from skred.report.prediction.figures import prediction_table
 
     where = prediction_track(problem, track, release)
@@ -46,5 +47,6 @@ def predict(
     prediction = predict_avalanches(
         problem, law, settings, folder, where, output.tell, progress=output.progress
     )
+    write_reports(folder)
     output.show(prediction, prediction_table, prediction["statement"], folder)
     return DONE if prediction["gate"]["passed"] else NOT_CONVERGED

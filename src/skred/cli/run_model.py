@@ -51,12 +51,14 @@ def calibrate_law(
     output.tell(f"{law_id}: sampling")
 
     from skred.inference.calibrate import calibrate, write_calibration
+    from skred.report.folders import write_reports
     from skred.report.shared.tables import summary_table
 
     settings = sampling.settings(problem.likelihood, sampler)
     calibration = calibrate(problem, law, settings, progress=output.progress)
     output.tell(f"{law_id}: writing {folder}")
     write_calibration(calibration, folder)
+    write_reports(folder)
     gate = calibration.gate
     verdict = "the chains can be trusted" if gate.passed else "THE GATE FAILED: do not use this result"
     measured = f"r-hat at most {gate.r_hat_max:.3f}, effective draws at least {gate.ess_bulk_min:.0f}"

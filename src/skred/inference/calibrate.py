@@ -13,6 +13,7 @@ import arviz_stats as az
 import pymc as pm
 import xarray as xr
 
+from skred.inference.along_track import with_along_track
 from skred.inference.gate import Gate, check_gate
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY, interval
 from skred.inference.joint_metropolis import JointMetropolis
@@ -111,11 +112,9 @@ def calibrate_surely(problem: Problem, law: Law, settings: SamplerSettings) -> C
 
 
 def write_calibration(calibration: Calibration, folder: Path) -> None:
-    """Write ``posterior.nc``, ``summary.json`` and the figures of one calibration."""
-    from skred.report.calibration.figures import save_model_figures
-
-    save(calibration.tree, folder / "posterior.nc")
-    save_model_figures(calibration.tree, calibration.law, calibration.problem, folder)
+    """Write ``posterior.nc`` and ``summary.json``, from which the figures of a calibration are made."""
+    tree = with_along_track(calibration.tree, calibration.law, calibration.problem)
+    save(tree, folder / "posterior.nc")
     attributes = calibration.tree.attrs
     summary = {
         "format": 1,

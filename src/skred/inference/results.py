@@ -6,6 +6,7 @@ import json
 import os
 import platform
 from collections.abc import Sequence
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,10 @@ from skred.inference.gate import Gate
 from skred.inference.problem import Problem
 from skred.inference.recorded_data import recorded_groups
 from skred.inference.sampling import SamplerSettings
-from skred.physics.law import Law, Parameter
+from skred.physics.law import Law, Parameter, parameter_of
 
+FORMAT = 1
+"""Of the files with trees; figures are made from no other."""
 _PACKAGES = ("skred", "pymc", "pytensor", "arviz", "numba", "numpy", "scipy", "xarray")
 
 
@@ -101,12 +104,9 @@ def _last_finite(value: Any) -> float:
 def _attributes(problem: Problem, law: Law, gate: Gate, settings: SamplerSettings) -> dict[str, Any]:
     campaign = problem.campaign
     return {
-        "title": f"{law.title}, {problem.likelihood} calibration on {campaign.name}",
-        "law": law.id,
-        "equation": law.equation,
+        **law_attributes(problem, law),
         "campaign": campaign.name,
         "campaign_fingerprint": campaign.fingerprint(),
-        "likelihood": problem.likelihood,
         "smoothing_m": problem.terrain.smoothing_m,
         "n_cells": problem.terrain.n_cells,
         "settings": json.dumps(settings.as_dict()),
@@ -114,3 +114,23 @@ def _attributes(problem: Problem, law: Law, gate: Gate, settings: SamplerSetting
         "gate": json.dumps(gate.as_dict()),
         "versions": json.dumps({"python": platform.python_version(), **{p: version(p) for p in _PACKAGES}}),
     }
+
+
+def law_attributes(problem: Problem, law: Law) -> dict[str, Any]:
+    """Names, symbols and units of a calibrated law, as attributes of its tree: figures know of no other."""
+    others = [parameter for parameter in problem.parameters(law) if parameter not in law.parameters]
+    return {
+        "format": FORMAT,
+        "title": f"{law.title}, {problem.likelihood} calibration on {problem.campaign.name}",
+        "law": law.id,
+        "law_title": law.title,
+        "law_parameters": _json(law.parameters),
+        "population_parameters": _json(others),
+        "strengths": _json([parameter_of(mechanism.strength) for mechanism in law.mechanisms]),
+        "equation": law.equation,
+        "likelihood": problem.likelihood,
+    }
+
+
+def _json(parameters: Sequence[Parameter]) -> str:
+    return json.dumps([asdict(parameter) for parameter in parameters])

@@ -64,9 +64,8 @@ def _in_place(folder: Path, make: Callable[[Path, Path], list[str]]) -> list[Pat
         made = sorted(file.relative_to(beside) for file in Path(beside).rglob("*") if file.is_file())
         for name in made:
             os.replace(Path(beside) / name, folder / name)
-    for name in possible:
-        if Path(name) not in made:
-            (folder / name).unlink(missing_ok=True)
+    for gone in set(map(Path, possible)).difference(made):
+        (folder / gone).unlink(missing_ok=True)
     return [folder / name for name in made]
 
 
@@ -81,7 +80,84 @@ def _diagnosis(folder: Path, beside: Path) -> list[str]:
     return [f"{name}.png" for name in FIGURES]
 
 
-_KINDS: dict[str, Callable[[Path, Path], list[str]]] = {"verdict.json": _diagnosis}
+def _comparison(folder: Path, beside: Path) -> list[str]:
+    from skred.report.comparison.laws import COMPARISON_FIGURES, save_comparison_figures
+    from skred.report.comparison.page import render_comparison
+    from skred.report.shared.document import get, listed
+
+    comparison = _read_document(folder / "compare.json", "format")
+    figures: dict[str, Path] = {}
+    possible = [f"{name}.png" for name in COMPARISON_FIGURES]
+    for models, where in (
+        (listed(comparison, "models"), ""),
+        (listed(comparison, "pooled", "models"), "pooled"),
+    ):
+        for name in (_plain_name(get(model, "id"), folder) for model in models):
+            place = Path(where) / name
+            drawn = _model_figures(folder / place, beside / place)
+            possible += [str(place / figure) for figure in _possible_of_a_model()]
+            figures |= {} if where else {f"{name}/{figure.stem}": figure for figure in drawn}
+    figures |= save_comparison_figures(comparison, beside)
+    write_text(beside / "report.html", render_comparison(comparison, figures))
+    return possible
+
+
+def _plain_name(name: Any, folder: Path) -> str:
+    """A law's id as the name of its folder, and nothing that leads out of it."""
+    if not isinstance(name, str) or name != Path(name).name or name in ("", ".", ".."):
+        raise ReportError(f"{folder / 'compare.json'}: {str(name)[:60]!r} is no name of a law")
+    return name
+
+
+def _calibration(folder: Path, beside: Path) -> list[str]:
+    _read_document(folder / "summary.json", "format")
+    _model_figures(folder, beside)
+    return _possible_of_a_model()
+
+
+def _model_figures(folder: Path, beside: Path) -> list[Path]:
+    from skred.report.calibration.figures import save_model_figures
+
+    beside.mkdir(parents=True, exist_ok=True)
+    with _opened(folder / "posterior.nc") as tree:
+        return save_model_figures(tree, beside)
+
+
+def _possible_of_a_model() -> list[str]:
+    from skred.report.calibration.figures import MODEL_FIGURES
+
+    return [f"{name}.png" for name in MODEL_FIGURES]
+
+
+def _prediction(folder: Path, beside: Path) -> list[str]:
+    from skred.report.prediction.figures import FIGURES
+    from skred.report.shared.style import write_png
+
+    document = _read_document(folder / "prediction.json", "format")
+    if document.get("valid") is True:
+        with _opened(folder / "prediction.nc") as tree:
+            for name, make in FIGURES.items():
+                write_png(make(document, tree), beside / f"{name}.png")
+    return [f"{name}.png" for name in FIGURES]
+
+
+def _scorecard(folder: Path, beside: Path) -> list[str]:
+    from skred.report.scorecard.figures import SCORECARD_FIGURES, save_scorecard_figures
+    from skred.report.scorecard.page import render_scorecard
+
+    document = _read_document(folder / "scorecard.json", "format")
+    figures = save_scorecard_figures(document, beside)
+    write_text(beside / "scorecard.html", render_scorecard(document, figures))
+    return [f"{name}.png" for name in SCORECARD_FIGURES]
+
+
+_KINDS: dict[str, Callable[[Path, Path], list[str]]] = {
+    "verdict.json": _diagnosis,
+    "compare.json": _comparison,
+    "prediction.json": _prediction,
+    "scorecard.json": _scorecard,
+    "summary.json": _calibration,
+}
 """What a folder holds, and what makes its report; returns the figures that there may be."""
 
 

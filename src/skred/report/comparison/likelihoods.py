@@ -27,7 +27,7 @@ def likelihoods_figure(comparison: Document) -> Figure | None:
         return None
     figure = new_figure(1.75 + 0.45 * len(rows), "The same laws under both calibrations")
     axes = figure.subplots()
-    practical_band(axes)
+    practical_band(axes, comparison)
     colours, _ = styles(comparison)
     for place, row in enumerate(rows):
         for key, offset in (("hierarchical", -_APART), ("pooled", _APART)):

@@ -71,8 +71,8 @@ def _pairs(axes: Axes, recorded: FloatArray, before: Band, after: Band | None) -
     )  # fmt: skip
     ends = [f(values) for values in (recorded, before[0], low, high) for f in (np.nanmin, np.nanmax)]
     margin = 0.04 * (max(ends) - min(ends)) or 1.0
-    ends = [float(min(ends) - margin), float(max(ends) + margin)]
-    axes.plot(ends, ends, color=GREY, linewidth=0.9, linestyle="--", label="perfect")
+    line = [float(min(ends) - margin), float(max(ends) + margin)]
+    axes.plot(line, line, color=GREY, linewidth=0.9, linestyle="--", label="perfect")
     size = 4.5 if len(recorded) < 150 else 3.0
     axes.plot(
         recorded, before[0], linestyle="none", marker="o", markersize=size, markerfacecolor="none",
@@ -85,7 +85,7 @@ def _pairs(axes: Axes, recorded: FloatArray, before: Band, after: Band | None) -
         )  # fmt: skip
     beside = 0.06 * float(np.ptp(recorded)) or margin
     axes.set_xlim(recorded.min() - beside, recorded.max() + beside)
-    axes.set_ylim(*ends)
+    axes.set_ylim(*line)
 
 
 @styled

@@ -105,7 +105,7 @@ def _comparison(document: doc.Document, number: int, comparison: doc.Document) -
 
 def _too_few(document: doc.Document) -> int | None:
     """How many clean campaigns it takes to reach the limit, where none is as odd and there were fewer."""
-    check = next(iter(doc.listed(document, "report", "checks")), {})
+    check: doc.Document = next(iter(doc.listed(document, "report", "checks")), {})
     n, most, own = (doc.get(check, key) for key in ("n_simulated", "largest_simulated", "statistic"))
     limit = doc.get(document, "report", "limits", "p_value")
     if doc.get(check, "fired") is not False or not all(map(is_number, (n, own, limit))) or not limit:

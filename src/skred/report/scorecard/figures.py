@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 
 DIAGNOSIS, BAR = "#0072B2", "#D55E00"
 """What was measured; what was asked for."""
+SCORECARD_FIGURES = (
+    "false_alarms", "power", "confusion", "confusion_classes", "places", "reliability", "gain", "baselines",
+)  # fmt: skip
+"""Names of all figures that there may be."""
 _KINDS = ("sparse", "dense")
 _SNR = (1.5, 13.0)
 
@@ -36,7 +40,16 @@ def save_scorecard_figures(document: Document, folder: Path) -> dict[str, Path]:
         Files by name: ``false_alarms``, ``power``, ``confusion``, ``confusion_classes``, ``places``,
         ``reliability``, ``gain`` and ``baselines``, as far as there are data for them.
     """
-    makers: dict[str, Callable[[Document], Figure | None]] = {
+    files = {}
+    for name, make in _makers().items():
+        figure = make(document)
+        if figure is not None:
+            files[name] = write_png(figure, folder / f"{name}.png")
+    return files
+
+
+def _makers() -> dict[str, Callable[[Document], Figure | None]]:
+    return {
         "false_alarms": false_alarms_figure,
         "power": power_figure,
         "confusion": lambda one: confusion_figure(one, "mechanisms"),
@@ -46,12 +59,6 @@ def save_scorecard_figures(document: Document, folder: Path) -> dict[str, Path]:
         "gain": gain_figure,
         "baselines": baselines_figure,
     }
-    files = {}
-    for name, make in makers.items():
-        figure = make(document)
-        if figure is not None:
-            files[name] = write_png(figure, folder / f"{name}.png")
-    return files
 
 
 def own_scores(document: Document, kind: str, part: str = "open") -> Any:
