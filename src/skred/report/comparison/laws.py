@@ -111,7 +111,7 @@ def pointwise_figure(comparison: Document) -> Figure | None:
             label=f"{figure_text(law['id'], 24)}: sum {total}",
         )
     if any(listed(law, "exact", "failed_refits") for law in laws):
-        axes.scatter([], [], s=20, c="#ffffff", edgecolors=GREY, label="hollow: the refit failed the gate")
+        axes.scatter([], [], s=20, c="#ffffff", edgecolors=GREY, label="hollow: the refit did not converge")
     _event_axis(axes, events)
     axes.set_ylabel("elpd of the event\nless that of the best law [nats]")
     legend_below(figure, [axes], columns=4)

@@ -45,7 +45,7 @@ def likelihoods_figure(comparison: Document) -> Figure | None:
 
 
 def _difference(model: Document | None) -> float | None:
-    """Difference of elpd of a law that passed the gate."""
+    """Difference of elpd of a law that converged."""
     value = get(model, "difference", "elpd")
     return float(value) if model is not None and passed(model) and is_number(value) else None
 

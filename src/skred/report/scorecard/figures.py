@@ -68,11 +68,11 @@ def own_scores(document: Document, kind: str, part: str = "open") -> Any:
 
 @styled
 def false_alarms_figure(document: Document) -> Figure | None:
-    """Share of alarms where nothing is hidden, by kind, with their one-sided upper limits and bars."""
+    """Share of alarms where nothing is hidden, by kind, with upper limits and acceptance criteria."""
     found = get(own_scores(document, "all"), "false_alarms")
     bars = get(document, "standards", "bars_false_alarms")
     rows = [("nulls, all", found["all"], bars["all"]), ("plain", found["plain"], bars["plain"])]
-    rows += [("nasty, all", found["nasty"], bars["nasty"])]
+    rows += [("contaminated, all", found["nasty"], bars["nasty"])]
     rows += [(name_text(name), one, bars["nasty"]) for name, one in found["by_nastiness"].items()]
     for kind in _KINDS:
         rows.append((f"{kind}, all", get(own_scores(document, kind), "false_alarms", "all"), bars["all"]))
@@ -99,7 +99,7 @@ def false_alarms_figure(document: Document) -> Figure | None:
             [place - 0.35, place + 0.35],
             color=BAR,
             linewidth=1.6,
-            label="bar for the upper limit",
+            label="acceptance criterion for the upper limit",
         )
         axes.text(max(limit, bar) + 0.008, place, f"{one['hits']} of {one['n']}", va="center", fontsize=7.5)
     axes.set_yticks(range(len(rows)), [figure_text(row[0], 30) for row in rows])
@@ -163,7 +163,7 @@ def _detection(axes: Axes, document: Document, kind: str) -> None:
         color=BAR,
         markersize=7,
         markeredgewidth=1.8,
-        label="bar",
+        label="acceptance criterion",
     )
     axes.set_title(f"{kind}: found, n = {get(scores, 'detection', 'all', 'n')}")
 
@@ -188,7 +188,7 @@ def _names(axes: Axes, document: Document, kind: str) -> None:
         color=BAR,
         markersize=7,
         markeredgewidth=1.8,
-        label="bar",
+        label="acceptance criterion",
     )
     axes.set_title(f"{kind}: named, n = {get(scores, 'naming', 'all', 'n')}")
 
