@@ -84,6 +84,8 @@ def diagnose_case(case: Case, replicas: int, *, figures: bool = True) -> dict[st
     from skred.diagnosis.outcome import Diagnosis
     from skred.diagnosis.repeated import outer_folds
     from skred.diagnosis.verdict.document import verdict
+    from skred.diagnosis.verdict.figure_data import figure_data
+    from skred.diagnosis.verdict.report_facts import report_facts
     from skred.inference.hierarchical.problem import hierarchical_problem
     from skred.physics.laws import load_law
     from skred.report.diagnosis.report import save_diagnosis_figures
@@ -101,9 +103,10 @@ def diagnose_case(case: Case, replicas: int, *, figures: bool = True) -> dict[st
             name: {str(factor): _best_factor(found.comparison, name, factor) for factor in PRIOR_FACTORS}
             for name in found.comparison.under_each[0].candidates
         }
-    if figures and case.name == case.base_model:
+    if figures and case.name == case.base_model and isinstance(found, Diagnosis):
         with TemporaryDirectory() as folder:
-            written = save_diagnosis_figures(found, Path(folder))
+            whole = document | {"report": report_facts(found)}
+            written = save_diagnosis_figures(whole, figure_data(found), Path(folder))
             for name in SHOWN:
                 if name in written:
                     shrink(written[name])

@@ -33,13 +33,12 @@ from skred.diagnosis.discrepancy.profile import KINDS
 from skred.diagnosis.effort import SAMPLING
 from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.population_draws import population_draws, typical
-from skred.diagnosis.evidence.prior_odds import POWER, UNLISTED, prior_odds, stated
+from skred.diagnosis.evidence.prior_odds import NOTHING, POWER, UNLISTED, prior_odds, stated
 from skred.inference.calibrate import calibrate_surely
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.prove.hashes import source_sha256
-from skred.report.diagnosis.words import leading_name
 from skred.simulator.draw import draw_trial
 from studies.files import RESULTS, read, write
 from studies.proof.record import diagnosed, opened_batches, sealed_of
@@ -83,6 +82,12 @@ def base_of(sealed: dict[str, Any]) -> Base | None:
     return base_on(campaign, truth["base_model"])
 
 
+def _leading_name(compared: Comparison) -> str:
+    """The most probable listed mechanism or fault."""
+    shares = compared.probability
+    return max((name for name in shares if name not in (NOTHING, UNLISTED)), key=shares.__getitem__)
+
+
 def beyond(compared: Comparison, name: str) -> float:
     """What the unlisted force gains about a listed mechanism at its best strength, in nats, at most."""
     under_errors = compared.leading(name)
@@ -112,7 +117,7 @@ def look(sealed: dict[str, Any]) -> dict[str, Any]:
         if base is None:
             return told | {"failed": "gate"}
         compared = compare(base)
-        name = leading_name(compared)
+        name = _leading_name(compared)
         gain = beyond(compared, name)
     except np.linalg.LinAlgError as error:
         return told | {"failed": repr(error)}

@@ -295,6 +295,7 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch) -> Diagnosed:
             return document | {"statement": "What [it] says."}
 
         monkeypatch.setattr(module, "diagnose_to", made_up)
+        monkeypatch.setattr("skred.report.folders.write_reports", lambda folder: [])
         return asked
 
     report = ModuleType("skred.report.diagnosis.report")
@@ -327,7 +328,7 @@ def test_what_a_diagnosis_ends_with(
     diagnosed(reason, converged)
     assert run(["diagnose", "--out", "told"]) == code
     told = capsys.readouterr()
-    assert told.err == "a stage\n"
+    assert told.err == "a stage\nwriting the report\n"
     assert told.out == "What [it] says.\n\nwritten: told\n"
     assert run(["diagnose", "--json"]) == code
     told = capsys.readouterr()

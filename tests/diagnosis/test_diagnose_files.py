@@ -19,6 +19,7 @@ from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchic
 from skred.inference.sampling import SamplerSettings
 from skred.parallel.processes import helpers
 from skred.physics.laws import load_law
+from skred.report.folders import write_reports
 from skred.simulator.draw import draw_trial
 
 
@@ -30,27 +31,25 @@ def few() -> HierarchicalProblem:
 
 
 def test_nothing_of_an_earlier_diagnosis_is_left(few: HierarchicalProblem, tmp_path: Path) -> None:
-    """Draws of a mechanism that was not let in now would be taken for its own; other files are not ours."""
+    """Draws of a mechanism that was not added now would be taken for its own; other files are not ours."""
     for name in ("augmented.nc", "places_2.png", "notes.txt"):
         (tmp_path / name).write_text("earlier")
     document = diagnose_to(few, load_law("constant"), SamplerSettings(), Effort(), tmp_path)
     assert document["verdict"] == "cannot_tell" and "only 4 avalanches" in document["reason"]
+    write_reports(tmp_path)
     assert {file.name for file in tmp_path.iterdir()} == {
-        "notes.txt", "report.html", "verdict.json", "where.png",
+        "notes.txt", "report.html", "verdict.json", "diagnosis.nc", "where.png",
     }  # fmt: skip
 
 
 @pytest.mark.parametrize("with_helpers", [False, True])
-@pytest.mark.parametrize("broken", [False, True])
 def test_draws_are_in_their_files(
-    with_helpers: bool,
-    broken: bool,
-    few: HierarchicalProblem,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
+    with_helpers: bool, few: HierarchicalProblem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also where a figure cannot be drawn."""
-    names = {"base.nc": "base", "base_same_errors.nc": "reference", "augmented.nc": "augmented"}
+    names = {
+        "base.nc": "base", "base_same_errors.nc": "reference", "augmented.nc": "augmented",
+        "diagnosis.nc": "curves",
+    }  # fmt: skip
     made: dict[str, Any] = {
         name: SimpleNamespace(tree=xr.DataTree(xr.Dataset(attrs={"name": name}))) for name in names.values()
     }
@@ -59,19 +58,12 @@ def test_draws_are_in_their_files(
     none: Any = None
     added = MechanismsAdded((step,), made["reference"], none)
     found = Diagnosis(few, law, made["base"], none, none, none, none, none, none, added, none)
-
-    def drawn(*_: Any) -> dict[str, Path]:
-        if broken:
-            raise ZeroDivisionError
-        return {}
-
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     monkeypatch.setattr(module, "diagnose", lambda *_: found)
     monkeypatch.setattr(module, "verdict", lambda _: {})
-    monkeypatch.setattr("skred.report.diagnosis.report.save_diagnosis_figures", drawn)
-    monkeypatch.setattr("skred.report.diagnosis.report.render_diagnosis", lambda *_: "")
-    expected = pytest.raises(ZeroDivisionError) if broken else nullcontext()
-    with helpers() if with_helpers else nullcontext(), expected:
+    monkeypatch.setattr(module, "report_facts", lambda _: {})
+    monkeypatch.setattr(module, "figure_data", lambda _: made["curves"].tree)
+    with helpers() if with_helpers else nullcontext():
         diagnose_to(few, law, SamplerSettings(), Effort(), tmp_path)
     told = {
         file.name: xr.open_datatree(file, engine="h5netcdf").attrs["name"] for file in tmp_path.glob("*.nc")

@@ -15,12 +15,14 @@ import xarray as xr
 from scipy.special import ndtr, ndtri
 
 from skred.campaign import CampaignError, find_campaign, read_campaign
+from skred.cli.main import run
 from skred.errors import InputError
 from skred.inference.calibrate import calibrate
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.gate import Gate
 from skred.inference.hierarchical.event_draws import fronts_of, new_avalanches
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
+from skred.inference.recorded_data import recorded_groups
 from skred.inference.sampling import SamplerSettings
 from skred.physics.kernel.columns import GRAVITY
 from skred.physics.laws import load_law
@@ -30,6 +32,7 @@ from skred.prediction.predict import Simulation, predict, prediction_of
 from skred.prediction.probabilities import PARTS, SHARES
 from skred.prediction.reading_errors import reading_error
 from skred.prediction.track import PredictionTrack, prediction_track
+from skred.report.folders import write_reports
 from skred.report.prediction.figures import prediction_figure, prediction_table, uncertainty_figure
 
 N_CHAINS, N_DRAWS = 2, 40
@@ -284,8 +287,9 @@ def test_nothing_moves(problem: HierarchicalProblem, tmp_path: Path) -> None:
     assert all(np.isfinite(v).all() for name, v in data.items() if not name.startswith(("mean_", "speed_sd")))
     document = prediction_document(made(problem, "constant"), track, data)
     assert any("100 % do not start" in line for line in document["statement"])
-    prediction_figure(data, load_law("constant"), problem)
-    uncertainty_figure(data, load_law("constant"))
+    tree = xr.DataTree.from_dict({"/": data, **recorded_groups(problem)})
+    prediction_figure(document, tree)
+    uncertainty_figure(document, tree)
 
 
 def made(problem: HierarchicalProblem, law_id: str, gate: Gate = GOOD) -> Any:
@@ -352,6 +356,13 @@ def test_files(problem: HierarchicalProblem, tmp_path: Path) -> None:
     for name in ("campaign_fingerprint", "seed", "versions", "settings", "law", "gate", "release"):
         assert name in data.attrs
     assert prediction_table(document).row_count == 3 + 3 * 4
+    figures = write_reports(tmp_path)
+    drawn = {file.name: file.read_bytes() for file in figures}
+    assert set(drawn) == {"prediction.png", "uncertainty.png"}
+    for file in figures:
+        file.unlink()
+    assert run(["report", str(tmp_path)]) == 0
+    assert {name: (tmp_path / name).read_bytes() for name in drawn} == drawn
 
 
 def test_another_track(problem: HierarchicalProblem, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 from scorecard_cases import CRASH, QUIET, drawn, effect, named, truth
 
 from skred.prove.scorecard import scorecard, write_scorecard
+from skred.report.folders import write_reports
 
 FIGURES = {
     "false_alarms",
@@ -46,7 +47,9 @@ def card(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]
         "always <i>nothing</i>": {name: QUIET for name in answers},
         "$other_$": scored,
     }
-    return folder, write_scorecard(folder, ledger, trials, methods)
+    document = write_scorecard(folder, ledger, trials, methods)
+    write_reports(folder)
+    return folder, document
 
 
 def test_files_are_written_and_the_data_are_returned(card: tuple[Path, dict[str, Any]]) -> None:
@@ -124,6 +127,7 @@ def test_few_trials_and_bad_answers_do_not_fail(case: str, tmp_path: Path) -> No
     trials = [{"trial": f"trial-{k:04d}", "truth": one} for k, one in enumerate(truths)]
     answers = {f"trial-{k:04d}": one for k, one in enumerate(given) if one is not None}
     write_scorecard(tmp_path, {}, trials, {"skred": answers, "silent": {}})
+    write_reports(tmp_path)
     data, page = written(tmp_path)
     assert data["n_trials"] == len(trials)
     assert not any(bar["status"] == "met" for bar in data["bars"])

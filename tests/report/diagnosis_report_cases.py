@@ -1,7 +1,9 @@
 """A diagnosis made up quickly: no sampler runs, and nothing is refitted."""
 
+import json
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -30,8 +32,13 @@ from skred.diagnosis.outcome import (
 )
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.predict.profile_law import Draws, ProfileLaw
+from skred.diagnosis.verdict.document import verdict
+from skred.diagnosis.verdict.figure_data import figure_data
+from skred.diagnosis.verdict.report_facts import report_facts
 from skred.inference.gate import Gate
 from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.results import save
+from skred.output import plain, write_json
 from skred.physics.law import Parameter
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
@@ -220,3 +227,23 @@ def _steps(problem, comparison, names, clean, *, second):
             Step(candidate, tuple(tied), its_race, calibration(problem, added), BootstrapTest(0.1, clean))
         )
     return tuple(steps)
+
+
+def document_of(found: Outcome, **more) -> dict:
+    """What `skred diagnose` writes to verdict.json, as it is read again."""
+    document = verdict(found) | {"settings": {"draws": 1000, "replicas": 50}, "report": report_facts(found)}
+    return json.loads(json.dumps(plain(document | more), allow_nan=False))
+
+
+@cache
+def documents(kind: str, text: str = "") -> tuple[dict, xr.DataTree]:
+    """Content of verdict.json and of diagnosis.nc."""
+    found = diagnosis(kind, text)
+    return document_of(found), figure_data(found)
+
+
+def write_documents(kind: str, folder: Path, text: str = "") -> None:
+    """What a diagnosis leaves in its folder that its report is made from."""
+    document, tree = documents(kind, text)
+    write_json(folder / "verdict.json", document)
+    save(tree, folder / "diagnosis.nc")

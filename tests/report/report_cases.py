@@ -6,7 +6,11 @@ import numpy as np
 import xarray as xr
 
 from skred.campaign import Campaign, Sensor, find_campaign, read_campaign
+from skred.inference.along_track import with_along_track
 from skred.inference.pooled.problem import PooledProblem, pooled_problem
+from skred.inference.problem import Problem
+from skred.inference.recorded_data import recorded_groups
+from skred.inference.results import law_attributes
 from skred.physics.law import Law
 
 DRAWS = {
@@ -58,6 +62,15 @@ def calibration(problem: PooledProblem, law: Law, draws: int = 60, chains: int =
     tree = xr.DataTree.from_dict({name: xr.Dataset(group) for name, group in groups.items()})
     tree.attrs["gate"] = '{"passed": true, "r_hat_max": 1.002, "ess_bulk_min": 900, "ess_tail_min": 800}'
     return tree
+
+
+def as_saved(tree: xr.DataTree, law: Law, problem: Problem) -> xr.DataTree:
+    """The tree with what a file of a calibration has beside the groups above."""
+    more = with_along_track(tree, law, problem)
+    for name, group in recorded_groups(problem).items():
+        more[name] = xr.DataTree(group)
+    more.attrs |= law_attributes(problem, law)
+    return more
 
 
 def gate(passed: bool = True) -> dict:
@@ -159,6 +172,7 @@ def comparison() -> dict:
         "settings": {"sampler": "metropolis", "draws": 1000, "tune": 500, "chains": 4, "seed": 0},
         "versions": {"skred": "0.1.0", "pymc": "6.4.0"},
         "interval": {"kind": "equal-tailed", "probability": 0.9},
+        "limits": {"practical_difference": 4.0, "r_hat": 1.01, "ess": 400.0, "integration": 0.2},
         "models": [
             entry("pcm", best, best),
             entry("constant", [-15.0, -15.1, -17.0, -17.5], best),

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_report_cases import diagnosis, with_finding
+from diagnosis_report_cases import diagnosis, document_of, with_finding
 
 from skred.diagnosis.augment.coefficient import strength_of
 from skred.diagnosis.augment.step import Left
@@ -16,6 +16,7 @@ from skred.diagnosis.compare.candidate import FORM
 from skred.diagnosis.compare.decision import Decision
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.verdict.document import verdict
+from skred.diagnosis.verdict.figure_data import figure_data
 from skred.diagnosis.verdict.statement import statement
 from skred.physics.mechanisms.stretches import U_1, U_2
 from skred.report.diagnosis.report import render_diagnosis
@@ -109,7 +110,7 @@ def test_physics_and_instruments_tied_are_both_told(monkeypatch: pytest.MonkeyPa
     told = rf"cannot tell it from: {dam} \([^)]*%\), a force not in the list \([^)]*%\)\."
     assert re.search(told, document["statement"])
     assert f"A speed at s = 1700 m would split {bias} and {dam} best." in document["statement"]
-    html = render_diagnosis(found, document | {"settings": {"draws": 1000, "replicas": 50}}, {})
+    html = render_diagnosis(document_of(found), figure_data(found), {})
     assert "If it is the recordings that are off, the equation of motion itself keeps its terms" in html
     assert "Physics is missing, or the recordings are off</strong>" in html
     assert "from obstacle, a force not in the list." in html and "not the physics" not in html

@@ -3,11 +3,10 @@
 import io
 import re
 
-from diagnosis_report_cases import diagnosis
+from diagnosis_report_cases import documents
 from rich.console import Console
 from test_report_html import Page
 
-from skred.diagnosis.verdict.document import verdict
 from skred.report.diagnosis.report import diagnosis_table, render_diagnosis
 
 HOSTILE = "<script>alert(1)</script>[red]"
@@ -36,8 +35,8 @@ FOLDS = {
 
 
 def text_of(**more):
-    found = diagnosis("sensor")
-    html = render_diagnosis(found, verdict(found) | {"settings": {}} | more, {})
+    document, tree = documents("sensor")
+    html = render_diagnosis(document | more, tree, {})
     headings = re.findall(r'<h2 id="([^"]+)">(\d+)\.', html)
     assert [int(number) for _, number in headings] == list(range(1, len(headings) + 1))
     page = Page(html)
@@ -53,7 +52,7 @@ def test_without_them_there_is_no_section():
 def test_locked_avalanches():
     text, anchors = text_of(locked=LOCKED)
     assert anchors[anchors.index("unseen") - 1] == "before-after"
-    assert "+3.8 (2 se 2.8), no practical difference" in text
+    assert "+3.8 nats (2 se 2.8), no practical difference" in text
     for words in ("log score of e03 [nats] −20.2 −17.0", HOSTILE, "[m/s] 5.0 3.0"):
         assert words.replace("−", "-") in text.replace("−", "-")
     assert "runouts, root mean square [m] n/a" not in text
@@ -68,12 +67,11 @@ def test_locked_avalanches_and_nothing_to_compare():
 
 def test_outer_folds():
     text, _ = text_of(outer_folds=FOLDS)
-    assert "repeated 2 times" in text and "+8.0 (2 se 5.0)" in text
-    assert "a, b segment_drag +8.0" in text.replace("segment drag", "segment_drag")
-    found = diagnosis("sensor")
+    assert "repeated 2 times" in text and "+8.0 nats (2 se 5.0)" in text
+    assert "a, b segment drag +8.0" in text
     console = Console(file=io.StringIO(), width=100)
-    console.print(diagnosis_table(verdict(found) | {"outer_folds": FOLDS, "locked": LOCKED}))
+    console.print(diagnosis_table(documents("sensor")[0] | {"outer_folds": FOLDS, "locked": LOCKED}))
     told = console.file.getvalue()
-    assert re.search(r"outer folds +\+8\.0 \(2 se 5\.0\)", told) and re.search(
+    assert re.search(r"outer folds +\+8\.0 nats \(2 se 5\.0\)", told) and re.search(
         r"locked avalanches +\+3\.8", told
     )

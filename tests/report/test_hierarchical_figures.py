@@ -3,17 +3,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hierarchical_cases import hierarchical_calibration, hierarchical_comparison, hierarchical_ryggfonn
-from report_cases import HOSTILE, comparison
+from report_cases import HOSTILE, as_saved, comparison
 from test_report_figures import assert_pictures
 
 from skred.campaign import Event, Sensor, Status
 from skred.physics.laws import load_law
-from skred.report.calibration.figures import save_comparison_figures, save_model_figures
-from skred.report.calibration.new_avalanches import _median_speeds, reached_text
+from skred.report.calibration.figures import save_model_figures
+from skred.report.calibration.new_avalanches import reached_text
 from skred.report.calibration.population import _levels, population_lines, set_limits
+from skred.report.comparison.laws import save_comparison_figures
 from skred.report.comparison.likelihoods import likelihoods_figure
 from skred.report.shared.draws import new_avalanche, shaded_density
 from skred.report.shared.labels import population_label, population_role, symbol_text
+from skred.report.shared.recordings import recordings_of
 from skred.report.shared.style import new_figure, tint
 
 
@@ -34,7 +36,7 @@ def with_sensors(problem, sensors, **changes):
 @pytest.mark.parametrize("law_id", ["coulomb", "voellmy"])
 def test_every_law_has_its_figures(problem, law_id, tmp_path):
     law = load_law(law_id)
-    files = save_model_figures(hierarchical_calibration(problem, law), law, problem, tmp_path)
+    files = save_model_figures(as_saved(hierarchical_calibration(problem, law), law, problem), tmp_path)
     assert [file.stem for file in files] == [
         "trace", "joint", "marginals", "new_avalanche", "population", "events", "along_track",
     ]  # fmt: skip
@@ -48,7 +50,9 @@ def test_a_law_of_three_strengths(problem, tmp_path):
         mechanisms=pcm.mechanisms + constant.mechanisms,
         parameters=pcm.parameters + constant.parameters,
     )
-    assert_pictures(save_model_figures(hierarchical_calibration(problem, law), law, problem, tmp_path))
+    assert_pictures(
+        save_model_figures(as_saved(hierarchical_calibration(problem, law), law, problem), tmp_path)
+    )
 
 
 def test_spans_many_sensors_events_releases_no_reference_and_hostile_names(problem, tmp_path):
@@ -65,7 +69,7 @@ def test_spans_many_sensors_events_releases_no_reference_and_hostile_names(probl
     tree = hierarchical_calibration(changed, law, draws=10)
     releases = tree["event_posterior"]["release"].values
     releases += np.random.default_rng(0).uniform(0, 5, releases.shape)
-    assert_pictures(save_model_figures(tree, law, changed, tmp_path))
+    assert_pictures(save_model_figures(as_saved(tree, law, changed), tmp_path))
 
 
 def test_nothing_recorded_nothing_reached_and_draws_all_alike(problem, tmp_path):
@@ -81,21 +85,22 @@ def test_nothing_recorded_nothing_reached_and_draws_all_alike(problem, tmp_path)
     for name in (parameter.name for parameter in changed.parameters(law)):
         tree["posterior"][name].values[:] = tree["posterior"][name].values[0, 0]
     del tree.attrs["gate"]
-    assert_pictures(save_model_figures(tree, law, changed, tmp_path))
+    assert_pictures(save_model_figures(as_saved(tree, law, changed), tmp_path))
 
 
 def test_what_is_said_of_a_sensor(problem):
     law = load_law("pcm")
     tree = hierarchical_calibration(problem, law)
-    sensor = problem.campaign.sensors[2]
+    recordings = recordings_of(as_saved(tree, law, problem))
+    sensor = recordings.sensors[2]
     reached = tree["posterior_predictive"]["reached"].values
     reached[..., 2] = False
     reached[0, :, 0, 2] = True
-    draws = new_avalanche(tree, problem, sensor)
+    draws = new_avalanche(tree, recordings, sensor)
     assert draws.reached == pytest.approx(1 / 44) and len(draws.reading) == 40
     text = reached_text(draws, problem.terrain.length_m)
     assert text == "reached by 2 % of new avalanches,\nby 15 of 21 recorded (3 read 0), 1 missing"
-    runout = new_avalanche(tree, problem, problem.campaign.sensors[3])
+    runout = new_avalanche(tree, recordings, recordings.sensors[3])
     assert runout.offset == problem.campaign.reference_s_m
     assert reached_text(runout, float(runout.front.max()) + runout.offset).startswith("less than 1 % of new")
     assert reached_text(runout, 1e6) == "22 recorded"
@@ -106,8 +111,8 @@ def test_the_median_of_new_avalanches_narrows_with_the_population_alone(problem)
     tree = hierarchical_calibration(problem, law, draws=20)
     for name in ("retardation", "retardation_spread"):
         tree["posterior"][name].values[:] = tree["posterior"][name].values[0, 0]
-    medians = _median_speeds(tree, law, problem, np.zeros(50))
-    assert np.ptp(medians, axis=0).max() == 0.0
+    medians = as_saved(tree, law, problem)["along_track"]["median_speed"].values
+    assert np.ptp(medians, axis=0).max() == pytest.approx(0.0, abs=1e-9)
     median = float(tree["posterior"]["retardation"].values[0, 0])
     at_median = problem.speeds(law.mechanisms, np.array([[median]]), 0.0)[0]
     assert medians[0, 50:250] == pytest.approx(at_median[50:250], rel=0.02)
@@ -115,12 +120,12 @@ def test_the_median_of_new_avalanches_narrows_with_the_population_alone(problem)
 
 def test_the_population_in_words(problem):
     law = load_law("voellmy")
-    lines = population_lines(hierarchical_calibration(problem, law, draws=500), law, problem)
+    lines = population_lines(as_saved(hierarchical_calibration(problem, law, draws=500), law, problem))
     assert [line for line in lines if line and not line.startswith(" ")] == [
         "Across avalanches: mean and 90 % interval",
         "median μ", "median D", "spread sd(log μ)", "spread sd(log D)", "correlation corr(log μ, log D)",
     ]  # fmt: skip
-    assert lines[3].startswith("    0.29") and lines[6].endswith("m⁻¹")
+    assert lines[3].startswith("    0.29") and lines[6].endswith("1/m")
 
 
 def test_regions_hold_their_share():

@@ -7,7 +7,7 @@ from report_cases import HOSTILE, comparison, gate
 from test_report_html import Page, hostile, nulls
 from test_report_tables import shown
 
-from skred.report.comparison.html import render_comparison
+from skred.report.comparison.page import render_comparison
 from skred.report.shared.document import is_hierarchical, side_by_side
 from skred.report.shared.relative import relative_new_avalanche
 from skred.report.shared.tables import comparison_table, summary_table
@@ -71,7 +71,7 @@ def test_both_calibrations_side_by_side(figures):
     document = hierarchical_comparison()
     text = Page(render_comparison(document, figures)).text
     assert "pcm -55.70 best -58.70 (0.20) -59.70 best -62.70 (0.20)" in text
-    assert "coulomb failed the gate not calibrated" in text
+    assert "coulomb did not converge not calibrated" in text
     assert "PCM stays first. The spread of D now explains what Sigma did." in text
     assert [row["id"] for row in side_by_side(document)] == ["pcm", "constant", "coulomb"]
 
@@ -92,7 +92,7 @@ def test_error_models(figures):
     assert "Differences are to the model robust, paired" in text
     assert "robust robust, in words -52.40 ± 11.20 - - -55.30 (0.12) 2 passed" in text
     assert "normal normal, in words -58.01 ± 11.20 -5.61 ± 0.83 yes -60.91 (0.12) 2 passed" in text
-    assert "student student, in words failed the gate, not compared : r-hat 1.312 exceeds 1.01" in text
+    assert "student student, in words did not converge, not compared : r-hat 1.312 exceeds 1.01" in text
 
 
 def test_every_number_may_be_null_and_every_name_hostile(figures):
@@ -109,7 +109,7 @@ def test_nothing_passed():
     document = hierarchical_comparison()
     document["models"] = document["models"][2:]
     text = Page(render_comparison(document, {})).text
-    assert "No law passed the gate" in text and "One law was calibrated" in text
+    assert "No law's chains converged" in text and "One law was calibrated" in text
     assert "n/a" in Page(render_comparison({"likelihood": "hierarchical", "models": []}, {})).text
 
 
@@ -137,7 +137,7 @@ def test_summary_has_the_population_and_new_avalanches():
     assert "correlation corr(log mu, 1 -0.19 0.22" in words
     assert "b m/s 0.63 6 to 56 26 0.71 1 to 43 22 20" in words
     assert "runout m - 640 to 2280 1800 - 1790 to 2160 1970 22" in words
-    assert "Errors: normal, with a few outliers." in words and "Gate passed." in words
+    assert "Errors: normal, with a few outliers." in words and "Converged." in words
 
 
 def test_names_are_not_markup():

@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 import pytest
 from report_cases import HOSTILE, comparison
 
-from skred.report.comparison.html import render_comparison
+from skred.report.comparison.page import render_comparison
 from skred.report.shared.numbers import decimals_for, fixed, floats, rounded, share
 
 
@@ -75,8 +75,8 @@ def test_no_false_decimals_in_parameters(figures):
 def test_a_failed_law_is_shown_and_not_ranked(figures):
     html = render_comparison(comparison(), figures)
     text = Page(html).text
-    assert "1 of 3 laws failed the gate and is not ranked: coulomb." in text
-    assert "coulomb: failed the gate, not ranked. r-hat 1.312 exceeds 1.01: more --tune" in text
+    assert "1 of 3 laws did not converge and is not ranked: coulomb." in text
+    assert "coulomb: did not converge, not ranked. r-hat 1.312 exceeds 1.01: more --tune" in text
     ranking = html[html.index("exact elpd") : html.index('id="trust"')]
     assert "<th>coulomb</th>" not in ranking and "<th>pcm</th>" in ranking
 
@@ -85,7 +85,7 @@ def test_nothing_passed_and_nothing_known():
     document = comparison()
     document["models"] = document["models"][2:]
     text = Page(render_comparison(document, {})).text
-    assert "No law passed the gate, so nothing is compared." in text
+    assert "No law's chains converged, so nothing is compared." in text
     assert "n/a" in Page(render_comparison({"format": 1, "models": []}, {})).text
 
 

@@ -17,15 +17,15 @@ def test_comparison_fits_a_narrow_terminal():
     assert "…" not in text
     row = next(line for line in text.splitlines() if line.startswith("constant"))
     assert row.split()[1:3] == ["-64.60", "-4.90"]
-    assert "coulomb" in text and "gate failed" in text
-    assert "coulomb failed the gate: r-hat 1.312 exceeds 1.01: more --tune" in " ".join(text.split())
+    assert "coulomb" in text and "not converged" in text
+    assert "coulomb did not converge: r-hat 1.312 exceeds 1.01: more --tune" in " ".join(text.split())
 
 
 def test_summary_has_units_interval_and_diagnostics():
     text = shown(summary_table(comparison()["models"][0]))
     assert "90 % interval" in text and "equal-tailed" in text
     assert "0.243 to 0.333" in text and "1.002" in text and "mu (a0)" in text
-    assert "Gate passed." in text
+    assert "Converged." in text
     assert "more --tune" in shown(summary_table(comparison()["models"][2]))
 
 

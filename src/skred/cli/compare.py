@@ -32,6 +32,10 @@ def compare(
     problem = problem_of(campaign, likelihood.likelihood, likelihood.errors, likelihood.smoothing)
     with output.results("compare") as results:
         comparison = _compared(problem, laws, sampling, results.unfinished, output, exact=exact_loo)
+        from skred.report.folders import write_reports
+
+        output.tell("writing the report")
+        write_reports(results.unfinished)
 
     from skred.report.shared.tables import comparison_table
 

@@ -39,11 +39,14 @@ def diagnose(
         with output.results("diagnose") as results:
             from skred.diagnosis.run import diagnose_to
             from skred.report.diagnosis.report import diagnosis_table
+            from skred.report.folders import write_reports
 
             settings, effort = diagnosing.settings(), diagnosing.effort()
             lock, folds = diagnosing.lock or 0, diagnosing.outer_folds or 0
             document = diagnose_to(
                 problem, law, settings, effort, results.unfinished, output.tell, lock=lock, folds=folds
             )
+            output.tell("writing the report")
+            write_reports(results.unfinished)
     output.show(document, diagnosis_table, [], results.path)  # the statement is in the table
     return DONE if document["reason"] is None or document["converged"] else NOT_CONVERGED

@@ -14,6 +14,7 @@ from skred.cli.mechanisms import mechanisms
 from skred.cli.predict import predict
 from skred.cli.program import new_program, run_program
 from skred.cli.prove import prove_app
+from skred.cli.report import report
 from skred.cli.validate import validate
 
 app = new_program(
@@ -26,6 +27,7 @@ app.command(predict)
 app.command(diagnose)
 app.command(identify)
 app.command(mechanisms)
+app.command(report)
 app.command(prove_app)
 
 

@@ -38,6 +38,7 @@ def predict(
     from skred.inference.calibrate import calibrate
     from skred.prediction.predict import predict as predict_avalanches
     from skred.prediction.track import prediction_track
+    from skred.report.folders import write_reports
     from skred.report.prediction.figures import prediction_table
 
     where = prediction_track(problem, track, release)
@@ -46,5 +47,6 @@ def predict(
         output.tell(f"{law.id}: calibrating on {problem.campaign.name}")
         calibration = calibrate(problem, law, settings, progress=output.progress)
         prediction = predict_avalanches(calibration, results.unfinished, where, output.tell)
+        write_reports(results.unfinished)
     output.show(prediction, prediction_table, prediction["statement"], results.path)
     return DONE if prediction["gate"]["passed"] else NOT_CONVERGED

@@ -281,9 +281,11 @@ def _run(folder: "ProofFolder", working: Working, time_limit: float, silent: boo
 def _reveal(folder: "ProofFolder", working: Working, partial: bool, as_json: bool, quiet: bool) -> int:
     """Open and score, and say where the scores are."""
     from skred.prove.reveal import reveal as reveal_trials
+    from skred.report.folders import write_reports
 
     pool, silent = working.worker_pool(), quiet or as_json
     scorecard = reveal_trials(folder, pool, lambda line: _tell(line, silent), partial=partial)
+    write_reports(folder.path)
     if as_json:
         write_json(scorecard)
     elif not quiet:

@@ -63,14 +63,14 @@ def calibrate_law(
 
         from skred.inference.calibrate import calibrate, write_calibration
         from skred.inference.fit import calibration_statement
-        from skred.report.calibration.figures import save_model_figures
+        from skred.report.folders import write_reports
         from skred.report.shared.tables import summary_table
 
         settings = sampling.settings(problem.likelihood, sampler)
         calibration = calibrate(problem, law, settings, progress=output.progress)
         output.tell(f"{law_id}: writing {results.path}")
         write_calibration(calibration, results.unfinished)
-        save_model_figures(calibration.tree, law, problem, results.unfinished)
+        write_reports(results.unfinished)
     entry = calibration.entry()
     output.show(entry, summary_table, calibration_statement(entry), results.path)
     return DONE if calibration.gate.passed else NOT_CONVERGED

@@ -1,4 +1,4 @@
-"""A diagnosis with its files: verdict.json, report.html, draws as netCDF, and figures."""
+"""A diagnosis with its documents: verdict.json, and draws, curves and predictions as netCDF."""
 
 from __future__ import annotations
 
@@ -15,16 +15,20 @@ from skred.diagnosis.outcome import NotDiagnosed, Outcome
 from skred.diagnosis.repeated import folds_of, open_locked, outer_folds, set_aside
 from skred.diagnosis.verdict.document import verdict
 from skred.diagnosis.verdict.draws import augmented_draws
+from skred.diagnosis.verdict.figure_data import figure_data
+from skred.diagnosis.verdict.report_facts import report_facts
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.results import save
 from skred.inference.sampling import SamplerSettings
-from skred.output import write_json, write_text
+from skred.output import write_json
 from skred.parallel.processes import meanwhile
 from skred.physics.law import Law
 
 Tell = Callable[[str], None]
 DRAWS = ("base.nc", "base_same_errors.nc", "augmented.nc")
-"""Of the base law, of it under the errors of what was let in, and of the law with that."""
+"""Of the base law, of it under the errors of what was added, and of the law with that."""
+CURVES = "diagnosis.nc"
+"""What the figures show, see `skred.diagnosis.verdict.figure_data`."""
 
 
 def diagnose_to(
@@ -38,7 +42,9 @@ def diagnose_to(
     lock: int = 0,
     folds: int = 0,
 ) -> dict[str, Any]:
-    """Diagnose, and write everything into a folder; the verdict first, so that it is there in any case.
+    """Diagnose, and write all documents into a folder; the verdict first, so that it is there in any case.
+
+    Page and figures are made from the documents, see `skred.report.folders.write_reports`.
 
     Parameters
     ----------
@@ -47,17 +53,18 @@ def diagnose_to(
     folds : int
         Parts of the others without which the whole diagnosis is repeated, one by one; 0 for none.
     """
-    from skred.report.diagnosis.report import FIGURES, render_diagnosis, save_diagnosis_figures
-
     locked = None
     if lock:
         problem, locked = set_aside(problem, lock, settings.seed)
     if folds:
         folds_of(problem, folds, settings.seed)  # refused now rather than after the diagnosis
     found = diagnose(problem, law, settings, effort, tell)
-    document = verdict(found) | {"settings": settings.as_dict() | {"replicas": effort.replicas}}
+    document = verdict(found) | {
+        "settings": settings.as_dict() | {"replicas": effort.replicas},
+        "report": report_facts(found),
+    }
     # Not all of these are written each time: an earlier diagnosis's would be taken for this one's.
-    for name in ("verdict.json", "report.html", *DRAWS, *(f"{figure}.png" for figure in FIGURES)):
+    for name in ("verdict.json", CURVES, *DRAWS):
         (folder / name).unlink(missing_ok=True)
     write_json(folder / "verdict.json", document)
     if locked is not None:
@@ -67,12 +74,9 @@ def diagnose_to(
         document["outer_folds"] = outer_folds(problem, law, settings, effort, folds, tell)
     if lock or folds:
         write_json(folder / "verdict.json", document)
-    tell("writing the report")
-    with ExitStack() as draws:  # written whatever becomes of the figures, and of each other
-        for name, tree in _draws_of(found).items():
-            draws.callback(meanwhile(save, tree, folder / name))
-        figures = save_diagnosis_figures(found, folder)
-        write_text(folder / "report.html", render_diagnosis(found, document, figures))
+    with ExitStack() as saved:  # written whatever becomes of the others
+        for name, tree in (_draws_of(found) | {CURVES: figure_data(found)}).items():
+            saved.callback(meanwhile(save, tree, folder / name))
     return document
 
 

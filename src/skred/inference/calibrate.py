@@ -15,6 +15,7 @@ import xarray as xr
 
 import skred.inference.hierarchical.results  # noqa: F401 - registers what it says of readings
 import skred.inference.pooled.results  # noqa: F401 - likewise
+from skred.inference.along_track import with_along_track
 from skred.inference.gate import Gate, check_gate
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY, interval
 from skred.inference.joint_metropolis import JointMetropolis
@@ -113,8 +114,9 @@ def calibrate_surely(problem: Problem, law: Law, settings: SamplerSettings) -> C
 
 
 def write_calibration(calibration: Calibration, folder: Path) -> None:
-    """Write the documents of one calibration: ``posterior.nc`` and ``summary.json``."""
-    save(calibration.tree, folder / "posterior.nc")
+    """Write ``posterior.nc`` and ``summary.json``, from which the figures of a calibration are made."""
+    tree = with_along_track(calibration.tree, calibration.law, calibration.problem)
+    save(tree, folder / "posterior.nc")
     attributes = calibration.tree.attrs
     document = {
         "format": 1,

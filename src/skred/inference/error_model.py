@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign, Status
-from skred.inference.reading_density import OUTLIER_FACTOR
 
 FloatArray = NDArray[np.float64]
 DEFAULT_ERRORS = "robust"
+OUTLIER_FACTOR = 6.0
+"""How much wider than its stated error an outlying reading scatters."""
 PLACE_SD_M = 8.0
 """Standard deviation [m] of the place where a front stopped, relative to a sensor."""
 

@@ -7,13 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.inference.error_model import Errors, EventReadings
+from skred.inference.error_model import OUTLIER_FACTOR, Errors, EventReadings
 from skred.parallel.compile_cache import compiled, inner
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-OUTLIER_FACTOR = 6.0
-"""How much wider than its stated error an outlying reading scatters."""
 _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 _SQRT_HALF = math.sqrt(0.5)
 _LEAST = 1e-300

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Sequence
+from dataclasses import asdict
 from functools import singledispatch
 from importlib.metadata import version
 from pathlib import Path
@@ -15,10 +16,13 @@ import xarray as xr
 
 from skred.inference.gate import Gate
 from skred.inference.problem import Problem
+from skred.inference.recorded_data import recorded_groups
 from skred.inference.sampling import SamplerSettings
 from skred.output import write_bytes
-from skred.physics.law import Law, Parameter
+from skred.physics.law import Law, Parameter, parameter_of
 
+FORMAT = 1
+"""Of the files with trees; figures are made from no other."""
 _PACKAGES = ("skred", "pymc", "pytensor", "arviz", "numba", "numpy", "scipy", "xarray")
 
 
@@ -54,8 +58,7 @@ def assemble(
     posterior, prior : parameters of the law, and of the population in a hierarchical calibration
     posterior_predictive, prior_predictive, event_posterior : see `predictive`
     log_likelihood : ``recordings`` (chain, draw, event)
-    observed_data : ``reading`` (event, sensor), NaN where there is none
-    constant_data : status, covariance of the recordings, sensors, track, terrain
+    observed_data, constant_data : see `skred.inference.recorded_data.recorded_groups`
     """
     parameters = posterior["posterior"].to_dataset()
     own = problem.parameters(law)
@@ -70,8 +73,7 @@ def assemble(
         ),
         "prior": _with_units(prior, own, law),
         **predictive(problem, law, parameters, prior, settings.seed),
-        "observed_data": _observed(problem),
-        "constant_data": _constant(problem),
+        **recorded_groups(problem),
     }
     if "sample_stats" in posterior.children:
         groups["sample_stats"] = _storable(posterior["sample_stats"].to_dataset())
@@ -109,37 +111,6 @@ def _with_units(parameters: xr.Dataset, own: Sequence[Parameter], law: Law) -> x
     return labelled
 
 
-def _observed(problem: Problem) -> xr.Dataset:
-    return xr.Dataset(
-        {"reading": (("event", "sensor"), problem.values, {"units": "m s-1; m for the runout"})},
-        coords=problem.coords,
-    )
-
-
-def _constant(problem: Problem) -> xr.Dataset:
-    campaign, terrain = problem.campaign, problem.terrain
-    sensor = problem.coords["sensor"]
-    return xr.Dataset(
-        {
-            "status": (
-                ("event", "sensor"),
-                campaign.status,
-                {"flag_values": [0, 1, 2], "flag_meanings": "observed not_reached missing"},
-            ),
-            "s_from": ("sensor", [s.s_from_m for s in campaign.sensors], {"units": "m"}),
-            "s_to": ("sensor", [s.s_to_m for s in campaign.sensors], {"units": "m"}),
-            "release_s": ("event", [e.release_s_m for e in campaign.events], {"units": "m"}),
-            "track_x": ("point", campaign.track.x_m, {"units": "m"}),
-            "track_z": ("point", campaign.track.z_m, {"units": "m"}),
-            "cell_edge": ("edge", terrain.edge_s_m, {"units": "m"}),
-            "slope": ("cell", terrain.slope_rad, {"units": "rad"}),
-            "curvature": ("cell", terrain.curvature, {"units": "m-1"}),
-            **problem.constants(),
-        },
-        coords={"event": problem.coords["event"], "sensor": sensor, "sensor_bis": sensor},
-    )
-
-
 def _storable(stats: xr.Dataset) -> xr.Dataset:
     """Statistics that netCDF can hold: SMC pads its evidence in arrays of objects."""
     kept = stats.copy()
@@ -159,12 +130,9 @@ def _last_finite(value: Any) -> float:
 def _attributes(problem: Problem, law: Law, gate: Gate, settings: SamplerSettings) -> dict[str, Any]:
     campaign = problem.campaign
     return {
-        "title": f"{law.title}, {problem.likelihood} calibration on {campaign.name}",
-        "law": law.id,
-        "equation": law.equation,
+        **law_attributes(problem, law),
         "campaign": campaign.name,
         "campaign_fingerprint": campaign.fingerprint(),
-        "likelihood": problem.likelihood,
         "smoothing_m": problem.terrain.smoothing_m,
         "n_cells": problem.terrain.n_cells,
         "settings": json.dumps(settings.as_dict()),
@@ -172,3 +140,23 @@ def _attributes(problem: Problem, law: Law, gate: Gate, settings: SamplerSetting
         "gate": json.dumps(gate.as_dict()),
         "versions": json.dumps({"python": platform.python_version(), **{p: version(p) for p in _PACKAGES}}),
     }
+
+
+def law_attributes(problem: Problem, law: Law) -> dict[str, Any]:
+    """Names, symbols and units of a calibrated law, as attributes of its tree: figures know of no other."""
+    others = [parameter for parameter in problem.parameters(law) if parameter not in law.parameters]
+    return {
+        "format": FORMAT,
+        "title": f"{law.title}, {problem.likelihood} calibration on {problem.campaign.name}",
+        "law": law.id,
+        "law_title": law.title,
+        "law_parameters": _json(law.parameters),
+        "population_parameters": _json(others),
+        "strengths": _json([parameter_of(mechanism.strength) for mechanism in law.mechanisms]),
+        "equation": law.equation,
+        "likelihood": problem.likelihood,
+    }
+
+
+def _json(parameters: Sequence[Parameter]) -> str:
+    return json.dumps([asdict(parameter) for parameter in parameters])

@@ -7,7 +7,6 @@ import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Status
+from skred.inference.along_track import with_along_track
 from skred.inference.calibrate import Calibration, calibrate
 from skred.inference.evidence import SMC_DRAWS, evidence
-from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY
+from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
+from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY, PRACTICAL_DIFFERENCE
 from skred.inference.leave_one_out import ExactLoo, exact_leave_one_out
 from skred.inference.paired import best_first, paired_difference, sum_se
 from skred.inference.pooled.problem import PooledProblem
@@ -28,27 +29,11 @@ from skred.inference.sampling import SamplerSettings
 from skred.inference.waic import waic
 from skred.model_selection.alpha_beta_entry import alpha_beta_entry
 from skred.model_selection.statement import statement
-from skred.output import write_json, write_text
+from skred.output import write_json
 from skred.physics.law import Law
 
 EVIDENCE_SEEDS = 2
 Tell = Callable[[str], None]
-
-
-@dataclass(frozen=True, eq=False)
-class Scored:
-    """Laws calibrated on one problem, with their scores.
-
-    Attributes
-    ----------
-    document : dict
-        As in ``compare.json``.
-    figures : dict of str to Path
-        Of each law, by ``<law id>/<figure>``.
-    """
-
-    document: dict[str, Any]
-    figures: dict[str, Path]
 
 
 def compare(
@@ -66,7 +51,7 @@ def compare(
     laws : sequence of Law
     settings : SamplerSettings
     folder : Path
-        Gets a folder for each law, ``compare.json``, figures and ``report.html``.
+        Gets a folder for each law, and ``compare.json``: report and figures are made from these.
     tell : callable
         Takes one line for each stage.
 
@@ -76,8 +61,8 @@ def compare(
         The content of ``compare.json``.
     """
     started = time.monotonic()
-    scored = score(problem, laws, settings, folder, tell, exact=True)
-    return write_comparison(scored, folder, started, tell)
+    document = score(problem, laws, settings, folder, tell, exact=True)
+    return write_comparison(document, folder, started)
 
 
 def score(
@@ -88,12 +73,15 @@ def score(
     tell: Tell,
     *,
     exact: bool,
-) -> Scored:
-    """Calibrate laws and score their predictions; with `exact` all events are left out by refits."""
-    from skred.report.calibration.figures import save_model_figures
+) -> dict[str, Any]:
+    """Calibrate laws and score their predictions; with `exact` all events are left out by refits.
 
+    Returns
+    -------
+    dict
+        As in ``compare.json``.
+    """
     entries: list[dict[str, Any]] = []
-    figures: dict[str, Path] = {}
     trees: dict[str, Any] = {}
     for law in laws:
         tell(f"{law.id}: sampling ({problem.likelihood})")
@@ -109,24 +97,15 @@ def score(
         entries.append(entry)
         law_folder = folder / law.id
         law_folder.mkdir(exist_ok=True, parents=True)
-        save(calibration.tree, law_folder / "posterior.nc")
-        drawn = save_model_figures(calibration.tree, law, problem, law_folder)
-        figures |= {f"{law.id}/{figure.stem}": figure for figure in drawn}
-    return Scored(_document(problem, settings, calibration, rank(entries, trees)), figures)
+        save(with_along_track(calibration.tree, law, problem), law_folder / "posterior.nc")
+    return _document(problem, settings, calibration, rank(entries, trees))
 
 
-def write_comparison(scored: Scored, folder: Path, started: float, tell: Tell) -> dict[str, Any]:
-    """Add the statement, and write ``compare.json``, figures and ``report.html``; returns the document."""
-    from skred.report.calibration.figures import save_comparison_figures
-    from skred.report.comparison.html import render_comparison
-
-    comparison = scored.document
+def write_comparison(comparison: dict[str, Any], folder: Path, started: float) -> dict[str, Any]:
+    """Say what came out, and write ``compare.json``; returns the document."""
     comparison["statement"] = statement(comparison)
     comparison["seconds"] = time.monotonic() - started
-    tell("writing the report")
-    figures = scored.figures | save_comparison_figures(comparison, folder)
     write_json(folder / "compare.json", comparison)
-    write_text(folder / "report.html", render_comparison(comparison, figures))
     return comparison
 
 
@@ -243,6 +222,7 @@ def _document(
         },
         "versions": json.loads(any_of_them.tree.attrs["versions"]),
         "interval": {"kind": INTERVAL_KIND, "probability": INTERVAL_PROBABILITY},
+        "limits": {"practical_difference": PRACTICAL_DIFFERENCE, "r_hat": R_HAT_LIMIT, "ess": ESS_LIMIT},
         "event_ids": list(campaign.event_ids),
         "models": models,
         "alpha_beta": alpha_beta_entry(problem),

@@ -44,7 +44,8 @@ def compare_hierarchical(
     laws : sequence of Law
     settings : SamplerSettings
     folder : Path
-        Gets a folder for each law, ``pooled`` with the same, ``compare.json``, figures and ``report.html``.
+        Gets a folder for each law, ``pooled`` with the same, and ``compare.json``: report and figures are
+        made from these.
     tell : callable
         Takes one line for each stage.
     exact : bool
@@ -56,8 +57,8 @@ def compare_hierarchical(
         The content of ``compare.json``.
     """
     started = time.monotonic()
-    scored = score(problem, laws, settings, folder, tell, exact=exact)
-    document = scored.document
+    document = score(problem, laws, settings, folder, tell, exact=exact)
+    document["limits"]["integration"] = problem.integration_limit
     document["pooled"] = _pooled(pooled, laws, settings, folder / "pooled", tell)
     document["changes"] = changes(document)
     best = document["models"][0]
@@ -65,7 +66,7 @@ def compare_hierarchical(
     if best["gate"]["passed"]:
         law = next(law for law in laws if law.id == best["id"])
         document["error_models"] = _error_models(problem, law, best, settings, tell)
-    return write_comparison(scored, folder, started, tell)
+    return write_comparison(document, folder, started)
 
 
 def _pooled(
@@ -73,7 +74,7 @@ def _pooled(
 ) -> dict[str, Any]:
     if isinstance(pooled, str):
         return {"reason": pooled, "models": []}
-    entries = score(pooled, laws, settings, folder, tell, exact=True).document["models"]
+    entries = score(pooled, laws, settings, folder, tell, exact=True)["models"]
     return {"reason": None, "models": [{key: entry[key] for key in _SHOWN} for entry in entries]}
 
 

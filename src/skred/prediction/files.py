@@ -1,4 +1,4 @@
-"""A prediction's files: three tables, netCDF, two figures and a summary, each whole or not at all."""
+"""A prediction's files: three tables, netCDF and a summary, each whole or not at all."""
 
 from __future__ import annotations
 
@@ -10,25 +10,24 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.recorded_data import recorded_groups
 from skred.inference.results import save
 from skred.output import write_json, write_text
-from skred.physics.law import Law
 from skred.prediction.probabilities import PARTS
 
 FloatArray = NDArray[np.float64]
 TABLES = ("exceedance.csv", "runout.csv", "uncertainty.csv")
-FILES = (*TABLES, "prediction.nc", "prediction.png", "uncertainty.png", "prediction.json")
-"""Files that a prediction writes beside the posterior; ``prediction.json`` comes last."""
+FILES = (*TABLES, "prediction.nc", "prediction.json")
+"""What a prediction writes beside the posterior, the last one last."""
 
 
 def write_prediction(
     document: dict[str, Any],
     data: xr.Dataset | None,
     problem: HierarchicalProblem,
-    law: Law,
     folder: Path,
 ) -> None:
-    """Write the tables, ``prediction.nc``, two figures and, when all is there, ``prediction.json``.
+    """Write the tables, ``prediction.nc`` and, when all is there, ``prediction.json``; figures need no more.
 
     Without data, because the gate failed, only the last. What an earlier prediction left in the folder
     goes first, so that nothing of it stands beside the new one.
@@ -36,14 +35,10 @@ def write_prediction(
     for name in reversed(FILES):
         (folder / name).unlink(missing_ok=True)
     if data is not None:
-        from skred.report.prediction.figures import prediction_figure, uncertainty_figure
-        from skred.report.shared.style import write_png
-
         for name, text in zip(TABLES, tables(data), strict=True):
             write_text(folder / name, text)
-        save(xr.DataTree(dataset=data), folder / "prediction.nc")
-        write_png(prediction_figure(data, law, problem), folder / "prediction.png")
-        write_png(uncertainty_figure(data, law), folder / "uncertainty.png")
+        groups = {"/": data, **recorded_groups(problem)}
+        save(xr.DataTree.from_dict(groups), folder / "prediction.nc")
     write_json(folder / "prediction.json", document)
 
 

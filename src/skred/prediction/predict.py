@@ -21,7 +21,7 @@ from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.population import population_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY
-from skred.inference.results import save
+from skred.inference.results import FORMAT, save
 from skred.physics.law import Law
 from skred.prediction.document import named_places, prediction_document, recorded_runouts
 from skred.prediction.files import write_prediction
@@ -93,7 +93,7 @@ def predict(
     document = prediction_document(calibration, track, data)
     document["seconds"] = time.monotonic() - started
     tell("writing the results")
-    write_prediction(document, data, problem, law, folder)
+    write_prediction(document, data, problem, folder)
     return document
 
 
@@ -184,6 +184,7 @@ def _attributes(
         "versions",
     )  # fmt: skip
     attributes = {
+        "format": FORMAT,
         "title": f"{law.title}: the next avalanche on {track.name}",
         "error_model": problem.error_model.id,
         "track": track.name,

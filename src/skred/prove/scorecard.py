@@ -1,4 +1,4 @@
-"""The scorecard of concealed trials: scores, criteria and comparisons as data, page and figures."""
+"""The scorecard of concealed trials: scores, acceptance criteria and comparisons as data."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from skred.output import plain, write_json, write_text
+from skred.output import plain, write_json
 from skred.prove.scoring.answers import Pair, pairs_of
 from skred.prove.scoring.criteria import acceptance_criteria
 from skred.prove.scoring.intervals import LEVEL, RESAMPLES, SEED
@@ -26,7 +26,7 @@ def write_scorecard(
     trials: Sequence[Mapping[str, Any]],
     answers: Mapping[str, Mapping[str, Mapping[str, Any]]],
 ) -> dict[str, Any]:
-    """Score all answers and write ``scorecard.json``, ``scorecard.html`` and the figures.
+    """Score all answers and write ``scorecard.json``, from which page and figures are made.
 
     Parameters
     ----------
@@ -44,14 +44,9 @@ def write_scorecard(
     dict
         The scorecard as plain data.
     """
-    from skred.report.scorecard.figures import save_scorecard_figures
-    from skred.report.scorecard.page import render_scorecard
-
     document = scorecard(ledger, trials, answers)
     folder.mkdir(parents=True, exist_ok=True)
     write_json(folder / "scorecard.json", document)
-    figures = save_scorecard_figures(document, folder)
-    write_text(folder / "scorecard.html", render_scorecard(document, figures))
     return document
 
 

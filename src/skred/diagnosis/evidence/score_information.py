@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
+from skred.inference.error_model import OUTLIER_FACTOR
 from skred.inference.reading_density import (
     OBSERVED,
-    OUTLIER_FACTOR,
     RELATIVE,
     VALUE,
     VELOCITY,

@@ -72,6 +72,11 @@ def _standard(found: Diagnosis, covariate: str | None) -> dict[str, Any] | None:
     return None if standard is None else standard.as_dict()
 
 
+def candidates_of(comparison: Comparison) -> list[str]:
+    """Ids of the mechanisms in a comparison, under any error model."""
+    return list(dict.fromkeys(name for one in comparison.under_each for name in one.candidates))
+
+
 def candidate_documents(found: Diagnosis, comparison: Comparison) -> list[dict[str, Any]]:
     """Every mechanism of a comparison; what was added from it with its strength as it was calibrated."""
     added = {
@@ -79,7 +84,7 @@ def candidate_documents(found: Diagnosis, comparison: Comparison) -> list[dict[s
         for number, step in enumerate(found.steps)
         if step.comparison is comparison
     }
-    rows = [_candidate(comparison, name) for name in comparison.under_each[0].candidates]
+    rows = [_candidate(comparison, name) for name in candidates_of(comparison)]
     for row in rows:
         if row["id"] in added:
             row["strength"] = strength_document(found, added[row["id"]])

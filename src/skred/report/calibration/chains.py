@@ -15,6 +15,7 @@ from skred.report.shared.labels import (
     symbol_label,
     symbol_text,
 )
+from skred.report.shared.law import law_of
 from skred.report.shared.numbers import decimals_for, rounded
 from skred.report.shared.style import (
     GREY,
@@ -30,13 +31,12 @@ from skred.report.shared.style import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from skred.physics.law import Law, Parameter
+    from skred.physics.law import Parameter
+    from skred.report.shared.law import CalibratedLaw
 
 FloatArray = NDArray[np.float64]
 _MAX_TRACE_POINTS = 1500
@@ -46,25 +46,21 @@ _LINES = 0.64
 """Share of a panel's height that is drawn in; the legend has the rest."""
 
 
-def _shown(law: Law, parameters: Sequence[Parameter] | None) -> tuple[Parameter, ...]:
-    """The parameters to show: the law's own if no others are given."""
-    return law.parameters if parameters is None else tuple(parameters)
-
-
-def _label(parameter: Parameter, law: Law, n_shown: int) -> str:
+def _label(parameter: Parameter, law: CalibratedLaw, n_shown: int) -> str:
     """Label of an axis; where there are more than the law's own, they are those of a population."""
-    of_population = n_shown > len(law.parameters)
+    of_population = n_shown > len(law.own)
     return population_label(parameter) if of_population else parameter_label(parameter)
 
 
 @styled
-def trace_figure(tree: xr.DataTree, law: Law, parameters: Sequence[Parameter] | None = None) -> Figure:
-    """Trace and rank histogram of every chain, one row per parameter (the law's own if none are given).
+def trace_figure(tree: xr.DataTree) -> Figure:
+    """Trace and rank histogram of every chain, one row per parameter.
 
     Ranks are over all chains together: in chains that sample the same distribution they are spread
     evenly (Vehtari and others, 2021, doi 10.1214/20-BA1221).
     """
-    shown = _shown(law, parameters)
+    law = law_of(tree)
+    shown = law.parameters
     n = len(shown)
     title = "Chains: traces that overlap and ranks that are level have mixed"
     figure = new_figure(0.9 + 1.75 * n, f"{title}\n{figure_text(law.title, 80)}\n{gate_text(tree)}")
@@ -104,9 +100,10 @@ def _ranks(axes: Axes, chains: FloatArray, colours: list[str]) -> None:
 
 
 @styled
-def joint_figure(tree: xr.DataTree, law: Law, parameters: Sequence[Parameter] | None = None) -> Figure:
+def joint_figure(tree: xr.DataTree) -> Figure:
     """Two-dimensional histogram of each pair of parameters, with their marginal histograms."""
-    every = _shown(law, parameters)
+    law = law_of(tree)
+    every = law.parameters
     shown = every[:_MAX_JOINT]
     draws = [chains_of(tree, parameter.name).ravel() for parameter in shown]
     n = len(shown)
@@ -137,8 +134,8 @@ def joint_figure(tree: xr.DataTree, law: Law, parameters: Sequence[Parameter] | 
     return figure
 
 
-def _joint_title(law: Law, parameters: tuple[Parameter, ...], draws: list[FloatArray]) -> str:
-    of_population = len(parameters) > len(law.parameters)
+def _joint_title(law: CalibratedLaw, parameters: tuple[Parameter, ...], draws: list[FloatArray]) -> str:
+    of_population = len(parameters) > len(law.own)
     what = " of the medians, spreads and correlations across avalanches" if of_population else ""
     title = f"Joint posterior{what}\n{figure_text(law.title, 80)}"
     if len(draws) == 2 and all(np.ptp(values) > 0 for values in draws):
@@ -156,9 +153,10 @@ def _pair(axes: Axes, x: FloatArray, y: FloatArray, colour: str) -> None:
 
 
 @styled
-def marginals_figure(tree: xr.DataTree, law: Law, parameters: Sequence[Parameter] | None = None) -> Figure:
+def marginals_figure(tree: xr.DataTree) -> Figure:
     """Posterior of each parameter against its prior density, with mean and 90 % interval."""
-    shown = _shown(law, parameters)
+    law = law_of(tree)
+    shown = law.parameters
     n = len(shown)
     columns = min(n, 2)
     rows = -(-n // columns)

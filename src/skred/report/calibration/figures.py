@@ -1,24 +1,16 @@
-"""All figures: of one law's calibration, and of a comparison of laws."""
+"""All figures of one law's calibration."""
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 from skred.report.calibration.along_track import along_track_figure
 from skred.report.calibration.chains import joint_figure, marginals_figure, trace_figure
 from skred.report.calibration.new_avalanches import new_avalanche_figure, new_avalanche_track_figure
 from skred.report.calibration.population import events_figure, population_figure
 from skred.report.calibration.predictive import predictive_figure
-from skred.report.comparison.laws import (
-    elpd_figure,
-    evidence_figure,
-    pareto_k_figure,
-    pointwise_figure,
-    save_comparison_figures,
-)
-from skred.report.comparison.sensors import predictions_figure
+from skred.report.shared.law import law_of
 from skred.report.shared.style import write_png
 
 if TYPE_CHECKING:
@@ -27,40 +19,25 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from skred.inference.pooled.problem import PooledProblem
-    from skred.inference.problem import Problem
-    from skred.physics.law import Law
-
-__all__ = [
-    "along_track_figure",
-    "elpd_figure",
-    "events_figure",
-    "evidence_figure",
-    "joint_figure",
-    "marginals_figure",
-    "new_avalanche_figure",
-    "new_avalanche_track_figure",
-    "pareto_k_figure",
-    "pointwise_figure",
-    "population_figure",
-    "predictions_figure",
-    "predictive_figure",
-    "save_comparison_figures",
-    "save_model_figures",
-    "trace_figure",
-]
+_OF_CHAINS = {"trace": trace_figure, "joint": joint_figure, "marginals": marginals_figure}
+_POOLED = {"predictive": predictive_figure, "along_track": along_track_figure}
+_HIERARCHICAL = {
+    "new_avalanche": new_avalanche_figure,
+    "population": population_figure,
+    "events": events_figure,
+    "along_track": new_avalanche_track_figure,
+}
+MODEL_FIGURES = tuple(dict.fromkeys((*_OF_CHAINS, *_POOLED, *_HIERARCHICAL)))
+"""Names of all figures that there may be."""
 
 
-def save_model_figures(tree: xr.DataTree, law: Law, problem: Problem, folder: Path) -> list[Path]:
+def save_model_figures(tree: xr.DataTree, folder: Path) -> list[Path]:
     """Write the figures of one calibration as PNG.
 
     Parameters
     ----------
     tree : DataTree
-        As made by `skred.inference.results.assemble`.
-    law : Law
-    problem : Problem
-        What it was calibrated on.
+        As made by `skred.inference.along_track.with_along_track`.
     folder : Path
         An existing folder.
 
@@ -70,18 +47,9 @@ def save_model_figures(tree: xr.DataTree, law: Law, problem: Problem, folder: Pa
         trace, joint (where there are two or more parameters), marginals; of a pooled calibration then
         predictive and along_track, of a hierarchical one new_avalanche, population, events and along_track.
     """
-    parameters = problem.parameters(law)
-    makers: dict[str, Callable[[], Figure]] = {"trace": partial(trace_figure, tree, law, parameters)}
-    if len(parameters) > 1:
-        makers["joint"] = partial(joint_figure, tree, law, parameters)
-    makers["marginals"] = partial(marginals_figure, tree, law, parameters)
-    if problem.likelihood == "hierarchical":
-        makers["new_avalanche"] = partial(new_avalanche_figure, tree, law, problem)
-        makers["population"] = partial(population_figure, tree, law, problem)
-        makers["events"] = partial(events_figure, tree, law, problem)
-        makers["along_track"] = partial(new_avalanche_track_figure, tree, law, problem)
-    else:
-        pooled = cast("PooledProblem", problem)
-        makers["predictive"] = partial(predictive_figure, tree, law, pooled)
-        makers["along_track"] = partial(along_track_figure, tree, law, pooled)
-    return [write_png(make(), folder / f"{name}.png") for name, make in makers.items()]
+    law = law_of(tree)
+    makers: dict[str, Callable[[xr.DataTree], Figure]] = dict(_OF_CHAINS)
+    if len(law.parameters) < 2:
+        del makers["joint"]
+    makers |= _HIERARCHICAL if law.likelihood == "hierarchical" else _POOLED
+    return [write_png(make(tree), folder / f"{name}.png") for name, make in makers.items()]

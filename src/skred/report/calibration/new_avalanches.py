@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from skred.report.calibration.predictive import recorded_marks
 from skred.report.shared.draws import (
     NewAvalanche,
-    chains_of,
     density,
     left_out,
     new_avalanche,
@@ -19,6 +18,8 @@ from skred.report.shared.draws import (
     shown_sensors,
 )
 from skred.report.shared.labels import figure_text
+from skred.report.shared.law import law_of
+from skred.report.shared.recordings import recordings_of
 from skred.report.shared.style import (
     INK,
     bare,
@@ -38,30 +39,27 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from skred.inference.problem import Problem
-    from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
-_MAX_AVALANCHES = 1000
-_MEDIANS, _AVALANCHES_OF_A_MEDIAN = 120, 100
 _SHOWN = (0.002, 0.998)
 """Quantiles of the new avalanches that a panel reaches to at least."""
 
 
 @styled
-def new_avalanche_figure(tree: xr.DataTree, law: Law, problem: Problem) -> Figure:
+def new_avalanche_figure(tree: xr.DataTree) -> Figure:
     """Distribution of a new avalanche's reading against the recorded one, of each of up to twelve sensors."""
-    sensors = shown_sensors(problem.campaign)
+    law, recordings = law_of(tree), recordings_of(tree)
+    sensors = shown_sensors(recordings)
     rows, columns = grid_for(len(sensors))
-    title = f"A new avalanche against the recorded ones{left_out(problem.campaign.n_sensors)}"
+    title = f"A new avalanche against the recorded ones{left_out(recordings.n_sensors)}"
     height = 1.1 + (2.75 if columns > 2 else 2.5) * rows
     figure = new_figure(height, f"{title}\n{figure_text(law.title, 80)}")
     panels = panels_in(figure, len(sensors), columns)
     colour = law_colours([law.id])[law.id]
     for axes, sensor in zip(panels, sensors, strict=True):
-        draws = new_avalanche(tree, problem, sensor)
+        draws = new_avalanche(tree, recordings, sensor)
         _reading_panel(axes, draws, colour)
-        text = f"{sensor_title(sensor)}\n{reached_text(draws, problem.terrain.length_m)}"
+        text = f"{sensor_title(sensor)}\n{reached_text(draws, recordings.length_m)}"
         if columns > 2:
             text = text.replace(": ", "\n", 1)
         axes.set_title(text, fontsize=7.5 if columns > 2 else 8)
@@ -129,20 +127,21 @@ def _percent(value: float) -> str:
 
 
 @styled
-def new_avalanche_track_figure(tree: xr.DataTree, law: Law, problem: Problem) -> Figure:
+def new_avalanche_track_figure(tree: xr.DataTree) -> Figure:
     """Bands of new avalanches' speeds; apart from them, how well the median is known; the terrain below."""
-    strengths, releases = _avalanches(tree, law)
-    speeds = problem.speeds(law.mechanisms, strengths, releases)
-    medians = _median_speeds(tree, law, problem, releases)
+    law, recordings = law_of(tree), recordings_of(tree)
+    found = tree["along_track"].to_dataset()
     colour = law_colours([law.id])[law.id]
 
     def draw(axes: Axes) -> None:
-        s_m = problem.terrain.edge_s_m
+        s_m, speed, medians = found["s"].values, found["speed"], found["median_speed"]
         for tail, amount in ((0.05, 0.2), (0.25, 0.42)):
-            low, high = np.quantile(speeds, [tail, 1.0 - tail], axis=0)
+            low, high = (speed.sel(quantile=share, method="nearest").values for share in (tail, 1.0 - tail))
             label = f"new avalanches, {100 - 200 * tail:.0f} %"
             axes.fill_between(s_m, low, high, color=tint(colour, amount), linewidth=0, label=label)
-        low, median, high = np.quantile(medians, [0.05, 0.5, 0.95], axis=0)
+        low, median, high = (
+            medians.sel(quantile=share, method="nearest").values for share in (0.05, 0.5, 0.95)
+        )
         dark = shades(colour, 2)[0]
         axes.fill_between(
             s_m, low, high, color=dark, alpha=0.55, linewidth=0, label="their median, 90 % interval"
@@ -151,46 +150,13 @@ def new_avalanche_track_figure(tree: xr.DataTree, law: Law, problem: Problem) ->
 
     what = "Front speed of new avalanches along the track (0 where they have stopped)"
     title = f"{what}\n{figure_text(law.title, 80)}"
-    top = 1.05 * max(float(np.quantile(speeds, 0.95, axis=0).max()), 1.0, *highest_recorded(problem))
-    return track_figure(problem, title, draw, top=top, start=_start(releases))
+    top = 1.05 * max(float(found["speed"].values[-1].max()), 1.0, *highest_recorded(recordings))
+    return track_figure(recordings, title, draw, top=top, start=_start(found["release"].values))
 
 
 def _start(releases: FloatArray) -> tuple[float, str]:
-    low, high = np.quantile(releases, [0.05, 0.95])
+    """Where the track is shown from, and words for it, by the quantiles of the releases."""
+    low, high = float(releases[0]), float(releases[-1])
     if high - low < 0.5:
-        return float(low), f"release at s = {low:.0f} m"
-    return float(low), f"releases, 90 % between s = {low:.0f} and {high:.0f} m"
-
-
-def _avalanches(tree: xr.DataTree, law: Law) -> tuple[FloatArray, FloatArray]:
-    """Strengths (n, n_strengths) and releases (n,) of randomly chosen new avalanches."""
-    predictive = tree["posterior_predictive"].to_dataset()
-    names = [*(mechanism.strength.name for mechanism in law.mechanisms), "release"]
-    rows = [predictive[name].transpose("chain", "draw", "event").values.ravel() for name in names]
-    n = len(rows[0])
-    chosen = np.random.default_rng(0).permutation(n)[:_MAX_AVALANCHES]
-    table = np.column_stack(rows)[chosen]
-    return np.ascontiguousarray(table[:, :-1]), np.ascontiguousarray(table[:, -1])
-
-
-def _median_speeds(tree: xr.DataTree, law: Law, problem: Problem, releases: FloatArray) -> FloatArray:
-    """Median speed across new avalanches for each of some draws of the population, (n_draws, n_edges).
-
-    The avalanches of all draws are the same ones in standard deviations (a Latin hypercube), so that
-    the medians differ by the population alone.
-    """
-    from scipy.special import ndtri
-
-    from skred.inference.hierarchical.population import population_of
-
-    samples = {p.name: chains_of(tree, p.name).ravel() for p in problem.parameters(law)}
-    n = len(next(iter(samples.values())))
-    chosen = np.unique(np.linspace(0, n - 1, min(n, _MEDIANS)).astype(int))
-    means, factors = population_of(law, {name: values[chosen] for name, values in samples.items()})
-    rng = np.random.default_rng(0)
-    size = _AVALANCHES_OF_A_MEDIAN
-    ranks = np.column_stack([rng.permutation(size) for _ in law.mechanisms])
-    deviations = ndtri((ranks + 0.5) / size)
-    places = np.resize(releases, size)
-    rows = [np.exp(mean + deviations @ factor.T) for mean, factor in zip(means, factors, strict=True)]
-    return np.array([np.median(problem.speeds(law.mechanisms, row, places), axis=0) for row in rows])
+        return low, f"release at s = {low:.0f} m"
+    return low, f"releases, 90 % between s = {low:.0f} and {high:.0f} m"

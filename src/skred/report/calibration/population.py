@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from skred.report.shared.draws import INTERVAL, chains_of, density, interval, kernels, shaded_density
 from skred.report.shared.labels import figure_text, parameter_label, population_role, symbol_text, unit_text
+from skred.report.shared.law import law_of
 from skred.report.shared.numbers import decimals_for, rounded
+from skred.report.shared.recordings import recordings_of
 from skred.report.shared.style import (
     GREY,
     INK,
@@ -30,9 +32,8 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-    from skred.inference.problem import Problem
-    from skred.physics.law import Law
-    from skred.physics.mechanisms.spec import Strength
+    from skred.physics.law import Parameter
+    from skred.report.shared.law import CalibratedLaw
 
 FloatArray = NDArray[np.float64]
 _LOG_BEYOND = 6.0
@@ -44,12 +45,13 @@ _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 
 @styled
-def population_figure(tree: xr.DataTree, law: Law, problem: Problem) -> Figure:
+def population_figure(tree: xr.DataTree) -> Figure:
     """Strengths of new avalanches, those of the recorded ones over them, and what the population is.
 
     One panel for each pair of strengths; of a law with one strength its density.
     """
-    strengths = [mechanism.strength for mechanism in law.mechanisms][:_MAX_STRENGTHS]
+    law = law_of(tree)
+    strengths = law.strengths[:_MAX_STRENGTHS]
     pairs = list(combinations(range(len(strengths)), 2)) or [(0, 0)]
     rows = len(pairs) // 2 + 1  # one panel is for words
     title = "Friction across avalanches: the population, and each recorded avalanche"
@@ -65,7 +67,7 @@ def population_figure(tree: xr.DataTree, law: Law, problem: Problem) -> Figure:
             _one_strength(axes, new[i], own[i], strengths[i], colour)
         else:
             _pair(axes, (new[i], new[j]), (own[i], own[j]), (strengths[i], strengths[j]), colour)
-    _statement(panels, len(pairs), population_lines(tree, law, problem))
+    _statement(panels, len(pairs), population_lines(tree))
     legend_below(figure, panels[: len(pairs)], columns=3)
     return figure
 
@@ -76,20 +78,17 @@ def _draws(tree: xr.DataTree, name: str, group: str) -> FloatArray:
     return np.asarray(values, dtype=float).reshape(-1, values.shape[-1])
 
 
-def population_lines(tree: xr.DataTree, law: Law, problem: Problem) -> list[str]:
+def population_lines(tree: xr.DataTree) -> list[str]:
     """Medians, spreads and correlations of the strengths across avalanches, with 90 % intervals."""
-    samples = {name: chains_of(tree, name).ravel() for name in law.parameter_names}
-    medians = law.strength_rows(samples).T
+    law = law_of(tree)
     percent = f"{100 * INTERVAL:.0f} %"
     lines = [f"Across avalanches: mean and {percent} interval"]
-    for mechanism, values in zip(law.mechanisms, medians, strict=True):
-        strength = mechanism.strength
+    for strength in law.strengths:
+        values = chains_of(tree, strength.name, "median_strength").ravel()
         lines += _named("median", strength.symbol, values, strength.unit)
-    own = set(law.parameter_names)
-    for parameter in problem.parameters(law):
-        if parameter.name not in own:
-            values = chains_of(tree, parameter.name).ravel()
-            lines += _named(population_role(parameter.name), parameter.symbol, values, parameter.unit)
+    for parameter in law.parameters[len(law.own) :]:
+        values = chains_of(tree, parameter.name).ravel()
+        lines += _named(population_role(parameter.name), parameter.symbol, values, parameter.unit)
     return lines
 
 
@@ -115,7 +114,7 @@ def _statement(panels: Any, n_used: int, lines: list[str]) -> None:
     text.set_in_layout(False)
 
 
-def _one_strength(axes: Axes, new: FloatArray, own: FloatArray, strength: Strength, colour: str) -> None:
+def _one_strength(axes: Axes, new: FloatArray, own: FloatArray, strength: Parameter, colour: str) -> None:
     """Density of one strength, and the events' intervals in the order of their medians below it."""
     low, high = (float(value) for value in np.quantile(new, _OUTER))
     grid = np.linspace(min(low, float(own.min())), max(high, float(own.max())), 400)
@@ -162,7 +161,7 @@ def _pair(
     axes: Axes,
     new: tuple[FloatArray, FloatArray],
     own: tuple[FloatArray, FloatArray],
-    strengths: tuple[Strength, Strength],
+    strengths: tuple[Parameter, Parameter],
     colour: str,
 ) -> None:
     """Regions that hold 50 and 90 % of new avalanches, and the recorded ones."""
@@ -232,9 +231,10 @@ def set_limits(axes: Axes, axis: Axis, low: float, high: float, *, linear: bool 
 
 
 @styled
-def events_figure(tree: xr.DataTree, law: Law, problem: Problem) -> Figure:
+def events_figure(tree: xr.DataTree) -> Figure:
     """Each recorded avalanche's own strengths, with the population behind; releases where they vary."""
-    events = list(problem.campaign.event_ids)
+    law = law_of(tree)
+    events = recordings_of(tree).event_ids
     columns = _event_columns(tree, law)
     n = len(events)
     title = f"Each recorded avalanche's own friction\n{figure_text(law.title, 80)}"
@@ -254,13 +254,14 @@ def events_figure(tree: xr.DataTree, law: Law, problem: Problem) -> Figure:
     return figure
 
 
-def _event_columns(tree: xr.DataTree, law: Law) -> list[tuple[str, FloatArray, FloatArray | None]]:
+def _event_columns(tree: xr.DataTree, law: CalibratedLaw) -> list[tuple[str, FloatArray, FloatArray | None]]:
     """Label, the events' own draws and the population's of each strength; releases without a population."""
     columns: list[tuple[str, FloatArray, FloatArray | None]] = []
-    for mechanism in law.mechanisms[:_MAX_STRENGTHS]:
-        name = mechanism.strength.name
-        own, new = _draws(tree, name, "event_posterior"), _draws(tree, name, "posterior_predictive")
-        columns.append((parameter_label(mechanism.strength), own, new))
+    for strength in law.strengths[:_MAX_STRENGTHS]:
+        own, new = (
+            _draws(tree, strength.name, f"{which}") for which in ("event_posterior", "posterior_predictive")
+        )
+        columns.append((parameter_label(strength), own, new))
     release = _draws(tree, "release", "event_posterior")
     if np.ptp(release, axis=0).max() > 0:
         columns.append(("release s [m]", release, None))

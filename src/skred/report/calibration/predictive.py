@@ -17,6 +17,8 @@ from skred.report.shared.draws import (
     shown_sensors,
 )
 from skred.report.shared.labels import figure_text
+from skred.report.shared.law import law_of
+from skred.report.shared.recordings import recordings_of
 from skred.report.shared.style import (
     GREY,
     RECORDED,
@@ -34,8 +36,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from skred.inference.pooled.problem import PooledProblem
-    from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
 _PREDICTIVE = "predicted reading of a new avalanche (mean response, Sigma)"
@@ -44,15 +44,16 @@ _RESPONSE_HEIGHT = 1.25
 
 
 @styled
-def predictive_figure(tree: xr.DataTree, law: Law, problem: PooledProblem) -> Figure:
+def predictive_figure(tree: xr.DataTree) -> Figure:
     """One panel per sensor, up to twelve."""
-    sensors = shown_sensors(problem.campaign)
+    law, recordings = law_of(tree), recordings_of(tree)
+    sensors = shown_sensors(recordings)
     rows, columns = grid_for(len(sensors))
-    title = f"Predicted against recorded{left_out(problem.campaign.n_sensors)}\n{figure_text(law.title, 80)}"
+    title = f"Predicted against recorded{left_out(recordings.n_sensors)}\n{figure_text(law.title, 80)}"
     figure = new_figure(1.0 + (2.4 if columns > 2 else 2.15) * rows, title)
     panels = panels_in(figure, len(sensors), columns)
     for axes, sensor in zip(panels, sensors, strict=True):
-        _panel(axes, sensor_draws(tree, problem, sensor), law_colours([law.id])[law.id], small=columns > 2)
+        _panel(axes, sensor_draws(tree, recordings, sensor), law_colours([law.id])[law.id], small=columns > 2)
     legend_below(figure, panels, columns=2)
     return figure
 

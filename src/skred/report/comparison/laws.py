@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 _MAX_NAMED_EVENTS = 45
 _LOWEST_K = -0.5
+COMPARISON_FIGURES = ("comparison_elpd", "pointwise", "pareto_k", "predictions", "evidence", "likelihoods")
+"""Names of all figures that there may be."""
 
 
 def save_comparison_figures(comparison: Document, folder: Path) -> dict[str, Path]:
@@ -32,16 +34,12 @@ def save_comparison_figures(comparison: Document, folder: Path) -> dict[str, Pat
         By name: comparison_elpd, pointwise, pareto_k, predictions, evidence; of a hierarchical comparison
         that has a pooled one beside it also likelihoods.
     """
-    makers = {
-        "comparison_elpd": elpd_figure,
-        "pointwise": pointwise_figure,
-        "pareto_k": pareto_k_figure,
-        "predictions": new_avalanches_figure if is_hierarchical(comparison) else predictions_figure,
-        "evidence": evidence_figure,
-        "likelihoods": likelihoods_figure,
-    }
+    predictions = new_avalanches_figure if is_hierarchical(comparison) else predictions_figure
+    makers = (
+        elpd_figure, pointwise_figure, pareto_k_figure, predictions, evidence_figure, likelihoods_figure,
+    )  # fmt: skip
     files = {}
-    for name, make in makers.items():
+    for name, make in zip(COMPARISON_FIGURES, makers, strict=True):
         figure = make(comparison)
         if figure is not None:
             files[name] = write_png(figure, folder / f"{name}.png")
@@ -59,7 +57,7 @@ def elpd_figure(comparison: Document) -> Figure | None:
     title = f"How much worse each law predicts an avalanche left out, against {best}"
     figure = new_figure(1.65 + 0.36 * len(laws), title)
     axes = figure.subplots()
-    practical_band(axes)
+    practical_band(axes, comparison)
     for row, law in enumerate(laws):
         difference, se, doubled = floats([get(law, "difference", k) for k in ("elpd", "se", "se_doubled")])
         colour = colours[law["id"]]
@@ -113,7 +111,7 @@ def pointwise_figure(comparison: Document) -> Figure | None:
             label=f"{figure_text(law['id'], 24)}: sum {total}",
         )
     if any(listed(law, "exact", "failed_refits") for law in laws):
-        axes.scatter([], [], s=20, c="#ffffff", edgecolors=GREY, label="hollow: the refit failed the gate")
+        axes.scatter([], [], s=20, c="#ffffff", edgecolors=GREY, label="hollow: the refit did not converge")
     _event_axis(axes, events)
     axes.set_ylabel("elpd of the event\nless that of the best law [nats]")
     legend_below(figure, [axes], columns=4)

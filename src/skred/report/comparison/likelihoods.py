@@ -27,7 +27,7 @@ def likelihoods_figure(comparison: Document) -> Figure | None:
         return None
     figure = new_figure(1.75 + 0.45 * len(rows), "The same laws under both calibrations")
     axes = figure.subplots()
-    practical_band(axes)
+    practical_band(axes, comparison)
     colours, _ = styles(comparison)
     for place, row in enumerate(rows):
         for key, offset in (("hierarchical", -_APART), ("pooled", _APART)):
@@ -45,7 +45,7 @@ def likelihoods_figure(comparison: Document) -> Figure | None:
 
 
 def _difference(model: Document | None) -> float | None:
-    """Difference of elpd of a law that passed the gate."""
+    """Difference of elpd of a law that converged."""
     value = get(model, "difference", "elpd")
     return float(value) if model is not None and passed(model) and is_number(value) else None
 

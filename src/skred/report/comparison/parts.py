@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from skred.inference.intervals import PRACTICAL_DIFFERENCE
-from skred.report.shared.document import Document, listed
+from skred.report.shared.document import Document, get, listed
 from skred.report.shared.labels import figure_text
-from skred.report.shared.numbers import fixed
+from skred.report.shared.numbers import fixed, is_number
 from skred.report.shared.style import GREY, PALE, law_colours, law_markers
 
 if TYPE_CHECKING:
@@ -33,8 +32,10 @@ def typeset(number: float) -> str:
     return fixed(number).replace("-", "\N{MINUS SIGN}")
 
 
-def practical_band(axes: Axes) -> None:
+def practical_band(axes: Axes, comparison: Document) -> None:
     """No difference of elpd, and those that are none in practice."""
-    label = f"no practical difference: less than {PRACTICAL_DIFFERENCE:.0f}"
-    axes.axvspan(-PRACTICAL_DIFFERENCE, PRACTICAL_DIFFERENCE, color=PALE, alpha=0.7, linewidth=0, label=label)
+    least = get(comparison, "limits", "practical_difference")
+    if is_number(least):
+        label = f"no practical difference: less than {least:.0f}"
+        axes.axvspan(-least, least, color=PALE, alpha=0.7, linewidth=0, label=label)
     axes.axvline(0, color=GREY, linewidth=0.8)

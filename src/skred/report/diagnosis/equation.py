@@ -6,33 +6,23 @@ import math
 import re
 from typing import TYPE_CHECKING, Any
 
-from skred.diagnosis.augment.coefficient import augmented_of, strength_of
-from skred.diagnosis.evidence.covariates import standard_of
-from skred.physics.mechanisms.spec import Group
-from skred.physics.mechanisms.stretches import U_1, U_2, equation_of, is_opposed
-from skred.report.shared.draws import chains_of, interval
-from skred.report.shared.labels import name_text, population_role, symbol_text, unit_text
-from skred.report.shared.numbers import decimals_for, rounded
+from skred.report.diagnosis.words import INSTRUMENT, facts_of, stretch_in, title_of
+from skred.report.shared import document as doc
+from skred.report.shared.labels import name_text, population_role, printable, symbol_text
+from skred.report.shared.numbers import decimals_for, is_number, rounded, whole
 
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-    from skred.diagnosis.augment.step import Step
-    from skred.diagnosis.discrepancy.profile import Profile
-    from skred.inference.calibrate import Calibration
-    from skred.physics.law import Law
-    from skred.report.diagnosis.flat import Flat as Diagnosis
-
-INTERVAL_SDS = 1.645
-"""Standard deviations from the middle to the end of a 90 % interval."""
 _HEAD = "dU^2/(2 ds) ="
 _SIMPLE = [
     ("U", "m s-1", "speed of the front"),
     ("s", "m", "length along the track, downhill"),
     ("phi", "rad", "slope of the track"),
     ("kappa", "m-1", "curvature of the track, positive where it is concave"),
-    ("g", "m s-2", "gravity, 9.81"),
+    ("g", "m s-2", "gravity, 9.81 m/s²"),
 ]
+_WORD = re.compile(r"[A-Za-z]+(?:_\w+)?")
 
 
 def formula(text: str) -> Markup:
@@ -45,18 +35,19 @@ def formula(text: str) -> Markup:
     return Markup(shown.replace("- -", "- "))  # noqa: S704 (escaped above)
 
 
-def equations(found: Diagnosis) -> dict[str, Any]:
+def equations(document: doc.Document) -> dict[str, Any]:
     """The base law's equation, with each new term, and what is read instead for an instrument's fault."""
     terms, readings = [], []
-    for step in found.steps:
-        mechanism, shape = step.candidate.mechanism, step.candidate.best.shape
-        if mechanism.group is Group.INSTRUMENT:
-            readings.append(formula(mechanism.equation.partition(": ")[2] or mechanism.equation))
+    for mechanism in doc.listed(document, "mechanisms"):
+        equation = printable(doc.get(mechanism, "equation") or "")
+        if doc.get(facts_of(document, str(doc.get(mechanism, "id"))), "kind") == INSTRUMENT:
+            readings.append(formula(equation.partition(": ")[2] or equation))
         else:
-            terms.append(formula("- " + equation_of(mechanism, shape).removeprefix("-")))
-    right, relation = _right(found.law)
-    if found.profile is not None:
-        terms.append(formula("- " + found.profile.profile.kind.equation.removeprefix("-")))
+            terms.append(formula("- " + equation.removeprefix("-")))
+    profile = doc.get(document, "profile", "equation")
+    if profile:
+        terms.append(formula("- " + printable(profile).removeprefix("-")))
+    right, relation = _right(document)
     return {
         "head": formula(_HEAD),
         "base": formula(right),
@@ -66,142 +57,129 @@ def equations(found: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _right(law: Law) -> tuple[str, str]:
-    """Right-hand side of a law's equation, and the relation of its parameters."""
-    ending = f", {law.relation}" if law.relation else ""
-    return law.equation.removeprefix(_HEAD).strip().removesuffix(ending), law.relation
+def _right(document: doc.Document) -> tuple[str, str]:
+    """Right-hand side of the law's equation, and the relation of its parameters."""
+    equation, relation = (
+        printable(doc.get(document, "report", "law", key) or "") for key in ("equation", "relation")
+    )
+    ending = f", {relation}" if relation else ""
+    return equation.removeprefix(_HEAD).strip().removesuffix(ending), relation
 
 
-def symbol_rows(found: Diagnosis) -> list[dict[str, Any]]:
+def symbol_rows(document: doc.Document) -> list[dict[str, Any]]:
     """Symbol, unit, meaning and reference of everything in the equation."""
-    rows = []
-    for mechanism in found.law.mechanisms:
-        strength = mechanism.strength
-        name = name_text(strength.name)
-        meaning = mechanism.title if mechanism.title.startswith(name) else f"{name}: {mechanism.title}"
-        rows.append(_row(strength.symbol, strength.unit, meaning, mechanism.reference, mechanism.doi))
-    for number, step in enumerate(found.steps):
-        rows += _added_rows(found, step, number)
-    if found.profile is not None:
-        rows += _profile_rows(found.profile.profile)
-    text = found.law.equation + "".join(step.candidate.mechanism.equation for step in found.steps)
+    rows, text = [], printable(doc.get(document, "report", "law", "equation") or "")
+    for facts in doc.listed(document, "report", "law", "mechanisms"):
+        name, title = name_text(doc.get(facts, "parameter")), printable(doc.get(facts, "title"))
+        rows.append(_of_facts(facts, title if title.startswith(name) else f"{name}: {title}"))
+    added = doc.listed(document, "report", "added")
+    for number, mechanism in enumerate(doc.listed(document, "mechanisms")):
+        rows += _added_rows(document, mechanism, added[number] if number < len(added) else {})
+        text += printable(doc.get(mechanism, "equation") or "")
+    rows += _profile_rows(doc.get(document, "profile"))
     present = set(re.findall(r"[A-Za-z]+", text)) | {"s", "U"}
     return rows + [_row(*one) for one in _SIMPLE if one[0] in present]
 
 
-def _row(symbol: str, unit: str, meaning: str, reference: str = "", doi: str = "", new: bool = False) -> Any:
-    return {
-        "symbol": formula(symbol),
-        "unit": unit_text(unit),
-        "meaning": meaning,
-        "reference": f"{reference}{', doi ' + doi if doi else ''}",
-        "new": new,
-    }
+def _row(symbol: str, unit: Any, meaning: str, reference: str = "", new: bool = False) -> dict[str, Any]:
+    return {"symbol": formula(symbol), "unit": unit, "meaning": meaning, "reference": reference, "new": new}
 
 
-def _added_rows(found: Diagnosis, step: Step, number: int) -> list[dict[str, Any]]:
-    candidate = step.candidate
-    mechanism, shape = candidate.mechanism, candidate.best.shape
-    mean, sd = strength_of(found.steps, number)
-    decimals = decimals_for(sd)
-    about = f"{name_text(mechanism.strength.name)}: {mechanism.title}"
+def _of_facts(facts: doc.Document, meaning: str, new: bool = False) -> dict[str, Any]:
+    reference, doi = (printable(doc.get(facts, key) or "") for key in ("reference", "doi"))
+    source = f"{reference}, doi {doi}" if doi else reference
+    return _row(printable(doc.get(facts, "symbol") or ""), doc.get(facts, "unit"), meaning, source, new)
+
+
+def _added_rows(document: doc.Document, mechanism: doc.Document, added: doc.Document) -> list[dict[str, Any]]:
+    """Rows of a mechanism that was added: its coefficient, its place, its constants."""
+    name = printable(doc.get(mechanism, "id"))
+    mean, sd = (doc.get(mechanism, "strength", key) for key in ("mean", "sd"))
+    decimals, facts = decimals_for(sd), facts_of(document, name)
+    about = f"{name_text(doc.get(mechanism, 'strength', 'parameter'))}: {title_of(document, name)}"
     meaning = f"{about}; here {rounded(mean, decimals)} ± {rounded(sd, decimals)}"
-    if shape.sensor:
+    sensor, covariate = (doc.get(mechanism, key) for key in ("sensor", "covariate"))
+    if sensor and is_number(mean) and abs(mean) < 10.0:
         percent = 100.0 * (math.exp(mean) - 1.0)
-        meaning += f": {shape.sensor} reads {abs(percent):.0f} % too {'high' if percent > 0 else 'low'}"
-    rows = [
-        _row(
-            mechanism.strength.symbol,
-            mechanism.strength.unit,
-            meaning,
-            mechanism.reference,
-            mechanism.doi,
-            True,
-        )
-    ]
-    if (stretch := candidate.stretch()) is not None:
-        first, last = stretch
-        if mechanism.id == "obstacle":
-            middle = 0.5 * (first + last)
-            rows.append(_row("s_o", "m", f"its crown, here {middle:.0f}", new=True))
-            rows.append(_row("w", "m", f"length of its climb, and of its descent, here {middle - first:.0f}"))
-        else:
-            ends = f"where the stretch begins and ends, here {first:.0f} and {last:.0f}"
-            rows.append(_row("s_1, s_2", "m", ends, new=True))
-    if is_opposed(shape):
-        first, last = (dict(shape.constants)[name] for name in (U_1, U_2))
-        what = f"speed at which a relief on the stretch equals it, here {first:g} at s_1 to {last:g} at s_2"
-        return [*rows, _row("U_0", "m s-1", what, new=True)]
-    for named, value in shape.constants:
-        symbol, _, unit = named.partition(" [")
-        rows.append(_row(_short(symbol), unit.rstrip("]") or "1", f"{symbol}, here {value:g}", new=True))
-    if shape.covariate:
-        standard = standard_of(found.problem.campaign.events, shape.covariate)
-        what = "logarithm standardised" if standard is not None and standard.logarithm else "standardised"
-        rows.append(_row("x", "1", f"{shape.covariate}, {what}", new=True))
+        high = "high" if percent > 0 else "low"
+        meaning += f": {printable(sensor)} reads {abs(percent):.0f} % too {high}"
+    rows = [_of_facts(facts, meaning, new=True)]
+    rows += _place_rows(stretch_in(doc.get(mechanism, "location")), str(doc.get(mechanism, "equation") or ""))
+    rows += _constant_rows(doc.get(mechanism, "constants") or {}, doc.get(added, "shape", "opposed") is True)
+    if covariate:
+        what = "logarithm standardised" if doc.get(added, "by_logarithm") else "standardised"
+        rows.append(_row("x", "1", f"{printable(covariate)}, {what}", new=True))
     return rows
 
 
-def _profile_rows(profile: Profile) -> list[dict[str, Any]]:
+def _place_rows(stretch: tuple[float, float] | None, equation: str) -> list[dict[str, Any]]:
+    """Where something acts, by the symbols that its equation has for that."""
+    if stretch is None:
+        return []
+    first, last = stretch
+    there = set(_WORD.findall(equation))
+    middle, half = 0.5 * (first + last), 0.5 * (last - first)
+    known = [
+        ("s_1", "s_1, s_2", f"where the stretch begins and ends, here {first:.0f} and {last:.0f}"),
+        ("s_o", "s_o", f"the middle of the place where it acts, here {middle:.0f}"),
+        ("w", "w", f"half of the length on which it acts, here {half:.0f}"),
+    ]
+    rows = [_row(shown, "m", words, new=True) for symbol, shown, words in known if symbol in there]
+    return rows or [_row("s", "m", f"acts between {first:.0f} and {last:.0f}", new=True)]
+
+
+def _constant_rows(constants: doc.Document, opposed: bool) -> list[dict[str, Any]]:
+    """Constants of a shape; the speeds at which a relief equals it as one."""
+    known = {str(name): value for name, value in constants.items() if is_number(value)}
+    if opposed and len(known) == 2:
+        first, last = known.values()
+        what = f"speed at which a relief on the stretch equals it, here {first:g} at s_1 to {last:g} at s_2"
+        return [_row("U_0", "m s-1", what, new=True)]
+    rows = []
+    for named, value in known.items():
+        symbol, _, unit = printable(named).partition(" [")
+        short = {"loss": "l"}.get(symbol, symbol)
+        rows.append(_row(short, unit.rstrip("]") or "1", f"{symbol}, here {value:g}", new=True))
+    return rows
+
+
+def _profile_rows(profile: doc.Document | None) -> list[dict[str, Any]]:
     """The force profile's symbols."""
-    first, last = profile.knots_m[0], profile.knots_m[-1]
-    what = f"the force profile: linear between {len(profile.knots_m)} knots from {first:.0f} to {last:.0f} m"
-    rows = [_row("f(s)", profile.kind.unit, what, new=True)]
-    if profile.kind.opposed:
+    places = [place for place in doc.listed(profile, "s_m") if is_number(place)]
+    if not places:
+        return []
+    what = f"the force profile: linear between {len(places)} places from {whole(places[0])} to"
+    rows = [_row("f(s)", doc.get(profile, "unit"), f"{what} {whole(places[-1])} m", new=True)]
+    if "U_0" in str(doc.get(profile, "equation")):
         rows.append(_row("U_0", "m s-1", "typical speed of the base law's fronts there", new=True))
     return rows
 
 
-def _short(symbol: str) -> str:
-    return {"loss": "l"}.get(symbol, symbol)
-
-
-def parameter_rows(found: Diagnosis) -> list[dict[str, str]]:
+def parameter_rows(document: doc.Document) -> list[dict[str, Any]]:
     """All parameters, by the base law and by the augmented one."""
-    rows: dict[str, dict[str, str]] = {}
-    calibrations = {
-        "before": found.calibration,
-        "after": found.steps[-1].calibration if found.steps else None,
-    }
-    for when, calibration in calibrations.items():
-        if calibration is None:
-            continue
-        for parameter in calibration.problem.parameters(calibration.law):
-            values = chains_of(calibration.tree, parameter.name).ravel()
-            shown = {
-                "name": _role(parameter.name, calibration),
-                "symbol": formula(parameter.symbol),
-                "unit": unit_text(parameter.unit),
-                "before": "",
-                "after": "",
-            }
-            rows.setdefault(parameter.name, shown)[when] = _interval_text(values)
-    # Of what was added the one interval that there is: over all places, not that of the chains at one.
-    for number, name in enumerate(_added_names(found)):
-        mean, sd = strength_of(found.steps, number)
-        decimals = decimals_for(sd)
-        ends = (rounded(mean + side * INTERVAL_SDS * sd, decimals) for side in (-1.0, 1.0))
-        rows[name]["after"] = f"{rounded(mean, decimals)} ({' to '.join(ends)})"
-    return list(rows.values())
+    return [
+        {
+            "name": _role(parameter),
+            "symbol": formula(printable(doc.get(parameter, "symbol") or "")),
+            "unit": doc.get(parameter, "unit"),
+            "before": _interval_text(doc.get(parameter, "before")),
+            "after": _interval_text(doc.get(parameter, "after")),
+        }
+        for parameter in doc.listed(document, "report", "parameters")
+    ]
 
 
-def _added_names(found: Diagnosis) -> list[str]:
-    return [one.name for one in augmented_of(found.steps[-1].calibration).added] if found.steps else []
-
-
-def _role(name: str, calibration: Calibration) -> str:
+def _role(parameter: doc.Document) -> str:
+    name = doc.get(parameter, "name")
+    if doc.get(parameter, "added"):
+        return f"{name_text(name)}, added"
     role = population_role(name)
-    added = {one.name for one in getattr(calibration.problem, "added", ())}
-    return (
-        f"{name_text(name)}, added"
-        if name in added
-        else f"median {name_text(name)}"
-        if role == "median"
-        else role
-    )
+    return f"median {name_text(name)}" if role == "median" else role
 
 
-def _interval_text(values: Any) -> str:
-    decimals = decimals_for(float(values.std()))
-    low, high = (rounded(value, decimals) for value in interval(values))
-    return f"{rounded(float(values.mean()), decimals)} ({low} to {high})"
+def _interval_text(found: doc.Document | None) -> str:
+    if not found:
+        return ""
+    decimals = decimals_for(doc.get(found, "sd"))
+    mean, low, high = (rounded(doc.get(found, key), decimals) for key in ("mean", "low", "high"))
+    return f"{mean} ({low} to {high})"

@@ -7,84 +7,93 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.evidence.predictive import Predicted
 from skred.report.diagnosis.words import AFTER, BEFORE
 from skred.report.shared.labels import figure_text, unit_text
+from skred.report.shared.recordings import recordings_of
 from skred.report.shared.style import GREY, legend_below, new_figure, styled
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from skred.diagnosis.predict.held_out import HeldOut
-    from skred.report.diagnosis.flat import Flat as Diagnosis
-
 FloatArray = NDArray[np.float64]
+Band = tuple[FloatArray, FloatArray, FloatArray]
+"""Mean, and 5 % and 95 % quantiles."""
 _MOST_NAMED = 60
 
 
+def is_compared(tree: xr.DataTree) -> bool:
+    """Whether avalanches left out were also predicted with something added."""
+    return "held_out" in tree.children and "after" in tree["held_out"].to_dataset()["when"].values
+
+
 @styled
-def left_out_figure(found: Diagnosis) -> Figure:
+def left_out_figure(tree: xr.DataTree) -> Figure:
     """Recorded against predicted: speeds at sensors, and runouts."""
-    problem, before, after = found.problem, found.before, found.after
-    assert before is not None
-    is_velocity = np.asarray(problem.readings.is_velocity, dtype=bool)
-    reference = problem.campaign.reference_s_m or 0.0
-    kinds = [("front speed", is_velocity, unit_text("m s-1"), 0.0), ("runout", ~is_velocity, "m", reference)]
-    shown = [kind for kind in kinds if problem.observed[:, kind[1]].any()]
-    words = "before and after" if after is not None else "by the base law"
+    recordings, compared = recordings_of(tree), is_compared(tree)
+    reference = recordings.reference_s_m or 0.0
+    is_runout, observed = recordings.is_runout, recordings.observed
+    kinds = [("front speed", ~is_runout, unit_text("m s-1"), 0.0), ("runout", is_runout, "m", reference)]
+    shown = [kind for kind in kinds if observed[:, kind[1]].any()]
+    words = "before and after" if compared else "by the base law"
     figure = new_figure(4.5, f"Avalanches left out: recorded against predicted, {words}")
-    panels = figure.subplots(1, len(shown), squeeze=False).ravel()
-    for axes, (quantity, columns, unit, zero) in zip(panels, shown, strict=True):
-        seen = problem.observed[:, columns]
-        recorded = problem.values[:, columns][seen] - zero
-        first = _of(before, columns, seen, zero)
-        second = None if after is None else _of(after, columns, seen, zero)
-        _pairs(axes, recorded, first, second)
-        of = " from the reference" if quantity == "runout" and problem.campaign.reference_s_m else ""
-        of = of or (" s" if quantity == "runout" else "")
+    panels = figure.subplots(1, max(len(shown), 1), squeeze=False).ravel()
+    for axes, (quantity, columns, unit, zero) in zip(panels, shown, strict=False):
+        seen = observed[:, columns]
+        before = _predicted(tree, "before", columns, seen, zero)
+        after = _predicted(tree, "after", columns, seen, zero) if compared else None
+        _pairs(axes, recordings.values[:, columns][seen] - zero, before, after)
+        of = "" if quantity != "runout" else " from the reference" if recordings.reference_s_m else " s"
         axes.set_xlabel(f"recorded {quantity}{of} [{unit}]")
         axes.set_ylabel(f"predicted from the other avalanches [{unit}]")
     legend_below(figure, panels, columns=2)
     return figure
 
 
-def _of(held: HeldOut, columns: NDArray[np.bool_], seen: NDArray[np.bool_], zero: float) -> Predicted:
-    """Predictions of the readings of some sensors, as rows."""
-    return Predicted(*(values[:, columns][seen] - zero for values in held.predicted))
+def _predicted(
+    tree: xr.DataTree, when: str, columns: NDArray[np.bool_], seen: NDArray[np.bool_], zero: float
+) -> Band:
+    """Predictions of the readings of some sensors, one after the other."""
+    held = tree["held_out"].to_dataset().sel(when=when)
+    mean, low, high = (
+        held[name].transpose("event", "sensor").values[:, columns][seen] - zero
+        for name in ("mean", "low", "high")
+    )
+    return mean, low, high
 
 
-def _pairs(axes: Axes, recorded: FloatArray, before: Predicted, after: Predicted | None) -> None:
-    last = before if after is None else after
-    ends = [recorded.min(), recorded.max(), np.nanmin(before.mean), np.nanmax(before.mean)]
-    ends += [np.nanmin(last.low), np.nanmax(last.high)]
+def _pairs(axes: Axes, recorded: FloatArray, before: Band, after: Band | None) -> None:
+    mean, low, high = before if after is None else after
     axes.vlines(
-        recorded, last.low, last.high, color="#c9d6e3", linewidth=1.6, zorder=1,
+        recorded, low, high, color="#c9d6e3", linewidth=1.6, zorder=1,
         label="90 % interval" + ("" if after is None else ", with what was missing"),
     )  # fmt: skip
+    ends = [f(values) for values in (recorded, before[0], low, high) for f in (np.nanmin, np.nanmax)]
     margin = 0.04 * (max(ends) - min(ends)) or 1.0
-    low, high = float(min(ends) - margin), float(max(ends) + margin)
-    axes.plot([low, high], [low, high], color=GREY, linewidth=0.9, linestyle="--", label="perfect")
+    line = [float(min(ends) - margin), float(max(ends) + margin)]
+    axes.plot(line, line, color=GREY, linewidth=0.9, linestyle="--", label="perfect")
     size = 4.5 if len(recorded) < 150 else 3.0
     axes.plot(
-        recorded, before.mean, linestyle="none", marker="o", markersize=size, markerfacecolor="none",
+        recorded, before[0], linestyle="none", marker="o", markersize=size, markerfacecolor="none",
         color=BEFORE, label="base law", zorder=2,
     )  # fmt: skip
     if after is not None:
         axes.plot(
-            recorded, after.mean, linestyle="none", marker="o", markersize=size, color=AFTER, alpha=0.85,
+            recorded, mean, linestyle="none", marker="o", markersize=size, color=AFTER, alpha=0.85,
             markeredgewidth=0.0, label="with what was missing", zorder=3,
         )  # fmt: skip
     beside = 0.06 * float(np.ptp(recorded)) or margin
     axes.set_xlim(recorded.min() - beside, recorded.max() + beside)
-    axes.set_ylim(low, high)
+    axes.set_ylim(*line)
 
 
 @styled
-def scores_figure(found: Diagnosis) -> Figure:
+def scores_figure(tree: xr.DataTree) -> Figure:
     """Difference of each left-out avalanche's log score, in order."""
-    assert found.before is not None and found.after is not None
-    difference = found.after.pointwise - found.before.pointwise
+    held = tree["held_out"].to_dataset()
+    score = held["log_score"].transpose("when", "event")
+    difference = np.asarray(score.sel(when="after").values - score.sel(when="before").values, dtype=float)
     order = np.argsort(difference)
     n = len(order)
     figure = new_figure(3.1, "Left out one at a time: how much better each avalanche is predicted")
@@ -96,7 +105,7 @@ def scores_figure(found: Diagnosis) -> Figure:
     axes.grid(axis="y")
     axes.set_xlim(-0.7, n - 0.3)
     if n <= _MOST_NAMED:
-        names = [figure_text(found.problem.campaign.event_ids[k], 14) for k in order]
+        names = [figure_text(held["event"].values[k], 14) for k in order]
         axes.set_xticks(np.arange(n), names, rotation=90, fontsize=7 if n <= 40 else 5.5)
     else:
         axes.set_xticks([])

@@ -2,40 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from skred.diagnosis.augment.coefficient import strength_of
-from skred.diagnosis.check.bootstrap_test import LIMIT
-from skred.diagnosis.compare.decision import NOTHING_ALONE, TIED_NATS, decide
-from skred.diagnosis.discrepancy.profile import AMPLITUDES, KINDS, LENGTHS_M, NEAR_M
-from skred.diagnosis.evidence.prior_odds import UNLISTED
-from skred.diagnosis.predict.held_out import K_LIMIT, paired
-from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
-from skred.inference.intervals import PRACTICAL_DIFFERENCE
-from skred.physics.mechanisms import mechanisms
-from skred.report.comparison.html import environment, picture
 from skred.report.diagnosis import rows, unseen
 from skred.report.diagnosis.equation import equations, parameter_rows, symbol_rows
-from skred.report.diagnosis.words import (
-    comparisons,
-    leading_name,
-    profile_of,
-    short_title,
-    stretch_of,
-    verdict_words,
-)
+from skred.report.diagnosis.evidence import group_of
+from skred.report.diagnosis.words import comparisons, in_words, law_id, stretch_in, verdict_words
 from skred.report.shared import document as doc
-from skred.report.shared.labels import unit_text
-from skred.report.shared.numbers import fixed
+from skred.report.shared.html import environment, picture
+from skred.report.shared.labels import name_text, unit_text
+from skred.report.shared.numbers import fixed, is_number
 
 if TYPE_CHECKING:
-    from skred.diagnosis.compare.location import Location
-    from skred.report.diagnosis.flat import Flat as Diagnosis
+    import xarray as xr
 
 _NO_FORCE = 1e-6
 """Retardation that is none [m s-2]."""
@@ -52,126 +33,121 @@ _SECTIONS = {
 }
 
 
-def page(found: Diagnosis, document: doc.Document, figures: Mapping[str, Path]) -> str:
+def page(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Path]) -> str:
     """Render the report of a diagnosis, see `skred.report.diagnosis.report.render_diagnosis`."""
-    campaign = found.problem.campaign
-    sections = dict(_SECTIONS)
-    if not found.steps and found.profile is None:
-        sections["equation"] = "The equation"
-        sections["before-after"] = "How well avalanches left out are predicted"
     locked, folds = unseen.locked(document), unseen.outer_folds(document)
-    if locked is None and folds is None:
-        del sections["unseen"]
+    sections = _sections(document, has_unseen=locked is not None or folds is not None)
+    report = doc.get(document, "report") or {}
+    compared = [_comparison(document, number, one) for number, one in enumerate(comparisons(document))]
     return (
         environment()
         .get_template("diagnosis.html.jinja")
         .render(
             d=document,
-            found=found,
-            campaign=campaign,
+            r=report,
+            campaign=doc.get(report, "campaign") or {},
+            limits=doc.get(report, "limits") or {},
+            law=law_id(document),
             sections=sections,
             number={name: place for place, name in enumerate(sections, start=1)},
             figures={name: picture(file) for name, file in figures.items()},
-            verdict=verdict_words(found),
-            facts=rows.recorded_facts(found),
-            sensors=rows.sensor_rows(found),
-            detectability=rows.detectability_rows(found),
-            work=rows.work_rows(found),
-            profile=profile_of(found),
-            stretch=stretch_of(found),
-            comparisons=[_comparison(found, number, one) for number, one in enumerate(comparisons(found))],
-            equations=equations(found),
-            symbols=symbol_rows(found),
-            parameters=parameter_rows(found),
-            held=rows.held_out_rows(found),
-            difference=_difference(found),
+            verdict=verdict_words(document),
+            sensors=rows.sensor_rows(tree),
+            detectability=rows.detectability_rows(document),
+            work=rows.work_rows(document),
+            stretch=stretch_in(doc.get(document, "location")),
+            comparisons=compared,
+            equations=equations(document),
+            symbols=symbol_rows(document),
+            parameters=parameter_rows(document),
+            held=rows.held_out_rows(document),
+            difference=_difference(document),
             locked=locked,
             folds=folds,
-            trust=rows.trust_rows(found),
-            priors=rows.prior_rows(found),
+            trust=rows.trust_rows(document),
+            priors=rows.prior_rows(document),
             settings=rows.settings_rows(document),
-            profile_scales=[
-                f"{kind.amplitude:g} {unit_text(kind.unit)}"
-                + (", nil at the typical speed" if kind.opposed else "")
-                for kind in KINDS
-            ],
-            profile_amplitudes=[f"{part:.2g}" for part in AMPLITUDES],
-            profile_lengths=[f"{length:.0f}" for length in LENGTHS_M],
-            profile_window=f"{2.0 * NEAR_M:.0f}",
-            limits={
-                "p": LIMIT, "alone": NOTHING_ALONE, "k": K_LIMIT, "tied": f"{math.exp(TIED_NATS):.1f}",
-                "r_hat": R_HAT_LIMIT, "ess": ESS_LIMIT, "practical": PRACTICAL_DIFFERENCE,
-            },
-            too_few=_too_few(found),
-            dropped=_dropped(found),
-            flat=_flat(profile_of(found)),
-            short_title=short_title,
+            force_prior=_force_prior(doc.get(report, "profile_prior")),
+            checks=doc.listed(report, "checks"),
+            too_few=_too_few(document),
+            dropped=in_words(doc.listed(report, "not_added")),
+            flat=not _number(doc.get(report, "force", "largest"), 1.0) > _NO_FORCE,
         )
-    )  # fmt: skip
+    )
 
 
-def _comparison(found: Diagnosis, number: int, comparison: Any) -> dict[str, Any]:
-    """A comparison, with the ending of its figures' names."""
-    step = found.steps[number] if number < len(found.steps) else None
-    winner = step.candidate.mechanism if step is not None else None
-    ties = step.tied if step is not None else ()
-    listed = [mechanisms()[name] for name in ties if name != UNLISTED]
-    same = [one.id for one in listed if winner is not None and one.is_same_term(winner)]
+def _number(value: Any, otherwise: float) -> float:
+    return float(value) if is_number(value) else otherwise
+
+
+def _sections(document: doc.Document, *, has_unseen: bool) -> dict[str, str]:
+    """Titles of the sections by their anchors, in their order."""
+    sections = dict(_SECTIONS)
+    if not doc.listed(document, "mechanisms") and not doc.get(document, "profile"):
+        sections["equation"] = "The equation"
+        sections["before-after"] = "How well avalanches left out are predicted"
+    if not has_unseen:
+        del sections["unseen"]
+    return sections
+
+
+def _comparison(document: doc.Document, number: int, comparison: doc.Document) -> dict[str, Any]:
+    """A comparison, with the names of its figures."""
     return {
-        "ending": f"_{number + 1}" if number else "",
-        "rows": rows.comparison_rows(comparison, _strength(found, number)),
+        "figures": {name: group_of(name, number) for name in ("probabilities", "strength", "places")},
+        "rows": rows.comparison_rows(document, comparison),
         "errors": rows.error_rows(comparison),
-        "winner": winner,
-        "leading": leading_name(comparison),
-        "ties": _in_words(ties),
-        "same": same,
+        "added": name_text(doc.get(comparison, "added") or ""),
+        "ties": in_words(doc.listed(comparison, "tied_with")),
+        "same": in_words(doc.listed(comparison, "same_term")),
     }
 
 
-def _strength(found: Diagnosis, number: int) -> dict[str, tuple[float, float]]:
-    """The strength of what was added from a comparison, by its id."""
-    if number >= len(found.steps):
-        return {}
-    return {found.steps[number].candidate.mechanism.id: strength_of(found.steps, number)}
-
-
-def _flat(profile: Location | None) -> bool:
-    """Whether the free force did not move from nothing."""
-    return profile is not None and not bool(np.any(np.abs(profile.mean) > _NO_FORCE))
-
-
-def _too_few(found: Diagnosis) -> bool:
-    """Whether the check cannot reach its limit because too few clean campaigns were simulated."""
-    check = found.check
-    if check is None or check.fired:
-        return False
-    n = len(check.simulated)
-    return 1.0 / (n + 1) > LIMIT and bool(check.statistic > check.simulated.max(initial=-math.inf))
-
-
-def _dropped(found: Diagnosis) -> tuple[str, ...]:
-    """What the comparison would have named, had its own calibration passed the gate."""
-    if found.comparison is None or found.check is None or found.table is None or found.steps:
-        return ()
-    return _in_words(decide(found.comparison.probability, found.check.p_value, found.table.can_tell).names)
-
-
-def _in_words(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Ids as they are, but for the way out of the list."""
-    return tuple("a force not in the list" if name == UNLISTED else name for name in names)
-
-
-def _difference(found: Diagnosis) -> dict[str, Any] | None:
-    """The difference of the log scores, its doubled standard error, and whether it counts."""
-    if found.before is None or found.after is None:
+def _too_few(document: doc.Document) -> int | None:
+    """How many clean campaigns it takes to reach the limit, where none is as odd and there were fewer."""
+    check: doc.Document = next(iter(doc.listed(document, "report", "checks")), {})
+    n, most, own = (doc.get(check, key) for key in ("n_simulated", "largest_simulated", "statistic"))
+    limit = doc.get(document, "report", "limits", "p_value")
+    if doc.get(check, "fired") is not False or not all(map(is_number, (n, own, limit))) or not limit:
         return None
-    value, se = paired(found.after, found.before)
-    better = found.after.pointwise > found.before.pointwise
+    oddest = not is_number(most) or own > most
+    return round(1.0 / limit - 1.0) if oddest and 1.0 / (n + 1) > limit else None
+
+
+def _difference(document: doc.Document) -> dict[str, Any] | None:
+    """The difference of the log scores, its doubled standard error, and whether it counts."""
+    value, se = (doc.get(document, "evidence", key) for key in ("elpd_diff", "elpd_se"))
+    if not is_number(value):
+        return None
+    least = _number(doc.get(document, "report", "limits", "practical_difference"), 0.0)
+    score = doc.get(document, "report", "log_score")
     return {
         "value": fixed(value, 1, signed=True),
-        "doubled": fixed(2.0 * se, 1),
-        "practical": abs(value) >= PRACTICAL_DIFFERENCE,
-        "clear": abs(value) > 2.0 * se,
-        "better": int(better.sum()),
-        "of": len(better),
+        "doubled": fixed(2.0 * se if is_number(se) else None, 1),
+        "practical": abs(value) >= least,
+        "clear": is_number(se) and abs(value) > 2.0 * se,
+        "better": doc.get(score, "n_better"),
+        "of": doc.get(score, "n_events"),
     }
+
+
+def _force_prior(prior: doc.Document | None) -> dict[str, str] | None:
+    """What a force that is not in the list is thought to be like beforehand, in words."""
+    if not prior:
+        return None
+    scales = [
+        f"{_plain(doc.get(kind, 'sd'))} {unit_text(doc.get(kind, 'unit'))}"
+        + (", nil at the typical speed" if doc.get(kind, "nil_at_typical_speed") else "")
+        for kind in doc.listed(prior, "kinds")
+    ]
+    times, lengths = (doc.listed(prior, key) for key in ("sd_times", "correlation_lengths_m"))
+    return {
+        "times": ", ".join(f"{part:.2g}" for part in times if is_number(part)),
+        "scales": "; ".join(scales),
+        "lengths": ", ".join(f"{length:.0f}" for length in lengths if is_number(length)),
+        "window": fixed(doc.get(prior, "window_m"), 0),
+    }
+
+
+def _plain(value: Any) -> str:
+    return f"{value:g}" if is_number(value) else fixed(None)

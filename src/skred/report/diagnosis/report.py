@@ -7,32 +7,36 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from skred.report.diagnosis.evidence import check_figure, probabilities_figure, strength_figure
-from skred.report.diagnosis.flat import flat
-from skred.report.diagnosis.held_out import left_out_figure, scores_figure
-from skred.report.diagnosis.places import local_names, places_figure, where_figure
+from skred.report.diagnosis.check import check_figure
+from skred.report.diagnosis.evidence import group_of, probabilities_figure, strength_figure
+from skred.report.diagnosis.held_out import is_compared, left_out_figure, scores_figure
+from skred.report.diagnosis.places import places_figure, places_of, where_figure
 from skred.report.diagnosis.terminal import diagnosis_table
-from skred.report.diagnosis.words import comparisons
+from skred.report.diagnosis.words import comparisons, leading_name
 from skred.report.shared import document as doc
 from skred.report.shared.style import write_png
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
-    from skred.diagnosis.outcome import Outcome
-
 __all__ = ["FIGURES", "diagnosis_table", "render_diagnosis", "save_diagnosis_figures"]
-_OF_RACES = ("probabilities", "strength", "places")
-FIGURES = ("check", "where", *_OF_RACES, *(f"{name}_2" for name in _OF_RACES), "left_out", "scores")
+_OF_COMPARISONS = ("probabilities", "strength", "places")
+FIGURES = (
+    "check", "where", *_OF_COMPARISONS, *(f"{name}_2" for name in _OF_COMPARISONS), "left_out", "scores",
+)  # fmt: skip
 """Names of all figures that there may be."""
 
 
-def save_diagnosis_figures(outcome: Outcome, folder: Path) -> dict[str, Path]:
+def save_diagnosis_figures(document: doc.Document, tree: xr.DataTree, folder: Path) -> dict[str, Path]:
     """Write the figures of a diagnosis as PNG.
 
     Parameters
     ----------
-    outcome : Outcome
+    document : mapping
+        The content of ``verdict.json``; anything may be null.
+    tree : DataTree
+        The content of ``diagnosis.nc``.
     folder : Path
         An existing folder.
 
@@ -41,32 +45,40 @@ def save_diagnosis_figures(outcome: Outcome, folder: Path) -> dict[str, Path]:
     dict of str to Path
         Those of `FIGURES` that apply; with _2 those of a second comparison.
     """
-    found = flat(outcome)
     makers: dict[str, Callable[[], Figure]] = {}
-    if found.check is not None:
-        makers["check"] = partial(check_figure, found)
-    makers["where"] = partial(where_figure, found)
-    for number, comparison in enumerate(comparisons(found)):
-        ending = f"_{number + 1}" if number else ""
-        makers[f"probabilities{ending}"] = partial(probabilities_figure, found, comparison, number)
-        makers[f"strength{ending}"] = partial(strength_figure, found, comparison, number)
-        if local_names(comparison):
-            makers[f"places{ending}"] = partial(places_figure, found, comparison, number)
-    if found.before is not None:
-        makers["left_out"] = partial(left_out_figure, found)
-    if found.before is not None and found.after is not None:
-        makers["scores"] = partial(scores_figure, found)
+    if "check" in tree.children:
+        makers["check"] = partial(check_figure, document, tree)
+    makers["where"] = partial(where_figure, document, tree)
+    for number, comparison in enumerate(comparisons(document)):
+        makers[group_of("probabilities", number)] = partial(
+            probabilities_figure, document, comparison, number
+        )
+        if _has_curve(tree, comparison, number):
+            makers[group_of("strength", number)] = partial(strength_figure, document, tree, number)
+        if places_of(tree, number):
+            makers[group_of("places", number)] = partial(places_figure, document, tree, number)
+    if "held_out" in tree.children:
+        makers["left_out"] = partial(left_out_figure, tree)
+    if is_compared(tree):
+        makers["scores"] = partial(scores_figure, tree)
     return {name: write_png(make(), folder / f"{name}.png") for name, make in makers.items()}
 
 
-def render_diagnosis(outcome: Outcome, document: doc.Document, figures: Mapping[str, Path]) -> str:
+def _has_curve(tree: xr.DataTree, comparison: doc.Document, number: int) -> bool:
+    """Whether the leading candidate's evidence along its coefficient is known."""
+    group = group_of("comparison", number)
+    return group in tree.children and leading_name(comparison) in tree[group].to_dataset()["candidate"].values
+
+
+def render_diagnosis(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Path]) -> str:
     """Render the report of a diagnosis.
 
     Parameters
     ----------
-    outcome : Outcome
     document : mapping
-        The verdict that is also written as ``verdict.json``.
+        The content of ``verdict.json``; anything may be null.
+    tree : DataTree
+        The content of ``diagnosis.nc``.
     figures : mapping of str to Path
         As `save_diagnosis_figures` returns them; what is missing is left out.
 
@@ -77,4 +89,4 @@ def render_diagnosis(outcome: Outcome, document: doc.Document, figures: Mapping[
     """
     from skred.report.diagnosis.page import page
 
-    return page(flat(outcome), document, figures)
+    return page(document, tree, figures)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.report.diagnosis.unseen import difference_text
 from skred.report.shared import document as doc
+from skred.report.shared.html import two_digits
 from skred.report.shared.labels import name_text, printable, shortened, unit_text
-from skred.report.shared.numbers import decimals_for, fixed, is_number, rounded, share, whole
+from skred.report.shared.numbers import decimals_for, is_number, rounded, share, whole
 from skred.report.shared.tables import plain_table, plain_text
 
 if TYPE_CHECKING:
@@ -53,8 +53,8 @@ def _rows(document: doc.Document) -> list[tuple[str, str]]:
     rows.append(("elpd difference", _difference(document)))
     for key, words in (("locked", "locked avalanches"), ("outer_folds", "outer folds")):
         if document.get(key):
-            rows.append((words, difference_text(doc.get(document, key))))
-    rows.append(("p-value", fixed_p(doc.get(document, "evidence", "p_value"))))
+            rows.append((words, difference_text(document, doc.get(document, key))))
+    rows.append(("p-value", two_digits(doc.get(document, "evidence", "p_value"))))
     return rows
 
 
@@ -80,13 +80,6 @@ def _probabilities(document: doc.Document) -> str:
 
 
 def _difference(document: doc.Document) -> str:
-    difference, se = (doc.get(document, "evidence", key) for key in ("elpd_diff", "elpd_se"))
-    if not is_number(difference):
-        return "n/a (nothing was let in)"
-    doubled = f"{fixed(difference, 1, signed=True)} (2 se {fixed(2.0 * se, 1) if is_number(se) else 'n/a'})"
-    return doubled + ("" if abs(difference) >= PRACTICAL_DIFFERENCE else ", no practical difference")
-
-
-def fixed_p(value: object) -> str:
-    """A p-value with two significant digits."""
-    return f"{value:.2g}" if is_number(value) else fixed(None)
+    if not is_number(doc.get(document, "evidence", "elpd_diff")):
+        return "n/a (nothing was added)"
+    return difference_text(document, doc.get(document, "evidence"))

@@ -1,32 +1,22 @@
-"""Words and colours of a diagnosis that its figures, tables and page share."""
+"""Words and colours of a diagnosis that its figures, tables and page share, read off its document."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy.special import logsumexp
-
-from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
-from skred.physics.mechanisms import mechanisms
-from skred.physics.mechanisms.spec import Group
-from skred.report.shared.labels import unit_text
+from skred.report.shared import document as doc
+from skred.report.shared.labels import name_text, printable, unit_text
+from skred.report.shared.numbers import is_number
 from skred.report.shared.style import GREY
 
-if TYPE_CHECKING:
-    from skred.diagnosis.compare.candidate import Candidate
-    from skred.diagnosis.compare.comparison import Comparison
-    from skred.diagnosis.compare.location import Location
-    from skred.report.diagnosis.flat import Flat as Diagnosis
-
-FloatArray = NDArray[np.float64]
 BEFORE, AFTER, MISMATCH = GREY, "#0072B2", "#D55E00"
 """Predictions by the base law and by the augmented one; the place where something is missing."""
-_COLOURS = {Group.PHYSICS: "#0072B2", Group.INSTRUMENT: "#CC79A7", UNLISTED: "#E69F00", NOTHING: GREY}
+PHYSICS, INSTRUMENT, UNLISTED, NOTHING = "physics", "instrument", "unlisted", "nothing"
+"""Kinds of candidates; the last two are ids as well."""
+_COLOURS = {PHYSICS: "#0072B2", INSTRUMENT: "#CC79A7", UNLISTED: "#E69F00", NOTHING: GREY}
 _KINDS = {
-    Group.PHYSICS: "listed physics", Group.INSTRUMENT: "instrument", UNLISTED: "unlisted",
-    NOTHING: "nothing",
+    PHYSICS: "listed physics", INSTRUMENT: "instrument", UNLISTED: "not in the list", NOTHING: "nothing",
 }  # fmt: skip
 _VERDICTS = {
     "missing_physics": "Physics is missing",
@@ -37,97 +27,103 @@ _VERDICTS = {
 }
 
 
-def verdict_words(found: Diagnosis) -> str:
+def verdict_words(document: doc.Document) -> str:
     """The verdict in a few words."""
-    if found.decision.disputed:
+    if doc.get(document, "report", "disputed"):
         return "Physics is missing, or the recordings are off"
-    return _VERDICTS[found.decision.verdict]
+    verdict = doc.get(document, "verdict")
+    return _VERDICTS.get(str(verdict), name_text(verdict or "n/a"))
 
 
-def title_of(name: str) -> str:
-    """A raced id in plain words."""
-    if name == NOTHING:
-        return "nothing missing"
-    if name == UNLISTED:
-        return "a force that is not in the list"
-    mechanism = mechanisms().get(name)
-    return mechanism.title if mechanism is not None else name
+def facts_of(document: doc.Document, name: str) -> doc.Document:
+    """What the document says of a mechanism, or of the two ids that are none; empty where nothing."""
+    return doc.get(document, "report", "mechanisms", name) or {}
 
 
-def short_title(name: str) -> str:
+def title_of(document: doc.Document, name: Any) -> str:
+    """An id in plain words; the id itself where the document has none."""
+    return printable(doc.get(facts_of(document, str(name)), "title") or name)
+
+
+def short_title(document: doc.Document, name: Any) -> str:
     """The same without the examples after its colon."""
-    return title_of(name).partition(":")[0]
+    return title_of(document, name).partition(":")[0]
 
 
-def kind_of(name: str) -> str:
+def in_words(names: Sequence[Any]) -> list[str]:
+    """Ids as they are in tables; the force in no list in words."""
+    return ["a force not in the list" if name == UNLISTED else name_text(name) for name in names]
+
+
+def kind_of(document: doc.Document, name: str) -> str:
     """What an id blames, in words."""
-    return _KINDS[_group(name)]
+    return _KINDS[_kind(document, name)]
 
 
-def colour_of(name: str) -> str:
-    """One colour for each group of ids."""
-    return _COLOURS[_group(name)]
+def colour_of(document: doc.Document, name: str) -> str:
+    """One colour for each kind of candidate."""
+    return _COLOURS[_kind(document, name)]
 
 
 def kinds() -> list[tuple[str, str]]:
-    """Words and colour of each group."""
-    return [(_KINDS[group], colour) for group, colour in _COLOURS.items()]
+    """Words and colour of each kind."""
+    return [(_KINDS[kind], colour) for kind, colour in _COLOURS.items()]
 
 
-def _group(name: str) -> str:
-    if name in (NOTHING, UNLISTED):
-        return name
-    mechanism = mechanisms().get(name)
-    return mechanism.group if mechanism is not None else UNLISTED
+def _kind(document: doc.Document, name: str) -> str:
+    kind = str(doc.get(facts_of(document, name), "kind") or name)
+    return kind if kind in _KINDS else PHYSICS
 
 
-def bracketed(unit: str) -> str:
+def bracketed(unit: Any) -> str:
     """A unit in brackets for an axis; nothing where there is none."""
-    return "" if unit == "1" else f" [{unit_text(unit)}]"
+    return "" if unit in ("1", None) else f" [{unit_text(unit)}]"
 
 
-def leading_name(comparison: Comparison) -> str:
-    """The most probable listed id."""
-    shares = {
-        name: share for name, share in comparison.probability.items() if name not in (NOTHING, UNLISTED)
-    }
-    return max(shares, key=lambda name: shares[name])
+def comparisons(document: doc.Document) -> list[doc.Document]:
+    """The model comparisons, the first one without anything added."""
+    return doc.listed(document, "report", "comparisons")
 
 
-def leading(comparison: Comparison, name: str = "") -> Candidate:
-    """A candidate, by default the most probable listed one, where its evidence is highest."""
-    chosen = name or leading_name(comparison)
-    return comparison.leading(chosen).candidates[chosen]
+def shares_of(comparison: doc.Document) -> dict[str, float]:
+    """Probability of each candidate that has one, most probable first."""
+    shares = doc.get(comparison, "probability") or {}
+    known = {str(name): float(share) for name, share in shares.items() if is_number(share)}
+    return dict(sorted(known.items(), key=lambda item: -item[1]))
 
 
-def comparisons(found: Diagnosis) -> list[Comparison]:
-    """The comparisons that were run and looked at, each once."""
-    first = [found.comparison] if found.comparison is not None else []
-    return first + [step.comparison for step in found.steps[1:]]
+def leading_name(comparison: doc.Document) -> str:
+    """What was added from a comparison, or else its most probable mechanism; empty where there is none."""
+    added = doc.get(comparison, "added")
+    if added is not None:
+        return str(added)
+    return next((name for name in shares_of(comparison) if name not in (NOTHING, UNLISTED)), "")
 
 
-def factor_at(candidate: Candidate, relative: float) -> float:
-    """Log Bayes factor of an candidate with its prior's scale multiplied."""
-    added = candidate.mechanism.added
-    assert added is not None
-    factors = [one.log_bayes_factor_at(relative * added.scale_of(one.shape)) for one in candidate.curves]
-    return float(logsumexp(candidate.log_weights + np.array(factors)))
+def stretch_in(entry: doc.Document | None) -> tuple[float, float] | None:
+    """Ends of a ``location`` [m]; None where it has none."""
+    ends = [doc.get(entry, key) for key in ("s_from_m", "s_to_m")]
+    return (float(ends[0]), float(ends[1])) if all(map(is_number, ends)) else None
 
 
-def profile_of(found: Diagnosis) -> Location | None:
-    """The missing force along the track; where there is no alarm, that in which nothing stands out."""
-    return found.location or found.quiet
-
-
-def stretch_of(found: Diagnosis) -> tuple[float, float] | None:
-    """Where the verdict says that something acts [m]."""
-    if found.steps:
-        return found.steps[0].candidate.stretch()
-    if found.decision.verdict == "unexplained" and found.location is not None:
-        return found.location.stretch_m
-    return None
-
-
-def blamed_sensors(found: Diagnosis) -> set[str]:
+def blamed_sensors(document: doc.Document) -> set[str]:
     """Sensors that the verdict blames."""
-    return {step.candidate.best.shape.sensor or "" for step in found.steps} - {""}
+    return {
+        str(doc.get(one, "sensor")) for one in doc.listed(document, "mechanisms") if doc.get(one, "sensor")
+    }
+
+
+def law_id(document: doc.Document) -> str:
+    """Id of the base law."""
+    return printable(doc.get(document, "base_model") or "the law")
+
+
+def law_title(document: doc.Document) -> str:
+    """Title of the base law."""
+    return printable(doc.get(document, "report", "law", "title") or law_id(document))
+
+
+def with_added(document: doc.Document, added: Sequence[Any]) -> str:
+    """The base law and what was added to it, as a sum."""
+    names = ["the force profile" if name == UNLISTED else printable(name) for name in added]
+    return " + ".join([law_id(document), *names])

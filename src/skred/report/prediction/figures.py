@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.report.shared.document import get
 from skred.report.shared.labels import figure_text, printable, shortened, unit_text
 from skred.report.shared.numbers import fixed, share, whole
+from skred.report.shared.recordings import recordings_of
 from skred.report.shared.style import (
     GREY,
     INK,
@@ -26,8 +28,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
-    from skred.inference.hierarchical.problem import HierarchicalProblem
-    from skred.physics.law import Law
+    from skred.report.shared.document import Document
+    from skred.report.shared.recordings import Recordings
 
 FloatArray = NDArray[np.float64]
 _DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (1.5, 1.5)))
@@ -58,24 +60,24 @@ _TICKS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005)
 
 
 @styled
-def prediction_figure(data: xr.Dataset, law: Law, problem: HierarchicalProblem) -> Figure:
+def prediction_figure(document: Document, tree: xr.DataTree) -> Figure:
     """Speed and runout that shares of avalanches exceed along the track, with credible bands.
 
     Parameters
     ----------
-    data : Dataset
-        As `skred.prediction.predict.prediction_of` makes it.
-    law : Law
-    problem : HierarchicalProblem
-        For what was recorded, drawn on the campaign's own track.
+    document : mapping
+        The content of ``prediction.json``.
+    tree : DataTree
+        The content of ``prediction.nc``; what was recorded is drawn on the campaign's own track.
     """
+    data, recordings = tree.to_dataset(), recordings_of(tree)
     title = f"The next avalanche on {figure_text(data.attrs['track'], 40)}: how fast, how far"
-    figure = new_figure(7.6, f"{title}\n{figure_text(_subtitle(data, law), 100)}")
+    figure = new_figure(7.6, f"{title}\n{figure_text(_subtitle(data, document), 100)}")
     windows = _windows(data)
     panels = figure.subplots(
         3, len(windows), sharex="col", squeeze=False, gridspec_kw={"height_ratios": [1.3, 1.15, 1.0]}
     )
-    colour = law_colours([law.id])[law.id]
+    colour = _colour(document)
     for column, window in enumerate(windows):
         speed, runout, profile = panels[:, column]
         last = column == len(windows) - 1
@@ -85,9 +87,9 @@ def prediction_figure(data: xr.Dataset, law: Law, problem: HierarchicalProblem) 
         if last:
             _distances(profile, data, colour)
         if data.attrs["track_is_own"]:
-            _recorded(runout, problem, window)
+            _recorded(runout, recordings, window)
             if last:
-                _recorded_speeds(speed, problem, window)
+                _recorded_speeds(speed, recordings, window)
         _reference((speed, runout, profile), data)
         if column > 0:
             for axes in (speed, runout):
@@ -128,8 +130,14 @@ def _windows(data: xr.Dataset) -> list[tuple[float, float]]:
     return [whole_track, *wide]
 
 
-def _subtitle(data: xr.Dataset, law: Law) -> str:
-    return f"{law.title}, calibrated on {data.attrs['campaign']}; bands: 90 % credible"
+def _colour(document: Document) -> str:
+    law_id = str(get(document, "law", "id"))
+    return law_colours([law_id])[law_id]
+
+
+def _subtitle(data: xr.Dataset, document: Document) -> str:
+    title, campaign = printable(get(document, "law", "title")), data.attrs["campaign"]
+    return f"{title}, calibrated on {campaign}; bands: 90 % credible"
 
 
 def _start(data: xr.Dataset) -> float:
@@ -201,10 +209,10 @@ def _distances(axes: Axes, data: xr.Dataset, colour: str) -> None:
         axes.annotate(text, (at, level), (offset, 0), ha=side, **_BESIDE)
 
 
-def _recorded(axes: Axes, problem: HierarchicalProblem, window: tuple[float, float]) -> None:
+def _recorded(axes: Axes, recordings: Recordings, window: tuple[float, float]) -> None:
     """Share of the recorded avalanches that ran beyond s."""
-    of_runout = [sensor.is_runout for sensor in problem.campaign.sensors]
-    values = np.sort(problem.values[:, of_runout][problem.observed[:, of_runout]])
+    of_runout = recordings.is_runout
+    values = np.sort(recordings.values[:, of_runout][recordings.observed[:, of_runout]])
     n = len(values)
     if n == 0:
         return
@@ -215,12 +223,12 @@ def _recorded(axes: Axes, problem: HierarchicalProblem, window: tuple[float, flo
     )
 
 
-def _recorded_speeds(axes: Axes, problem: HierarchicalProblem, window: tuple[float, float]) -> None:
+def _recorded_speeds(axes: Axes, recordings: Recordings, window: tuple[float, float]) -> None:
     """Recorded speeds at their sensors, a span's at its middle."""
     label: str | None = "recorded speeds (spread sideways)"
     half_width = 0.012 * (window[1] - window[0])
-    for column, sensor in enumerate(problem.campaign.sensors):
-        values = np.sort(problem.values[problem.observed[:, column], column])
+    for column, sensor in enumerate(recordings.sensors):
+        values = np.sort(recordings.values[recordings.observed[:, column], column])
         if sensor.is_runout or len(values) == 0:
             continue
         middle = 0.5 * (sensor.s_from_m + sensor.s_to_m)
@@ -239,17 +247,19 @@ def _reference(panels: tuple[Axes, ...], data: xr.Dataset) -> None:
 
 
 @styled
-def uncertainty_figure(data: xr.Dataset, law: Law) -> Figure:
+def uncertainty_figure(document: Document, tree: xr.DataTree) -> Figure:
     """Standard deviations of speed and runout by where they come from.
 
     Parameters
     ----------
-    data : Dataset
-        As `skred.prediction.predict.prediction_of` makes it.
-    law : Law
+    document : mapping
+        The content of ``prediction.json``.
+    tree : DataTree
+        The content of ``prediction.nc``.
     """
+    data = tree.to_dataset()
     title = f"Where the uncertainty comes from, on {figure_text(data.attrs['track'], 40)}"
-    figure = new_figure(6.6, f"{title}\n{figure_text(_subtitle(data, law), 100)}")
+    figure = new_figure(6.6, f"{title}\n{figure_text(_subtitle(data, document), 100)}")
     speed, arrival, runout = figure.subplots(3, 1, gridspec_kw={"height_ratios": [1.6, 0.7, 1.0]})
     s_m = data["s"].values
     for part, (colour, dashes, label) in _PART_STYLES.items():
@@ -259,7 +269,7 @@ def uncertainty_figure(data: xr.Dataset, law: Law) -> Figure:
     speed.set_ylabel(f"sd of speed [{unit_text('m s-1')}]")
     speed.set_ylim(bottom=0.0)
     speed.set_title("Speed: standard deviation among the avalanches that come to s")
-    _arrival(arrival, data, law_colours([law.id])[law.id])
+    _arrival(arrival, data, _colour(document))
     for axes in (speed, arrival):
         axes.set_xlim(_start(data), s_m[-1])
         axes.grid(axis="y")
@@ -315,6 +325,10 @@ def _runout_parts(axes: Axes, data: xr.Dataset) -> None:
     axes.set_title("Runout: standard deviation (variances add up, standard deviations do not)")
 
 
+FIGURES = {"prediction": prediction_figure, "uncertainty": uncertainty_figure}
+"""Makers of all figures by their names."""
+
+
 def prediction_table(document: dict[str, Any]) -> Table:
     """How far and how fast, with bands, for the terminal.
 
@@ -334,7 +348,7 @@ def prediction_table(document: dict[str, Any]) -> Table:
     for column in ("", "90 % band", "unit"):
         table.add_column(column, justify="right", no_wrap=True)
     if not document["valid"]:
-        table.add_row(Text("nothing: the gate failed", style="red"), "", "", "")
+        table.add_row(Text("nothing: the chains did not converge", style="red"), "", "", "")
         return table
     for row in document["runout"]["exceeded_by"]:
         what = f"runout exceeded by {100 * row['share']:g} %"

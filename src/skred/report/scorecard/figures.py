@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 
 DIAGNOSIS, BAR = "#0072B2", "#D55E00"
 """What was measured; what was asked for."""
+SCORECARD_FIGURES = (
+    "false_alarms", "power", "confusion", "confusion_classes", "places", "reliability", "gain", "baselines",
+)  # fmt: skip
+"""Names of all figures that there may be."""
 _KINDS = ("sparse", "dense")
 _SNR = (1.5, 13.0)
 
@@ -36,7 +40,16 @@ def save_scorecard_figures(document: Document, folder: Path) -> dict[str, Path]:
         Files by name: ``false_alarms``, ``power``, ``confusion``, ``confusion_classes``, ``places``,
         ``reliability``, ``gain`` and ``baselines``, as far as there are data for them.
     """
-    makers: dict[str, Callable[[Document], Figure | None]] = {
+    files = {}
+    for name, make in _makers().items():
+        figure = make(document)
+        if figure is not None:
+            files[name] = write_png(figure, folder / f"{name}.png")
+    return files
+
+
+def _makers() -> dict[str, Callable[[Document], Figure | None]]:
+    return {
         "false_alarms": false_alarms_figure,
         "power": power_figure,
         "confusion": lambda one: confusion_figure(one, "mechanisms"),
@@ -46,12 +59,6 @@ def save_scorecard_figures(document: Document, folder: Path) -> dict[str, Path]:
         "gain": gain_figure,
         "baselines": baselines_figure,
     }
-    files = {}
-    for name, make in makers.items():
-        figure = make(document)
-        if figure is not None:
-            files[name] = write_png(figure, folder / f"{name}.png")
-    return files
 
 
 def own_scores(document: Document, kind: str, part: str = "open") -> Any:
@@ -61,11 +68,11 @@ def own_scores(document: Document, kind: str, part: str = "open") -> Any:
 
 @styled
 def false_alarms_figure(document: Document) -> Figure | None:
-    """Share of alarms where nothing is hidden, by kind, with their one-sided upper limits and bars."""
+    """Share of alarms where nothing is hidden, by kind, with upper limits and acceptance criteria."""
     found = get(own_scores(document, "all"), "false_alarms")
     bars = get(document, "standards", "bars_false_alarms")
     rows = [("nulls, all", found["all"], bars["all"]), ("plain", found["plain"], bars["plain"])]
-    rows += [("nasty, all", found["nasty"], bars["nasty"])]
+    rows += [("contaminated, all", found["nasty"], bars["nasty"])]
     rows += [(name_text(name), one, bars["nasty"]) for name, one in found["by_nastiness"].items()]
     for kind in _KINDS:
         rows.append((f"{kind}, all", get(own_scores(document, kind), "false_alarms", "all"), bars["all"]))
@@ -92,7 +99,7 @@ def false_alarms_figure(document: Document) -> Figure | None:
             [place - 0.35, place + 0.35],
             color=BAR,
             linewidth=1.6,
-            label="bar for the upper limit",
+            label="acceptance criterion for the upper limit",
         )
         axes.text(max(limit, bar) + 0.008, place, f"{one['hits']} of {one['n']}", va="center", fontsize=7.5)
     axes.set_yticks(range(len(rows)), [figure_text(row[0], 30) for row in rows])
@@ -156,7 +163,7 @@ def _detection(axes: Axes, document: Document, kind: str) -> None:
         color=BAR,
         markersize=7,
         markeredgewidth=1.8,
-        label="bar",
+        label="acceptance criterion",
     )
     axes.set_title(f"{kind}: found, n = {get(scores, 'detection', 'all', 'n')}")
 
@@ -181,7 +188,7 @@ def _names(axes: Axes, document: Document, kind: str) -> None:
         color=BAR,
         markersize=7,
         markeredgewidth=1.8,
-        label="bar",
+        label="acceptance criterion",
     )
     axes.set_title(f"{kind}: named, n = {get(scores, 'naming', 'all', 'n')}")
 

@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
-from skred.report.comparison.html import environment, picture
 from skred.report.scorecard.sections import sections_of
 from skred.report.shared.document import Document, get, listed
+from skred.report.shared.html import environment, picture
 
 
 def render_scorecard(document: Document, figures: Mapping[str, Path]) -> str:

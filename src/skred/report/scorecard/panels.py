@@ -55,7 +55,9 @@ def places_figure(document: Document) -> Figure | None:
                 np.r_[_LEAST_M, np.sort(error)], np.r_[0.0, steps], where="post", color=colour, linewidth=1.4
             )
     bar = get(document, "standards", "bar_place_m")
-    points.axhline(bar, color=INK, linestyle="--", linewidth=1.0, label="bar for the median, dense")
+    points.axhline(
+        bar, color=INK, linestyle="--", linewidth=1.0, label="acceptance criterion for the median, dense"
+    )
     shares.axvline(bar, color=INK, linestyle="--", linewidth=1.0)
     shares.axhline(0.5, color=GREY, linewidth=0.7)
     points.set(yscale="log", xlabel="signal-to-noise [-]", ylabel="error [m]")

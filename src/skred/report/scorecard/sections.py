@@ -66,13 +66,13 @@ def sections_of(document: Document) -> list[Section]:
 
 def _bars(document: Document) -> Section:
     words = (
-        "Each bar was set before the trials. It is judged by the point estimate, for false alarms by the "
-        "one-sided upper limit; beyond doubt means that the whole interval lies on the same side. The "
-        "ceiling is what linearised calculations with perfect knowledge of the models reach. With fewer than "
-        "20 trials, 100 for the calibration of probabilities, no bar is called met. Masked trials have a "
-        "section of their own and are in no other, but for the counts of what was said of what.",
+        "Each acceptance criterion was set before the trials. The point estimate is judged, for false alarms "
+        "the one-sided upper limit. Beyond doubt: the whole interval lies on the same side. The ceiling is "
+        "what linearised calculations with perfect knowledge of the models reach. With fewer than 20 trials, "
+        "100 for the calibration of probabilities, no criterion is called met. Trials with a compensated "
+        "effect have a section of their own. They are in no other, but for the counts of answers.",
     )
-    return Section("bars", "The bars", words, (bar_table(document), count_table(document)))
+    return Section("bars", "Acceptance criteria", words, (bar_table(document), count_table(document)))
 
 
 def _alarms(scores: Mapping[str, Any]) -> Section:
@@ -80,14 +80,14 @@ def _alarms(scores: Mapping[str, Any]) -> Section:
     rows: list[tuple[str, Path]] = [
         ("all nulls", ("false_alarms", "all")),
         ("plain", ("false_alarms", "plain")),
-        ("nasty", ("false_alarms", "nasty")),
+        ("contaminated", ("false_alarms", "nasty")),
         *((name_text(name), ("false_alarms", "by_nastiness", name)) for name in habits),
         ("all nulls, failures counted", ("false_alarms", "all", "with_failures")),
     ]
     words = ("An alarm is a verdict that says something is missing, off or unexplained where nothing is "
-             "hidden. Nasty: heavy tails, correlated errors, an odd event, outlying readings.",)  # fmt: skip
+             "hidden. Contaminated: heavy tails, correlated errors, an odd event, outliers.",)  # fmt: skip
     table = by_kind("Share of alarms, 95 % interval, counts.", scores, rows)
-    caption = "Share of alarms and its one-sided 95 % upper limit, which the bar is for."
+    caption = "Share of alarms and its one-sided 95 % upper limit, which the acceptance criterion is for."
     return Section("alarms", "False alarms", words, (table,), (("false_alarms", caption),))
 
 
@@ -102,8 +102,8 @@ def _detection(scores: Mapping[str, Any]) -> Section:
              "limit of 2.85.",)  # fmt: skip
     tables = (snr_table(scores, "detection", "Share found."), by_kind("Found, in other words.", scores, rows))
     caption = (
-        "Found, above, and named, below, against signal-to-noise; crosses are bars. Where two points of a "
-        "panel share a bin they are moved apart."
+        "Found, above, and named, below, against signal-to-noise; crosses are acceptance criteria. Where two "
+        "points of a panel share a bin they are moved apart."
     )
     return Section("detection", "Detection", words, tables, (("power", caption),))
 
@@ -112,8 +112,8 @@ def _names(scores: Mapping[str, Any]) -> Section:
     keys = {
         "right_first_name": "right first name",
         "right_class": "right class",
-        "right_set": "right tie set",
-        "right_set_of_3": "right tie set of at most 3",
+        "right_set": "right credible set",
+        "right_set_of_3": "right credible set of at most 3",
         "named_alone": "a single name given",
         "ceiling_right_first_name": "ceiling: right first name",
         "ceiling_named": "ceiling: a single name given",
@@ -136,8 +136,8 @@ def _names(scores: Mapping[str, Any]) -> Section:
     honest: list[tuple[str, Path]] = [
         ("right where a single name is given", ("honesty", "right_where_named")),
         ("right class where a single name is given", ("honesty", "right_class_where_named")),
-        ("tie sets that hold the truth", ("honesty", "set_holds_truth_where_tied")),
-        ("names in a tie set, median", ("honesty", "names_in_tie_sets_median")),
+        ("credible sets that hold the truth", ("honesty", "set_holds_truth_where_tied")),
+        ("names in a credible set, median", ("honesty", "names_in_tie_sets_median")),
         ("single names over the ceiling's expectation", ("honesty", "named_over_ceiling")),
     ]
     tables.append(
@@ -185,8 +185,9 @@ def _confusion() -> Section:
     figures = (
         (
             "confusion",
-            "Each row is a kind of truth, with its number of trials; frames mark right names. Tie sets count "
-            "by their leading name, time-outs as crashes; masked trials are included.",
+            "Each row is a kind of truth, with its number of trials; frames mark right names. Credible sets "
+            "count by their leading name, time-outs as crashes. Trials with a compensated effect are "
+            "included.",
         ),
         ("confusion_classes", "The same over classes of mechanisms that recordings cannot tell apart."),
     )
@@ -234,11 +235,11 @@ def _probabilities(scores: Mapping[str, Any]) -> Section:
         ("log score per trial [nats]", ("probability", "log_score_mean_nats")),
         ("Brier score per trial", ("probability", "brier_mean")),
     ]
-    words = ("Where nothing is hidden, nasty or not, nothing should be probable; where no list has the "
-             "effect, unlisted. Of two mechanisms both count, added in the log score; they are left out of "
-             "the reliability of all ids. The log score charges for at least a probability of 0.001, which "
-             "stands for answers without any. Bins are ten of equal width. Statements of one trial are not "
-             "independent: the intervals of all ids are somewhat narrow.",)  # fmt: skip
+    words = ("Where nothing is hidden, contaminated or not, nothing should be probable; where no list has "
+             "the effect, unlisted. Of two mechanisms both count, added in the log score; they are left "
+             "out of the reliability of all ids. The log score charges for at least a probability of 0.001, "
+             "which stands for answers without any. Bins are ten of equal width. Statements of one trial are "
+             "not independent: the intervals of all ids are somewhat narrow.",)  # fmt: skip
     caption = "Share of statements that are true against their stated probability."
     table = by_kind("Scores of stated probabilities.", scores, rows, decimals=3)
     return Section("probabilities", "Stated probabilities", words, (table,), (("reliability", caption),))
@@ -264,17 +265,20 @@ def _masked(scores: Mapping[str, Any]) -> list[Section]:
         ("found", ("detection", "all")),
         ("right first name", ("naming", "all", "right_first_name")),
         ("right class", ("naming", "all", "right_class")),
-        ("right tie set", ("naming", "all", "right_set")),
+        ("right credible set", ("naming", "all", "right_set")),
         ("right first name, signal-to-noise 6 to 8.5", ("naming", "around_7", "right_first_name")),
         ("right where a single name is given", ("honesty", "right_where_named")),
         ("right stretch", ("place", "right_stretch")),
         ("log score per trial [nats]", ("probability", "log_score_mean_nats")),
     ]
     words = ("Here the calibrated base model is right on average at every sensor, because its strengths or "
-             "an opposing effect took the hidden one on: it shows only in what differs between "
+             "an opposing effect took the hidden one on. It shows only in what differs between "
              "avalanches.",)  # fmt: skip
-    tables = (by_kind("Masked trials.", scores, rows), snr_table(scores, "detection", "Share found."))
-    return [Section("masked", "Masked trials", words, tables)]
+    tables = (
+        by_kind("Trials with a compensated effect.", scores, rows),
+        snr_table(scores, "detection", "Share found."),
+    )
+    return [Section("masked", "Trials with a compensated effect", words, tables)]
 
 
 def _baselines(document: Document) -> list[Section]:
@@ -314,7 +318,7 @@ def _paired_table(paired: Mapping[str, Any], kind: str) -> Table:
     head = (
         "baseline",
         "right first name",
-        "right tie set",
+        "right credible set",
         "right first name, as decided",
         "log score [nats]",
     )
@@ -334,7 +338,7 @@ def _side_by_side(methods: Mapping[str, Any], kind: str) -> Table:
         ("false alarms", ("false_alarms", "all")),
         ("found", ("detection", "all")),
         ("right first name", ("naming", "all", "right_first_name")),
-        ("right tie set", ("naming", "all", "right_set")),
+        ("right credible set", ("naming", "all", "right_set")),
         ("right where named", ("honesty", "right_where_named")),
     )
     rows = []

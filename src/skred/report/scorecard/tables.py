@@ -81,7 +81,7 @@ def _any_text(record: Any, decimals: int) -> str:
 
 
 def bar_table(document: Document) -> Table:
-    """Every bar, what was measured, and whether it is met."""
+    """Every acceptance criterion, what was measured, and whether it is met."""
     rows, marks = [], []
     for bar in listed(document, "bars"):
         sure = ", beyond doubt" if bar["beyond_doubt"] else ""
@@ -98,7 +98,7 @@ def bar_table(document: Document) -> Table:
             )
         )
         marks.append({"met": "met", "not met": "bad"}.get(bar["status"], "quiet"))
-    head = ("goal", "what", "bar", "measured", "95 % interval", "n", "ceiling", "")
+    head = ("goal", "what", "criterion", "measured", "95 % interval", "n", "ceiling", "")
     return Table("", head, tuple(rows), tuple(marks))
 
 

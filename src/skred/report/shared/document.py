@@ -36,12 +36,12 @@ def passed(model: Document) -> bool:
 
 
 def ranked(comparison: Document) -> list[Document]:
-    """The laws that are compared: those that passed the gate."""
+    """The laws that are compared: those whose chains converged."""
     return [model for model in models(comparison) if passed(model)]
 
 
 def failed(comparison: Document) -> list[Document]:
-    """The laws that failed the gate."""
+    """The laws whose chains did not converge."""
     return [model for model in models(comparison) if not passed(model)]
 
 

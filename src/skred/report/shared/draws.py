@@ -16,9 +16,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-    from skred.campaign import Campaign, Sensor
-    from skred.inference.pooled.problem import PooledProblem
-    from skred.inference.problem import Problem
+    from skred.campaign import Sensor
+    from skred.report.shared.recordings import Recordings
 
 FloatArray = NDArray[np.float64]
 
@@ -73,12 +72,12 @@ def kernels(grid: FloatArray, centres: FloatArray, width: float) -> FloatArray:
 
 
 def gate_text(tree: xr.DataTree) -> str:
-    """One line on the gate of a calibration; empty where the tree does not say."""
+    """One line on the convergence of a calibration; empty where the tree does not say."""
     try:
         gate = json.loads(tree.attrs["gate"])
-        state = "passed" if gate["passed"] else "FAILED"
+        state = "converged" if gate["passed"] else "NOT CONVERGED"
         sizes = min(gate["ess_bulk_min"], gate["ess_tail_min"])
-        return f"gate {state}: r-hat at most {gate['r_hat_max']:.3f}, effective draws at least {sizes:.0f}"
+        return f"{state}: r-hat at most {gate['r_hat_max']:.3f}, effective draws at least {sizes:.0f}"
     except (KeyError, TypeError, ValueError):
         return ""
 
@@ -143,9 +142,9 @@ class NewAvalanche(Recorded):
     reading: FloatArray
 
 
-def shown_sensors(campaign: Campaign) -> tuple[Sensor, ...]:
+def shown_sensors(recordings: Recordings) -> tuple[Sensor, ...]:
     """The sensors that a figure with one panel each shows."""
-    return campaign.sensors[:MAX_SENSORS]
+    return recordings.sensors[:MAX_SENSORS]
 
 
 def left_out(n_sensors: int) -> str:
@@ -153,28 +152,27 @@ def left_out(n_sensors: int) -> str:
     return f" (the first {MAX_SENSORS} of {n_sensors} sensors)" if n_sensors > MAX_SENSORS else ""
 
 
-def recorded_at(problem: Problem, sensor: Sensor) -> dict[str, Any]:
+def recorded_at(recordings: Recordings, sensor: Sensor) -> dict[str, Any]:
     """The fields of `Recorded` of one sensor."""
-    campaign = problem.campaign
-    column = campaign.sensors.index(sensor)
-    offset = campaign.reference_s_m or 0.0 if sensor.is_runout else 0.0
-    observed, not_reached = problem.observed[:, column], problem.not_reached[:, column]
+    column = recordings.sensors.index(sensor)
+    offset = recordings.reference_s_m or 0.0 if sensor.is_runout else 0.0
+    observed, not_reached = recordings.observed[:, column], recordings.not_reached[:, column]
     return {
         "sensor": sensor,
         "offset": offset,
-        "recorded": problem.values[observed, column] - offset,
+        "recorded": recordings.values[observed, column] - offset,
         "n_not_reached": int(not_reached.sum()),
         "n_missing": int((~observed & ~not_reached).sum()),
     }
 
 
-def sensor_draws(tree: xr.DataTree, problem: PooledProblem, sensor: Sensor) -> SensorDraws:
+def sensor_draws(tree: xr.DataTree, recordings: Recordings, sensor: Sensor) -> SensorDraws:
     """Gather what belongs to one sensor of a pooled calibration."""
-    recorded = recorded_at(problem, sensor)
-    column = problem.campaign.sensors.index(sensor)
+    recorded = recorded_at(recordings, sensor)
+    column = recordings.sensors.index(sensor)
     predictive = tree["posterior_predictive"].to_dataset()
     response = predictive["mean_response"].transpose("chain", "draw", "release", "sensor").values[..., column]
-    events_per_release = np.bincount(problem.release_of_event, minlength=len(problem.releases))
+    _, events_per_release = np.unique(recordings.release_s_m, return_counts=True)
     reading = predictive["reading"].transpose("chain", "draw", "event", "sensor").values[..., column]
     return SensorDraws(
         **recorded,
@@ -183,15 +181,16 @@ def sensor_draws(tree: xr.DataTree, problem: PooledProblem, sensor: Sensor) -> S
     )
 
 
-def new_avalanche(tree: xr.DataTree, problem: Problem, sensor: Sensor) -> NewAvalanche:
+def new_avalanche(tree: xr.DataTree, recordings: Recordings, sensor: Sensor) -> NewAvalanche:
     """Gather what belongs to one sensor of a hierarchical calibration."""
-    recorded = recorded_at(problem, sensor)
-    column = problem.campaign.sensors.index(sensor)
+    recorded = recorded_at(recordings, sensor)
+    column = recordings.sensors.index(sensor)
     predictive = tree["posterior_predictive"].to_dataset()
     front, reading, reached = (
         predictive[name].transpose("chain", "draw", "event", "sensor").values[..., column]
         for name in ("front", "reading", "reached")
     )
+    reached = np.asarray(reached, dtype=bool)
     return NewAvalanche(
         **recorded,
         reached=float(reached.mean()),

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 ABSENT = "n/a"
 """What stands where a number is not available."""
 _MOST_DIGITS = 7
+_MOST_ODDS = 50.0
 
 
 def is_number(value: Any) -> bool:
@@ -47,6 +48,18 @@ def share(value: Any) -> str:
     if 0.995 <= value < 1.0:
         return ">0.99"
     return f"{value:.2f}"
+
+
+def odds(nats: Any) -> str:
+    """A log Bayes factor as odds, with the nats in brackets: 20 to 1 (3.0 nats)."""
+    if not is_number(nats):
+        return ABSENT
+    size = abs(float(nats))
+    ratio = math.exp(size) if size < _MOST_ODDS else math.inf
+    shown = f"{ratio:.1f}" if ratio < 9.95 else f"{float(f'{ratio:.1e}'):,.0f}"
+    shown = "more than a million" if ratio > 1e6 else shown.replace(",", "\N{NARROW NO-BREAK SPACE}")
+    words = f"{shown} to 1" if nats >= 0 else f"1 to {shown}"
+    return f"{words} ({fixed(nats, 1)} nats)"
 
 
 def decimals_for(sd: Any, mcse: Any = None) -> int | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.report.shared import document as doc
 from skred.report.shared.labels import population_role, printable, shortened
 from skred.report.shared.numbers import decimals_for, fixed, is_number, rounded, share, whole
@@ -17,12 +16,12 @@ if TYPE_CHECKING:
 
 
 def comparison_table(comparison: doc.Document) -> Table:
-    """The comparison, best law first; laws that failed the gate below, without a rank.
+    """The comparison, best law first; laws that did not converge below, without a rank.
 
     Parameters
     ----------
     comparison : mapping
-        As `skred.report.comparison.html.render_comparison` takes it.
+        As `skred.report.comparison.page.render_comparison` takes it.
     """
     own = "with every avalanche its own friction" if doc.is_hierarchical(comparison) else ""
     name = shortened(doc.get(comparison, "campaign", "name"), 36 if own else 60)
@@ -47,7 +46,7 @@ def comparison_table(comparison: doc.Document) -> Table:
     failed = doc.failed(comparison)
     for model in failed:
         table.add_row(
-            plain_text(shortened(doc.get(model, "id"))), plain_text("gate failed", "red"), *["-"] * 8
+            plain_text(shortened(doc.get(model, "id"))), plain_text("not converged", "red"), *["-"] * 8
         )
     lines = [_explanation(comparison), *_pooled_line(comparison), *map(_failure, failed)]
     table.caption = plain_text("\n".join(lines))
@@ -153,7 +152,7 @@ def _ranked_row(model: doc.Document, *, best: bool) -> list[Any]:
 def _explanation(comparison: doc.Document) -> str:
     n_events = doc.get(comparison, "campaign", "n_events")
     few = f" with {whole(n_events)} events" if is_number(n_events) and n_events < 100 else ""
-    limit = f"{PRACTICAL_DIFFERENCE:.0f}"
+    limit = whole(doc.get(comparison, "limits", "practical_difference"))
     how = (
         "by importance sampling, refitted where that cannot be trusted"
         if doc.is_hierarchical(comparison)
@@ -175,7 +174,7 @@ def _pooled_line(comparison: doc.Document) -> list[str]:
 
 def _failure(model: doc.Document) -> str:
     problems = [printable(problem) for problem in doc.listed(model, "gate", "problems")]
-    return f"{shortened(doc.get(model, 'id'))} failed the gate: {'; '.join(problems) or 'sample again'}"
+    return f"{shortened(doc.get(model, 'id'))} did not converge: {'; '.join(problems) or 'sample again'}"
 
 
 def _parameter_row(parameter: doc.Document, *, of_population: bool) -> list[Any]:
@@ -204,4 +203,4 @@ def _parameter_row(parameter: doc.Document, *, of_population: bool) -> list[Any]
 def _gate(model: doc.Document) -> str:
     if doc.get(model, "gate") is None:
         return ""
-    return "Gate passed." if doc.passed(model) else _failure(model)
+    return "Converged." if doc.passed(model) else _failure(model)

@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from skred.campaign import Sensor
-    from skred.inference.problem import Problem
+    from skred.report.shared.recordings import Recordings
 
 _MAX_NAMED = 20
 """Names that stand beside each other; of more sensors one in two, one in three, ... is named."""
@@ -25,7 +24,7 @@ _ZOOM_BELOW = 0.6
 
 
 def track_figure(
-    problem: Problem, title: str, draw: Callable[[Axes], None], *, top: float, start: tuple[float, str]
+    recordings: Recordings, title: str, draw: Callable[[Axes], None], *, top: float, start: tuple[float, str]
 ) -> Figure:
     """Front speed along the track above, the terrain below.
 
@@ -33,7 +32,7 @@ def track_figure(
 
     Parameters
     ----------
-    problem : Problem
+    recordings : Recordings
     title : str
     draw : callable
         Draws the speeds in a panel.
@@ -43,7 +42,7 @@ def track_figure(
         Where the track is shown from [m], and what is said of the release.
     """
     figure = new_figure(5.7, title)
-    shown = windows(problem, start[0])
+    shown = windows(recordings, start[0])
     layout: dict[str, Any] = {"height_ratios": [2.1, 1]}
     panels = figure.subplots(2, len(shown), sharex="col", sharey="row", squeeze=False, gridspec_kw=layout)
     for column, (low, high) in enumerate(shown):
@@ -51,10 +50,10 @@ def track_figure(
         speed, profile = panels[:, column]
         draw(speed)
         if in_detail:
-            _readings(speed, problem)
-        _runouts(speed, problem)
-        terrain_profile(profile, problem, (low, high), named=in_detail)
-        _reference(speed, profile, problem)
+            _readings(speed, recordings)
+        _runouts(speed, recordings)
+        terrain_profile(profile, recordings, (low, high), named=in_detail)
+        _reference(speed, profile, recordings)
         speed.set_xlim(low, high)
     panels[0, 0].set_ylabel(f"front speed [{unit_text('m s-1')}]")
     panels[0, 0].set_ylim(0, top)
@@ -65,43 +64,37 @@ def track_figure(
     return figure
 
 
-def highest_recorded(problem: Problem) -> list[float]:
+def highest_recorded(recordings: Recordings) -> list[float]:
     """The highest recorded speed with its error [m/s]; empty where none is recorded."""
-    of_speed = [column for column, _, _ in placed_sensors(problem)]
-    recorded = (problem.values + problem.campaign.reading_sd())[:, of_speed]
+    of_speed = [column for column, _, _ in recordings.placed()]
+    recorded = (recordings.values + recordings.reading_sd)[:, of_speed]
     finite = recorded[np.isfinite(recorded)]
     return [float(finite.max())] if len(finite) else []
 
 
-def placed_sensors(problem: Problem) -> list[tuple[int, Sensor, float]]:
-    """Column, sensor and middle [m] of every sensor of speed."""
-    sensors = enumerate(problem.campaign.sensors)
-    return [(k, s, (s.s_from_m + s.s_to_m) / 2) for k, s in sensors if not s.is_runout]
-
-
-def windows(problem: Problem, release: float) -> list[tuple[float, float]]:
+def windows(recordings: Recordings, release: float) -> list[tuple[float, float]]:
     """Stretches of the track to show: all of it, and the one with recordings if that is short."""
-    length = problem.terrain.length_m
+    length = recordings.length_m
     whole = (min(release, length), length)
-    places = [s for _, sensor, _ in placed_sensors(problem) for s in (sensor.s_from_m, sensor.s_to_m)]
-    for column, sensor in enumerate(problem.campaign.sensors):
+    places = [s for _, sensor, _ in recordings.placed() for s in (sensor.s_from_m, sensor.s_to_m)]
+    for column, sensor in enumerate(recordings.sensors):
         if sensor.is_runout:
-            places += problem.values[problem.observed[:, column], column].tolist()
+            places += recordings.values[recordings.observed[:, column], column].tolist()
     if not places:
         return [whole]
     low, high = max(whole[0], min(places) - 0.03 * length), min(length, max(places) + 0.03 * length)
     return [whole, (low, high)] if high - low < _ZOOM_BELOW * (length - whole[0]) else [whole]
 
 
-def _readings(axes: Axes, problem: Problem) -> None:
+def _readings(axes: Axes, recordings: Recordings) -> None:
     """Each reading with its error; spread sideways in order, or else they hide each other."""
-    sd = problem.campaign.reading_sd()
-    placed = placed_sensors(problem)
-    half = _half_width([middle for _, _, middle in placed], problem.terrain.length_m)
+    sd = recordings.reading_sd
+    placed = recordings.placed()
+    half = _half_width([middle for _, _, middle in placed], recordings.length_m)
     label: str | None = "recorded, with its error (spread sideways)"
     for column, sensor, middle in placed:
-        rows = problem.observed[:, column]
-        values, errors = problem.values[rows, column], sd[rows, column]
+        rows = recordings.observed[:, column]
+        values, errors = recordings.values[rows, column], sd[rows, column]
         if len(values) == 0:
             continue
         rank = np.argsort(np.argsort(values, kind="stable"), kind="stable")
@@ -120,46 +113,44 @@ def _half_width(places: list[float], length: float) -> float:
     return float(min([0.016 * length, *(0.4 * gaps)]))
 
 
-def _runouts(axes: Axes, problem: Problem) -> None:
+def _runouts(axes: Axes, recordings: Recordings) -> None:
     """Rug of the recorded runouts at the foot of the panel."""
     label = "recorded runouts"
-    for column, sensor in enumerate(problem.campaign.sensors):
-        values = problem.values[problem.observed[:, column], column]
+    for column, sensor in enumerate(recordings.sensors):
+        values = recordings.values[recordings.observed[:, column], column]
         if sensor.is_runout and len(values):
             foot = axes.get_xaxis_transform()
             axes.vlines(values, 0, 0.045, transform=foot, color=RECORDED, linewidth=1.2, label=label)
             label = "_not in the legend"
 
 
-def terrain_profile(axes: Axes, problem: Problem, window: tuple[float, float], *, named: bool) -> None:
+def terrain_profile(axes: Axes, recordings: Recordings, window: tuple[float, float], *, named: bool) -> None:
     """Terrain with the sensors on it; spans as thick lines."""
-    track = problem.campaign.track
-    s_m, z_m = np.asarray(track.s_m), np.asarray(track.z_m)
+    s_m, z_m = recordings.track_s_m, recordings.track_z_m
     height = float(np.ptp(z_m)) or 1.0
     axes.fill_between(s_m, z_m, z_m.min() - 0.08 * height, color="#ececec", linewidth=0)
     axes.plot(s_m, z_m, color=INK, linewidth=1.0)
-    for _, sensor, middle in placed_sensors(problem):
+    for _, sensor, middle in recordings.placed():
         if sensor.is_span:
             span = np.linspace(sensor.s_from_m, sensor.s_to_m, 20)
             axes.plot(span, np.interp(span, s_m, z_m), color=INK, linewidth=3.5, solid_capstyle="butt")
         axes.plot(middle, float(np.interp(middle, s_m, z_m)), marker="o", markersize=3.5, color=INK)
     if named:
-        _names(axes, problem, window)
+        _names(axes, recordings, window)
     axes.set_ylim(z_m.min() - 0.08 * height, z_m.max() + 0.05 * height)
 
 
-def _names(axes: Axes, problem: Problem, window: tuple[float, float]) -> None:
+def _names(axes: Axes, recordings: Recordings, window: tuple[float, float]) -> None:
     """Names of the sensors above the panel, moved apart where they would overlap."""
-    placed = placed_sensors(problem)
+    placed = recordings.placed()
     placed = placed[:: -(-len(placed) // _MAX_NAMED) or 1]
-    track = problem.campaign.track
     gap = 0.045 * (window[1] - window[0])
     middles = spread(np.array([middle for _, _, middle in placed]), gap)
     if len(middles):  # moved apart, but not out of the window
         middles = middles + max(window[0] - middles.min(), 0.0)
         middles = middles - max(middles.max() - window[1], 0.0)
     for (_, sensor, middle), x in zip(placed, middles, strict=True):
-        z = float(np.interp(middle, track.s_m, track.z_m))
+        z = recordings.elevation(middle)
         axes.annotate(
             figure_text(sensor.id, 14),
             (middle, z),
@@ -173,9 +164,9 @@ def _names(axes: Axes, problem: Problem, window: tuple[float, float]) -> None:
         )
 
 
-def _reference(speed: Axes, profile: Axes, problem: Problem) -> None:
+def _reference(speed: Axes, profile: Axes, recordings: Recordings) -> None:
     """Mark the zero that runouts are reported from, such as the crown of a dam."""
-    reference = problem.campaign.reference_s_m
+    reference = recordings.reference_s_m
     if reference is None:
         return
     label = f"reference (zero of reported runouts), s = {reference:.0f} m"

@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.report.shared import document as doc
-from skred.report.shared.labels import name_text, population_role, printable, symbol_text, unit_text
-from skred.report.shared.numbers import decimals_for, fixed, is_number, rounded, share, whole
+from skred.report.shared.html import environment, picture
+from skred.report.shared.numbers import decimals_for, fixed, is_number, rounded
 from skred.report.shared.relative import relative_new_avalanche, relative_response
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 _TITLES = {
     "comparison_elpd": "Differences of elpd to the best law, with their standard errors, single and doubled.",
@@ -75,8 +69,6 @@ def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> 
     str
         A self-contained page: style inside, pictures as data URIs.
     """
-    from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
-
     hierarchical = doc.is_hierarchical(comparison)
     sections = _sections(comparison)
     return (
@@ -96,11 +88,12 @@ def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> 
             titles={**_TITLES, **_HIERARCHICAL_TITLES} if hierarchical else _TITLES,
             of_a_law=_OF_A_LAW,
             of_a_population=_OF_A_POPULATION,
-            integration_limit=_integration_limit() if hierarchical else None,
+            limits=doc.get(comparison, "limits") or {},
             k_limit=doc.pareto_k_limit(comparison),
-            practical=PRACTICAL_DIFFERENCE,
-            r_hat_limit=R_HAT_LIMIT,
-            ess_limit=ESS_LIMIT,
+            counts=_counts,
+            within_factor=_within_factor,
+            relative=relative_response,
+            relative_new=relative_new_avalanche,
         )
     )
 
@@ -114,12 +107,6 @@ def _sections(comparison: doc.Document) -> dict[str, str]:
         "errors": hierarchical and bool(doc.listed(comparison, "error_models")),
     }
     return {name: title for name, title in _SECTIONS.items() if has.get(name, True)}
-
-
-def _integration_limit() -> float:
-    from skred.inference.hierarchical.problem import INTEGRATION_LIMIT
-
-    return INTEGRATION_LIMIT
 
 
 def _sensors(comparison: doc.Document) -> list[Any]:
@@ -138,55 +125,6 @@ def _within_factor(parameter: doc.Document) -> str:
     return rounded(factor, decimals_for(_NORMAL_90 * sd * factor))
 
 
-def picture(file: Path) -> str:
-    """A picture as a data URI."""
-    return "data:image/png;base64," + base64.b64encode(file.read_bytes()).decode("ascii")
-
-
-@cache
-def environment() -> Environment:
-    """Templates of this package, with every value escaped unless a template says otherwise."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("skred.report", "templates"),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
-    environment.filters.update(
-        fixed=fixed,
-        whole=whole,
-        share=share,
-        rounded=rounded,
-        shown=_shown,
-        unit=lambda unit: _kept_together(unit_text(unit)),
-        symbol=lambda symbol: _kept_together(symbol_text(symbol)),
-        name=name_text,
-        difference=_difference,
-        role=population_role,
-        within_factor=_within_factor,
-    )
-    environment.globals.update(get=doc.get, listed=doc.listed, decimals_for=decimals_for, is_number=is_number)
-    environment.globals.update(relative=relative_response, relative_new=relative_new_avalanche)
-    return environment
-
-
-def _shown(value: Any) -> str:
-    """Any plain value as text; ``n/a`` where it is null."""
-    if value is None:
-        return "n/a"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return printable(value)
-
-
-def _kept_together(text: str) -> str:
-    """A unit or symbol without line breaks, but after a comma."""
-    return text.replace(" ", "\N{NO-BREAK SPACE}").replace(",\N{NO-BREAK SPACE}", ", ")
-
-
-def _difference(value: Any) -> str:
+def _counts(difference: Any) -> str:
     """Whether a difference matters in practice, in words."""
-    return {True: "yes", False: "no"}.get(value, "n/a")
+    return {True: "yes", False: "no"}.get(difference, "n/a")

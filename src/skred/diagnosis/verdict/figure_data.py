@@ -1,0 +1,219 @@
+"""The curves, draws and predictions of a diagnosis that its figures show: ``diagnosis.nc``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from scipy.special import logsumexp
+
+from skred.diagnosis.augment.coefficient import augmented_of
+from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.comparison import Comparison
+from skred.diagnosis.compare.location import Location
+from skred.diagnosis.evidence.coefficient import Curve
+from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, NothingAdded, Outcome
+from skred.diagnosis.verdict.mechanisms import candidates_of
+from skred.diagnosis.verdict.report_facts import FORMAT, checks_of, comparisons_of
+from skred.inference.recorded_data import recorded_groups
+from skred.physics.mechanisms.stretches import is_opposed
+
+FloatArray = NDArray[np.float64]
+PRIOR_SCALES = np.geomspace(0.1, 10.0, 13)
+"""Scales of a strength's prior, relative to the one used, at which the Bayes factor is given."""
+_READING = {"units": "m s-1; m for the runout"}
+_NATS = {"units": "nat"}
+_OF_CANDIDATE = {"units": "see the variable unit"}
+
+
+def figure_data(found: Outcome) -> xr.DataTree:
+    """Everything that the figures of a diagnosis show.
+
+    Groups
+    ------
+    observed_data, constant_data : see `skred.inference.recorded_data.recorded_groups`
+    check : ``simulated`` (law, campaign) and ``statistic`` (law): of clean campaigns and of the recordings,
+        by the base law and by each law with something added
+    force : the missing retardation along the track: ``mean``, ``low``, ``high``, ``covered`` (s)
+    comparison, comparison_2 : evidence along the strength of each candidate's most probable shape, and its
+        log Bayes factor by the prior's scale
+    shapes, shapes_2 : log Bayes factor of each candidate at each place, sensor or covariate
+    held_out : each avalanche as predicted from the others, ``before`` and ``after`` something was added
+    added : draws of the strengths that were added
+
+    Of what was not diagnosed only the first two.
+    """
+    groups: dict[str, xr.Dataset] = dict(recorded_groups(found.problem))
+    if not isinstance(found, NotDiagnosed):
+        groups |= {"check": _checks(found), "force": _force(found.location), "held_out": _held_out(found)}
+        for number, comparison in enumerate(comparisons_of(found)):
+            ending = f"_{number + 1}" if number else ""
+            groups[f"comparison{ending}"] = _curves(comparison)
+            groups[f"shapes{ending}"] = _shapes(comparison)
+        if found.steps:
+            groups["added"] = _added(found)
+    tree = xr.DataTree.from_dict(groups)
+    tree.attrs = {
+        "title": f"What {found.law.title} leaves out, {found.problem.campaign.name}",
+        "format": FORMAT,
+        "law": found.law.id,
+        "campaign": found.problem.campaign.name,
+        "campaign_fingerprint": found.problem.campaign.fingerprint(),
+    }
+    return tree
+
+
+def _checks(found: Diagnosis) -> xr.Dataset:
+    checks = checks_of(found)
+    return xr.Dataset(
+        {
+            "simulated": (("law", "campaign"), _padded([check.simulated for _, check in checks]), _NATS),
+            "statistic": ("law", [check.statistic for _, check in checks], _NATS),
+        },
+        coords={"law": [" + ".join((found.law.id, *added)) for added, _ in checks]},
+        attrs={"statistic": "log odds of anything against nothing, in the linear model"},
+    )
+
+
+def _force(location: Location) -> xr.Dataset:
+    retardation = {"units": "m s-2"}
+    return xr.Dataset(
+        {
+            "mean": ("s", location.mean, retardation),
+            "low": ("s", location.low, retardation),
+            "high": ("s", location.high, retardation),
+            "covered": ("s", location.covered, {"units": "1", "long_name": "share of the avalanches"}),
+        },
+        coords={"s": ("s", location.s_m, {"units": "m"})},
+        attrs={"band": "low to high holds the whole profile with probability 0.9"},
+    )
+
+
+def _held_out(found: Diagnosis) -> xr.Dataset:
+    held = {"before": found.before}
+    if not isinstance(found.finding, NothingAdded):
+        held["after"] = found.finding.after
+    of_reading, of_event = ("when", "event", "sensor"), ("when", "event")
+    each = held.values()
+    return xr.Dataset(
+        {
+            "mean": (of_reading, [one.predicted.mean for one in each], _READING),
+            "low": (of_reading, [one.predicted.low for one in each], _READING),
+            "high": (of_reading, [one.predicted.high for one in each], _READING),
+            "log_score": (of_event, [one.pointwise for one in each], _NATS),
+            "pareto_k": (of_event, [one.pareto_k for one in each], {"units": "1"}),
+        },
+        coords={"when": list(held), **found.problem.coords},
+        attrs={"interval": "low to high holds 90 % of the readings predicted, errors included"},
+    )
+
+
+def _curves(comparison: Comparison) -> xr.Dataset:
+    """Evidence along the strength of each candidate's most probable shape."""
+    names = candidates_of(comparison)
+    candidates = [comparison.leading(name).candidates[name] for name in names]
+    best = [candidate.best for candidate in candidates]
+    fine = [_fine(curve) for curve in best]
+    at, on = ("candidate", "strength_point"), ("candidate", "fine_point")
+    scaled = [[_factor_at(candidate, float(scale)) for scale in PRIOR_SCALES] for candidate in candidates]
+    return xr.Dataset(
+        {
+            "unit": ("candidate", [candidate.mechanism.strength.unit for candidate in candidates]),
+            "strength": (at, _padded([curve.strengths for curve in best]), _OF_CANDIDATE),
+            "log_evidence": (at, _padded([curve.log_evidence for curve in best]), _NATS),
+            "fine_strength": (on, _padded([part[0] for part in fine]), _OF_CANDIDATE),
+            "fine_log_evidence": (on, _padded([part[1] for part in fine]), _NATS),
+            "fine_log_prior": (on, _padded([part[2] for part in fine])),
+            "log_bayes_factor": (
+                ("candidate", "prior_scale"),
+                np.array(scaled).reshape(len(names), -1),
+                _NATS,
+            ),
+        },
+        coords={"candidate": names, "prior_scale": ("prior_scale", PRIOR_SCALES, {"units": "1"})},
+        attrs={"log_evidence": "relative to strength 0, everything else refitted"},
+    )
+
+
+def _fine(curve: Curve) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Strengths on a fine grid, log evidence and log prior density there."""
+    strengths, log_density = curve.fine()
+    log_prior = _log_prior(curve, strengths)
+    return strengths, log_density - log_prior, log_prior
+
+
+def _log_prior(curve: Curve, strengths: FloatArray) -> FloatArray:
+    added = curve.mechanism.added
+    assert added is not None
+    scale = added.scale_of(curve.shape)
+    constant = -0.5 * math.log(2.0 * math.pi * scale**2) + (0.0 if added.either_sign else math.log(2.0))
+    return np.asarray(-0.5 * (strengths / scale) ** 2 + constant)
+
+
+def _factor_at(candidate: Candidate, relative: float) -> float:
+    """Log Bayes factor of a candidate with its prior's scale multiplied."""
+    added = candidate.mechanism.added
+    assert added is not None
+    factors = [one.log_bayes_factor_at(relative * added.scale_of(one.shape)) for one in candidate.curves]
+    return float(logsumexp(candidate.log_weights + np.array(factors)))
+
+
+def _shapes(comparison: Comparison) -> xr.Dataset:
+    """Every shape of every candidate: where it acts, and its log Bayes factor for all strengths together."""
+    rows: list[tuple[Any, ...]] = []
+    for name in candidates_of(comparison):
+        candidate = comparison.leading(name).candidates[name]
+        best = candidate.best
+        for curve, weight in zip(candidate.curves, candidate.log_weights, strict=True):
+            shape = curve.shape
+            ends = [math.nan if end is None else end for end in (shape.s_from_m, shape.s_to_m)]
+            what = shape.sensor or "", shape.covariate or "", is_opposed(shape), curve is best
+            rows.append((name, *ends, *what, float(np.exp(weight)), curve.log_bayes_factor))
+    columns = list(zip(*rows, strict=True)) if rows else [()] * 9
+    names = (
+        "mechanism",
+        "s_from",
+        "s_to",
+        "sensor",
+        "covariate",
+        "opposed",
+        "best",
+        "prior",
+        "log_bayes_factor",
+    )
+    units = {
+        "s_from": {"units": "m"},
+        "s_to": {"units": "m"},
+        "prior": {"units": "1"},
+        "log_bayes_factor": _NATS,
+    }
+    kinds = (str, float, float, str, str, bool, bool, float, float)
+    return xr.Dataset(
+        {
+            name: ("shape", np.array(column, dtype=kind), units.get(name, {}))
+            for name, column, kind in zip(names, columns, kinds, strict=True)
+        }
+    )
+
+
+def _added(found: Diagnosis) -> xr.Dataset:
+    """Draws of the added strengths, by the law that has all of them."""
+    calibration = found.steps[-1].calibration
+    posterior = calibration.tree["posterior"].to_dataset()
+    units = {one.name: one.mechanism.strength.unit for one in augmented_of(calibration).added}
+    draws = posterior[list(units)].copy()
+    for name, unit in units.items():
+        draws[name].attrs = {"units": unit}
+    return draws
+
+
+def _padded(rows: Sequence[FloatArray]) -> FloatArray:
+    """Rows of unequal length as one array, NaN where they end."""
+    table = np.full((len(rows), max((len(row) for row in rows), default=0)), np.nan)
+    for number, row in enumerate(rows):
+        table[number, : len(row)] = row
+    return table

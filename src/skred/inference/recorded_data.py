@@ -1,0 +1,65 @@
+"""What was recorded and on which track, as two groups of a DataTree: figures need no campaign beside it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import xarray as xr
+
+from skred.inference.problem import Problem
+
+
+def recorded_groups(problem: Problem) -> dict[str, xr.Dataset]:
+    """The recordings and what they were made with.
+
+    Groups
+    ------
+    observed_data : ``reading`` (event, sensor), NaN where there is none
+    constant_data : status and standard deviation of each reading, sensors, releases, track, terrain, and what
+        the likelihood adds; ``reference_s`` among its attributes [m] where the campaign has one
+    """
+    return {"observed_data": _observed(problem), "constant_data": _constant(problem)}
+
+
+def _observed(problem: Problem) -> xr.Dataset:
+    return xr.Dataset(
+        {"reading": (("event", "sensor"), problem.values, {"units": "m s-1; m for the runout"})},
+        coords=problem.coords,
+    )
+
+
+def _constant(problem: Problem) -> xr.Dataset:
+    campaign, terrain = problem.campaign, problem.terrain
+    sensor = problem.coords["sensor"]
+    reading = {"units": "m s-1; m for the runout"}
+    reference = campaign.reference_s_m
+    return xr.Dataset(
+        {
+            "status": (
+                ("event", "sensor"),
+                campaign.status,
+                {"flag_values": [0, 1, 2], "flag_meanings": "observed not_reached missing"},
+            ),
+            "reading_sd": (("event", "sensor"), campaign.reading_sd(), reading),
+            "quantity": ("sensor", [str(s.quantity) for s in campaign.sensors]),
+            "s_from": ("sensor", [s.s_from_m for s in campaign.sensors], {"units": "m"}),
+            "s_to": ("sensor", [s.s_to_m for s in campaign.sensors], {"units": "m"}),
+            "relative_sd": ("sensor", [s.relative_sd for s in campaign.sensors], {"units": "1"}),
+            "absolute_sd": ("sensor", [s.absolute_sd for s in campaign.sensors], reading),
+            "release_s": ("event", [e.release_s_m for e in campaign.events], {"units": "m"}),
+            **_track(problem),
+            "cell_edge": ("edge", terrain.edge_s_m, {"units": "m"}),
+            "slope": ("cell", terrain.slope_rad, {"units": "rad"}),
+            "curvature": ("cell", terrain.curvature, {"units": "m-1"}),
+            **problem.constants(),
+        },
+        coords={"event": problem.coords["event"], "sensor": sensor, "sensor_bis": sensor},
+        attrs={} if reference is None else {"reference_s": float(reference)},
+    )
+
+
+def _track(problem: Problem) -> dict[str, Any]:
+    """The track as it was surveyed: along it, horizontally, and its elevation."""
+    track = problem.campaign.track
+    values = {"track_s": track.s_m, "track_x": track.x_m, "track_z": track.z_m}
+    return {name: ("point", value, {"units": "m"}) for name, value in values.items()}

@@ -1,0 +1,63 @@
+"""Figure of the bootstrap test: the recordings against clean campaigns simulated from the law."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.report.diagnosis.words import AFTER, MISMATCH, with_added
+from skred.report.shared import document as doc
+from skred.report.shared.html import two_digits
+from skred.report.shared.labels import figure_text
+from skred.report.shared.style import legend_below, new_figure, styled, tint
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FloatArray = NDArray[np.float64]
+
+
+@styled
+def check_figure(document: doc.Document, tree: xr.DataTree) -> Figure:
+    """The statistic of clean campaigns and of the recordings; again for each law with something added."""
+    found = tree["check"].to_dataset()
+    simulated = np.asarray(found["simulated"].transpose("law", "campaign").values, dtype=float)
+    title = "Is anything wrong? The recordings against clean campaigns simulated from the law"
+    figure = new_figure(3.3, title)
+    panels = figure.subplots(1, len(simulated), squeeze=False).ravel()
+    checks = doc.listed(document, "report", "checks")
+    for number, axes in enumerate(panels):
+        values = simulated[number][np.isfinite(simulated[number])]
+        _histogram(axes, values, float(found["statistic"].values[number]))
+        check = checks[number] if number < len(checks) else {}
+        name = figure_text(with_added(document, doc.listed(check, "added")), 44)
+        p_value = two_digits(doc.get(check, "p_value"))
+        axes.set_title(f"{name}\np = {p_value}, {len(values)} simulated")
+        axes.set_xlabel("log odds of anything against nothing [nats]")
+    panels[0].set_ylabel("clean campaigns")
+    legend_below(figure, panels, columns=2)
+    return figure
+
+
+def _histogram(axes: Axes, values: FloatArray, statistic: float) -> None:
+    if len(values) == 0:
+        values = np.array([0.0])
+    low, high = float(values.min()), float(values.max())
+    reach = [low, high, statistic]
+    least = (max(reach) - min(reach)) / 60.0  # or else bars cannot be seen beside a distant line
+    wanted = int(np.clip(2.0 * math.sqrt(len(values)), 8, 40))
+    n = max(1, min(wanted, math.ceil((high - low) / max(least, 1e-12))))
+    bins = low + max((high - low) / n, least, 1e-12) * np.arange(n + 1)
+    bins[-1] += 1e-9
+    axes.hist(
+        values, bins=list(bins), color=tint(AFTER, 0.45), edgecolor="white", linewidth=0.4,
+        label="clean campaigns",
+    )  # fmt: skip
+    axes.axvline(statistic, color=MISMATCH, linewidth=2.0, label="the recordings")
+    margin = 0.06 * (max(reach) - min(reach)) or 1.0
+    axes.set_xlim(min(reach) - margin, max(reach) + margin)

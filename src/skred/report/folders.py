@@ -1,0 +1,195 @@
+"""Reports and figures of a folder of results, made from the documents in it: whichever command wrote them."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from skred.errors import InputError
+from skred.output import write_text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    import xarray as xr
+
+FORMAT = 1
+"""Of the documents that this version reads."""
+_AGAIN = "run the command that wrote it again"
+
+
+class ReportError(InputError):
+    """A folder without results, or with results that this version cannot read."""
+
+
+def write_reports(folder: Path) -> list[Path]:
+    """Make the report and the figures of a folder of results anew, from its documents alone.
+
+    Nothing in the folder changes before all of it is there; then each file is replaced as a whole, and
+    figures that no longer apply are removed.
+
+    Parameters
+    ----------
+    folder : Path
+        Of ``skred diagnose``, ``compare``, ``predict`` or ``prove``, or of a law that was calibrated.
+
+    Returns
+    -------
+    list of Path
+        What was written.
+
+    Raises
+    ------
+    ReportError
+        If it holds no results, or results of another version of the format.
+    """
+    if not folder.is_dir():
+        raise ReportError(f"{folder}: no such folder")
+    for document, make in _KINDS.items():
+        if (folder / document).is_file():
+            return _in_place(folder, make)
+    names = ", ".join(_KINDS)
+    raise ReportError(f"{folder}: no results to report on; a folder of results holds one of {names}")
+
+
+def _in_place(folder: Path, make: Callable[[Path, Path], list[str]]) -> list[Path]:
+    """Write into a hidden folder beside the results, then move everything to where it belongs."""
+    with TemporaryDirectory(prefix=".skred-report-", dir=folder) as beside:
+        possible = make(folder, Path(beside))
+        made = sorted(file.relative_to(beside) for file in Path(beside).rglob("*") if file.is_file())
+        for name in made:
+            os.replace(Path(beside) / name, folder / name)
+    for gone in set(map(Path, possible)).difference(made):
+        (folder / gone).unlink(missing_ok=True)
+    return [folder / name for name in made]
+
+
+def _diagnosis(folder: Path, beside: Path) -> list[str]:
+    from skred.report.diagnosis.report import FIGURES, render_diagnosis, save_diagnosis_figures
+
+    document = _read_document(folder / "verdict.json", "format")
+    _check_format(folder / "verdict.json", document.get("report"), "report.format")
+    with _opened(folder / "diagnosis.nc") as tree:
+        figures = save_diagnosis_figures(document, tree, beside)
+        write_text(beside / "report.html", render_diagnosis(document, tree, figures))
+    return [f"{name}.png" for name in FIGURES]
+
+
+def _comparison(folder: Path, beside: Path) -> list[str]:
+    from skred.report.comparison.laws import COMPARISON_FIGURES, save_comparison_figures
+    from skred.report.comparison.page import render_comparison
+    from skred.report.shared.document import get, listed
+
+    comparison = _read_document(folder / "compare.json", "format")
+    figures: dict[str, Path] = {}
+    possible = [f"{name}.png" for name in COMPARISON_FIGURES]
+    for models, where in (
+        (listed(comparison, "models"), ""),
+        (listed(comparison, "pooled", "models"), "pooled"),
+    ):
+        for name in (_plain_name(get(model, "id"), folder) for model in models):
+            place = Path(where) / name
+            drawn = _model_figures(folder / place, beside / place)
+            possible += [str(place / figure) for figure in _possible_of_a_model()]
+            figures |= {} if where else {f"{name}/{figure.stem}": figure for figure in drawn}
+    figures |= save_comparison_figures(comparison, beside)
+    write_text(beside / "report.html", render_comparison(comparison, figures))
+    return possible
+
+
+def _plain_name(name: Any, folder: Path) -> str:
+    """A law's id as the name of its folder, and nothing that leads out of it."""
+    if not isinstance(name, str) or name != Path(name).name or name in ("", ".", ".."):
+        raise ReportError(f"{folder / 'compare.json'}: {str(name)[:60]!r} is no name of a law")
+    return name
+
+
+def _calibration(folder: Path, beside: Path) -> list[str]:
+    _read_document(folder / "summary.json", "format")
+    _model_figures(folder, beside)
+    return _possible_of_a_model()
+
+
+def _model_figures(folder: Path, beside: Path) -> list[Path]:
+    from skred.report.calibration.figures import save_model_figures
+
+    beside.mkdir(parents=True, exist_ok=True)
+    with _opened(folder / "posterior.nc") as tree:
+        return save_model_figures(tree, beside)
+
+
+def _possible_of_a_model() -> list[str]:
+    from skred.report.calibration.figures import MODEL_FIGURES
+
+    return [f"{name}.png" for name in MODEL_FIGURES]
+
+
+def _prediction(folder: Path, beside: Path) -> list[str]:
+    from skred.report.prediction.figures import FIGURES
+    from skred.report.shared.style import write_png
+
+    document = _read_document(folder / "prediction.json", "format")
+    if document.get("valid") is True:
+        with _opened(folder / "prediction.nc") as tree:
+            for name, make in FIGURES.items():
+                write_png(make(document, tree), beside / f"{name}.png")
+    return [f"{name}.png" for name in FIGURES]
+
+
+def _scorecard(folder: Path, beside: Path) -> list[str]:
+    from skred.report.scorecard.figures import SCORECARD_FIGURES, save_scorecard_figures
+    from skred.report.scorecard.page import render_scorecard
+
+    document = _read_document(folder / "scorecard.json", "format")
+    figures = save_scorecard_figures(document, beside)
+    write_text(beside / "scorecard.html", render_scorecard(document, figures))
+    return [f"{name}.png" for name in SCORECARD_FIGURES]
+
+
+_KINDS: dict[str, Callable[[Path, Path], list[str]]] = {
+    "verdict.json": _diagnosis,
+    "compare.json": _comparison,
+    "prediction.json": _prediction,
+    "scorecard.json": _scorecard,
+    "summary.json": _calibration,
+}
+"""What a folder holds, and what makes its report; returns the figures that there may be."""
+
+
+def _read_document(file: Path, key: str) -> dict[str, Any]:
+    """A JSON document of the format that this version reads."""
+    try:
+        document = json.loads(file.read_text(encoding="utf-8"))
+    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise ReportError(f"{file}: not a JSON document ({error})") from error
+    _check_format(file, document, key)
+    return dict(document)
+
+
+def _check_format(file: Path, document: Any, key: str) -> None:
+    """Refuse what was written by another version of the format."""
+    found = document.get("format") if isinstance(document, Mapping) else None
+    if found != FORMAT:
+        told = f"with {key} {found!r} instead of {FORMAT}" if found is not None else f"without {key!r}"
+        raise ReportError(f"{file}: written by another version of skred, {told}; {_AGAIN}")
+
+
+@contextmanager
+def _opened(file: Path) -> Iterator[xr.DataTree]:
+    """A netCDF file of results, read as far as it is needed."""
+    import xarray as xr
+
+    if not file.is_file():
+        raise ReportError(f"{file}: not there; {_AGAIN}")
+    try:
+        opened = xr.open_datatree(file, engine="h5netcdf")
+    except (OSError, ValueError) as error:
+        raise ReportError(f"{file}: not a netCDF file that can be read ({error})") from error
+    with opened as tree:
+        _check_format(file, tree.attrs, "format")
+        yield tree
