@@ -237,9 +237,9 @@ def _probabilities(scores: Mapping[str, Any]) -> Section:
     ]
     words = ("Where nothing is hidden, contaminated or not, nothing should be probable; where no list has "
              "the effect, unlisted. Of two mechanisms both count, added in the log score; they are left "
-             "out of the reliability of all ids. The log score charges for at least a probability of 0.001, which "
-             "stands for answers without any. Bins are ten of equal width. Statements of one trial are not "
-             "independent: the intervals of all ids are somewhat narrow.",)  # fmt: skip
+             "out of the reliability of all ids. The log score charges for at least a probability of 0.001, "
+             "which stands for answers without any. Bins are ten of equal width. Statements of one trial are "
+             "not independent: the intervals of all ids are somewhat narrow.",)  # fmt: skip
     caption = "Share of statements that are true against their stated probability."
     table = by_kind("Scores of stated probabilities.", scores, rows, decimals=3)
     return Section("probabilities", "Stated probabilities", words, (table,), (("reliability", caption),))
