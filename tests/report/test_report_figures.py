@@ -116,8 +116,9 @@ def test_the_users_settings_change_nothing(problem, tmp_path):
 def test_importing_the_report_is_light():
     heavy = "{'matplotlib', 'jinja2', 'rich', 'xarray', 'arviz', 'pymc', 'numba'}"
     code = (
-        "import sys, skred.report.calibration.figures, skred.report.comparison.html; "
-        "import skred.report.shared.tables; "
+        "import sys, skred.report.calibration.figures, skred.report.comparison.page; "
+        "import skred.report.shared.tables, skred.report.folders, skred.report.diagnosis.report; "
+        "import skred.report.prediction.figures, skred.report.scorecard.page; "
         f"print(sorted({heavy} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
