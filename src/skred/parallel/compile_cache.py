@@ -8,13 +8,14 @@ functions that it calls. Docstrings, comments and places in the file are not par
 
 from __future__ import annotations
 
+import builtins
 import dis
 import hashlib
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import Enum
-from types import CodeType, FunctionType, ModuleType
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
@@ -145,8 +146,7 @@ def _meaning(function: FunctionType, name: str, known: dict[str, Any]) -> Any:
         For what cannot be stamped: a function that is not compiled here, or that stands below its caller; a
         module of this package, whose functions are to be imported themselves.
     """
-    builtins = vars(__import__("builtins"))
-    value = known[name] if name in known else builtins.get(name)
+    value = known[name] if name in known else getattr(builtins, name, None)
     value = getattr(value, "cell_contents", value)
     stamp = _stamps.get(_python_function(value)) if callable(value) else None
     if stamp is not None:
@@ -155,8 +155,8 @@ def _meaning(function: FunctionType, name: str, known: dict[str, Any]) -> Any:
         return value.__name__
     if isinstance(value, type):
         return value.__module__, value.__qualname__, getattr(value, "_fields", ())
-    if callable(value) and builtins.get(name) is value:
-        return "builtins", name
+    if isinstance(value, BuiltinFunctionType):
+        return value.__module__, value.__qualname__
     if isinstance(value, np.ndarray):
         return value.dtype.str, value.shape, value.tobytes()
     if isinstance(value, int | float | str | tuple | np.generic | Enum):
