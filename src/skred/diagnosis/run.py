@@ -24,7 +24,7 @@ from skred.physics.law import Law
 
 Tell = Callable[[str], None]
 DRAWS = ("base.nc", "base_same_errors.nc", "augmented.nc")
-"""Of the base law, of it under the errors of what was let in, and of the law with that."""
+"""Of the base law, of it under the errors of what was added, and of the law with that."""
 
 
 def diagnose_to(

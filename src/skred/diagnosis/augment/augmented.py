@@ -1,14 +1,13 @@
-"""A base law with mechanisms added to it, calibrated anew: all strengths, spreads and correlations together.
+"""A base law with mechanisms added, calibrated anew: all strengths, spreads and correlations together.
 
-The events' own strengths are integrated out as in any hierarchical calibration. What is added is the same
-for all events; at each of its strengths events look different, so their likelihoods are tabulated on a
-grid of strengths that covers the posterior, and interpolated between.
+The events' own strengths are integrated out as in any hierarchical calibration. What is added is the same for
+all events. At each of its strengths events look different, so their likelihoods are tabulated on a grid of
+strengths that covers the posterior, and interpolated between.
 """
 
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -17,6 +16,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from skred.diagnosis.augment.added_strength import AddedStrength, added_strengths
 from skred.diagnosis.augment.coefficient_grid import Located, finer, locate
 from skred.diagnosis.augment.tables import BUDGETS, Tables, build_tables, exact_nodes
 from skred.diagnosis.augment.tabulated_op import tabulated_log_densities
@@ -33,7 +33,7 @@ from skred.inference.hierarchical.rough_population import moments_of
 from skred.inference.hierarchical.surface import Surfaces
 from skred.physics.kernel.fronts import front_speeds
 from skred.physics.law import Law, Parameter
-from skred.physics.mechanisms.spec import Direction, Mechanism, Shape
+from skred.physics.mechanisms.spec import Mechanism
 from skred.physics.mechanisms.stretches import equation_of
 
 FloatArray = NDArray[np.float64]
@@ -58,42 +58,11 @@ _START_WIDER = 1.5
 _INSIDE = 0.02
 """How far inside the range of a strength chains start, as a share of it: at its end steps shrink."""
 _ROUGH_DRAWS = 8
-"""Draws of the first look at the tables' error, before anything is sampled."""
+"""Draws at which the tables' error is looked at before anything is sampled."""
 _ROUGH_RUNS = 8 * 22
-"""As above, of that look."""
+"""Events times draws there, as above."""
 _ENOUGH = 0.2
-"""Share of the limit below which tables are good enough at that look: of few draws the worst is not seen."""
-
-
-@dataclass(frozen=True, eq=False)
-class AddedStrength:
-    """A mechanism of one shape that is added, its strength free.
-
-    Attributes
-    ----------
-    name : str
-        Of the parameter: the strength's own, numbered if two of a kind are added.
-    mechanism : Mechanism
-    shape : Shape
-    direction : Direction
-    """
-
-    name: str
-    mechanism: Mechanism
-    shape: Shape
-    direction: Direction
-
-    @property
-    def parameter(self) -> Parameter:
-        """As a free random variable."""
-        strength = self.mechanism.strength
-        return Parameter(self.name, strength.symbol, strength.unit, strength.paper_symbol)
-
-    @property
-    def scale(self) -> float:
-        """Scale of the prior: half-normal, or normal where either sign may be."""
-        assert self.mechanism.added is not None
-        return self.mechanism.added.scale_of(self.shape)
+"""Share of the limit below which tables are good enough there: few draws do not show the worst."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -352,7 +321,7 @@ def augmented_problem(base: Base, curves: Sequence[Curve]) -> AugmentedProblem:
     """
     if not 1 <= len(curves) <= MOST_ADDED:
         raise ValueError(f"expected one or {MOST_ADDED} mechanisms to add, found {len(curves)}")
-    added = _named(curves)
+    added = added_strengths(curves)
     speeds = {
         d.weakening_speed
         for d in (*base.directions, *(one.direction for one in added))
@@ -384,17 +353,6 @@ def _with_tables(base: Base, added: tuple[AddedStrength, ...], tables: Tables) -
 def _extension(base: Base, added: Sequence[AddedStrength]) -> Extension:
     directions = (*base.directions, *(one.direction for one in added))
     return Extension(base.problem, base.law, directions)
-
-
-def _named(curves: Sequence[Curve]) -> tuple[AddedStrength, ...]:
-    count: Counter[str] = Counter()
-    added = []
-    for curve in curves:
-        name = curve.mechanism.strength.name
-        count[name] += 1
-        own = name if count[name] == 1 else f"{name}_{count[name]}"
-        added.append(AddedStrength(own, curve.mechanism, curve.shape, curve.direction))
-    return tuple(added)
 
 
 def _rough_error(problem: AugmentedProblem, located: Located) -> float:
