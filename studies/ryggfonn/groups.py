@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.discrepancy.profile import combined, most_probable
-from skred.diagnosis.evidence.coefficient import Fit
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.prior_odds import UNLISTED
+from skred.diagnosis.evidence.refit import Fit
 from skred.inference.pooled.problem import pooled_problem
 from skred.report.shared.style import GREY, RECORDED, legend_below, new_figure, styled
 from studies.reproduction.facts import RecordedRetardation, mean_retardation, recorded_retardation

@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 
 from skred.campaign import find_campaign, read_campaign
 from skred.diagnosis.compare.comparison import compare
-from skred.diagnosis.evidence import coefficient as curves
+from skred.diagnosis.evidence import refit as curves
 from skred.diagnosis.evidence.conditional_map import Rows
 from skred.diagnosis.evidence.event_quadrature import (
     FINE,

@@ -18,10 +18,11 @@ from skred.diagnosis.compare.decision import Decision, blamed
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Detectability, Identifiability
 from skred.diagnosis.discrepancy.profile import KINDS, Prior, Profile
-from skred.diagnosis.evidence.coefficient import Curve, Fit
+from skred.diagnosis.evidence.coefficient import Curve
 from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.predictive import Predicted
 from skred.diagnosis.evidence.prior_odds import UNLISTED, prior_odds
+from skred.diagnosis.evidence.refit import Fit
 from skred.diagnosis.outcome import (
     Diagnosis,
     MechanismsAdded,

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 
 import skred.diagnosis.augment.results  # noqa: F401 - registers what it says of readings
+from skred.diagnosis.augment.added_strength import AddedStrength, added_strengths
 from skred.diagnosis.augment.coefficient_grid import Located, finer, locate
 from skred.diagnosis.augment.problem import (
     CHECKED_EVENTS,
     CLAIM_LIMIT,
-    AddedStrength,
     AugmentedProblem,
     extension_with,
 )
@@ -21,6 +20,7 @@ from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.marginal import population_at
 
 MOST_ADDED = 2
+"""Mechanisms added at most: tables grow with the power of their number."""
 _ROUGH_DRAWS = 8
 """Draws of the first look at the tables' error, before anything is sampled."""
 _ROUGH_RUNS = 176
@@ -42,7 +42,7 @@ def augmented_problem(base: Base, curves: Sequence[Curve]) -> AugmentedProblem:
     """
     if not 1 <= len(curves) <= MOST_ADDED:
         raise ValueError(f"expected one or {MOST_ADDED} mechanisms to add, found {len(curves)}")
-    added = _named(curves)
+    added = added_strengths(curves)
     speeds = {
         d.weakening_speed
         for d in (*base.directions, *(one.direction for one in added))
@@ -69,17 +69,6 @@ def _with_tables(base: Base, added: tuple[AddedStrength, ...], tables: Tables) -
     return AugmentedProblem(
         old.campaign, old.terrain, old.error_model, old.place_sd_m, base=base, added=added, tables=tables
     )
-
-
-def _named(curves: Sequence[Curve]) -> tuple[AddedStrength, ...]:
-    count: Counter[str] = Counter()
-    added = []
-    for curve in curves:
-        name = curve.mechanism.strength.name
-        count[name] += 1
-        own = name if count[name] == 1 else f"{name}_{count[name]}"
-        added.append(AddedStrength(own, curve.mechanism, curve.shape, curve.direction))
-    return tuple(added)
 
 
 def _rough_error(problem: AugmentedProblem, located: Located) -> float:

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
-from skred.diagnosis.evidence.coefficient import Base, Curve, Fit, Rounds, refit
+from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 from skred.parallel.threads import in_parts, side_by_side
 from skred.physics.mechanisms.spec import Added
 

@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from skred.diagnosis.augment.added_strength import AddedStrength
 from skred.diagnosis.augment.coefficient_grid import finer
 from skred.diagnosis.augment.tables import Tables, build_tables, exact_nodes
 from skred.diagnosis.augment.tabulated_op import tabulated_log_densities
@@ -31,7 +32,7 @@ from skred.inference.hierarchical.rough_population import moments_of
 from skred.inference.hierarchical.surface import Surfaces
 from skred.physics.kernel.fronts import front_speeds
 from skred.physics.law import Law, Parameter
-from skred.physics.mechanisms.spec import Direction, Mechanism, Shape
+from skred.physics.mechanisms.spec import Mechanism
 
 FloatArray = NDArray[np.float64]
 CLAIM_LIMIT = 0.0455
@@ -53,37 +54,6 @@ _START_WIDER = 1.5
 """How much wider than the posterior chains start, as r-hat asks for."""
 _INSIDE = 0.02
 """How far inside the range of a strength chains start, as a share of it: at its end steps shrink."""
-
-
-@dataclass(frozen=True, eq=False)
-class AddedStrength:
-    """A mechanism of one shape that is added, its strength free.
-
-    Attributes
-    ----------
-    name : str
-        Of the parameter: the strength's own, numbered if two of a kind are added.
-    mechanism : Mechanism
-    shape : Shape
-    direction : Direction
-    """
-
-    name: str
-    mechanism: Mechanism
-    shape: Shape
-    direction: Direction
-
-    @property
-    def parameter(self) -> Parameter:
-        """As a free random variable."""
-        strength = self.mechanism.strength
-        return Parameter(self.name, strength.symbol, strength.unit, strength.paper_symbol)
-
-    @property
-    def scale(self) -> float:
-        """Scale of the prior: half-normal, or normal where either sign may be."""
-        assert self.mechanism.added is not None
-        return self.mechanism.added.scale_of(self.shape)
 
 
 def extension_with(base: Base, added: Sequence[AddedStrength]) -> Extension:

@@ -9,7 +9,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from skred.diagnosis.augment.problem import AddedStrength, AugmentedProblem
+from skred.diagnosis.augment.added_strength import AddedStrength
+from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.extension import Extension
 from skred.inference.hierarchical.event_density import draw_nodes
 from skred.inference.hierarchical.event_draws import Avalanches, new_avalanches

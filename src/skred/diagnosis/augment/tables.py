@@ -1,4 +1,4 @@
-"""Tables of nodes on a grid of added strengths that covers their posterior."""
+"""Tables of quadrature points on a grid of added strengths that covers their posterior."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
-"""Integrated log densities of a law with mechanisms added, between the strengths at which there are nodes.
+"""Integrated log densities of a law with mechanisms added, interpolated between tables of quadrature points.
 
-Tables of nodes stand on a regular grid of the added strengths, skewed where two go together. Between them
-the log density of each event is interpolated by cubic polynomials, along every axis through the four
-tables nearest.
+Tables stand on a regular grid of the added strengths, skewed where two go together. Between them the log
+density of each event is interpolated by cubic polynomials, along every axis through the four tables nearest.
 """
 
 from __future__ import annotations

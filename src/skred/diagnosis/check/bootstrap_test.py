@@ -1,8 +1,8 @@
-"""Is anything wrong? The evidence for anything at all, against what clean campaigns show.
+"""Is anything wrong? A parametric bootstrap test of the evidence for anything at all.
 
-Whole campaigns are simulated from the base law's posterior and everything is refitted to each, so that the
-price of looking at many mechanisms and places is paid; sampling stops as soon as the answer is clear
-(Besag and Clifford, 1991, doi 10.1093/biomet/78.2.301).
+Whole campaigns are simulated from the base law's posterior and everything is refitted to each, so that
+looking at many mechanisms and places is accounted for. Sampling stops as soon as the answer is clear (Besag
+and Clifford, 1991, doi 10.1093/biomet/78.2.301).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What many more nodes, and sampling, change for those that lead a comparison: mechanisms and free forces."""
+"""Re-computed evidence of what leads a comparison: with many more quadrature points, and by sampling."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.discrepancy.profile import KINDS, Profile
 from skred.diagnosis.discrepancy.sampled_evidence import sampled_log_factor
-from skred.diagnosis.evidence.coefficient import Base, Fit, Rounds, refit
+from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, event_modes
 from skred.diagnosis.evidence.event_quadrature import FINE, event_nodes
 from skred.diagnosis.evidence.extension import Extension, extended
 from skred.diagnosis.evidence.marginal import evidence, importance_evidence
+from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 
 FloatArray = NDArray[np.float64]
 _CHECKED = 5
@@ -40,10 +41,10 @@ def recomputed(
     pool: ThreadPoolExecutor,
     best: float = -np.inf,
 ) -> tuple[dict[str, Candidate], list[Profile]]:
-    """All candidates under one error model, those that lead looked at once more.
+    """All candidates under one error model, those that lead with re-computed evidence.
 
-    Mechanisms at the top of their best curve, if it was computed with fronts: what is wrong with a rough one
-    is its own. Profiles by sampling their values.
+    A mechanism's is re-computed at the maximum of its best curve, if that was computed with fronts: a rough
+    one is wrong in its own way. A profile's is computed by sampling its values.
 
     Parameters
     ----------
@@ -74,7 +75,7 @@ def recomputed(
 def _looked_at(
     base: Base, candidates: Mapping[str, Candidate], leading: Sequence[str], pool: ThreadPoolExecutor
 ) -> dict[str, Candidate]:
-    """All mechanisms, those that lead with many more nodes at the top of their best curve."""
+    """All mechanisms, those that lead with many more quadrature points at the maximum of their best curve."""
     looked = {name: pool.submit(_at_top, base, candidates[name]) for name in leading}
     plain = extended(base.problem, base.law, base.directions)
     nothing = pool.submit(_finely, base, plain, base.strengths, base.fit) if leading else None
@@ -89,7 +90,7 @@ def _looked_at(
 
 
 def _at_top(base: Base, candidate: Candidate) -> tuple[float, float]:
-    """At the top of a mechanism's best curve."""
+    """At the maximum of a mechanism's best curve."""
     best = candidate.best
     top = int(np.argmax(best.log_evidence))
     extension = extended(base.problem, base.law, (*base.directions, best.direction))
@@ -97,7 +98,7 @@ def _at_top(base: Base, candidate: Candidate) -> tuple[float, float]:
 
 
 def _finely(base: Base, extension: Extension, strengths: FloatArray, fit: Fit) -> tuple[float, float]:
-    """Log evidence with many nodes, from where a fit is: by Laplace's formula, by importance sampling."""
+    """Log evidence with many quadrature points: by the Laplace approximation, and by importance sampling."""
     start = (fit.found.population(len(base.law.mechanisms)), fit.points)
     fits = refit(extension, base.rows, strengths[None, :], start, Rounds(FINE))
     population = fits[0].found.population(len(base.law.mechanisms))

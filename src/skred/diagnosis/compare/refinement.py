@@ -1,9 +1,9 @@
-"""Local refinement: leading places with fronts, then split as finely as the recordings resolve.
+"""Local refinement: leading places computed with fronts, then split as finely as the recordings resolve.
 
-A first look stands for all that is near its place. Where a mechanism leads, its place is computed with
-fronts and moved, shortened and lengthened. Where one of these parts holds most of the evidence it is parted
-in its turn, in smaller steps: a strong effect on a stretch whose ends are wrong by a tenth of its length
-loses several nats, and a force of no shape in particular would not.
+Screening takes one place for all that is near it. Where a mechanism leads, its place is computed with
+fronts, and moved, shortened and lengthened. A part that holds most of the evidence is parted in its turn, in
+smaller steps. A strong effect on a stretch whose ends are wrong by a tenth of its length loses several nats,
+and a force of any shape would not.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class Place:
 def refine(
     base: Base, curves: Sequence[Curve], budget: Budget, pool: ThreadPoolExecutor
 ) -> dict[str, Candidate]:
-    """Entrants whose leading places are computed with fronts and then split; rough curves for the others.
+    """Candidates whose leading places are computed with fronts and then split; rough curves for the others.
 
     The leading mechanism comes first: others have to keep up with what its parts have. Once a place is looked
     at it may fall behind others that then lead, and are looked at in their turn.
@@ -105,7 +105,7 @@ def refine(
         places.update(zip(todo, pool.map(look, [curves[k] for k in todo]), strict=True))
         height = {k: max(curves[k].log_bayes_factor, places[k].log_bayes_factor) for k in todo}
         _split(base, [k for k in todo if height[k] > _SPLIT_FROM], places, budget, pool)
-    return entrants_of(curves, places)
+    return candidates_of(curves, places)
 
 
 def _split(
@@ -160,7 +160,7 @@ def _may_have(height: float) -> float:
     return height + max(_MORE, _MORE_OF_OWN * height)
 
 
-def entrants_of(curves: Sequence[Curve], places: Mapping[int, Place]) -> dict[str, Candidate]:
+def candidates_of(curves: Sequence[Curve], places: Mapping[int, Place]) -> dict[str, Candidate]:
     """Curves by mechanism; parts of a place share the weight of the one that they stand in for."""
     gathered: dict[str, tuple[list[Curve], list[float]]] = {}
     for name in dict.fromkeys(one.mechanism.id for one in curves):

@@ -1,7 +1,7 @@
-"""Modes that nodes have found and climbs from elsewhere have not.
+"""Modes that quadrature points have found and climbs from elsewhere have not.
 
-Where a gate stands just above the stops, a front that stops a little too early is in a valley of its own, and
-no step out of it gains anything. Nodes that are spread over the whole population land beyond.
+Where a gate stands just above the stops, a front that stops a little too early is at a mode of its own, and
+no step away from it gains anything. Points that are spread over the whole population lie beyond.
 """
 
 from __future__ import annotations

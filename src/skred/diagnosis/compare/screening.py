@@ -1,4 +1,4 @@
-"""The comparison's first look at a place: quick, and by fronts where tangents mislead."""
+"""Linearised screening: the evidence at every place along tangents, and by fronts where tangents mislead."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""What these recordings can tell, before any residual is looked at.
+"""Detectability: what these recordings can tell, before any residual is looked at.
 
-For each mechanism: how much of its information is left once base strengths, their scatter and releases
-have had their share; the smallest strength that would be found in 90 % of cases; what it cannot be told
-from; and the one extra sensor that would help most. It depends on track, sensors and number of events, and
-on where the events' modes are, not on whether the readings fit.
+For each mechanism: how much of its information is retained once base strengths, their scatter and releases
+have had their share; the smallest strength that would be found in 90 % of cases; what it is confounded with;
+and the one extra sensor that would help most. It depends on track, sensors and number of events, and on
+where the events' modes are, not on whether the readings fit.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""The cheap look at everything that could be missing: efficient scores at the events' modes.
+"""The score test of everything that could be missing: efficient scores at the events' modes.
 
-It is what detection limits come from, and the omnibus check's statistic: the evidence for anything at all
-over every mechanism, place, instrument and the unlisted force, with their prior odds, in the linear
-model. Being cheap, it is computed for the recordings and for simulated ones alike.
+Detection limits come from it, and so does the check's statistic: the evidence for anything at all in the
+linear model, over every mechanism, place, instrument fault and the force that is not in the list, with their
+prior odds. It is cheap, so it is computed for the recordings and for bootstrap campaigns alike.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
-from skred.diagnosis.discrepancy.profile import KINDS, entering, hats, knots, priors_of
+from skred.diagnosis.discrepancy.profile import KINDS, entering, knots, priors_of, spline_basis
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population, Rows, look_around
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.linear_mixed_model import (
@@ -96,7 +96,7 @@ class ScoreTest:
     @cached_property
     def _parts(self) -> list[Extension]:
         """Extensions whose directions follow each other: candidates, profiles; then candidates with U."""
-        basis = hats(self.setting.terrain, self.knots_m)
+        basis = spline_basis(self.setting.terrain, self.knots_m)
         profiles = [entering(self.setting, kind, row) for kind in KINDS for row in basis]
         plain = [c.direction for c in self.placed_mechanisms if not c.with_speed]
         parts = [[*plain, *profiles]]

@@ -8,8 +8,8 @@ from skred.diagnosis.evidence.marginal import evidence, importance_evidence
 from skred.diagnosis.evidence.score_information import reading_slopes
 from skred.inference.error_model import ErrorModel, EventReadings
 from skred.inference.hierarchical.event_density import draw_nodes
-from skred.inference.hierarchical.reading_density import assess
 from skred.inference.hierarchical.surface import Nodes
+from skred.inference.reading_density import assess
 
 _NODES = 8
 """Of each event: enough for a sum."""

@@ -1,4 +1,4 @@
-"""The most probable strengths and release of each event, given its population: Gauss-Newton, row by row."""
+"""The conditional MAP: the most probable strengths and release of each event, given its population."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""Nodes: each event's likelihood over its own strengths, where a population makes them likely.
+"""Quadrature points of each event's likelihood over its own strengths, where a population makes them likely.
 
-A mixture of proposals, many nodes around the event's own mode, some over the whole population, and many
-where those have found the weight to be, weighs each node by the mixture's density; so a second mode
-(reached, not reached) that the first proposal misses is still counted. The same quasi-random numbers serve
-every strength, which makes differences between strengths smoother than the integrals themselves. Where there
-is one strength and nothing else that is free, nodes lie on a line (`line_nodes`) and nothing is random.
+Points come from a mixture of proposals: many around the event's own mode, some over the whole population,
+and many where those have found the weight to be. Each is weighed by the mixture's density. So a second mode
+(reached, not reached) that the first proposal misses still counts. The same quasi-random numbers serve every
+strength, which makes differences between strengths smoother than the integrals themselves. Where one
+strength is all that is free, points lie on a line (`line_nodes`) and nothing is random.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 
 
 class Budget(NamedTuple):
-    """How many nodes an event gets, and how much wider than the linear model the proposals are.
+    """How many quadrature points an event gets, and how much wider than the linear model the proposals are.
 
     On a line only their total counts.
 
@@ -42,7 +42,7 @@ class Budget(NamedTuple):
         Put where the others have found the weight to be: around modes that nobody looked for, along the
         edges that stops make.
     linear : bool
-        Take readings at the nodes from the tangents at the mode instead of from fronts: quick, and wrong
+        Take readings at the points from the tangents at the mode instead of from fronts: quick, and wrong
         where a front stops near a sensor.
     """
 
@@ -55,11 +55,11 @@ class Budget(NamedTuple):
 
     @property
     def total(self) -> int:
-        """All of an event's nodes."""
+        """All of an event's points."""
         return self.around_mode + self.over_population + self.adapted
 
     def times(self, more: int) -> Budget:
-        """So many times the nodes."""
+        """So many times the points."""
         return self._replace(
             around_mode=more * self.around_mode,
             over_population=more * self.over_population,
@@ -78,7 +78,7 @@ ROUGH = Budget(32, 16, 0, linear=True)
 FRONTS = Budget(16, 32, 32)
 """Of screening with fronts, where tangents mislead."""
 _CENTRES = 16
-"""Places that adapted nodes are put around, of each event."""
+"""Places that adapted points are put around, of each event."""
 _SHRUNK = 3.0
 """As how many effective nodes the linear model counts for the width around those places."""
 _ADAPTED_WIDER = 1.3
@@ -87,7 +87,7 @@ narrower than it."""
 
 
 class Spread(NamedTuple):
-    """Nodes of all rows, as many each.
+    """Quadrature points of all rows, as many each.
 
     Attributes
     ----------
@@ -113,12 +113,12 @@ class Spread(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """A share of the nodes: mixtures of normal densities of one width each, one for each row.
+    """A share of the points: mixtures of normal densities of one width each, one for each row.
 
     Attributes
     ----------
     size : int
-        Nodes of a row.
+        Points of a row.
     centres : (n_rows, n_centres, n_axes) array
     factor : (n_rows, n_axes, n_axes) array
     """
@@ -128,7 +128,7 @@ class _Part(NamedTuple):
     factor: FloatArray
 
     def points(self, numbers: FloatArray) -> FloatArray:
-        """Nodes from normal numbers, both (n_rows, size, n_axes)."""
+        """Points from normal numbers, both (n_rows, size, n_axes)."""
         # Around each centre a run of the quasi-random sequence: every sixteenth number would fill a sliver.
         at = np.arange(self.size) * self.centres.shape[1] // self.size
         points: FloatArray = self.centres[:, at] + numbers @ self.factor.transpose(0, 2, 1)
@@ -187,7 +187,7 @@ def event_nodes(
     reference: Population | None = None,
     shifts: FloatArray | None = None,
 ) -> Spread:
-    """Nodes of all rows, as many for each: on a line where one strength is free, else importance nodes.
+    """Quadrature points of all rows, as many for each: on a line where one strength is free, else random.
 
     Parameters
     ----------
@@ -195,9 +195,9 @@ def event_nodes(
     population : Population
         Roughly where the events' strengths are.
     modes : Modes
-        Around which many nodes are put.
+        Around which many points are put.
     reference : Population, optional
-        Other populations that the nodes of all rows must cover: those over the population are shared with
+        Other populations that the points of all rows must cover: those over the population are shared with
         them. Without any, a population that has become too narrow would never see what it misses.
     shifts : (n_rows, n_base + 1) array, optional
         By which each row's quasi-random numbers are moved round along each axis, 0 to 1. For means over
@@ -236,7 +236,7 @@ def importance_nodes(
         parts.append(_Part(size, centre[:, None, :], over))
 
     def spread(part: _Part, seed: int) -> tuple[FloatArray, FloatArray]:
-        """Nodes of a part, and the log likelihoods there, the release's prior included."""
+        """Points of a part, and the log likelihoods there, the release's prior included."""
         n_events = likelihood.extension.problem.campaign.n_events
         numbers = _normal_numbers(n_events, part.size, axes, seed)[rows.event]
         points = part.points(_rotated(numbers, shifts))
@@ -292,7 +292,7 @@ def _axes(likelihood: EventLikelihood) -> int:
 
 
 def _covered(population: Population, reference: Population | None) -> list[Population]:
-    """The rows' own population first, then each that the nodes of all rows must cover."""
+    """The rows' own population first, then each that the points of all rows must cover."""
     return [population, *([] if reference is None else reference.groups)]
 
 
@@ -306,7 +306,7 @@ def _cover(rows: Rows, population: Population, modes: Modes, axes: int) -> Float
 def _log_likelihoods(
     likelihood: EventLikelihood, modes: Modes, points: FloatArray, linear: bool
 ) -> FloatArray:
-    """At nodes, (n_rows, k, n_axes) to (n_rows, k); with the prior of a release that is an axis."""
+    """At points, (n_rows, k, n_axes) to (n_rows, k); with the prior of a release that is an axis."""
     n_rows, size, axes = points.shape
     extension, rows, n = likelihood.extension, likelihood.rows, likelihood.extension.n_base
     flat = np.zeros((n_rows * size, n + 1))
@@ -330,7 +330,7 @@ def _log_proposal(parts: list[_Part], points: FloatArray) -> FloatArray:
 
 
 def _adapted(points: FloatArray, log_posterior: FloatArray, cover: FloatArray, size: int) -> _Part:
-    """Where weighted nodes say that each row's posterior is: normal densities around some of them."""
+    """Where weighted points say that each row's posterior is: normal densities around some of them."""
     weights = np.exp(log_posterior - log_posterior.max(axis=1, keepdims=True))
     weights /= weights.sum(axis=1, keepdims=True)
     effective = 1.0 / np.sum(weights**2, axis=1)
@@ -358,7 +358,7 @@ def _rotated(numbers: FloatArray, shifts: FloatArray | None) -> FloatArray:
 
 
 def _linear_predictions(modes: Modes, points: FloatArray) -> FloatArray:
-    """Readings at nodes along the tangents at each row's mode; a speed below zero is none."""
+    """Readings at points along the tangents at each row's mode; a speed below zero is none."""
     change = (points - modes.tangents_at[:, None, :]) @ modes.by_points.transpose(0, 2, 1)
     result: FloatArray = np.maximum(modes.predictions[:, None, :] + change, 0.0)
     return result.reshape(-1, result.shape[2])

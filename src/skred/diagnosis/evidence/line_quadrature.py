@@ -1,9 +1,9 @@
-"""Nodes on a line: where an event has one free strength, trapezoids between nodes put where they are needed.
+"""Quadrature on a line: where an event has one free strength, trapezoids between well chosen points.
 
-Over one strength an event's likelihood is mostly smooth, with jumps where its front just passes or just stops
-and spikes as narrow as a hundredth of its population beside them. Random nodes, however weighted, miss the
-spikes and know jumps no better than the distance between them; nodes put between those that differ most close
-in on both.
+Over one strength an event's likelihood is mostly smooth. It has jumps where its front just passes or just
+stops, and spikes as narrow as a hundredth of its population beside them. Random points miss the spikes and
+know jumps no better than the distance between them. Points put between those that differ most close in on
+both.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """The linear mixed model around the events' own modes: population fit, efficient scores and information.
 
 Around its mode, an event's readings are linear in its own strengths, in its release and in the strength of
-anything added; the population makes the own strengths random. What is left of a direction after the
-population's mean, the events' own deviations and the releases have had their share is its efficient
-score and information (Lindstrom and Bates, 1990, doi 10.2307/2532087). Linearised at each event's own
-mode, never at the population's mean: that would alarm on clean recordings with small errors.
+anything added; the population makes the own strengths random. The population's mean, the events' own
+deviations and the releases have their share first; what is left of a direction is its efficient score and
+information (Lindstrom and Bates, 1990, doi 10.2307/2532087). It is linearised at each event's own mode,
+never at the population's mean: that would alarm on clean recordings with small errors.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Evidence over the population, its events' strengths integrated already: Laplace, and importance sampling.
+"""Evidence over the population, its events' strengths integrated already: by Laplace, by importance sampling.
 
 Coordinates of the population: means of the log strengths, logarithms of the spreads, inverse hyperbolic
 tangents of the partial correlations. Compiled, because a diagnosis asks for it a thousand times.

@@ -1,7 +1,7 @@
 """Avalanches that a calibration has not seen: how probable they were, and what was predicted of them.
 
-A `Predictor` is what is left of a calibration for that: draws of the population and of what is added, small
-enough to be written beside an answer, and plain data, so that it can be kept and used elsewhere.
+A `Predictor` is what is left of a calibration for that: draws of the population and of what is added. It is
+small enough to be written beside an answer, and plain data, so that it can be kept and used elsewhere.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scipy.special import logsumexp
 from skred.campaign import Campaign
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.augment.tables import exact_nodes
-from skred.diagnosis.discrepancy.profile import Kind, Profile, entering, hats
+from skred.diagnosis.discrepancy.profile import Kind, Profile, entering, spline_basis
 from skred.diagnosis.evidence.conditional_map import (
     EventLikelihood,
     Population,
@@ -110,7 +110,7 @@ class ProfileTerm:
         """One for each knot."""
         speed = np.interp(setting.terrain.edge_s_m, self.edge_m, self.front_speed)
         setting = replace(setting, front_speed=speed)
-        return [entering(setting, self.kind, row) for row in hats(setting.terrain, self.knots_m)]
+        return [entering(setting, self.kind, row) for row in spline_basis(setting.terrain, self.knots_m)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,8 +37,8 @@ def detection_sensor(table: Identifiability) -> dict[str, Any] | None:
 
 def _rival(step: Step) -> Candidate | None:
     """The first of those tied that a speed could split off: listed, and another term."""
-    raced = {name for under_errors in step.comparison.under_each for name in under_errors.candidates}
-    rivals = [step.comparison.leading(name).candidates[name] for name in step.tied if name in raced]
+    known = {name for under_errors in step.comparison.under_each for name in under_errors.candidates}
+    rivals = [step.comparison.leading(name).candidates[name] for name in step.tied if name in known]
     return next((one for one in rivals if not one.mechanism.is_same_term(step.candidate.mechanism)), None)
 
 
