@@ -110,12 +110,13 @@ def test_a_read_only_install_without_a_home(tmp_path: Path) -> None:
         (inside / "__pycache__").touch()  # no folder of that name can be made, not even by root
     (tmp_path / "temporary").mkdir()
     program = (
-        "import numpy as np, pytensor, skred\n"
+        "import numpy as np, skred, pytensor.link.numba.cache\n"
         "from skred.physics.kernel.inputs import make_contributions as f\n"
         "f(np.array([3]), np.ones((1, 2)), 1.0)\n"
         "print(skred.__file__, pytensor.config.base_compiledir, sum(f.stats.cache_misses.values()))"
     )
     bare = {"HOME": NO_HOME, "XDG_CACHE_HOME": "", "NUMBA_CACHE_DIR": "", "PYTENSOR_FLAGS": ""}
+    bare |= {"TMPDIR": str(tmp_path / "temporary"), "PYTHONPATH": str(tmp_path)}
     for misses in "10":
         used, compiled_in, missed = run(
             tmp_path,

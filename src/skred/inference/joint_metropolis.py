@@ -113,12 +113,16 @@ def _run_chain(  # type: ignore[no-untyped-def]
                 n_walks += 1
                 acceptance += np.exp(min(difference, 0.0))
             if log_uniforms[draw, move] < difference:
-                q[:] = proposal
+                for i in range(n):
+                    q[i] = proposal[i]
                 current = proposed
                 accepted += 1
-        draws[draw] = q
+        for i in range(n):
+            draws[draw, i] = q[i]
         if terms.size > 0:
-            terms[draw] = density((q, *data))[1]
+            _, pointwise = density((q, *data))
+            for i in range(pointwise.size):
+                terms[draw, i] = pointwise[i]
     return accepted / (n_draws * n_moves), acceptance / n_walks
 
 

@@ -50,9 +50,12 @@ def tabled(readings):  # type: ignore[no-untyped-def]
 @inner()
 def _cases_of(errors):  # type: ignore[no-untyped-def]
     """All cases of the mixture in one array, (n_cases, 4)."""
-    cases = np.empty((errors.weights.size, 4))
-    cases[:, _SCALE], cases[:, _SHARE] = errors.scales, errors.shares
-    cases[:, _LOG_WEIGHT], cases[:, _LOG_SCALE] = errors.log_weights, errors.log_scales
+    scales, shares = errors.scales, errors.shares
+    log_weights, log_scales = errors.log_weights, errors.log_scales
+    cases = np.empty((scales.size, 4))
+    for k in range(scales.size):
+        cases[k, _SCALE], cases[k, _SHARE] = scales[k], shares[k]
+        cases[k, _LOG_WEIGHT], cases[k, _LOG_SCALE] = log_weights[k], log_scales[k]
     return cases
 
 

@@ -33,7 +33,8 @@ _NUMBAS_OWN = (UserProvidedCacheLocator, InTreeCacheLocator, UserWideCacheLocato
 def compiled(*signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
     """`numba.njit` for what Python calls: cached, IEEE division, without the GIL.
 
-    What it calls must stand above it, and be compiled here as well.
+    What it calls must stand above it, and be compiled here as well. Matrix products, and arrays assigned to
+    slices of others, take seconds to compile, the latter for the words of an error: loops do not.
     """
     # A wrapper for C is a tenth of the time of compilation, and nobody calls it.
     options = {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True, **options}

@@ -38,7 +38,9 @@ def let_pytensor_write() -> None:
 
 
 def _can_write(folder: Path) -> bool:
-    """Whether there is such a folder, or can be, that can be written."""
-    while not folder.exists() and folder != folder.parent:
-        folder = folder.parent
+    """Whether there is such a folder, made now if need be, that can be written."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
     return os.access(folder, os.W_OK | os.X_OK)

@@ -137,9 +137,10 @@ def _node_moments(psi, n, first, points, log_weights):  # type: ignore[no-untype
                 own[i] += part
                 for j in range(size):
                     square[i, j] += part * statistics[j]
-        mean += own
         for i in range(size):
-            covariance[i] += square[i] - own[i] * own
+            mean[i] += own[i]
+            for j in range(size):
+                covariance[i, j] += square[i, j] - own[i] * own[j]
     return density.sum(), mean, covariance
 
 
@@ -204,7 +205,8 @@ def _slopes(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-u
         there[i] = psi[i] - _STEP
         low, down = _smooth(there, *fixed)
         there[i] = psi[i]
-        natural[i] = (up - down) / (2.0 * _STEP)
+        for k in range(mean.size):
+            natural[i, k] = (up[k] - down[k]) / (2.0 * _STEP)
         gradient[i] = (high - low) / (2.0 * _STEP)
         sides[i] = high - 2.0 * middle + low
         hessian[i, i] = -sides[i] / _STEP**2

@@ -109,7 +109,8 @@ def reading_slopes(rows, predictions, readings, errors):  # type: ignore[no-unty
         if common > 0.0:
             _common_slopes(table, row, predictions, i, common, slope, curvature, shared)
             continue
-        log_case[:] = log_weights
+        for case in range(n_cases):
+            log_case[case] = log_weights[case]
         for j in range(n_columns - 1):
             if table[row, j, OBSERVED] == 0.0:
                 continue

@@ -69,7 +69,8 @@ def fill_readings(  # type: ignore[no-untyped-def]
                     run, strengths, releases, edge, ground, scaled, barriers, limits, columns, profiles, u_c,
                     own, work, rows, runouts, lasts, firsts,
                 )  # fmt: skip
-            v[:] = rows[place]
+            for i in range(n_cells + 1):
+                v[i] = rows[place, i]
             runout, last, first = runouts[place], lasts[place], firsts[place]
         else:
             runout, last, first = march(release, edge, ground, barriers, limits, table, keep, gain, v)
@@ -91,7 +92,8 @@ def fill_readings(  # type: ignore[no-untyped-def]
                 profiles, u_c, speed_terms, table, v, dv, step, shift, d_time, d_runout, readings, jacobian,
             )  # fmt: skip
         if speeds.shape[1] > 0:
-            speeds[run] = np.sqrt(v)
+            for i in range(n_cells + 1):
+                speeds[run, i] = np.sqrt(v[i])
 
 
 def simulate(

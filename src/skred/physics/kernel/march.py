@@ -361,7 +361,8 @@ def march_tangents(  # type: ignore[no-untyped-def]
             v[i], start, end, end, np.inf, cell, barriers, columns, profiles, i, step, shift, d_time
         )
         if stopped:
-            d_runout[:] = shift
+            for k in range(n_tangents):
+                d_runout[k] = shift[k]
             if s <= release:
                 d_runout[:] = 0.0
                 d_runout[-1] = 1.0
@@ -381,7 +382,8 @@ def fill_increments(  # type: ignore[no-untyped-def]
     if speed_terms:
         fill_speed_changes(scaled, ground, table, u_c, keep, v, by_source, by_decay, mean, soften, carry)
     else:
-        carry[:] = keep
+        for i in range(carry.size):
+            carry[i] = keep[i]
     for k in range(columns.size):
         _fill_increment(columns[k], profiles[k], scaled, u_c, mean, by_source, by_decay, increment[k])
         if speed_terms:

@@ -191,7 +191,8 @@ def read_tangents(  # type: ignore[no-untyped-def]
         s_from, s_to, i, tangents = sensors[j, 1], sensors[j, 2], cells[j], jacobian[run, j]
         speed = readings[run, j]
         if sensors[j, 0] == RUNOUT:
-            tangents[:] = d_runout
+            for k in range(tangents.size):
+                tangents[k] = d_runout[k]
         elif not speed > 0.0:
             tangents[:] = 0.0
         elif s_from < s_to:
