@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from skred.report.shared.labels import shortened
+from skred.report.shared.labels import shortened, unit_text
 from skred.report.shared.numbers import decimals_for, rounded, share
 from skred.report.shared.tables import plain_table, plain_text
 
@@ -27,7 +27,14 @@ def identify_table(document: dict[str, Any]) -> Table:
         ]
         stretch = row["best_stretch_m"]
         where = "-" if stretch is None else f"{stretch[0]:.0f}-{stretch[1]:.0f}"
-        words = (row["id"], row["unit"], share(row["kept"]), numbers[0], share(row["power"]), *numbers[1:])
+        words = (
+            row["id"],
+            unit_text(row["unit"]),
+            share(row["kept"]),
+            numbers[0],
+            share(row["power"]),
+            *numbers[1:],
+        )
         table.add_row(*map(plain_text, (*words, where)))
     table.caption = plain_text(
         "Kept: share of the information left after the base law, its scatter and releases. Relevant: the"
