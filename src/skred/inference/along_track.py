@@ -16,8 +16,11 @@ from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Ends of the central 90 and 50 % bands, and the median: what the figures along the track draw."""
 _MOST_RESPONSES, _MOST_AVALANCHES = 400, 1000
+"""Draws of the mean response, and new avalanches, that bands are made of: enough for their 5 % quantiles."""
 _MEDIANS, _AVALANCHES_OF_A_MEDIAN = 120, 100
+"""Draws whose median front is drawn, and avalanches of each: the band of medians moves by less than a line."""
 
 
 def with_along_track(tree: xr.DataTree, law: Law, problem: Problem) -> xr.DataTree:

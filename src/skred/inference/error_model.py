@@ -113,6 +113,7 @@ _NODES = np.linspace(-4.0, 4.0, 27)
 """Evenly spaced nodes of a standard normal variable. Many readings determine an event's factor to a tenth;
 Gauss-Hermite nodes would be too far apart for that."""
 _WEIGHTS = np.exp(-0.5 * _NODES**2)
+"""Standard normal density at the nodes, not normalised."""
 ERROR_MODELS: dict[str, ErrorModel] = {
     model.id: model
     for model in (

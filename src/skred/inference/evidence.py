@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from skred.inference.sampling import quiet_pymc
 
 SMC_DRAWS = 1000
+"""Particles of sequential Monte Carlo: half of PyMC's default; what they leave open shows between seeds."""
 _CHAINS = 2
+"""Independent runs for each seed: the fewest that show whether they agree."""
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ FIT_LEVEL = 0.01
 """Probability, at most, that a right model is said to miss anywhere. It is the level of the bootstrap test of
 a diagnosis, so that both alarm equally rarely."""
 _MOST_NAMED = 3
+"""Sensors that a sentence describes one by one; of more it says how many."""
 _MEAN, _SD = range(2)
 """Statistics of a sensor, as `_moments` has them."""
 

@@ -36,7 +36,10 @@ DEGREES_OF_FREEDOM = 6.0
 _BLOCK = 100
 """Draws made in one call after tuning, when proposals are fixed."""
 TARGET_ACCEPTANCE = {1: 0.44, 2: 0.35}
+"""Acceptance that is best for one and two parameters (Roberts and Rosenthal, 2001, doi
+10.1214/ss/1015346320)."""
 _TARGET_ELSE = 0.25
+"""Acceptance for more parameters: near the best one of many, 0.234 (the same)."""
 _FORGET_UNTIL = 10
 """Adaptation steps after which the chain's past counts in full (the start is forgotten)."""
 

@@ -21,7 +21,9 @@ FloatArray = NDArray[np.float64]
 REFIT_CHAINS, REFIT_DRAWS, REFIT_BURN = 4, 500, 100
 """Draws of models of one or two parameters; chains of more are longer."""
 _ADAPTATION = 500
+"""Draws in which proposals adapt to the posterior of all events, before any is left out."""
 _BATCHES = 5
+"""Batches of each chain from whose means the Monte Carlo error is taken."""
 
 
 @dataclass(frozen=True)

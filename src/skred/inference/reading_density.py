@@ -15,9 +15,12 @@ IntArray = NDArray[np.int64]
 _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 _SQRT_HALF = math.sqrt(0.5)
 _LEAST = 1e-300
+"""Least density whose logarithm is taken."""
 _TINY, _SMALL = 1e-30, 1e-200
 """Densities below the first are taken by their logarithm; products below the second are put away."""
 _COMMON_STEPS, _COMMON_STEP = 28, 0.5
+"""Trapezoids over an error that velocities share, in its standard deviations: from -14 to 14 in steps of a
+half."""
 OBSERVED, VELOCITY, VALUE, RELATIVE, ABSOLUTE = range(5)
 """What is known of a reading, as `tabled` has it: two flags, and its error's parts."""
 _SCALE, _SHARE, _LOG_WEIGHT, _LOG_SCALE = range(4)

@@ -18,7 +18,9 @@ from skred.physics.law import Law
 
 Sampler = Literal["metropolis", "nuts", "smc"]
 PRIOR_DRAWS = 1000
+"""Draws of the prior that are kept for figures and starting points."""
 _STARTS_PER_CHAIN = 20
+"""Draws of the prior among which a chain's start is the most probable one."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,12 @@ from typing import Any
 from skred.errors import InputError
 
 PACKAGES = ("skred", "models")
-SCORING = ("prove/score*.py", "report/scorecard*.py", "report/templates/scorecard*.jinja")
+SCORING = (
+    "prove/scorecard.py",
+    "prove/scoring/*.py",
+    "report/scorecard/*.py",
+    "report/templates/scorecard*.jinja",
+)
 """Files that decide how answers are scored, within the package."""
 
 

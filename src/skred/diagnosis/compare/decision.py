@@ -18,6 +18,8 @@ TIED_NATS = 2.0
 such ties no recordings split: a low dam and a bias of the sensor beside it. Which group leads decides the
 verdict, not whether its name stands alone."""
 NOTHING_AT_MOST, NOTHING_ALONE = 0.5, 0.15
+"""Probability of nothing below which the check raises an alarm, its prior; and below which the comparison
+alone does."""
 ALARMS = ((LIMIT, NOTHING_AT_MOST), (1.0, NOTHING_ALONE))
 """The alarm is raised where, for any of these, the check's p-value is at most the first and the probability
 of nothing below the second. That is: by the check, unless the comparison denies it; or by the comparison

@@ -24,6 +24,8 @@ from skred.parallel.compile_cache import compiled, inner
 _SQRT_2 = math.sqrt(2.0)
 _SQRT_2PI = math.sqrt(2.0 * math.pi)
 _FAR = 6.0
+"""Standard deviations beyond which the slope of a normal tail is taken from its asymptote: the tail itself
+underflows."""
 
 
 @inner()

@@ -20,6 +20,7 @@ from skred.physics.mechanisms.spec import Mechanism, Shape
 
 FloatArray = NDArray[np.float64]
 FORMAT = 1
+"""Version of the document."""
 MOST_DRAWS, MOST_TERMS, MOST_CONSTANTS = 10_000, 4, 8
 """Draws, terms and constants of a term in a document at most: many times what is ever written."""
 _MOST_EDGES = 20_000

@@ -10,6 +10,7 @@ from skred.parallel.compile_cache import compiled, inner
 
 _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 _NEGLIGIBLE = -60.0
+"""Log share of the largest term below which a term is nil in double precision."""
 
 
 @inner()

@@ -23,6 +23,7 @@ FloatArray = NDArray[np.float64]
 LKJ_SHAPE = 2.0
 """Of the prior of the correlations (Lewandowski, Kurowicka and Joe): mildly against strong ones."""
 _LEAST = 1e-6
+"""Least that a partial correlation leaves, so that a factor has an inverse."""
 
 
 def spread_parameters(mechanisms: Sequence[Mechanism]) -> tuple[Parameter, ...]:

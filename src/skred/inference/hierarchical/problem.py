@@ -48,14 +48,21 @@ _AT_EDGE, _FARTHER_BELOW = 2.0, 10.0
 """If a population lies this near to the lower end of the range, the range is extended downwards. Recordings
 without drag do not bound it from below, and chains would leave the range that was computed."""
 _WIDER_CHECK = 1.0
+"""How much farther the box of log coefficients reaches for each step of fineness: a check must see what the
+box may have missed."""
 _MEDIAN_LOG_MEAN, _MEDIAN_LOG_SD = -0.64, 1.1
 """Mean and standard deviation of the log of a half-normal variable of scale 1."""
 _COARSE_CELL = 0.25
+"""Width of a patch while the population is looked for: about the widest of usual spreads."""
 _CHECKED_EVENTS, _CHECKED_DRAWS = 24, 40
+"""Events and draws of the posterior that an integration is checked at, at most."""
 _LEAST_CHECKED, _CHECKED_RUNS, _FINER_COSTS = 6, 2_000_000, 6.0
 """Least number of events checked, most runs of the kernel in a check, and its cost in usual ones."""
 _SHARP_RUNOUT_M = 4.0
+"""Error of a runout [m] below which patches are made narrower in proportion."""
 COARSER, _FINEST = 0.7, 2.0
+"""Fineness of a base law that is to be diagnosed, where claims are computed apart from it; and the finest
+that is tried again with."""
 INTEGRATION_LIMIT = 0.0091
 """Largest error of the log likelihood per event, in nats, in the mean over events: 0.2 for 22 events."""
 

@@ -18,13 +18,18 @@ FloatArray = NDArray[np.float64]
 SPREAD_MEDIAN, SPREAD_LOG_SD = 0.13, 0.6
 """Prior of a population's standard deviation of a strength's logarithm: log-normal."""
 _SEARCH, _ITERATIONS, _ENOUGH = 30, 300, 1e-4
+"""Steps after which the population is found, steps at most, and change below which they end."""
 _STARTING_SPREAD = 0.3
+"""Spread to begin with: wider than most, so that no event is out of reach."""
 _PRIOR_EVENTS = 2.0
+"""Events that a prior spread counts for where correlations are estimated: keeps a covariance regular with few
+events."""
 _REACH = 2.5
 """Distance, in posterior standard deviations, up to which populations are expected."""
 _AROUND = 2.0
 """How much wider, in variance, than the mean over some populations an envelope of them is."""
 _CELL_IN_SPREADS, _LEAST_CELL, _LARGEST_CELL = 1.0, 0.02, 0.25
+"""Width of a patch in the narrowest spread to be expected, and its limits."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -37,7 +37,9 @@ from skred.inference.hierarchical.bisection import (
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 _EVENTS_AT_ONCE = 16
+"""Events that are resolved together, between two reports of progress."""
 _FIRST_WIDTH = 0.5
+"""Widest first box, in the logarithm of a coefficient: wider ones hide a narrow mode."""
 
 
 class Nodes(NamedTuple):

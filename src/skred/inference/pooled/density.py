@@ -22,6 +22,7 @@ MAX_NOT_REACHED = 4
 """Sensors an event may have missed; each beyond the first multiplies the work by the nodes."""
 
 _NODE, _WEIGHT = (np.ascontiguousarray(a) for a in roots_legendre(24))
+"""Gauss-Legendre quadrature over a sensor that was not reached, 24 points."""
 _SQRT_HALF = math.sqrt(0.5)
 _INV_SQRT_2PI = 1.0 / math.sqrt(2.0 * math.pi)
 

@@ -18,6 +18,7 @@ BoolArray = NDArray[np.bool_]
 TOLERANCE = 1e-9
 """Largest last change of any mean or covariance, in standard deviations of the sensors."""
 MAX_ITERATIONS = 20_000
+"""Steps of expectation-maximisation after which it is told that it does not converge."""
 SMALLEST_EIGENVALUE = 1e-8
 """Of the correlation matrix; below it some sensors are a fixed combination of others."""
 LIKELIHOOD_SLACK = 1e-6
