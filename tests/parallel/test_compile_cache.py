@@ -118,15 +118,7 @@ def test_a_read_only_install_without_a_home(tmp_path: Path) -> None:
     bare = {"HOME": NO_HOME, "XDG_CACHE_HOME": "", "NUMBA_CACHE_DIR": "", "PYTENSOR_FLAGS": ""}
     bare |= {"TMPDIR": str(tmp_path / "temporary"), "PYTHONPATH": str(tmp_path)}
     for misses in "10":
-        used, compiled_in, missed = run(
-            tmp_path,
-            "-B",
-            "-c",
-            program,
-            TMPDIR=str(tmp_path / "temporary"),
-            PYTHONPATH=str(tmp_path),
-            **bare,
-        )
+        used, compiled_in, missed = run(tmp_path, "-B", "-c", program, **bare)
         assert Path(used).is_relative_to(tmp_path)
         assert Path(compiled_in).is_relative_to(tmp_path / "temporary")
         assert missed == misses
