@@ -20,7 +20,7 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 _MOST_RESPONSES, _MOST_AVALANCHES = 400, 1000
 """Draws of the mean response, and new avalanches, that bands are made of: enough for their 5 % quantiles."""
 _MEDIANS, _AVALANCHES_OF_A_MEDIAN = 120, 100
-"""Draws whose median front is drawn, and avalanches of each: the band of medians moves by less than a line."""
+"""Draws whose median front is drawn, and avalanches of each: the band of medians is then known to a line."""
 
 
 def with_along_track(tree: xr.DataTree, law: Law, problem: Problem) -> xr.DataTree:
