@@ -1,6 +1,6 @@
 """Write trials to develop on: campaigns with concealed physics, and apart from them the truth.
 
-``python benchmarks/development_set.py --n 40 --seed 1000 --out DIR [--kind mixed] [--hidden two] [--snr 7]``.
+``python -m benchmarks.development_set --n 40 --seed 1000 --out DIR [--kind mixed] [--hidden two] [--snr 7]``.
 
 Trial i has the seed ``seed + i``; every other one is sparse, the rest dense, unless a kind is given. With
 ``--each`` they hide, in turn, each mechanism, nothing, each force that is in no list, ... (`EACH`). Folders:

@@ -1,6 +1,6 @@
 """How long `skred diagnose` takes by the clock, loading packages included: to its verdict, and to its report.
 
-``python benchmarks/diagnose_time.py [--json FILE]`` runs the command on the 22 avalanches of Ryggfonn, one
+``python -m benchmarks.diagnose_time [--json FILE]`` runs the command on the 22 avalanches of Ryggfonn, one
 base law after the other, and on dense campaigns of the development seeds, each with the base law that its
 trial asks about. Asked: 60 s for 22 sparse events, 120 s for 15 events with 40 gates, on two cores. First
 each law is run once and not counted, so that everything is compiled. Both cores must be free.

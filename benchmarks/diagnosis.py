@@ -1,7 +1,7 @@
 """Diagnoses of simulated campaigns with hidden physics, scored against the truth.
 
-``python benchmarks/development_set.py --n 40 --seed 1000 --out DIR`` makes the campaigns;
-``python benchmarks/diagnosis.py --trials DIR [--workers 2] [--json FILE]`` diagnoses them, each in a process
+``python -m benchmarks.development_set --n 40 --seed 1000 --out DIR`` makes the campaigns;
+``python -m benchmarks.diagnosis --trials DIR [--workers 2] [--json FILE]`` diagnoses them, each in a process
 that is told nothing but the campaign and the base law, and scores what came out with the scores of
 `skred prove`; FILE holds the whole scorecard. Each verdict is written as soon as it is there, and the same
 command goes on with a run that was ended.
@@ -19,6 +19,7 @@ from typing import Annotated, Any
 
 import cyclopts
 
+from benchmarks.files import write
 from skred.output import write_json
 from skred.prove.scorecard import DIAGNOSIS, scorecard
 
@@ -59,13 +60,15 @@ def summary(trials: Path) -> dict[str, Any]:
     return scorecard({"note": "development trials: not sealed"}, truths, {DIAGNOSIS: answers})
 
 
+KEPT = ("n_trials", "counts", "ledger", "bars", "trials")
+"""Parts of the scorecard that are written."""
 app = cyclopts.App(help=__doc__)
 
 
 @app.default
 def main(
     *,
-    trials: Annotated[Path, cyclopts.Parameter(help="Folder made by development_set.py.")],
+    trials: Annotated[Path, cyclopts.Parameter(help="Folder made by `benchmarks.development_set`.")],
     workers: Annotated[int, cyclopts.Parameter(help="Trials diagnosed at a time.")] = 1,
     replicas: Annotated[int, cyclopts.Parameter(help="Clean campaigns simulated for each check.")] = 120,
     out: Annotated[Path | None, cyclopts.Parameter(name="--json", help="File for the scores.")] = None,
@@ -92,7 +95,7 @@ def main(
             measured = f"{bar['measured']:.2f}, n = {bar['n']}"
             print(f"{bar['goal']}: {bar['what']}: {measured}: {bar['status']}")
     if out is not None:
-        write_json(out, found | {"settings": _settings(replicas)})
+        write(out, {key: found[key] for key in KEPT} | {"settings": _settings(replicas)})
 
 
 if __name__ == "__main__":

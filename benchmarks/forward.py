@@ -1,6 +1,6 @@
 """How fast the kernel is, beside a plain numba loop and pure Python, and how exact.
 
-    python benchmarks/forward.py [--repeat N] [--json FILE]
+    python -m benchmarks.forward [--repeat N] [--json FILE]
 
 Twenty-two fronts with different parameters down Ryggfonn (394 cells), read at LC, CD, b and the runout.
 Best of several, all in one run: compare the ratios, the times depend on the machine and its load.
@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -21,9 +20,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-sys.path.insert(0, str(Path(__file__).parent))
-from forward_peers import numba_peer, python_peer
-
+from benchmarks.forward_peers import numba_peer, python_peer
 from skred.campaign import find_campaign, read_campaign
 from skred.physics.geometry import contributions_of, path_of, sensor_table
 from skred.physics.kernel.columns import Column

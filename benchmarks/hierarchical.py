@@ -1,6 +1,6 @@
 """What the hierarchical likelihood costs: time to a passed gate, growth with events and gates, a peer.
 
-``python benchmarks/hierarchical.py [--quick] [--only PART] [--json FILE]``. Seconds of the wall clock, in a
+``python -m benchmarks.hierarchical [--quick] [--only PART] [--json FILE]``. Seconds of the wall clock, in a
 process whose compiled kernels come from the cache: surfaces (resolving each likelihood), compiling the
 model and its step, and sampling 4 chains until the gate is passed (r-hat at most 1.01, 400 effective
 draws; if not at once, once more with four times the draws, which counts). Of several seeds the median.
@@ -25,13 +25,13 @@ from pathlib import Path
 from statistics import median
 from typing import Annotated, Any
 
-import hierarchical_campaigns as campaigns
+from benchmarks import hierarchical_campaigns as campaigns
 import numpy as np
 from cyclopts import App, Parameter
-from peers import joint_nuts
+from benchmarks.peers import joint_nuts
 from rich.console import Console
 from rich.table import Table
-from sbc import SECOND_TRY
+from benchmarks.sbc import SECOND_TRY
 
 from skred.campaign import find_campaign, read_campaign
 from skred.inference.gate import check_gate
@@ -40,7 +40,8 @@ from skred.inference.joint_metropolis import JointMetropolis
 from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior
 from skred.physics.laws import load_law
 from skred.physics.law import Law
-from skred.output import plain, write_text
+from benchmarks.files import write
+from skred.output import plain
 
 Row = dict[str, Any]
 
@@ -82,7 +83,7 @@ def to_the_gate(problem: HierarchicalProblem, law: Law, seed: int) -> Row:
         if gate.passed:
             break
     sampling_s = time.perf_counter() - started
-    posterior = tree["posterior"]
+    posterior = tree["posterior"].to_dataset()
     draws = {name: posterior[name].values.ravel() for name in names}
     chosen = np.linspace(0, posterior[names[0]].size - 1, CHECKED_DRAWS).astype(int)
     errors, check_s = timed(
@@ -195,7 +196,7 @@ def joint(seed: int) -> Row:
         "compared": None,
     }
     if drawn.tree is not None:
-        posterior, stats = drawn.tree["posterior"], drawn.tree["sample_stats"]
+        posterior, stats = (drawn.tree[group].to_dataset() for group in ("posterior", "sample_stats"))
         row["compared"] = {
             "chains": posterior.sizes["chain"],
             "draws": posterior.sizes["draw"],
@@ -329,7 +330,7 @@ def main(
         found.setdefault("sources", {})[name] = campaigns.source_fingerprint()
         console.print(f"{name}: done", highlight=False)
         if json_file is not None:
-            write_text(json_file, json.dumps(plain(found), indent=1, allow_nan=False) + "\n")
+            write(json_file, found)
     return 0 if show(console, found) else 1
 
 

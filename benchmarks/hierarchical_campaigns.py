@@ -28,10 +28,9 @@ from numpy.typing import NDArray
 import skred.inference
 import skred.physics
 from skred.campaign import Event, Sensor, Status, find_campaign, read_campaign
-from skred.inference.error_model import Errors, EventReadings
+from skred.inference.error_model import OUTLIER_FACTOR, Errors, EventReadings
 from skred.inference.hierarchical.population import correlation_parameters, population_of, spread_parameters
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
-from skred.inference.hierarchical.reading_density import OUTLIER_FACTOR
 from skred.physics.kernel.fronts import simulate
 from skred.physics.law import Law
 

@@ -1,6 +1,6 @@
 """Simulation-based calibration of the hierarchical likelihood.
 
-``python benchmarks/hierarchical_sbc.py [--kind sparse] [--n 200] [--seed 0] [--law pcm] [--workers 2]``.
+``python -m benchmarks.hierarchical_sbc [--kind sparse] [--n 200] [--seed 0] [--law pcm] [--workers 2]``.
 
 Again and again: a population from the model's own prior; strengths of the events; what would have been
 recorded of them (`hierarchical_campaigns`: just what the likelihood stands for, outliers, the stop as seen
@@ -26,12 +26,12 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-import hierarchical_campaigns as campaigns
 import numpy as np
-import sbc
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
+from benchmarks import hierarchical_campaigns as campaigns
+from benchmarks import sbc
 from skred.errors import InputError
 from skred.inference.gate import check_gate
 from skred.inference.hierarchical.event_draws import recorded_avalanches

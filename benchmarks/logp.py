@@ -1,6 +1,6 @@
 """How long one evaluation of the pooled M2 log density takes, three ways.
 
-``python benchmarks/logp.py [--quick] [--json FILE]``. The same PyMC model is evaluated through
+``python -m benchmarks.logp [--quick] [--json FILE]``. The same PyMC model is evaluated through
 
 * the Ops' numba dispatch, as skred does;
 * the same Ops without a dispatch, that is through `perform`. PyTensor's default backend (numba)
@@ -15,7 +15,7 @@ in, cycling through a few points near the posterior; the time is the best of sev
 """
 
 # ruff: noqa: E402 I001
-import peers.single_thread  # noqa: F401
+import benchmarks.peers.single_thread  # noqa: F401
 
 import json
 import time
@@ -34,10 +34,10 @@ from rich.console import Console
 from rich.table import Table
 
 from models.pcm import LAW
-from peers import scan_model
-from peers.performed import expect_warnings, performed
+from benchmarks.peers import scan_model
+from benchmarks.peers.performed import expect_warnings, performed
 from skred.campaign import find_campaign, read_campaign
-from skred.inference.problem import PooledProblem, pooled_problem
+from skred.inference.pooled.problem import PooledProblem, pooled_problem
 
 FloatArray = NDArray[np.float64]
 TOLERANCE = 1e-8

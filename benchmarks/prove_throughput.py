@@ -1,6 +1,6 @@
 """Trials per second of `skred prove run` with one worker and with two.
 
-``python benchmarks/prove_throughput.py [--trials 6] [--kind sparse] [--quick] [--json FILE]`` seals trials
+``python -m benchmarks.prove_throughput [--trials 6] [--kind sparse] [--quick] [--json FILE]`` seals trials
 that hide nothing in a temporary folder and has them diagnosed twice, from the same sealed state, so that both
 runs do the same work. Compiled code is cached by a diagnosis that is not timed. Starting workers is part of
 a run.

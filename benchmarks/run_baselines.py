@@ -1,6 +1,6 @@
 """Answers of the baselines on simulated campaigns with hidden physics.
 
-``python benchmarks/run_baselines.py --trials DIR [--only sindy,forward_bic] [--workers 1]``. DIR is a
+``python -m benchmarks.run_baselines --trials DIR [--only sindy,forward_bic] [--workers 1]``. DIR is a
 development set (``DIR/trial-0001/campaign`` and ``request.json``) or a proof run
 (``DIR/trials/trial-0001/...``); each answer is ``DIR/answers/<id>/trial-0001.json``, in the words of
 verdict.json, written as soon as it is there, and the same command goes on with a run that was ended. A
@@ -12,7 +12,7 @@ A crash is a wrong answer.
 from __future__ import annotations
 
 # Before numpy: CPU time is to be comparable.
-import peers.single_thread  # noqa: F401
+import benchmarks.peers.single_thread  # noqa: F401
 
 # isort: split
 
@@ -25,8 +25,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import cyclopts
-from baselines import BASELINES, baseline
 
+from benchmarks.baselines import BASELINES, baseline
 from skred.output import write_json
 
 

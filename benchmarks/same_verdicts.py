@@ -12,6 +12,7 @@ The record was made by commit bba8a6d, before the rooms were rearranged, from th
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 from pathlib import Path
@@ -19,8 +20,9 @@ from typing import Annotated, Any
 
 import cyclopts
 
-ROOT = Path(__file__).resolve().parent.parent
-RECORD = Path(__file__).resolve().parent / "results" / "verdicts_before.json"
+from benchmarks.files import RESULTS, ROOT, read, write
+
+RECORD = RESULTS / "verdicts_before.json"
 SET = ("--each", "--seed", "3100000", "--n", "40")
 SAME = ("verdict", "mechanism", "indistinguishable")
 """Keys that must be equal."""
@@ -50,9 +52,16 @@ def differences(before: dict[str, Any], after: dict[str, Any]) -> list[str]:
         found.append("candidates")
     elif moved > CLOSE:
         found.append(f"a probability by {moved:.3f}")
-    if before["p_value"] != after["p_value"]:
+    if not same_number(before["p_value"], after["p_value"]):
         found.append(f"p-value: {before['p_value']} -> {after['p_value']}")
     return found
+
+
+def same_number(one: float | None, other: float | None) -> bool:
+    """Whether two numbers agree in the digits that result files keep; or neither is there."""
+    if one is None or other is None:
+        return one is other
+    return math.isclose(one, other, rel_tol=1e-5)
 
 
 def moved_most(before: dict[str, Any], after: dict[str, Any]) -> float:
@@ -115,9 +124,9 @@ def main(
         run("studies.ryggfonn", "--out", str(folder / "ryggfonn"))
     after = answers(folder)
     if record:
-        RECORD.write_text(json.dumps(after, indent=1) + "\n", encoding="utf-8")
+        write(RECORD, after)
         return 0
-    before = json.loads(RECORD.read_text(encoding="utf-8"))
+    before = read(RECORD)
     print(table(before, after))
     differ = [name for name in before if name in after and differences(before[name], after[name])]
     print(f"{len(differ)} of {len(before.keys() & after.keys())} differ.")

@@ -1,6 +1,6 @@
 """Effective draws per CPU second of the pooled M2 posterior: skred's Metropolis and its peers.
 
-``python benchmarks/sampling.py [--seeds 5] [--quick] [--json FILE]``. Every sampler draws from the
+``python -m benchmarks.sampling [--seeds 5] [--quick] [--json FILE]``. Every sampler draws from the
 same posterior, on one thread, with its defaults except where `SAMPLERS` or its file in
 ``benchmarks/peers`` says otherwise; all adaptation counts, compilation is listed apart. How many
 draws each makes is set so that every run takes some seconds: tuning then weighs as little as it
@@ -18,7 +18,7 @@ was killed goes on where it was when started again.
 """
 
 # ruff: noqa: E402 I001
-import peers.single_thread  # noqa: F401
+import benchmarks.peers.single_thread  # noqa: F401
 
 import hashlib
 import json
@@ -39,10 +39,10 @@ from rich.table import Table
 import skred.inference
 import skred.physics
 from models.pcm import LAW
-from peers.common import PARAMETERS, Drawn
+from benchmarks.peers.common import PARAMETERS, Drawn
 from skred.campaign import find_campaign, read_campaign
-from skred.inference.problem import PooledProblem, pooled_problem
-from skred.output import write_text
+from skred.inference.pooled.problem import PooledProblem, pooled_problem
+from benchmarks.files import rounded, write
 
 Run = dict[str, Any]
 """One finished (sampler, seed): its figures, or its error."""
@@ -104,7 +104,7 @@ class Results:
         if file is not None and file.exists():
             stored = json.loads(file.read_text())
             for key, expected in header.items():
-                if stored.get(key) != expected:
+                if stored.get(key) != rounded(expected):
                     raise ValueError(
                         f"{file}: made with other {key}: {stored.get(key)}, now {expected};"
                         " remove the file or name another"
@@ -120,7 +120,7 @@ class Results:
         """Store a run; the file is never seen half written."""
         self.runs.append(run)
         if self._file is not None:
-            write_text(self._file, json.dumps({**self._header, "runs": self.runs}, indent=1) + "\n")
+            write(self._file, {**self._header, "runs": self.runs})
 
 
 def settings_of(sampler: Sampler, quick: bool) -> dict[str, Any]:
@@ -183,7 +183,7 @@ def run_once(problem: PooledProblem, sampler: Sampler, seed: int, quick: bool) -
     """One sampler with one seed; an error is a result."""
     record: Run = {"sampler": sampler.name, "seed": seed}
     try:
-        module = import_module(f"peers.{sampler.module}")
+        module = import_module(f"benchmarks.peers.{sampler.module}")
         if hasattr(module, "log_density"):
             check_log_density(problem, module)
         drawn = module.sample(problem, seed, **settings_of(sampler, quick))

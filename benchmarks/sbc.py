@@ -1,6 +1,6 @@
 """Simulation-based calibration of a pooled law on the design of the Ryggfonn campaign.
 
-``python benchmarks/sbc.py [--n 200] [--seed 0] [--law pcm] [--out benchmarks/results/sbc.json]``.
+``python -m benchmarks.sbc [--n 200] [--seed 0] [--law pcm] [--out benchmarks/results/sbc.json]``.
 
 Again and again: true parameters from the prior; latent readings y_e ~ N(m(theta), Sigma) of the campaign's
 events; what the likelihood takes a recording for (a front velocity of at most 0 is not reached, a reading
@@ -18,14 +18,13 @@ counted. Each is written as soon as it is done; the same command goes on with a 
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pymc as pm
@@ -34,14 +33,15 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.stats import binom, chisquare
 
+from benchmarks import files
 from skred.campaign import Status, find_campaign, read_campaign
 from skred.errors import InputError
 from skred.inference.gate import check_gate
 from skred.inference.joint_metropolis import JointMetropolis
 from skred.inference.pooled.density import PooledArrays
-from skred.inference.problem import PooledProblem, pooled_problem
+from skred.inference.pooled.problem import PooledProblem, pooled_problem
 from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior
-from skred.output import plain, write_text
+from skred.output import plain
 from skred.physics.law import Law
 from skred.physics.laws import load_law
 
@@ -189,8 +189,8 @@ class Calibrator:
         )
         # The law's own model, with the recordings in shared variables that every simulation sets anew.
         template = replace(problem)
-        self._shared = PooledArrays(*(pytensor.shared(array) for array in problem.arrays))
-        template.__dict__["arrays"] = self._shared
+        self._shared = [pytensor.shared(array) for array in problem.arrays]
+        template.__dict__["arrays"] = PooledArrays(*self._shared)
         self.model: pm.Model = law.build(template)
         self.step = JointMetropolis(model=self.model, pointwise="recordings")
         self.truths = sample_prior(self.model, law, seed, PRIOR_ROWS)
@@ -261,7 +261,14 @@ def recorded(problem: PooledProblem, latent: FloatArray) -> PooledProblem:
 # Many simulations
 
 
-def simulations(calibrator: Calibrator, numbers: Sequence[int]) -> Iterator[dict[str, Any]]:
+class Calibrates(Protocol):
+    """What analyses one simulation after the other."""
+
+    def calibrate(self, number: int) -> dict[str, Any]:
+        """Ranks and diagnostics of one simulation."""
+
+
+def simulations(calibrator: Calibrates, numbers: Sequence[int]) -> Iterator[dict[str, Any]]:
     """Calibrate simulation after simulation; one that raises an error says so in its record."""
     for number in numbers:
         try:
@@ -303,10 +310,8 @@ def ranks_of(name: str, records: Sequence[dict[str, Any]]) -> Uniformity:
 
 
 def write(file: Path, head: dict[str, Any], records: Sequence[dict[str, Any]], summary: Any = None) -> None:
-    """Write all that is known so far, whole or not at all, one line for each simulation."""
-    lines = ",\n".join("  " + json.dumps(plain(record), allow_nan=False) for record in records)
-    start = json.dumps(plain({**head, "summary": summary}), indent=1, allow_nan=False)
-    write_text(file, f'{start[:-2]},\n "simulations": [\n{lines}\n ]\n}}\n')
+    """Write all that is known so far, whole or not at all; simulations in columns, one entry for each."""
+    files.write(file, {**head, "summary": summary, "simulations": files.as_columns(records)})
 
 
 def read(file: Path, head: dict[str, Any]) -> list[dict[str, Any]]:
@@ -319,11 +324,10 @@ def read(file: Path, head: dict[str, Any]) -> list[dict[str, Any]]:
     """
     if not file.exists():
         return []
-    earlier = json.loads(file.read_text(encoding="utf-8"))
-    if earlier["settings"] != plain(head["settings"]):
+    earlier = files.read(file)
+    if earlier["settings"] != files.rounded(plain(head["settings"])):
         raise InputError(f"{file}: holds a run with other settings; choose another --out or delete it")
-    records: list[dict[str, Any]] = earlier["simulations"]
-    return records
+    return files.as_rows(earlier["simulations"])
 
 
 def draw_figure(file: Path, records: Sequence[dict[str, Any]], quantities: Sequence[str], title: str) -> None:
@@ -347,6 +351,7 @@ def draw_figure(file: Path, records: Sequence[dict[str, Any]], quantities: Seque
     partial = file.with_name(f".{file.name}.partial")
     figure.savefig(partial, dpi=150, format="png")
     partial.replace(file)
+    files.shrink(file)
 
 
 def show(summary: dict[str, Any], records: Sequence[dict[str, Any]], title: str) -> None:

@@ -17,7 +17,7 @@ from scipy.stats import halfnorm
 def problem() -> Any:
     """M2 and its peers are calibrated on this."""
     from skred.campaign import find_campaign, read_campaign
-    from skred.inference.problem import pooled_problem
+    from skred.inference.pooled.problem import pooled_problem
 
     return pooled_problem(read_campaign(find_campaign("ryggfonn")))
 

@@ -1,6 +1,6 @@
 """What every baseline returns, and how evidence, probabilities or a guess become a verdict.
 
-What is tuned is tuned on development trials and frozen: ``python benchmarks/development_set.py`` with
+What is tuned is tuned on development trials and frozen: ``python -m benchmarks.development_set`` with
 ``--n 30 --seed 5000``, ``--n 60 --seed 5100 --hidden nothing`` and ``--n 40 --seed 5200 --hidden listed``.
 Limits of the alarm are apart for sparse and dense recordings, each the 95 % quantile of the scores of those
 trials in which nothing is hidden (32 sparse, 36 dense; nasty ones left out). Temperatures give the best mean
@@ -125,7 +125,7 @@ def weighed(
     Parameters
     ----------
     factors : mapping
-        Log Bayes factor of each raced id against nothing; perhaps of `unlisted`, which otherwise keeps its
+        Log Bayes factor of each candidate against nothing; perhaps of `unlisted`, which otherwise keeps its
         prior share of anything.
     limit : float
         Log odds of anything, above which it alarms.
@@ -134,16 +134,16 @@ def weighed(
     stretches : mapping
         Where each local id has most of its evidence.
     """
-    raced = with_ties(factors, possible(base_law))
-    odds = prior_odds([mechanisms()[name] for name in raced])
+    compared = with_ties(factors, possible(base_law))
+    odds = prior_odds([mechanisms()[name] for name in compared])
     if UNLISTED in factors:
-        raced[UNLISTED] = factors[UNLISTED]
+        compared[UNLISTED] = factors[UNLISTED]
     else:
-        listed = [odds[name] * np.exp(min(value, 600.0)) for name, value in raced.items()]
-        raced[UNLISTED] = float(np.log(np.sum(listed) / sum(odds[name] for name in raced)))
-    plain = probabilities({**raced, NOTHING: 0.0}, odds)
+        listed = [odds[name] * np.exp(min(value, 600.0)) for name, value in compared.items()]
+        compared[UNLISTED] = float(np.log(np.sum(listed) / sum(odds[name] for name in compared)))
+    plain = probabilities({**compared, NOTHING: 0.0}, odds)
     score = float(np.log1p(-min(plain[NOTHING], 1.0 - 1e-15)) - np.log(max(plain[NOTHING], 1e-300)))
-    tempered = {name: value / temperature for name, value in raced.items()}
+    tempered = {name: value / temperature for name, value in compared.items()}
     probability = probabilities({**tempered, NOTHING: 0.0}, odds)
     return decided(probability, score, limit, stretches)
 
@@ -174,10 +174,10 @@ def nearest(
     stretch : (float, float) or None
         Where.
     """
-    raced = with_ties(similarity, possible(base_law))
-    if score <= limit or not raced:
-        leading = max(raced, key=lambda name: raced[name], default=None)
+    compared = with_ties(similarity, possible(base_law))
+    if score <= limit or not compared:
+        leading = max(compared, key=lambda name: compared[name], default=None)
         return Answer("nothing_missing", None, (), None, None, score, leading)
-    name = max(raced, key=lambda one: raced[one])
-    tied = tuple(one for one in raced if one != name and raced[one] == raced[name])
+    name = max(compared, key=lambda one: compared[one])
+    tied = tuple(one for one in compared if one != name and compared[one] == compared[name])
     return Answer(VERDICT_OF[group_of(name)], name, tied, None, stretch, score, name)

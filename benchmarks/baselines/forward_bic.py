@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from skred.campaign import Campaign
 from skred.diagnosis.detect.score_test import PlacedMechanism
-from skred.diagnosis.evidence.conditional_map import Population, Rows, log_joint, look_around, take_rows
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, log_joint, look_around
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import MeanPrior, fit_population, mean_prior
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
@@ -38,16 +38,17 @@ def heights(fit: QuickFit, candidate: PlacedMechanism | None, strengths: FloatAr
     """Penalised log likelihood at some strengths of a candidate, all else refitted, (n,)."""
     directions = () if candidate is None else (candidate.direction,)
     extension, n = extended(fit.problem, fit.law, directions), len(strengths)
-    rows = _repeated(fit.rows, n)
-    given = np.repeat(strengths, len(fit.rows.event))[:, None][:, : len(directions)]
+    likelihood = EventLikelihood(extension, fit.rows, np.empty(0))
+    likelihood = likelihood.in_groups(strengths[:, None][:, : len(directions)])
+    rows = likelihood.rows
     start = Population(*(np.repeat(part, n, axis=0) for part in fit.population))
     prior = mean_prior(fit.law)
     population, points = fit_population(
-        extension, rows, given, prior, (start, np.tile(fit.modes.points, (n, 1))), n_rounds=_ROUNDS
+        likelihood, prior, (start, np.tile(fit.modes.points, (n, 1))), n_rounds=_ROUNDS
     )
-    modes = look_around(extension, rows, points, given)
+    modes = look_around(likelihood, points)
     precision = population.precision
-    height = log_joint(extension, rows, points, given, population)
+    height = log_joint(likelihood, points, population)
     height += 0.5 * np.linalg.slogdet(precision)[1][rows.group]
     height -= 0.5 * np.linalg.slogdet(modes.information + precision[rows.group])[1]
     total: FloatArray = height.reshape(n, -1).sum(axis=1) + _log_prior(population, prior)
@@ -60,15 +61,6 @@ def _log_prior(population: Population, prior: MeanPrior) -> FloatArray:
     log_spread = 0.5 * np.log(np.einsum("gii->gi", population.covariance))
     z_spread = (log_spread - np.log(SPREAD_MEDIAN)) / SPREAD_LOG_SD
     return np.asarray(-0.5 * np.sum(z_mean**2 + z_spread**2, axis=1))
-
-
-def _repeated(rows: Rows, n: int) -> Rows:
-    """The campaign's rows for each of n groups."""
-    n_rows = len(rows.event)
-    chosen = np.tile(np.arange(n_rows), n)
-    return Rows(
-        np.tile(rows.event, n), np.repeat(np.arange(n), n_rows), take_rows(rows.readings, chosen), rows.errors
-    )
 
 
 def gain(fit: QuickFit, candidate: PlacedMechanism) -> float:

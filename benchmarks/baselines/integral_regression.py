@@ -40,6 +40,7 @@ from .profiles import (
     smoothed,
     starting_coefficients,
 )
+from .quick_fit import stretch_of
 
 FloatArray = NDArray[np.float64]
 # Tuned on development trials, seeds 5000-5029, 5100-5159 and 5200-5239; see `common`.
@@ -110,7 +111,7 @@ class Regression:
         for (column, speed), members in groups.items():
             response = responses(terrain, self.ride.middle, speed)[column]
             found = self.integrals(np.array([profile for _, profile in members]), response)
-            np.add.at(result, (slice(None), slice(None), [k for k, _ in members]), -2.0 * found)
+            np.add.at(result, (..., [k for k, _ in members]), -2.0 * found)  # type: ignore[arg-type]
         return result * self.weight[:, :, None]
 
     def _other(self, direction: Direction) -> FloatArray:
@@ -238,8 +239,7 @@ class IntegralRegression:
             own = np.array([k for k, one in enumerate(ids) if one == name])
             factors[name] = float(logsumexp(found[own]) - np.log(len(own)))
             shape = todo[own[np.argmax(found[own])]].shape
-            local = shape.s_from_m is not None and shape.s_to_m is not None
-            stretches[name] = (shape.s_from_m, shape.s_to_m) if local else None  # type: ignore[assignment]
+            stretches[name] = stretch_of(shape)
         stretches["entrainment"] = stretches.get("segment_drag")
         kind = "dense" if is_dense(campaign) else "sparse"
         return weighed(factors, base_law, LIMITS[kind], TEMPERATURES[kind], stretches)

@@ -9,7 +9,14 @@ from numpy.typing import NDArray
 
 from skred.campaign import Campaign
 from skred.diagnosis.detect.score_test import ScoreTest
-from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, campaign_rows, event_modes
+from skred.diagnosis.evidence.conditional_map import (
+    EventLikelihood,
+    Modes,
+    Population,
+    Rows,
+    campaign_rows,
+    event_modes,
+)
 from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.linear_mixed_model import (
     Scores,
@@ -60,13 +67,14 @@ def quick_fit(campaign: Campaign, base_law: str) -> QuickFit:
     """Fit the base law by expectation-maximisation around the events' modes."""
     problem, law = hierarchical_problem(campaign), load_law(base_law)
     score_test = ScoreTest(problem, law, setting_of(problem, law))
-    rows, none = campaign_rows(score_test.extension), np.zeros(0)
+    rows = campaign_rows(score_test.extension)
+    likelihood = EventLikelihood(score_test.extension, rows, np.zeros(0))
     points = np.zeros((campaign.n_events, len(law.mechanisms) + 1))
     points[:, :-1] = np.log(starting_coefficients(problem, law, own=True))
     # Each event near its own readings: from a common start some stay where their front stops too early.
     start = Population(np.median(points[:, :-1], axis=0)[None], starting_population(law).covariance)
-    population, points = fit_population(score_test.extension, rows, none, mean_prior(law), (start, points))
-    modes = event_modes(score_test.extension, rows, points, none, population)
+    population, points = fit_population(likelihood, mean_prior(law), (start, points))
+    modes = event_modes(likelihood, points, population)
     return QuickFit(problem, law, score_test, rows, population, modes)
 
 

@@ -1,1 +1,1 @@
-"""Peers of skred's sampler and likelihood, one a file; see ``benchmarks/logp.py`` and ``sampling.py``."""
+"""Peers of skred's sampler and likelihood, one a file; see ``benchmarks.logp`` and ``sampling.py``."""

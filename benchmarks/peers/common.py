@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.pcm import LAW
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 
 FloatArray = NDArray[np.float64]
 PARAMETERS = ("dry_friction", "turbulent_drag")

@@ -13,11 +13,11 @@ from typing import Any
 import emcee
 import numpy as np
 from numba import njit
-from peers.common import PARAMETERS, Drawn, FloatArray, cpu_seconds, near_the_mode
 
+from benchmarks.peers.common import PARAMETERS, Drawn, FloatArray, cpu_seconds, near_the_mode
 from models.pcm import LAW
 from skred.inference.pooled.density import pooled_log_density
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 from skred.physics.kernel.fronts import simulate
 
 WALKERS = 128

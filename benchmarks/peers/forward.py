@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 from skred.physics.kernel.columns import GRAVITY
 from skred.physics.kernel.inputs import RUNOUT
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.inference.hierarchical.problem import HierarchicalProblem
-from skred.inference.hierarchical.reading_density import log_likelihoods
+from skred.inference.reading_density import log_likelihoods
 from skred.physics.kernel.fronts import simulate
 from skred.physics.law import Law
 
@@ -83,7 +83,7 @@ class JointGibbs:
         mean, spread, r = self.parts(population)
         z = (x - mean) / spread
         if self.n == 1:
-            square, log_r = z[..., 0] ** 2, 0.0
+            square, log_r = z[..., 0] ** 2, np.zeros(())
         else:
             a, b = z[..., 0], z[..., 1]
             square = (a**2 - 2.0 * r * a * b + b**2) / (1.0 - r**2)
@@ -105,13 +105,13 @@ class JointGibbs:
         """Every event alone: walks of all sizes, and draws from the population."""
         for move in range(_EVENT_MOVES):
             if move == 0:  # from the prior of an event: its density cancels
-                proposal, log_ratio = self.draw_events(self.x.shape[:2]), 0.0
+                proposal, log_ratio = self.draw_events(self.x.shape[:2]), np.zeros(())
             else:
                 size = 10.0 ** self.rng.uniform(-2.5, 0.3, (*self.x.shape[:2], 1))
                 spread = self.parts(self.population)[1]
                 proposal = self.x + size * spread * self.rng.standard_normal(self.x.shape)
                 log_ratio = self.log_population(self.population, proposal)
-                log_ratio -= self.log_population(self.population, self.x)
+                log_ratio = log_ratio - self.log_population(self.population, self.x)
             proposed = self.log_likelihood(proposal)
             accepted = np.log(self.rng.random(self.log_l.shape)) < proposed - self.log_l + log_ratio
             self.x[accepted], self.log_l[accepted] = proposal[accepted], proposed[accepted]

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from peers import pymc_run
-from peers.common import Drawn
-
+from benchmarks.peers import pymc_run
+from benchmarks.peers.common import Drawn
 from skred.inference.joint_metropolis import JointMetropolis
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 
 
 def sample(problem: PooledProblem, seed: int, *, draws: int, tune: int) -> Drawn:

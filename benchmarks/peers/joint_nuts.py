@@ -56,7 +56,7 @@ def joint_model(problem: HierarchicalProblem, law: Law) -> pm.Model:
     """
     if problem.error_model.id != "normal" or problem.releases.sd.any():
         raise ValueError("normal errors and certain releases only")
-    return law.build(_Joint(problem))  # type: ignore[no-any-return]
+    return law.build(_Joint(problem))
 
 
 class _Joint:
@@ -86,7 +86,7 @@ def log_likelihood(problem: HierarchicalProblem, mechanisms: Any, logs: Any) -> 
 
 
 def _log_stop(stop: Any, readings: Any) -> Any:
-    """As `skred.inference.hierarchical.reading_density` has it; infinities are kept out of the gradients."""
+    """As `skred.inference.reading_density` has it; infinities are kept out of the gradients."""
     far = 1e6
 
     def below(place: FloatArray) -> Any:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pymc as pm
-from peers import pymc_run
-from peers.common import Drawn
 
-from skred.inference.problem import PooledProblem
+from benchmarks.peers import pymc_run
+from benchmarks.peers.common import Drawn
+from skred.inference.pooled.problem import PooledProblem
 
 
 def sample(problem: PooledProblem, seed: int, *, draws: int, tune: int) -> Drawn:

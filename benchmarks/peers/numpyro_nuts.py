@@ -18,12 +18,12 @@ from jax import lax
 from jax.scipy.special import log_ndtr, ndtr
 from numpy.typing import NDArray
 from numpyro.infer import NUTS, init_to_value
-from peers.common import PARAMETERS, Drawn, FloatArray, cpu_seconds, near_the_mode
-from peers.forward import Track, cross, march_step, read, track_of
 from scipy.special import roots_legendre
 
+from benchmarks.peers.common import PARAMETERS, Drawn, FloatArray, cpu_seconds, near_the_mode
+from benchmarks.peers.forward import Track, cross, march_step, read, track_of
 from models.pcm import DRAG, DRY
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 
 CHAINS = 4
 _NODE, _WEIGHT = roots_legendre(40)
@@ -36,7 +36,8 @@ def readings(track: Track, mu: Any, drag: Any) -> Any:
     v, distance = cross(jnp, jnp.zeros(()), tuple(track.cells[:, 0]), mu, drag)
 
     def step(carry: Any, cell: Any) -> Any:
-        ahead = march_step(jnp, *carry, cell, mu, drag)
+        v, s = carry
+        ahead = march_step(jnp, v, s, cell, mu, drag)
         return ahead, ahead[0]
 
     start = (v, track.release + distance)

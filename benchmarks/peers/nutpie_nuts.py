@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import nutpie
-from peers.common import Drawn, cpu_seconds, draws_of, near_the_mode
+from typing import Any
 
+import nutpie
+
+from benchmarks.peers.common import Drawn, cpu_seconds, draws_of, near_the_mode
 from models.pcm import LAW
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 
 CHAINS = 4
 
@@ -25,7 +27,7 @@ def sample(problem: PooledProblem, seed: int, *, draws: int, tune: int, start: s
     return Drawn(draws_of(tree), cpu_seconds() - ready, ready - started)
 
 
-def _run(compiled, seed, draws, tune):  # type: ignore[no-untyped-def]
+def _run(compiled: Any, seed: int, draws: int, tune: int) -> Any:
     return nutpie.sample(
         compiled,
         draws=draws,

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from peers import pymc_run
-from peers.common import Drawn, near_the_mode
-
-from skred.inference.problem import PooledProblem
+from benchmarks.peers import pymc_run
+from benchmarks.peers.common import Drawn, near_the_mode
+from skred.inference.pooled.problem import PooledProblem
 
 
 def sample(problem: PooledProblem, seed: int, *, draws: int, tune: int, start: str) -> Drawn:

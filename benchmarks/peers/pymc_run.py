@@ -7,10 +7,10 @@ from collections.abc import Callable
 from typing import Any
 
 import pymc as pm
-from peers.common import Drawn, cpu_seconds, draws_of
 
+from benchmarks.peers.common import Drawn, cpu_seconds, draws_of
 from models.pcm import LAW
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 
 CHAINS = 4
 

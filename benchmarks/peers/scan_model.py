@@ -8,11 +8,10 @@ import numpy as np
 import pymc as pm
 import pytensor
 import pytensor.tensor as pt
-from peers.forward import Track, cross, march_step, read, track_of
 
+from benchmarks.peers.forward import Track, cross, march_step, read, track_of
 from models.pcm import DRAG, DRY
-from skred.inference.pooled.model import observe
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 
 
 def scan_readings(track: Track, mu: Any, drag: Any) -> Any:
@@ -38,5 +37,5 @@ def build(problem: PooledProblem) -> pm.Model:
     with pm.Model(coords=problem.coords) as model:
         mu = pm.HalfNormal("dry_friction", sigma=DRY.strength.prior_scale)
         drag = pm.HalfNormal("turbulent_drag", sigma=DRAG.strength.prior_scale)
-        observe(problem, scan_readings(track, mu, drag))
+        problem.observe_response(scan_readings(track, mu, drag))
     return model

@@ -1,6 +1,6 @@
 """Masked and open effects in the linear model: how much less often masked ones can be found at all.
 
-``python benchmarks/masked_ceiling.py [--n 16] [--workers 2]``. On n campaigns as those of `masked_open`,
+``python -m studies.masked.ceiling [--n 16] [--workers 2]``. On n campaigns as those of `masked_open`,
 sparse and dense in turn, effects are hidden in the linear model itself: candidates of the diagnosis, with
 their own shapes, so that nothing is lost by templates, by curved likelihoods or by numerics, and of exactly
 the signal-to-noise that was drawn. The alarm is raised by the odds of anything against nothing, which the
@@ -17,7 +17,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from itertools import pairwise
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any
 
 import cyclopts
@@ -28,15 +27,15 @@ from benchmarks.commit import commit
 from skred.diagnosis.compare.decision import NOTHING_ALONE
 from skred.diagnosis.detect.score_test import PlacedMechanism, ScoreTest
 from skred.diagnosis.evidence.linear_mixed_model import Scores
-from skred.output import write_json
 from skred.physics.mechanisms.spec import Group
 from skred.physics.mechanisms.stretches import is_opposed
 from skred.simulator.masked import MASKED
+from studies.files import RESULTS, write
 from studies.masked.open import EDGES, KINDS, as_read, drawn
 from studies.thresholds.compared_again import base_and_draws
 
 app = cyclopts.App(help=__doc__)
-RESULT = Path(__file__).resolve().parent / "results" / "masked_ceiling.json"
+RESULT = RESULTS / "masked_ceiling.json"
 FloatArray = NDArray[np.float64]
 DRAWS = 100
 """Effects of each arm hidden in a campaign, their signal-to-noise evenly over the whole range."""
@@ -157,7 +156,7 @@ def main(*, n: int = 16, workers: int = 2) -> None:
         found = [one for one in pool.map(found_in, range(n)) if one is not None]
     kinds = {"all": found} | {kind: [one for one in found if one["kind"] == kind] for kind in KINDS}
     told = {kind: summary(some) for kind, some in kinds.items()}
-    write_json(RESULT, {"commit": commit(), "campaigns": len(found), "summary": told, "trials": found})
+    write(RESULT, {"commit": commit(), "campaigns": len(found), "summary": told, "trials": found})
     for kind, rows in told.items():
         for span, row in rows.items():
             print(kind, span, row)

@@ -1,6 +1,6 @@
 """Masked and open effects of one signal-to-noise: how often either raises the alarm.
 
-``python benchmarks/masked_open.py weak [--n 40] [--workers 2]`` draws n campaigns with a masked effect (the
+``python -m studies.masked.open weak [--n 40] [--workers 2]`` draws n campaigns with a masked effect (the
 calibrated law is right on average at every sensor), sparse and dense in turn, asked to be of a
 signal-to-noise from 2 to 5.5, where batches of concealed trials have few; ``strong`` asks for 5.5 to 12. To
 each come two campaigns of the signal-to-noise that the masked one turned out to have: one with an open effect
@@ -16,7 +16,6 @@ same command goes on with a run that was ended. Nothing was tuned on these.
 
 from __future__ import annotations
 
-import json
 import os
 import tempfile
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -35,13 +34,13 @@ from skred.diagnosis.compare.comparison import compare
 from skred.diagnosis.compare.decision import alarmed
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.prior_odds import NOTHING
-from skred.output import write_json
 from skred.simulator.detectability import over_noise
 from skred.simulator.draw import Trial, draw_trial
+from studies.files import RESULTS, read, write
 from studies.thresholds.compared_again import REPLICAS, base_and_draws
 
 app = cyclopts.App(help=__doc__)
-RESULT = Path(__file__).resolve().parent / "results" / "masked_open.json"
+RESULT = RESULTS / "masked_open.json"
 SEED = 2_900_000
 RANGES = {"weak": (0, 2.0, 5.5), "strong": (1000, 5.5, 12.0)}
 """First number of a range's campaigns, and where the signal-to-noise asked for is."""
@@ -218,7 +217,7 @@ def keep(found: dict[str, Any]) -> dict[str, Any]:
     document |= {"masked_by": masked_by(trials), "weak_open": weak_open(trials)}
     document |= {"over_exact": over_exact(trials)}
     document |= {"seed": SEED, "commits": sorted({one["commit"] for one in trials})}
-    write_json(RESULT, document | {"trials": dict(sorted(found.items()))})
+    write(RESULT, document | {"trials": dict(sorted(found.items()))})
     return document
 
 
@@ -237,7 +236,7 @@ def main(which: Literal["weak", "strong"], /, *, n: int = 40, workers: int = 2) 
     """
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     first, _, _ = RANGES[which]
-    before = json.loads(RESULT.read_text(encoding="utf-8")) if RESULT.exists() else {}
+    before = read(RESULT) if RESULT.exists() else {}
     if before and before["seed"] != SEED:
         raise SystemExit(f"{RESULT} holds seeds from {before['seed']}, not {SEED}: put it elsewhere first")
     found: dict[str, Any] = before.get("trials", {})

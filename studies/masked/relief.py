@@ -1,7 +1,7 @@
 """What masked effects lose: opened trials, each at its true place, by how fast the relief that masks it is.
 
-``python benchmarks/masked_relief.py [--workers 2]`` draws the opened trials again in which a drag or snow
-taken up is opposed by a relief, fits the base law, and lets the hidden mechanism in where it is, opposed by
+``python -m studies.masked.relief [--workers 2]`` draws the opened trials again in which a drag or snow
+taken up is opposed by a relief, fits the base law, and adds the hidden mechanism where it is, opposed by
 a relief that equals it at the speed that a diagnosis takes for typical, times several factors. Beside that
 stands the best that the trial's own diagnosis found for the mechanism, whose place it had to look for. Kept
 trial by trial in ``results/masked_relief.json``; the same command goes on with a run that was ended.
@@ -9,10 +9,8 @@ trial by trial in ``results/masked_relief.json``; the same command goes on with 
 
 from __future__ import annotations
 
-import json
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any
 
 import cyclopts
@@ -20,15 +18,15 @@ import numpy as np
 
 from skred.diagnosis.evidence.coefficient import Base, curve_at, curve_near
 from skred.diagnosis.evidence.event_quadrature import USUAL
-from skred.output import write_json
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Shape
 from skred.physics.mechanisms.stretches import U_1, U_2
 from skred.prove.scorecard import DIAGNOSIS
+from studies.files import RESULTS, read, write
 from studies.proof.record import answers_of, opened_batches, sealed_of
 from studies.thresholds.compared_again import base_of
 
-RESULT = Path(__file__).resolve().parent / "results" / "masked_relief.json"
+RESULT = RESULTS / "masked_relief.json"
 FACTORS = (0.9, 0.95, 1.0, 1.05, 1.1)
 LEFT_OUT = ("1471600277", "1152334902", "1324747921")
 """Batches whose diagnoses did not look for what is opposed; and what came of this study was in the last."""
@@ -79,13 +77,13 @@ def opposed_trials() -> dict[str, tuple[dict[str, Any], float | None]]:
 @app.default
 def main(*, workers: int = 2) -> None:
     """Work out what is not known yet, and say how much a relief's speed costs."""
-    known = json.loads(RESULT.read_text(encoding="utf-8")) if RESULT.exists() else {}
+    known = read(RESULT) if RESULT.exists() else {}
     todo = {key: one for key, one in opposed_trials().items() if key not in known}
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         jobs = {pool.submit(told_of, *one): key for key, one in todo.items()}
         for job in as_completed(jobs):
             known[jobs[job]] = job.result()
-            write_json(RESULT, known)
+            write(RESULT, known)
             print(jobs[job], known[jobs[job]], flush=True)
     for of in ("sparse", "dense"):
         own = [one for one in known.values() if one["kind"] == of and one["at_its_place"]]

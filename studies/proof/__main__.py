@@ -1,16 +1,15 @@
-"""The published record: concealed trials that were sealed, diagnosed, revealed; and docs/proof.md.
+"""The record of concealed trials, as a page: ``python -m studies.proof`` writes docs/proof.md.
 
-``python benchmarks/proof_page.py --add DIR`` takes a revealed proof folder into the record
-(``proof_record.py`` has its form); without ``--add`` it only writes the page anew. The page scores the
-largest batch, which one version of the code diagnosed from first to last, and then all batches together.
+``--add DIR`` takes a revealed proof folder into the record first (``record.py`` has its form).
+``--full`` prints what the page has no room for instead: every trial with a wrong answer, the criteria over
+all batches, and what was written about each batch.
 
 A batch is one ledger. Batches are added as time allows, each with a seed of its own. One that is given up
-keeps its ledger, and its ``notes.md`` says why.
+keeps its ledger, and its notes say why.
 """
 
 from __future__ import annotations
 
-import math
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -19,52 +18,93 @@ from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import cyclopts
-import numpy as np
 
 from skred.output import write_text
 from skred.prove.ledger import ledger_sha256
-from skred.prove.plan import KINDS
 from skred.prove.scorecard import DIAGNOSIS, scorecard
 from skred.prove.scoring.answers import UNLISTED
-from skred.prove.scoring.standards import SNR_BINS
-from studies.proof.record import RECORD, add, answers_of, batches, is_open, ledger_of, sealed_of
+from studies.files import FIGURES, ROOT, shrink
+from studies.proof.record import (
+    Batch,
+    add,
+    answers_of,
+    batches,
+    is_open,
+    ledger_of,
+    missed,
+    notes_of,
+    opened_batches,
+    sealed_of,
+)
 
 FAILED = ("crash", "timeout")
-ROOT = Path(__file__).resolve().parent.parent
-FIGURES = ROOT / "docs" / "figures"
+COMMAND, KEPT = "python -m studies.proof", "studies/results/proof.tar.xz"
+"""How this is run, and where the record is kept, as the page says it."""
+SHOWN = ("power", "confusion_classes", "reliability", "gain", "baselines")
+"""Figures of the page."""
 Found = Mapping[str, Any]
-_HEAD = """# The record of concealed trials
+_HEAD = f"""# The record of concealed trials
 
-Written by `python benchmarks/proof_page.py` from `benchmarks/results/proof/`. Each batch was sealed before
-its first diagnosis (`skred prove seal`: salted SHA-256 of truth, campaign, settings and source), diagnosed by
-processes that were given the campaign alone (`skred prove run`), then opened and verified (`skred prove
-reveal`). A crash or a time-out is a wrong answer; every trial of every opened batch is counted, and a
-batch that was given up is listed with its reason. Scores are defined
-in `src/skred/prove/scores*.py`.
+Written by `{COMMAND}` from `{KEPT}`. [Reliability](reliability.md) says what
+to make of it.
+
+A *trial* is a simulated campaign with hidden physics, or with nothing hidden. The simulator shares no code
+with the diagnosis. Its forces have other shapes than the mechanisms of the list, and some are in no list.
+
+1. **Sealed** (`skred prove seal`): a ledger with the salted SHA-256 of every trial's truth, campaign,
+   settings and source is written before the first diagnosis.
+2. **Diagnosed** (`skred prove run`): each trial by a process that is given the campaign alone.
+3. **Opened** (`skred prove reveal`): truths are compared with the ledger, and answers are scored. A crash or
+   a time-out is a wrong answer. Every trial of every opened batch counts.
+
+Words used here:
+
+- *Signal-to-noise* is the square root of twice the expected log likelihood ratio of the true model with and
+  without what is hidden; 7 is a ratio of 24.5 nats.
+- *Sparse* trials have a few sensors, *dense* ones about forty.
+- *Contaminated* trials hide no physics, but have heavy tails, correlated errors or an odd avalanche.
+- An effect is *compensated* where the calibrated base law is right on average at every sensor. All others
+  are *open*.
 """
-_RUN = """Seed {seed}: {n} trials, {nothing} of them with nothing hidden ({nasty} nasty), all diagnosed by one
-version of the code, which was frozen before the seed was chosen. With the source of that version the same
-trials, with other salts, are drawn, diagnosed and scored by
+_RUN = """Seed {seed}: {n} trials, {nothing} of them with nothing hidden ({nasty} contaminated). One version
+of the code diagnosed all of them. It was frozen before the seed was chosen. With the source of that version
+the same trials, with other salts, come from
 
 ```console
 skred prove seal DIR --trials {n} --nothing-share {share:g} --seed {seed}
 skred prove run DIR
 skred prove reveal DIR
-python benchmarks/run_baselines.py --trials DIR
+python -m benchmarks.run_baselines --trials DIR
 skred prove reveal DIR
 ```
+
+The *newest batch* is {newest}, the last that was sealed. Intervals in brackets are of 95 %. The *ceiling* is
+what the linearised model expects of a perfect method in the blind run. Criteria leave compensated effects
+out; these have a table of their own.
 """
-_IN_ORDER = """Each batch was diagnosed by the code of its day, so these rows are also a history. The first
-two (1471600277, 1152334902) did not look for forces that are nil on average. Clean trials whose diagnosis
-crashed or timed out are counted as failures; CPU times are of different machines.
+_ORDER = """In the order in which they were sealed, each diagnosed by the code of its day. *Found* counts
+effects with a signal-to-noise of {strong:g} and more. The first two batches did not look for forces that are
+nil on average. CPU times are of different machines.
 """
-_BEFORE_OPPOSED = 2
-"""Opened batches whose code did not look for forces that are nil on average."""
-_WEAK, _STRONG = 4.0, 5.5
+_FULL = """`{command} --full` prints the rest: every trial with a wrong answer, the criteria over
+all batches, and what was written about each batch. The files are in `{kept}`:
+
+| file of a batch | content |
+| --- | --- |
+| `ledger.json` | what was published before the first diagnosis |
+| `sealed.json` | truth, settings and salt of every trial, which the ledger's hashes are of |
+| `answers/skred.json`, `answers/<baseline>.json` | every answer, less what is neither scored nor studied |
+| `studies/proof/notes/` | what was written about the batch when it was opened, or why it was given up |
+
+`tests/studies/test_record.py` recomputes every hash.
+"""
+_STRONG = 5.5
 """Signal-to-noise from which on effects should be found."""
+_BEFORE_COMPENSATED = 2
+"""Opened batches whose code did not look for forces that are nil on average."""
 
 
-def gathered(batches: Sequence[Path]) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
+def gathered(batches: Sequence[Batch]) -> tuple[list[dict[str, Any]], dict[str, dict[str, Any]]]:
     """Trials with their truths, and answers by method, of all batches, named by seed and trial."""
     trials, answers = [], dict[str, dict[str, Any]]()
     for batch in filter(is_open, batches):
@@ -76,130 +116,165 @@ def gathered(batches: Sequence[Path]) -> tuple[list[dict[str, Any]], dict[str, d
     return trials, answers
 
 
-def page(batches: Sequence[Path], run: Found, document: Found, figures: Sequence[str]) -> str:
-    """The whole page: the largest batch's scores are `run`, those of all together `document`."""
-    parts = [_HEAD, "## Batches\n", _batches(batches)]
-    parts += ["## One blind run\n", _about(_largest(batches)), bars_table(run)]
+def page(figures: Sequence[str], run: Found) -> str:
+    """The whole page: the largest batch's scores are `run`."""
+    every = _in_order()
+    newest, lines = every[-1], [line for batch in every for line in _lines(batch)]
+    parts = [_HEAD, "## What was sealed\n", _sealed(), "## One blind run, and the newest batch\n"]
+    parts += [_about(_largest(), newest), criteria(run, _scores([newest]))]
     parts += [f"![{name.replace('_', ' ')}](figures/proof-{name}.png)\n" for name in figures]
-    parts += ["### Open and masked\n", _masked(run), "### By what was hidden\n", _by_hidden(run)]
-    parts += ["### Why bars are missed\n", (RECORD / "missed.md").read_text(encoding="utf-8")]
-    parts += ["## The newest batch\n", _newest(batches)]
-    parts += ["## All batches together\n", _IN_ORDER, _by_batch(batches, document), bars_table(document)]
-    parts += [_later(batches, document), _by_hidden(document)]
-    parts += ["## What it got wrong\n", _wrong(batches), *map(_notes, batches)]
+    parts += ["Open and compensated effects of the blind run:\n", _open_and_compensated(run)]
+    parts += ["What was hidden in the blind run:\n", _by_hidden(run["trials"])]
+    parts += ["## Every batch\n", _ORDER.format(strong=_STRONG), _by_batch(every, lines)]
+    parts += ["## The full record\n", _FULL.format(command=COMMAND, kept=KEPT)]
     return "\n".join(parts)
 
 
-def _newest(batches: Sequence[Path]) -> str:
-    """Goals of the batch that was sealed last, by the code of that day."""
-    seed = str(_in_order(batches)[-1]["seed"])
-    bars = bars_table(_scores([RECORD / seed]))
-    return f"Seed {seed}; what is to be said about it stands at the end.\n\n{bars}"
+def full() -> str:
+    """What the page has no room for."""
+    every, lines = opened_batches(), [line for batch in opened_batches() for line in _lines(batch)]
+    parts = ["## Trials with a wrong answer\n", _wrong(every), "## All batches together\n"]
+    parts += [bars_table(_scores(every)), _by_hidden(lines)]
+    parts += ["## Why the blind run missed criteria\n", missed()]
+    parts += [f"## About batch {one.name}\n\n{notes_of(one)}" for one in batches() if notes_of(one)]
+    return "\n".join(parts)
 
 
-def _largest(batches: Sequence[Path]) -> Path:
+def _in_order() -> list[Batch]:
+    """The opened batches as they were sealed."""
+    return sorted(opened_batches(), key=lambda one: str(ledger_of(one)["created_utc"]))
+
+
+def _largest() -> Batch:
     """The opened batch with most trials."""
-    return max(filter(is_open, batches), key=lambda batch: int(ledger_of(batch)["n"]))
+    return max(opened_batches(), key=lambda batch: int(ledger_of(batch)["n"]))
 
 
-def _about(batch: Path) -> str:
-    """What a batch consists of, and how to repeat it."""
+def _scores(batches: Sequence[Batch]) -> Found:
+    trials, answers = gathered(batches)
+    return scorecard({"n": len(trials)}, trials, answers)
+
+
+def _lines(batch: Batch) -> list[Found]:
+    """One line a trial, of the diagnosis alone."""
+    trials, answers = gathered([batch])
+    found: list[Found] = scorecard({}, trials, {DIAGNOSIS: answers[DIAGNOSIS]})["trials"]
+    return found
+
+
+def _about(batch: Batch, newest: Batch) -> str:
+    """What the blind run consists of, and how to repeat it."""
     ledger = ledger_of(batch)
-    trials, _ = gathered([batch])
-    clean = [one["truth"] for one in trials if not one["truth"]["mechanisms"]]
+    clean = [one["truth"] for one in sealed_of(batch).values() if not one["truth"]["mechanisms"]]
     return _RUN.format(
         seed=ledger["seed"],
         n=ledger["n"],
         nothing=len(clean),
         nasty=sum(truth["hidden"] == "nasty" for truth in clean),
         share=len(clean) / ledger["n"],
+        newest=newest.name,
     )
 
 
-def _masked(document: Found) -> str:
+def _sealed() -> str:
+    """All ledgers, opened or given up, and why those were that were."""
+    rows = [
+        "| seed | trials | sealed (UTC) | SHA-256 of the ledger | source | |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    given_up = [""]
+    for batch in batches():
+        ledger = ledger_of(batch)
+        if not is_open(batch):
+            first, _, _ = notes_of(batch).replace("\n", " ").partition(". ")
+            given_up.append(f"- {batch.name}: {first.strip().rstrip('.')}.")
+        rows.append(
+            f"| {ledger['seed']} | {ledger['n']} | {str(ledger['created_utc'])[:16].replace('T', ' ')} |"
+            f" `{ledger_sha256(ledger)}` | `{ledger['source_sha256'][:12]}` |"
+            f" {'opened' if is_open(batch) else 'given up'} |"
+        )
+    return "\n".join([*rows, *given_up]) + "\n"
+
+
+def criteria(run: Found, newest: Found) -> str:
+    """Criteria, and what was measured in two batches."""
+    rows = [
+        "| goal | what | asked | ceiling | blind run | trials | | newest batch | trials | |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    other = {(one["goal"], one["what"]): one for one in newest["bars"]}
+    for one in run["bars"]:
+        cells = [*_asked(one), *_measured(one), *_measured(other.get((one["goal"], one["what"])))]
+        rows.append(f"| {' | '.join(cells)} |")
+    return "\n".join(rows) + "\n"
+
+
+def bars_table(document: Found) -> str:
+    """Criteria, and what was measured in one set."""
+    rows = [
+        "| goal | what | bar | linearised ceiling | measured (95 %) | trials | |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    rows += [f"| {' | '.join([*_asked(one), *_measured(one)])} |" for one in document["bars"]]
+    return "\n".join(rows) + "\n"
+
+
+def _asked(one: Found) -> list[str]:
+    """A criterion, its limits, and the linearised ceiling."""
+    limit = [f"at least {one['at_least']:g}"] if one["at_least"] is not None else []
+    limit += [f"at most {one['at_most']:g}"] if one["at_most"] is not None else []
+    ceiling = "" if one["ceiling"] is None else f"{one['ceiling']:.2f}"
+    return [one["goal"], one["what"], ", ".join(limit), ceiling]
+
+
+def _measured(one: Found | None) -> list[str]:
+    """What was measured, of how many trials, and whether that is enough."""
+    if one is None:
+        return ["-", "0", ""]
+    if one["measured"] is None:
+        return ["-", str(one["n"]), one["status"]]
+    between = f" ({one['low']:.3g} to {one['high']:.3g})" if one["low"] is not None else ""
+    return [f"{one['measured']:.3g}{between}", str(one["n"]), one["status"]]
+
+
+def _open_and_compensated(document: Found) -> str:
     """Found, of trials of which the base law shows on average something, and of those where it hides it."""
-    head = ["| signal-to-noise | open: found | masked: found |", "| --- | --- | --- |"]
+    head = ["| signal-to-noise | open: found | compensated: found |", "| --- | --- | --- |"]
     scores = document["methods"][DIAGNOSIS]
     both = [scores[which]["all"]["detection"]["by_snr"] for which in ("open", "masked")]
     rows = [
         f"| {row['snr_from']:g} to {row['snr_to']:g} | {_share(row)} | {_share(other)} |"
         for row, other in zip(*both, strict=True)
     ]
-    return "\n".join([*head, *rows, f"\nFrom {_STRONG:g} on: {_open_and_masked(document['trials'])}."]) + "\n"
+    return "\n".join([*head, *rows]) + "\n"
 
 
-def _later(batches: Sequence[Path], document: Found) -> str:
-    """The same of the batches whose code looked for what is nil on average."""
-    later = {ledger["seed"] for ledger in _in_order(batches)[_BEFORE_OPPOSED:]}
-    lines = [one for one in document["trials"] if int(one["trial"].partition("/")[0]) in later]
-    text = f"From {_STRONG:g} on, without the first two batches: {_open_and_masked(lines)}.\n\n"
-    text += "Share of masked effects found less that of open ones of like signal-to-noise (bins as above, "
-    text += "as many open ones as there are masked ones in each; 95 % by bootstrap; asked: within 0.10):\n\n"
-    last = str(_in_order(batches)[-1]["seed"])
-    newest = [one for one in lines if one["trial"].startswith(f"{last}/")]
-    rows = ["| | all | sparse | dense |", "| --- | --- | --- | --- |"]
-    for which, of in (("these batches", lines), (f"the last of them alone, {last}", newest)):
-        for least in (0.0, _WEAK, _STRONG):
-            kinds = [[one for one in of if one["kind"] in kind] for kind in (KINDS, KINDS[:1], KINDS[1:])]
-            cells = [_difference([one for one in own if one["snr"] >= least]) for own in kinds]
-            at = f"signal-to-noise {least:g} and more" if least else "any signal-to-noise"
-            rows.append(f"| {which}: {at} | {' | '.join(cells)} |")
-    return text + "\n".join(rows) + "\n"
+def _share(found: Found) -> str:
+    if not found["n"]:
+        return "-"
+    return f"{found['hits']} of {found['n']} ({found['low']:.2f} to {found['high']:.2f})"
 
 
-def _difference(lines: Sequence[Found]) -> str:
-    """Found share of masked less open effects at equal signal-to-noise, with its interval and number."""
-    rng = np.random.default_rng(0)
-    hidden = [one for one in lines if one["true_ids"]]
-    drawn = rng.integers(len(hidden), size=(2000, len(hidden)))
-    again = [_masked_less_open([hidden[k] for k in sample]) for sample in drawn]
-    low, high = np.nanquantile(again, [0.025, 0.975])
-    n = sum(one["hidden"] == "masked" for one in hidden)
-    return f"{_masked_less_open(hidden):.2f} ({low:.2f} to {high:.2f}), {n} masked"
-
-
-def _masked_less_open(lines: Sequence[Found]) -> float:
-    """Mean over the masked effects of found less the share of open ones found in the same bin."""
-    differences = []
-    for low, high in SNR_BINS:
-        found = {True: list[bool](), False: list[bool]()}
-        for one in lines:
-            if low <= one["snr"] < high:
-                found[one["hidden"] == "masked"].append(one["right"] not in ("failed", "not found"))
-        if found[True] and found[False]:
-            differences += [float(one) - float(np.mean(found[False])) for one in found[True]]
-    return float(np.mean(differences)) if differences else math.nan
-
-
-def _open_and_masked(lines: Sequence[Found]) -> str:
-    masked = [one for one in lines if one["hidden"] == "masked"]
-    open_ones = [one for one in lines if one["hidden"] != "masked"]
-    return f"{found_of(open_ones)} open effects were found, {found_of(masked)} masked ones"
-
-
-def _in_order(batches: Sequence[Path]) -> list[Found]:
-    """Ledgers of the opened batches as they were sealed."""
-    ledgers = [ledger_of(one) for one in batches if is_open(one)]
-    return sorted(ledgers, key=lambda one: str(one["created_utc"]))
-
-
-def _by_batch(batches: Sequence[Path], document: Found) -> str:
-    """What each version of the code did on its own trials, in the order in which they were sealed."""
+def _by_batch(every: Sequence[Batch], lines: Sequence[Found]) -> str:
+    """What each version of the code did on its own trials, and all of them."""
     rows = [
-        "| seed | trials | clean: false alarms, failures | found from 5.5 on: open | masked | one name: right"
-        " | tie sets with the truth | median CPU s sparse, dense |",
+        "| seed | trials | clean: false alarms, failures | found: open | compensated | one name: right"
+        " | ties with the truth | median CPU s sparse, dense |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    for ledger in _in_order(batches):
-        own = [one for one in document["trials"] if one["trial"].startswith(f"{ledger['seed']}/")]
+    later = {one.name for one in every[_BEFORE_COMPENSATED:]}
+    sets = {one.name: {one.name} for one in every} | {"all": {one.name for one in every}}
+    sets["all but the first two"] = later
+    for name, seeds in sets.items():
+        own = [one for one in lines if one["trial"].partition("/")[0] in seeds]
         clean = [one["right"] for one in own if not one["true_ids"]]
         masked = [one for one in own if one["hidden"] == "masked"]
         times = [[one["cpu_seconds"] for one in own if one["kind"] == kind] for kind in ("sparse", "dense")]
         cells = [
-            f"{ledger['seed']}",
+            name,
             f"{len(own)}",
             f"{len(clean)}: {clean.count('false alarm')}, {clean.count('failed')}",
-            found_of([one for one in own if one not in masked]),
+            found_of([one for one in own if one["hidden"] != "masked"]),
             found_of(masked),
             *named_of(own),
             ", ".join(f"{median(one for one in those if one is not None):.0f}" for those in times),
@@ -208,15 +283,19 @@ def _by_batch(batches: Sequence[Path], document: Found) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _by_hidden(document: Found) -> str:
+def _by_hidden(lines: Sequence[Found]) -> str:
     """How names fare by what was hidden, from whatever signal-to-noise."""
     rows = [
-        "| hidden | trials | found from 5.5 on | one name: right | tie sets with the truth |",
+        "| hidden | trials | found from 5.5 on | one name: right | ties with the truth |",
         "| --- | --- | --- | --- | --- |",
     ]
+    shown = {"masked": "compensated", "unlisted": "a force in no list", "nasty": "nothing, contaminated"}
+    shown |= {"listed": "one listed mechanism", "two": "two mechanisms", "instrument": "an instrument fault"}
     for name in ("listed", "masked", "two", "instrument", "unlisted", "nothing", "nasty"):
-        own = [one for one in document["trials"] if one["hidden"] == name]
-        rows.append(f"| {name} | {len(own)} | {found_of(own)} | {' | '.join(named_of(own))} |")
+        own = [one for one in lines if one["hidden"] == name]
+        rows.append(
+            f"| {shown.get(name, name)} | {len(own)} | {found_of(own)} | {' | '.join(named_of(own))} |"
+        )
     return "\n".join(rows) + "\n"
 
 
@@ -227,7 +306,7 @@ def found_of(lines: Sequence[Found]) -> str:
 
 
 def named_of(lines: Sequence[Found]) -> list[str]:
-    """How many single names are right, and how many tie sets hold a truth."""
+    """How many single names are right, and how many ties hold a truth."""
     cells = []
     for several, good in ((False, ("right",)), (True, ("right", "in the set"))):
         named = [one["right"] for one in lines if one["names"] and (len(one["names"]) > 1) == several]
@@ -235,57 +314,7 @@ def named_of(lines: Sequence[Found]) -> list[str]:
     return cells
 
 
-def _share(found: Found) -> str:
-    if not found["n"]:
-        return "-"
-    return f"{found['hits']} of {found['n']} ({found['low']:.2f} to {found['high']:.2f})"
-
-
-def _notes(batch: Path) -> str:
-    """What is to be said about a batch, written by hand after it was opened."""
-    file = batch / "notes.md"
-    return f"## About batch {batch.name}\n\n{file.read_text(encoding='utf-8')}" if file.exists() else ""
-
-
-def _batches(batches: Sequence[Path]) -> str:
-    rows = [
-        "| seed | trials | sealed (UTC) | SHA-256 of the ledger | source | |",
-        "| --- | --- | --- | --- | --- | --- |",
-    ]
-    for batch in batches:
-        ledger = ledger_of(batch)
-        rows.append(
-            f"| {ledger['seed']} | {ledger['n']} ({ledger['kind']}) | {ledger['created_utc']} |"
-            f" `{ledger_sha256(ledger)}` | `{ledger['source_sha256'][:12]}` |"
-            f" {_state(batch)} |"
-        )
-    return "\n".join(rows) + "\n"
-
-
-def _state(batch: Path) -> str:
-    if is_open(batch):
-        return "opened"
-    return "given up unopened, see below" if (batch / "notes.md").exists() else "not opened yet"
-
-
-def bars_table(document: Found) -> str:
-    """Goals, their bars, and what was measured."""
-    rows = [
-        "| goal | what | bar | linearised ceiling | measured (95 %) | trials | |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
-    ]
-    for one in document["bars"]:
-        limit = [f"at least {one['at_least']:g}"] if one["at_least"] is not None else []
-        limit += [f"at most {one['at_most']:g}"] if one["at_most"] is not None else []
-        between = f" ({one['low']:.3g} to {one['high']:.3g})" if one["low"] is not None else ""
-        measured = "-" if one["measured"] is None else f"{one['measured']:.3g}{between}"
-        ceiling = "" if one["ceiling"] is None else f"{one['ceiling']:.2f}"
-        cells = (one["goal"], one["what"], ", ".join(limit), ceiling, measured, one["n"], one["status"])
-        rows.append(f"| {' | '.join(map(str, cells))} |")
-    return "\n".join(rows) + "\n"
-
-
-def _wrong(batches: Sequence[Path]) -> str:
+def _wrong(batches: Sequence[Batch]) -> str:
     """Every trial in which something was alarmed, named or missed wrongly."""
     rows = [
         "| trial | what was hidden | signal-to-noise | verdict | named | P(nothing) |",
@@ -311,11 +340,6 @@ def _wrong(batches: Sequence[Path]) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _scores(batches: Sequence[Path]) -> Found:
-    trials, answers = gathered(batches)
-    return scorecard({"n": len(trials)}, trials, answers)
-
-
 app = cyclopts.App(help=__doc__)
 
 
@@ -323,19 +347,26 @@ app = cyclopts.App(help=__doc__)
 def main(
     *,
     new: Annotated[Path | None, cyclopts.Parameter(name="--add", help="Revealed proof folder.")] = None,
+    everything: Annotated[
+        bool, cyclopts.Parameter(name="--full", help="Print what the page leaves out.")
+    ] = False,
 ) -> None:
     """Write the page, after taking in another batch if one is given."""
     from skred.report.scorecard.figures import save_scorecard_figures
 
+    if everything:
+        print(full())
+        return
     if new is not None:
         add(new)
-    every = batches()
-    run, document = _scores([_largest(every)]), _scores(every)
+    run = _scores([_largest()])
     with TemporaryDirectory() as folder:
         figures = save_scorecard_figures(run, Path(folder))
-        for name, file in figures.items():
-            shutil.copy(file, FIGURES / f"proof-{name}.png")
-    write_text(ROOT / "docs" / "proof.md", page(every, run, document, list(figures)))
+        shown = [name for name in SHOWN if name in figures]
+        for name in shown:
+            shrink(figures[name])
+            shutil.copy(figures[name], FIGURES / f"proof-{name}.png")
+    write_text(ROOT / "docs" / "proof.md", page(shown, run))
 
 
 if __name__ == "__main__":

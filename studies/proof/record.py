@@ -1,90 +1,152 @@
-"""The published record on disk: ledgers, opened truths with their salts, answers.
+"""The published record: ledgers, opened truths with their salts, answers.
 
-A batch is one ledger, in ``results/proof/<seed>/``: ``ledger.json`` as it was published, ``sealed.json`` what
-the ledger's hashes are of, and ``answers/<method>.json``. The latter two have one trial a line, so that they
-stay small and a line is what changes.
+A batch is one ledger. All batches are in one archive, ``studies/results/proof.tar.xz``; of each it has
+``<seed>/ledger.json`` as it was published, ``<seed>/sealed.json``, what the ledger's hashes are of, and
+``<seed>/answers/<method>.json``. What was sealed is kept to the last digit, in columns: one list for each
+key, with one entry a trial (a tenth smaller: salts stand by salts). Answers have one trial a line and six
+digits. ``notes/<seed>.md`` is what was written about a batch after it was opened, or why it was given up.
 """
 
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from skred.output import plain, write_text
+from benchmarks.files import as_columns, as_rows, rounded
+from skred.output import plain
 from skred.prove.scorecard import DIAGNOSIS
 from skred.prove.scoring.answers import Pair, pairs_of
+from studies.proof.archive import read_archive, write_archive
 
-RECORD = Path(__file__).resolve().parent / "results" / "proof"
+ARCHIVE = Path(__file__).resolve().parents[1] / "results" / "proof.tar.xz"
+NOTES = Path(__file__).resolve().parent / "notes"
 DIGITS = 6
-"""Significant digits of what is kept of an answer; what is sealed is kept to the last, for its hash."""
-LEFT_OUT = ("predictors", "identifiability", "detection_limits")
-"""Not of the answer but of the campaign, which its seed draws again; most of the volume."""
+"""Significant digits of what is kept of an answer."""
+LEFT_OUT = (
+    "predictors",
+    "identifiability",
+    "detection_limits",
+    "candidates",
+    "missing_work",
+    "missing_work_of",
+    "profile",
+    "held_out",
+    "next_sensor",
+    "diagnostics",
+    "equation",
+)
+"""Most of the volume of an answer, and neither scored nor read by a study. The first three are of the
+campaign, which its seed draws again."""
 Found = dict[str, Any]
 
 
-def batches() -> list[Path]:
-    """The folders of all batches, by seed."""
-    return sorted((one for one in RECORD.iterdir() if one.is_dir()), key=lambda one: int(one.name))
+@dataclass(frozen=True)
+class Batch:
+    """One ledger and what belongs to it.
+
+    Attributes
+    ----------
+    name : str
+        Its seed.
+    """
+
+    name: str
 
 
-def is_open(batch: Path) -> bool:
-    """Whether a batch has been revealed; until then its folder holds the ledger alone."""
-    return (batch / "sealed.json").exists()
+@cache
+def _files() -> dict[str, bytes]:
+    return read_archive(ARCHIVE)
 
 
-def opened_batches() -> list[Path]:
-    """The folders of those that were revealed."""
+def names() -> list[str]:
+    """Names of all files of the record, such as ``36048904/ledger.json``."""
+    return list(_files())
+
+
+def batches() -> list[Batch]:
+    """All batches, by seed."""
+    return [Batch(seed) for seed in sorted({name.partition("/")[0] for name in names()}, key=int)]
+
+
+def is_open(batch: Batch) -> bool:
+    """Whether a batch has been revealed; until then there is its ledger alone."""
+    return f"{batch.name}/sealed.json" in _files()
+
+
+def opened_batches() -> list[Batch]:
+    """Those that were revealed."""
     return [one for one in batches() if is_open(one)]
 
 
-def ledger_of(batch: Path) -> Found:
+def ledger_of(batch: Batch) -> Found:
     """What was published before the first diagnosis."""
-    return dict(json.loads((batch / "ledger.json").read_text(encoding="utf-8")))
+    return dict(_read(f"{batch.name}/ledger.json"))
 
 
-def sealed_of(batch: Path) -> dict[str, Found]:
+def sealed_of(batch: Batch) -> dict[str, Found]:
     """What was sealed, by trial; each with its ``truth`` and its salt."""
-    return dict(json.loads((batch / "sealed.json").read_text(encoding="utf-8")))
+    return {one["trial"]: one for one in as_rows(_read(f"{batch.name}/sealed.json"))}
 
 
-def answers_of(batch: Path) -> dict[str, dict[str, Found]]:
+def answers_of(batch: Batch) -> dict[str, dict[str, Found]]:
     """What each method answered, by trial."""
-    files = sorted((batch / "answers").glob("*.json"))
-    return {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in files}
+    folder = f"{batch.name}/answers/"
+    return {Path(name).stem: _read(name) for name in names() if name.startswith(folder)}
 
 
-def diagnosed(batch: Path) -> list[Pair]:
+def notes_of(batch: Batch) -> str:
+    """What was written about a batch after it was opened or given up; empty where nothing was."""
+    file = NOTES / f"{batch.name}.md"
+    return file.read_text(encoding="utf-8") if file.exists() else ""
+
+
+def missed() -> str:
+    """Why the largest batch missed some criteria."""
+    return (NOTES / "missed.md").read_text(encoding="utf-8")
+
+
+def diagnosed(batch: Batch) -> list[Pair]:
     """Truth and diagnosis of every trial of an opened batch."""
     return pairs_of(list(sealed_of(batch).values()), answers_of(batch)[DIAGNOSIS])
 
 
 def add(folder: Path) -> None:
     """Take a revealed proof folder into the record."""
-    ledger = json.loads((folder / "ledger.json").read_text(encoding="utf-8"))
-    target = RECORD / str(ledger["seed"])
-    names = [entry["trial"] for entry in ledger["trials"]]
-    (target / "answers").mkdir(parents=True, exist_ok=True)
-    # As it was published, to the last byte.
-    shutil.copyfile(folder / "ledger.json", target / "ledger.json")
+    write_archive(ARCHIVE, _files() | kept_of(folder))
+    _files.cache_clear()
+
+
+def kept_of(folder: Path) -> dict[str, bytes]:
+    """What the record keeps of a revealed proof folder: its files, by name."""
+    published = (folder / "ledger.json").read_bytes()  # kept as it was published, to the last byte
+    ledger = json.loads(published)
+    seed, trials = ledger["seed"], [entry["trial"] for entry in ledger["trials"]]
+    files = {f"{seed}/ledger.json": published}
     for method in sorted((folder / "answers").iterdir()):
-        answers = {name: kept(_answer(folder, method.name, name)) for name in names}
-        write_text(target / "answers" / f"{method.name}.json", by_line(answers))
-    sealed = {name: json.loads((folder / "sealed" / f"{name}.json").read_text("utf-8")) for name in names}
-    write_text(target / "sealed.json", by_line(sealed))
+        answers = {name: kept(_answer(folder, method.name, name)) for name in trials}
+        files[f"{seed}/answers/{method.name}.json"] = by_line(answers).encode()
+    sealed = [json.loads((folder / "sealed" / f"{name}.json").read_text("utf-8")) for name in trials]
+    files[f"{seed}/sealed.json"] = json.dumps(as_columns(sealed), separators=(",", ":")).encode()
+    return files
 
 
 def kept(answer: Mapping[str, Any]) -> Found:
     """What is kept of an answer."""
-    return {key: _rounded(plain(value)) for key, value in answer.items() if key not in LEFT_OUT}
+    return {key: rounded(plain(value), DIGITS) for key, value in answer.items() if key not in LEFT_OUT}
 
 
 def by_line(trials: Mapping[str, Any]) -> str:
     """A JSON object with one trial a line."""
     lines = (f"{json.dumps(name)}: {json.dumps(one, allow_nan=False)}" for name, one in trials.items())
     return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _read(name: str) -> Any:
+    return json.loads(_files()[name])
 
 
 def _answer(folder: Path, method: str, name: str) -> Found:
@@ -95,11 +157,3 @@ def _answer(folder: Path, method: str, name: str) -> Found:
         found = json.loads(gain.read_text(encoding="utf-8"))["gain"]
         answer["gain"] = {**(answer.get("gain") or {}), **found}
     return answer
-
-
-def _rounded(value: Any) -> Any:
-    if isinstance(value, float):
-        return float(f"{value:.{DIGITS}g}")
-    if isinstance(value, dict):
-        return {key: _rounded(item) for key, item in value.items()}
-    return [_rounded(item) for item in value] if isinstance(value, list) else value

@@ -1,4 +1,4 @@
-"""Write the comparison with the paper: ``python scripts/reproduction.py``.
+"""Write the comparison with the paper: ``python -m studies.reproduction``.
 
 Every number of ``docs/reproduction.md`` and of its figures is computed here, in a few minutes.
 """
@@ -12,7 +12,7 @@ from typing import Annotated
 
 from cyclopts import App, Parameter, validators
 
-DEFAULT_OUT = Path(__file__).resolve().parent.parent / "docs" / "reproduction.md"
+DEFAULT_OUT = Path(__file__).resolve().parents[2] / "docs" / "reproduction.md"
 PACKAGES = ("skred", "pymc", "pytensor", "arviz", "numba", "numpy", "scipy")
 
 app = App(help="Compare the pooled calibration on Ryggfonn with the paper's statements.")
@@ -38,6 +38,7 @@ def main(
     """
     # Here, so that --help does not wait for PyMC.
     from skred.output import write_text
+    from studies.files import shrink
     from studies.reproduction.figures import save_reproduction_figures
     from studies.reproduction.page import page
     from studies.reproduction.study import run_study
@@ -50,8 +51,9 @@ def main(
     study = run_study(seed, quick=quick, tell=tell)
     out.parent.mkdir(parents=True, exist_ok=True)
     tell("figures")
-    save_reproduction_figures(study, out.parent / "figures")
-    command = f"python scripts/reproduction.py --seed {seed}" + (" --quick" if quick else "")
+    for picture in save_reproduction_figures(study, out.parent / "figures"):
+        shrink(picture)
+    command = f"python -m studies.reproduction --seed {seed}" + (" --quick" if quick else "")
     versions = {"python": platform.python_version(), **{name: version(name) for name in PACKAGES}}
     text = page(study, command=command, seed=seed, versions=versions, seconds=time.monotonic() - started)
     write_text(out, text)

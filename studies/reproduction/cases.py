@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.inference.pooled.density import PooledArrays, pooled_arrays
-from skred.inference.problem import PooledProblem, pooled_problem
+from skred.inference.pooled.problem import PooledProblem, pooled_problem
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import Mechanism, coulomb_friction
 from skred.physics.terrain import build_terrain

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 from skred.physics.geometry import contributions_of
 from skred.physics.kernel.columns import GRAVITY
 from skred.physics.kernel.fronts import simulate
@@ -93,7 +93,7 @@ def drop(terrain: Terrain, from_s_m: float, to_s_m: float) -> float:
 
 
 def mean_retardation(u_from: FloatArray, u_to: FloatArray, length_m: float, drop_m: float) -> FloatArray:
-    """Mean a_ret [m/s2] over a stretch: (U_to^2 - U_from^2) / (2 length) - g drop / length.
+    """Mean a_ret [m/s²] over a stretch: (U_to^2 - U_from^2) / (2 length) - g drop / length.
 
     From dU^2 / (2 ds) = g sin(phi) + a_ret, integrated; negative where the front is retarded.
     """
@@ -108,7 +108,7 @@ class RecordedRetardation:
     ----------
     events : tuple of str
         Those with a reading at both.
-    values, reading_sd : (n,) arrays, m/s2
+    values, reading_sd : (n,) arrays, m/s²
         Mean a_ret, and what the stated errors of the two speeds make of it.
     length_m, drop_m : float
         Of the stretch.
@@ -173,7 +173,7 @@ def recorded_retardation(
 def modelled_retardation(
     problem: PooledProblem, mechanisms: Sequence[Mechanism], strengths: FloatArray, from_m: float, to_m: float
 ) -> FloatArray:
-    """Mean a_ret [m/s2] of a law's front over a stretch, (n, n_strengths) to (n,).
+    """Mean a_ret [m/s²] of a law's front over a stretch, (n, n_strengths) to (n,).
 
     The same formula as for the recordings, so curvature counts as it does along the whole stretch and
     not at one cell, where it is mostly roughness.
@@ -189,7 +189,7 @@ def modelled_retardation(
 def retardation_at(
     problem: PooledProblem, friction: float, drag: float, speed: float, place_m: float
 ) -> float:
-    """-(mu max(0, g cos(phi) + kappa U^2) + D U^2) [m/s2] in the cell of one place."""
+    """-(mu max(0, g cos(phi) + kappa U^2) + D U^2) [m/s²] in the cell of one place."""
     terrain = problem.terrain
     i = int(np.searchsorted(terrain.edge_s_m, place_m, side="right")) - 1
     normal = max(0.0, GRAVITY * terrain.cos_slope[i] + terrain.curvature[i] * speed**2)

@@ -27,7 +27,7 @@ _PANELS = (
     ("coulomb", 0, "M1: a0 [-]", 1.0),
     ("pcm", 0, "M2: a0 [-]", 1.0),
     ("pcm", 1, "M2: a2 [1e-3 1/m]", 1e3),
-    ("constant", 0, "M3: a3 [m/s2]", 1.0),
+    ("constant", 0, "M3: a3 [m/s²]", 1.0),
 )
 _OFF_SCALE = ("stated",)
 """Shown in the tables only: it would squeeze all others together."""

@@ -25,7 +25,7 @@ STARTS_M = (0.0, 25.0, 50.0, 100.0, 150.0, 200.0)
 _LAW_HEADINGS = {
     "coulomb": ("M1, Coulomb", ("a0 [-]",)),
     "pcm": ("M2, PCM", ("a0 [-]", "a2 [1e-3 1/m]")),
-    "constant": ("M3, constant retardation", ("a3 [m/s2]",)),
+    "constant": ("M3, constant retardation", ("a3 [m/s²]",)),
 }
 
 
@@ -263,7 +263,7 @@ The paper's priors came from an optimisation on the same data. Least squares of 
 against the plain
 means of the readings that exist (which leave out the avalanches that did not arrive) gives (a0; for M2
 also a2 in
-1e-3 1/m; a3 in m/s2):
+1e-3 1/m; a3 in m/s²):
 
 {table(("law", "fitted to", "strengths", "LC", "CD", "b", "runout"), rows)}"""
 
@@ -291,7 +291,7 @@ Largest strength with which a front still leaves the flat of the bowl, by bisect
 and that front's
 speed at LC [m/s] and runout [m]. Both limits fall with the start, which Table 1 does not give.
 
-{table(("start s [m]", "M1: a0", "LC", "runout", "M3: a3 [m/s2]", "LC", "runout"), rows)}"""
+{table(("start s [m]", "M1: a0", "LC", "runout", "M3: a3 [m/s²]", "LC", "runout"), rows)}"""
 
 
 def _retardations(study: Study) -> str:
@@ -309,7 +309,7 @@ def _retardations(study: Study) -> str:
     for up, low, text in ((0, 0, ""), (0, -20, "CD 20 m up"), (0, 20, "CD 20 m down")):
         rows.append(_retardation_row(f"LC to CD{', ' + text if text else ''}", "LC", "CD", study, up, low))
     rows.append(_retardation_row("CD to b", "CD", "b", study, 0, 0))
-    spread, errors = "mean ± sd over events [m/s2]", "an event's own error [m/s2]"
+    spread, errors = "mean ± sd over events [m/s²]", "an event's own error [m/s²]"
     header = ("stretch", "length [m]", "drop [m]", "events", spread, errors)
     return f"""## Retardation from the recorded speeds
 
@@ -342,13 +342,13 @@ def _groups(r: RecordedRetardation) -> str:
     order = np.sort(r.values)
     second = float(np.sort(np.diff(order))[-2])
     return (
-        f"From LC to CD the widest gap between neighbouring events is {gap:.1f} m/s2 (the next widest"
+        f"From LC to CD the widest gap between neighbouring events is {gap:.1f} m/s² (the next widest"
         f" {second:.1f}). It"
         f" separates {len(strong)} events ({', '.join(sorted(strong))}; mean {r.mean_of(strong):.1f}"
-        f" m/s2) from"
-        f" {len(weak)} (mean {r.mean_of(weak):.1f} m/s2). Found by looking, so a hypothesis; an event's"
+        f" m/s²) from"
+        f" {len(weak)} (mean {r.mean_of(weak):.1f} m/s²). Found by looking, so a hypothesis; an event's"
         f" own error is up"
-        f" to {r.reading_sd.max():.1f} m/s2."
+        f" to {r.reading_sd.max():.1f} m/s²."
     )
 
 

@@ -115,16 +115,16 @@ def _bowl(study: Study) -> list[Statement]:
     return [
         Statement(
             "a3 must stay below a limit for the front to pass the bowl",
-            "4.7 m/s2",
-            f"{limit:.3f} m/s2",
+            "4.7 m/s²",
+            f"{limit:.3f} m/s²",
             judge(4.7, limit, 0.0),
             f"the start decides: {starts}; 4.70 from s = {start:.0f} m",
         ),
         Statement(
             "speed at LC with a3 at that limit",
             "about 30 m/s",
-            f"{readings[LC]:.1f} m/s at our limit, {at_paper:.1f} m/s at 4.7 m/s2",
-            f"at our limit {judge(30.0, readings[LC], 0.0)}; at 4.7 m/s2 {judge(30.0, at_paper, 0.0)}",
+            f"{readings[LC]:.1f} m/s at our limit, {at_paper:.1f} m/s at 4.7 m/s²",
+            f"at our limit {judge(30.0, readings[LC], 0.0)}; at 4.7 m/s² {judge(30.0, at_paper, 0.0)}",
             f"at the limit it is {speeds}; {there:.1f} m/s from s = {start:.0f} m, where the limit is 4.70",
         ),
     ]
@@ -152,7 +152,7 @@ def _coulomb(study: Study) -> list[Statement]:
             f" recorded"
             f" mean; no front with it stops short of the mean unless it starts at s = {start:.0f} m or"
             f" lower,"
-            f" where M3's limit would be {at_start:.2f} m/s2",
+            f" where M3's limit would be {at_start:.2f} m/s²",
         ),
         Statement(
             "M1 over-predicts LC considerably",
@@ -192,10 +192,10 @@ def _retardation(study: Study, law_id: str, paper: float) -> Statement:
     extra = f"; its a0 without curvature and drag {straight:.2f}" if law_id == "coulomb" else ""
     return Statement(
         f"{SHORT[law_id]}: retardation near LC",
-        f"about {paper} m/s2",
-        f"{mean:.2f} ± {sd:.2f} m/s2 from tower to wedge; {at_point:.2f} in the cell at LC",
+        f"about {paper} m/s²",
+        f"{mean:.2f} ± {sd:.2f} m/s² from tower to wedge; {at_point:.2f} in the cell at LC",
         judge(paper, mean, sd, (mean - 1.645 * sd, mean + 1.645 * sd)),
-        f"the paper's strengths on our track: {with_paper:.2f} m/s2 over the same stretch{extra}",
+        f"the paper's strengths on our track: {with_paper:.2f} m/s² over the same stretch{extra}",
     )
 
 
@@ -203,10 +203,10 @@ def _constant(study: Study) -> Statement:
     o = study.baseline("constant")
     return Statement(
         "M3: retardation",
-        "about -4.5 m/s2",
-        f"-{o.posterior.mean[0]:.3f} ± {o.posterior.sd[0]:.3f} m/s2",
+        "about -4.5 m/s²",
+        f"-{o.posterior.mean[0]:.3f} ± {o.posterior.sd[0]:.3f} m/s²",
         judge(4.5, o.posterior.mean[0], o.posterior.sd[0], _interval(o, 0)),
-        _range_text(study, "constant", 0) + " (m/s2, positive as a3)",
+        _range_text(study, "constant", 0) + " (m/s², positive as a3)",
     )
 
 
@@ -338,13 +338,13 @@ def _mean_retardation(study: Study) -> Statement:
     needed = -(here.mean + 4.6) * here.length_m / 9.81
     return Statement(
         "mean retardation from LC to the dam's foot",
-        "-4.6 ± 0.8 m/s2",
-        f"{here.mean:.2f} ± {here.sd:.2f} m/s2 ({len(here.values)} events; standard error {se:.2f})",
-        f"{'within two standard errors' if same else 'not reproduced'}: {here.mean + 4.6:+.2f} m/s2,"
+        "-4.6 ± 0.8 m/s²",
+        f"{here.mean:.2f} ± {here.sd:.2f} m/s² ({len(here.values)} events; standard error {se:.2f})",
+        f"{'within two standard errors' if same else 'not reproduced'}: {here.mean + 4.6:+.2f} m/s²,"
         f" {100 * abs(here.mean / -4.6 - 1):.0f} %{overlap}",
-        f"sensor places within their uncertainty: {min(shifted):.2f} to {max(shifted):.2f} m/s2, so they do"
+        f"sensor places within their uncertainty: {min(shifted):.2f} to {max(shifted):.2f} m/s², so they do"
         f" {'' if max(shifted) >= -4.6 else 'not '}explain it; a fall of the track smaller by"
         f" {needed:.0f} m of"
         f" {here.drop_m:.0f} m would; from CD to the foot alone it is {lower.mean:.2f} ± {lower.sd:.2f}"
-        f" m/s2",
+        f" m/s²",
     )

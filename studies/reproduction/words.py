@@ -95,7 +95,7 @@ def _start(study: Study, gap: float, base: float) -> list[str]:
     ]
     if abs(late_m3 / 4.7 - 1) > CLOSE and abs(there / PAPER["coulomb"][0] - 1) > CLOSE:
         text.append(
-            f"But from there M3's limit at the bowl is {late_m3:.2f} m/s2, not the paper's 4.7; where that is"
+            f"But from there M3's limit at the bowl is {late_m3:.2f} m/s², not the paper's 4.7; where that is"
             f" 4.70 (s = {start:.0f} m) M1's limit is {there:.3f}. On our track no single start gives both"
             " figures. We do not know what does: another track in or above the bowl, or starts that differ"
             " between avalanches, are candidates."
@@ -108,7 +108,7 @@ def _constant(study: Study) -> str:
     b, sd = float(o.posterior.mean[0]), float(o.posterior.sd[0])
     dropped = float(study.outcomes["dropped", "constant"].posterior.mean[0])
     start = float(study.outcomes["release50", "constant"].posterior.mean[0])
-    text = f"**M3.** Ours is {b:.2f} ± {sd:.2f} m/s2, {100 * abs(b / 4.5 - 1):.0f} % from the paper's 4.5."
+    text = f"**M3.** Ours is {b:.2f} ± {sd:.2f} m/s², {100 * abs(b / 4.5 - 1):.0f} % from the paper's 4.5."
     if max(dropped, start) < b - sd:
         share = (b - max(dropped, start)) / (b - 4.5)
         text += (
@@ -134,7 +134,7 @@ def _pcm(study: Study) -> str:
         if all(abs(others[law] / PAPER[law][0] - 1) > 0.04 for law in others):
             text.append(
                 f"It is no explanation of all three laws: the same fit gives M1 {others['coulomb']:.3f} and"
-                f" M3 {others['constant']:.2f} m/s2, no nearer to the paper's than our posteriors."
+                f" M3 {others['constant']:.2f} m/s², no nearer to the paper's than our posteriors."
                 if all(
                     abs(others[law] - PAPER[law][0])
                     > 0.95 * abs(float(study.baseline(law).posterior.mean[0]) - PAPER[law][0])
@@ -212,7 +212,7 @@ def _retardation(study: Study) -> str:
     shifted = [
         recorded_retardation(study.base.problem, "LC", "b", a, b).mean for a in (-40, 40) for b in (-5, 5)
     ]
-    text = f"**Mean retardation from LC to the dam's foot.** {r.mean:.2f} m/s2 against the paper's -4.6."
+    text = f"**Mean retardation from LC to the dam's foot.** {r.mean:.2f} m/s² against the paper's -4.6."
     if max(shifted) < -4.6:
         text += (
             " The sensors' places, moved within their uncertainty, do not close the gap"

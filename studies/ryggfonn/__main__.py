@@ -1,13 +1,12 @@
 """The real recordings diagnosed: what each base law leaves out at Ryggfonn, and what that depends on.
 
-``python benchmarks/ryggfonn_diagnoses.py`` diagnoses each case that has no result yet, writes
-``results/ryggfonn/<case>.json`` and figures, and then ``docs/ryggfonn.md``; the same command goes on with a
-run that was ended. Delete a result to have it made again.
+``python -m studies.ryggfonn`` diagnoses each case that has no result yet, writes
+``studies/results/ryggfonn/<case>.json`` and figures, and then ``docs/ryggfonn.md``; the same command goes on
+with a run that was ended. Delete a result to have it made again.
 """
 
 from __future__ import annotations
 
-import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -16,16 +15,16 @@ from typing import Annotated, Any, NamedTuple
 
 import cyclopts
 
-from skred.output import write_json, write_text
+from skred.output import write_text
+from studies.files import FIGURES, RESULTS, ROOT, read, shrink, write
 from studies.ryggfonn import page as ryggfonn_page
 from studies.ryggfonn.groups import groups_figure, retardations
 
-ROOT = Path(__file__).resolve().parent.parent
-RESULTS = ROOT / "benchmarks" / "results" / "ryggfonn"
-FIGURES = ROOT / "docs" / "figures"
+ANSWERS = RESULTS / "ryggfonn"
 MOVED = ("LC", "CD")
 PRIOR_FACTORS = (0.5, 1.0, 2.0)
-SHOWN = ("where", "probabilities", "places")
+SHOWN = ("where",)
+"""Figures of the page."""
 
 
 class Case(NamedTuple):
@@ -80,19 +79,20 @@ def campaign_of(case: Case) -> Any:
 
 def diagnose_case(case: Case, replicas: int, *, figures: bool = True) -> dict[str, Any]:
     """Diagnose one case; its verdict, and the evidence of each mechanism under other scales of its prior."""
-    from skred.cli.options import DIAGNOSIS_SAMPLING
     from skred.diagnosis.diagnose import diagnose
-    from skred.diagnosis.effort import Effort
+    from skred.diagnosis.effort import SAMPLING, Effort
     from skred.diagnosis.outcome import Diagnosis
     from skred.diagnosis.repeated import outer_folds
     from skred.diagnosis.verdict.document import verdict
+    from skred.diagnosis.verdict.figure_data import figure_data
+    from skred.diagnosis.verdict.report_facts import report_facts
     from skred.inference.hierarchical.problem import hierarchical_problem
     from skred.physics.laws import load_law
     from skred.report.diagnosis.report import save_diagnosis_figures
     from skred.report.shared.style import write_png
 
     problem = hierarchical_problem(campaign_of(case), error_model=case.errors, smoothing_m=case.smoothing_m)
-    settings = DIAGNOSIS_SAMPLING.settings("hierarchical")
+    settings = SAMPLING
     law, effort = load_law(case.base_model), Effort(replicas=replicas, exact_loo=case.folds > 0)
     found = diagnose(problem, law, settings, effort, print)
     document = verdict(found) | {"case": case._asdict()}
@@ -103,15 +103,17 @@ def diagnose_case(case: Case, replicas: int, *, figures: bool = True) -> dict[st
             name: {str(factor): _best_factor(found.comparison, name, factor) for factor in PRIOR_FACTORS}
             for name in found.comparison.under_each[0].candidates
         }
-    if figures and case.name == case.base_model:
+    if figures and case.name == case.base_model and isinstance(found, Diagnosis):
         with TemporaryDirectory() as folder:
-            written = save_diagnosis_figures(found, Path(folder))
+            whole = document | {"report": report_facts(found)}
+            written = save_diagnosis_figures(whole, figure_data(found), Path(folder))
             for name in SHOWN:
                 if name in written:
+                    shrink(written[name])
                     shutil.copy(written[name], FIGURES / f"ryggfonn-{case.name}-{name}.png")
     if figures and case.name == "pcm" and isinstance(found, Diagnosis):
         document["retardations"] = retardations(found)
-        write_png(groups_figure(document["retardations"]), FIGURES / "ryggfonn-groups.png")
+        shrink(write_png(groups_figure(document["retardations"]), FIGURES / "ryggfonn-groups.png"))
     return document
 
 
@@ -135,18 +137,16 @@ def main(
     ] = None,
 ) -> None:
     """Diagnose what has no result yet, and write the page."""
-    folder = RESULTS if out is None else out
+    folder = ANSWERS if out is None else out
     folder.mkdir(parents=True, exist_ok=True)
     for case in CASES:
         file = folder / f"{case.name}.json"
         if not file.exists():
             print(f"== {case.name}", flush=True)
-            write_json(file, diagnose_case(case, replicas, figures=out is None))
+            write(file, diagnose_case(case, replicas, figures=out is None))
     if out is not None:
         return
-    found = {
-        case.name: json.loads((RESULTS / f"{case.name}.json").read_text(encoding="utf-8")) for case in CASES
-    }
+    found = {case.name: read(ANSWERS / f"{case.name}.json") for case in CASES}
     write_text(ROOT / "docs" / "ryggfonn.md", ryggfonn_page.page(found))
 
 

@@ -1,4 +1,4 @@
-"""Build the embedded Ryggfonn campaigns from the raw figures: ``python scripts/build_ryggfonn.py``.
+"""Build the embedded Ryggfonn campaigns from the raw figures: ``python -m studies.ryggfonn.build_campaigns``.
 
 Rewrites the five campaign files of ``data/ryggfonn`` and ``data/ryggfonn-with-dam``; other files there stay.
 """
@@ -9,7 +9,7 @@ from pathlib import Path
 from skred.campaign import write_campaign
 from studies.ryggfonn.campaigns import build
 
-DATA = Path(__file__).resolve().parents[1] / "data"
+DATA = Path(__file__).resolve().parents[2] / "data"
 
 
 def main() -> None:

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.discrepancy.profile import combined, most_probable
-from skred.diagnosis.evidence.coefficient import Fit
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.prior_odds import UNLISTED
-from skred.inference.problem import pooled_problem
+from skred.diagnosis.evidence.refit import Fit
+from skred.inference.pooled.problem import pooled_problem
 from skred.report.shared.style import GREY, RECORDED, legend_below, new_figure, styled
 from studies.reproduction.facts import RecordedRetardation, mean_retardation, recorded_retardation
 
@@ -33,7 +33,7 @@ _MOST_OF_IT = 50.0
 
 
 def retardations(found: Diagnosis) -> list[dict[str, Any]]:
-    """Of each avalanche with both speeds: recorded, and of its most probable front by either law [m s-2].
+    """Of each avalanche with both speeds: recorded, and of its most probable front by either law [m/s²].
 
     Those on the far side of the widest gap between recorded ones are the group that retards more.
     """
@@ -63,7 +63,7 @@ def retardations(found: Diagnosis) -> list[dict[str, Any]]:
 def _retardations(
     found: Diagnosis, fit: Fit, directions: Sequence[Direction], between: RecordedRetardation
 ) -> FloatArray:
-    """Of the events' most probable fronts on the way between the sensors [m s-2]."""
+    """Of the events' most probable fronts on the way between the sensors [m/s²]."""
     law = extended(found.problem, found.law, tuple(directions))
     sensor = found.problem.campaign.sensors[found.problem.campaign.sensor_ids.index(FIRST)]
     ends = np.array([sensor.s_from_m, sensor.s_from_m + between.length_m], dtype=float)
@@ -107,20 +107,27 @@ def words(rows: Sequence[dict[str, Any]]) -> str:
     gap = {key: _mean(six, key) - _mean(others, key) for key in ("recorded", "base", "with_force")}
     kept = 100.0 * gap["with_force"] / gap["recorded"]
     alike, among = ([_correlation(own, key) for key in ("base", "with_force")] for own in (rows, others))
+    shown = ("recorded", "base", "with_force")
+    apart = " | ".join(f"{gap[key]:.1f}" for key in shown)
     return f"""### The two groups
 
-The data's README tells of six avalanches that retard more between LC and CD. Mean retardation there, by the
-recorded speeds and by each avalanche's most probable front under M2, without and with the unlisted force:
+The data's README tells of six avalanches that decelerate more between LC and CD. The table has their mean
+retardation there: from the recorded speeds, and from each avalanche's most probable front under M2, without
+and with the force that is not in the list. Where no speed was left at CD, the recorded value is a lower
+bound.
 
 | | avalanches | speed at LC [m/s] | recorded [m/s²] | M2 | M2 and the force |
 | --- | --- | --- | --- | --- | --- |
-{table}
-The six retard by {gap["recorded"]:.1f} m/s² more as recorded, by {gap["base"]:.1f} under M2 with friction and
-drag of their own, and by {gap["with_force"]:.1f} with the force, {kept:.0f} % of what was recorded.
-Correlation with what was recorded, without and with it: {alike[0]:.2f} and {alike[1]:.2f} over all
-{len(rows)}, {among[0]:.2f} and {among[1]:.2f} among the others alone.
-(Where no speed was left at CD, what is recorded is the least that it can have been.)
-{_told(kept)}
+{table}| difference | | | {apart} |
+
+Correlation of modelled with recorded retardation:
+
+| avalanches | M2 | M2 and the force |
+| --- | --- | --- |
+| all {len(rows)} | {alike[0]:.2f} | {alike[1]:.2f} |
+| the others alone | {among[0]:.2f} | {among[1]:.2f} |
+
+With the force the difference is {kept:.0f} % of the recorded one. {_told(kept)}
 
 ![Modelled and recorded retardation between LC and CD](figures/ryggfonn-groups.png)
 """
@@ -129,10 +136,10 @@ Correlation with what was recorded, without and with it: {alike[0]:.2f} and {ali
 def _told(kept: float) -> str:
     """What follows from how much of the gap between the groups is kept, in percent."""
     if kept >= _MOST_OF_IT:
-        return "So the force accounts for most of what sets the six apart."
+        return "So the force accounts for most of the difference."
     return (
-        "So the tool does not find these groups: what it lets in goes with a front's speed, and leaves\n"
-        "the gap as it was. What sets the six apart is left open."
+        "The force depends on a front's speed, and it does not\n"
+        "explain the difference. What sets the six apart is left open."
     )
 
 

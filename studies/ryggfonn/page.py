@@ -19,13 +19,18 @@ UNSEEN = "-unseen"
 """What the names of those cases end in that repeat the diagnosis without some avalanches."""
 _HEAD = """# Ryggfonn: what the block models leave out
 
-Written by `python benchmarks/ryggfonn_diagnoses.py` from `benchmarks/results/ryggfonn/`; every figure below
-is the tool's own. 22 avalanches on the natural terrain, the catching dam (15 m high, crown at s = 1940 m,
-upstream foot at 1910 m) withheld. Log Bayes factors are against nothing, in nats, shapes and strengths
-integrated over, under the error models that were raced; probabilities use the prior odds of the campaign
-format. Left-out gains compare the augmented law with the base law under one error model, the one that the
-winner leads in.
+Written by `python -m studies.ryggfonn` from `studies/results/ryggfonn/`. Every figure is the
+tool's own. The campaign has 22 avalanches on the natural terrain. The catching dam is withheld: 15 m high,
+crown at s = 1940 m, upstream foot at 1910 m.
+
+- *Log Bayes factors* are against `nothing`, in nats. Coefficients and shapes are integrated over, and the
+  error models that were compared are summed over.
+- *Probabilities* use the prior odds of [the method](method.md).
+- *Held-out* gains are changes of the log score when each avalanche is predicted from the others. Augmented
+  and base law are compared under one error model, the one in which the first name is most probable.
+- *Force not in the list* is the model discrepancy, a Gaussian process along the track.
 """
+_UNITS = {"1": "", "m-1": " 1/m", "s-1": " 1/s", "m s-2": " m/s²", "m": " m"}
 
 
 def page(found: Mapping[str, Found]) -> str:
@@ -48,19 +53,61 @@ def _base(title: str, one: Found) -> str:
     rows = sorted(one.get("candidates", []), key=lambda row: -row["log_bayes_factor"])[:6]
     table = "".join(_row(row, one["probability"][row["id"]]) for row in rows)
     unlisted = one.get("log_bayes_factors", {}).get("unlisted", float("nan"))
+    answer = "".join(f"| {what} | {said} |\n" for what, said in _answers(one).items())
     return f"""## {title}
 
-Verdict `{one["verdict"]}`{_named(one)}; omnibus p = {_number(one["evidence"]["p_value"])}, error models
-raced: {", ".join(one.get("error_models", []))}{_under(one)}.
+| | |
+| --- | --- |
+{answer}
+The six candidates with the most evidence, and the force that is not in the list:
 
-> {one["statement"]}
-
-| candidate | log Bayes factor | probability | strength | where |
+| candidate | log Bayes factor | probability | coefficient | where |
 | --- | --- | --- | --- | --- |
-{table}| unlisted force | {unlisted:.1f} | {_share(one["probability"].get("unlisted", 0.0))} | | |
+{table}| force not in the list | {unlisted:.1f} | {_share(one["probability"].get("unlisted", 0.0))} | | |
 
 ![Where: the missing retardation along the track](figures/ryggfonn-{name}-where.png)
 """
+
+
+def _answers(one: Found) -> dict[str, str]:
+    """The verdict, part by part."""
+    held, evidence, shares = one["held_out"], one["evidence"], one["probability"]
+    said = {"verdict": f"`{one['verdict']}`"}
+    said |= {f"added: `{row['id']}`": _added(row) for row in one["mechanisms"]}
+    if one["indistinguishable"]:
+        said[f"tied with `{one['mechanism']}`"] = ", ".join(
+            f"`{name}` ({shares[name]:.2f})" for name in one["indistinguishable"]
+        )
+    if one.get("profile"):
+        said["added: a force profile"] = (
+            f"{one['profile']['equation']}, most clearly at {_where(one['location'])}"
+        )
+        fronts = {"fast front": "none on a typical front; faster and slower ones feel it with opposite signs"}
+        said["mean effect"] = fronts.get(one["missing_work_of"], "on all fronts")
+    said["check"] = (
+        f"p = {_number(evidence['p_value'])}; with what was added {_number(one.get('p_value_augmented'))}"
+    )
+    said["probability of `nothing`"] = _share(shares["nothing"])
+    said["error models compared"] = f"{', '.join(one.get('error_models', []))}{_under(one)}"
+    if one["next_sensor"]:
+        place, splits = one["next_sensor"]["s_from_m"], one["next_sensor"]["splits"]
+        said["speed that would split the tie best"] = f"at s = {place:.0f} m ({' from '.join(splits)})"
+    said["held-out log score"] = (
+        f"{evidence['elpd_diff']:+.1f} (doubled standard error {2.0 * evidence['elpd_se']:.1f})"
+    )
+    said["held-out error of runout"] = _before_after(held, "rmse_runout", "m", 0)
+    said["held-out error of speeds"] = _before_after(held, "rmse_velocity", "m/s", 1)
+    return said
+
+
+def _added(row: Found) -> str:
+    strength = row["strength"]
+    size = f"{strength['mean']:.3g} ± {strength['sd']:.2g}{_UNITS[strength['unit']]}"
+    return f"{size}, {_where(row['location']) or 'along the whole track'}"
+
+
+def _before_after(held: Found, key: str, unit: str, digits: int) -> str:
+    return f"{held[key + '_before']:.{digits}f} {unit} before, {held[key + '_after']:.{digits}f} {unit} after"
 
 
 def _under(one: Found) -> str:
@@ -69,8 +116,8 @@ def _under(one: Found) -> str:
 
 def _row(row: Found, probability: float) -> str:
     strength = row["strength"]
-    unit = "" if strength["unit"] == "1" else f" {strength['unit']}"
-    where = _where(row["location"]) or row["covariate"] or row["sensor"] or "all along"
+    unit = _UNITS[strength["unit"]]
+    where = _where(row["location"]) or row["covariate"] or row["sensor"] or "along the whole track"
     return (
         f"| `{row['id']}` | {row['log_bayes_factor']:.1f} | {_share(probability)} |"
         f" {strength['mean']:.3g} ± {strength['sd']:.2g}{unit} | {where} |\n"
@@ -80,7 +127,7 @@ def _row(row: Found, probability: float) -> str:
 def _named(one: Found) -> str:
     if not one["mechanism"]:
         return ""
-    ties = f", not to be told from {', '.join(one['indistinguishable'])}" if one["indistinguishable"] else ""
+    ties = f", tied with {', '.join(one['indistinguishable'])}" if one["indistinguishable"] else ""
     return f": {one['mechanism']}{ties}"
 
 
@@ -101,7 +148,7 @@ def _candidate(one: Found, name: str) -> Found | None:
 
 
 def _growing(found: Mapping[str, Found]) -> str:
-    """Whether M1 is found to lack a drag that grows with speed."""
+    """Whether what M1 lacks grows with speed."""
     factors = found["coulomb"]["log_bayes_factors"]
     drags = ("turbulent_drag", "viscous_drag", "segment_drag")
     others = (
@@ -111,14 +158,15 @@ def _growing(found: Mapping[str, Found]) -> str:
         "velocity_weakening",
         "covariate_friction",
     )
-    said = ", ".join(f"`{name}` {factors[name]:.1f}" for name in drags)
-    against = ", ".join(f"`{name}` {factors[name]:.1f}" for name in others)
     best = max(factors, key=lambda name: factors[name])
-    word = "is one of them" if best in (*drags, "entrainment") else "is none of them"
+    rows = [(name, "yes") for name in drags] + [(name, "no") for name in others]
+    rows.sort(key=lambda row: -factors[row[0]])
+    table = "".join(f"| `{name}` | {grows} | {factors[name]:.1f} |\n" for name, grows in rows)
+    word = "grows with speed" if best in (*drags, "entrainment") else "does not grow with speed"
     return (
         "## Does M1 lack a drag that grows with speed?\n\n"
-        f"Terms that grow with speed: {said}. Others: {against}. The most probable candidate, `{best}`,\n"
-        f"{word}.\n"
+        "| candidate | grows with speed | log Bayes factor |\n| --- | --- | --- |\n" + table + "\n"
+        f"The candidate with the most evidence, `{best}`, {word}.\n"
     )
 
 
@@ -134,38 +182,41 @@ def _between(found: Mapping[str, Found]) -> str:
     said = ""
     if stretch is not None:
         said = (
-            f"Under M2 plain friction on a stretch would sit at {_where(stretch['location'])} and take"
-            f" {stretch['strength']['mean']:.2g} ± {stretch['strength']['sd']:.1g} m/s² more than dry"
-            " friction and drag do.\n"
+            f"\nUnder M2 the best friction on a stretch acts at {_where(stretch['location'])}:"
+            f" {stretch['strength']['mean']:.2g} ± {stretch['strength']['sd']:.1g} m/s² beside dry friction"
+            " and drag.\n"
         )
     return (
-        "## Between LC and CD\n\nMissing specific work between sensors (positive: the law brakes too little),"
-        " with the most probable unlisted force that goes with speed as what is named does. A force that is"
-        " nil at the typical speed does work only on other fronts; then it is that on one faster than most by"
-        f" the fronts' spread. {said}\n"
-        "| base | s [m] | work on a | missing work [J/kg] |\n| --- | --- | --- | --- |\n" + rows
+        "## Between LC and CD\n\n"
+        "LC and CD are sensors at 1650 and 1810 m. Missing specific work is positive where the law\n"
+        "decelerates fronts too little. It is the work of the most probable discrepancy that depends on\n"
+        "speed as the first name does. A compensated force does no work on a typical front. Its row is\n"
+        "for a front that is faster than the typical one by the fronts' spread.\n\n"
+        "| base | s [m] | work on a | missing work [J/kg] |\n| --- | --- | --- | --- |\n" + rows + said
     )
 
 
 def _dam(found: Mapping[str, Found]) -> str:
-    lines = []
+    """The best obstacle under each law, beside the dam."""
+    rows = []
     for name in ("pcm", "constant"):
         row = _candidate(found[name], "obstacle")
         if row is None:
-            lines.append(f"- Base `{name}`: no comparison was run ({found[name]['reason']}).")
+            rows.append(f"| `{name}` | no comparison was run: {found[name]['reason']} | | | | |")
             continue
         middle = 0.5 * (row["location"]["s_from_m"] + row["location"]["s_to_m"])
         best = max(one["log_bayes_factor"] for one in found[name]["candidates"])
-        near = "at" if abs(middle - DAM_CROWN_M) <= _NEAR_M else "not at"
+        near = "yes" if abs(middle - DAM_CROWN_M) <= _NEAR_M else "no"
         height, share = row["strength"], _share(found[name]["probability"]["obstacle"])
-        lines.append(
-            f"- Base `{name}`: the best obstacle stands at s = {middle:.0f} m ({near} the dam's crown),"
-            f" height {height['mean']:.1f} ± {height['sd']:.1f} m, log Bayes factor"
-            f" {row['log_bayes_factor']:.1f} against nothing and"
-            f" {row['log_bayes_factor'] - best:+.1f} against the best candidate; probability {share}."
+        rows.append(
+            f"| `{name}` | s = {middle:.0f} m | {near} | {height['mean']:.1f} ± {height['sd']:.1f} m |"
+            f" {row['log_bayes_factor']:.1f}; {row['log_bayes_factor'] - best:+.1f} | {share} |"
         )
-    title = "## Did the dam stop the avalanches that rest at it?\n\n"
-    return title + "\n".join(lines) + "\n\n" + _answer(found)
+    return (
+        "## Did the dam stop the avalanches that rest at it?\n\n"
+        "| base | best obstacle | at the dam's crown | height | log Bayes factor against `nothing`; against"
+        " the best | probability |\n| --- | --- | --- | --- | --- | --- |\n" + "\n".join(rows) + "\n\n"
+    ) + _answer(found)
 
 
 def _answer(found: Mapping[str, Found]) -> str:
@@ -174,11 +225,12 @@ def _answer(found: Mapping[str, Found]) -> str:
     if wins:
         return f"The diagnosis names an obstacle under {' and '.join(wins)}.\n"
     return (
-        "The diagnosis does not name the dam under either law: something else explains more of the same\n"
-        "recordings first. So from these recordings, with these laws, it cannot be told whether the dam\n"
-        "stopped the avalanches that rest at it. What it would take: speeds just above the foot and just\n"
-        "below the crown of the same avalanche (the dam's mark is the threshold v = 2 g h between those\n"
-        "that pass and those that stop), and the upper sensors' places better known than ±20 and ±40 m.\n"
+        "The diagnosis does not name the dam under either law. Another candidate explains more of the same\n"
+        "recordings. So these recordings, with these laws, cannot tell whether the dam stopped the\n"
+        "avalanches that rest at it. Two things would help:\n\n"
+        "- speeds of one avalanche just above the foot and just below the crown. The diagnostic signature\n"
+        "  of a dam is the threshold U² = 2 g h between avalanches that pass and those that stop;\n"
+        "- better known places of the upper sensors. They are known to ±20 and ±40 m.\n"
     )
 
 
@@ -197,42 +249,56 @@ def _robust(found: Mapping[str, Found]) -> str:
         share = _share(one["probability"].get("unlisted", 0.0))
         rows.append(f"| {name} | {said} | {_number(one['evidence']['p_value'])} | {what} | {share} |")
     scales = found["pcm"].get("prior_scales", {})
-    priors = "; ".join(
-        f"`{name}` {values['0.5']:.1f} / {values['1.0']:.1f} / {values['2.0']:.1f}"
+    priors = "\n".join(
+        f"| `{name}` | {values['0.5']:.1f} | {values['1.0']:.1f} | {values['2.0']:.1f} |"
         for name, values in sorted(scales.items(), key=lambda item: -item[1]["1.0"])[:3]
     )
     return f"""## What it depends on
 
-Base M2 under other choices: smoothing of the terrain (10 m elsewhere), Student errors, sensors taken as the
-spans they are, the surveyed terrain with the dam in it, and the sensors LC and CD both further up (by 40 and
-20 m), both further down, and closer to each other, as far as their places are uncertain.
+Base M2 under other choices:
 
-| case | verdict | omnibus p | leading candidates, log Bayes factor | probability of an unlisted force |
+| case | what is different |
+| --- | --- |
+| `pcm-smoothing-5`, `-20` | the terrain is smoothed over 5 or 20 m, elsewhere over 10 m |
+| `pcm-student` | Student errors are the ones asked for |
+| `pcm-spans` | LC and CD are taken as the spans that they are, elsewhere as points |
+| `pcm-sensors-up`, `-down`, `-closer` | LC is moved by 40 m and CD by 20 m, as far as their places are \
+uncertain: both up, both down, towards each other |
+| `pcm-with-dam` | the surveyed terrain, with the dam in it |
+
+| case | verdict | p of the check | leading candidates, log Bayes factor | probability of `unlisted` |
 | --- | --- | --- | --- | --- |
 {chr(10).join(rows)}
 
-Priors half, once and twice as wide, log Bayes factor of the best shape: {priors}.
+Log Bayes factor of the best shape with the prior of the coefficient half, once and twice as wide:
+
+| candidate | half | as it is | twice |
+| --- | --- | --- | --- |
+{priors}
 """
 
 
 def _left(found: Mapping[str, Found]) -> str:
-    lines = []
+    """What the check says of the augmented laws, and how they predict."""
+    rows = []
     for name in LAWS:
         one = found[name]
         if not one["mechanisms"] and not one.get("profile"):
-            lines.append(f"- `{name}`: nothing was let in ({one['verdict']}).")
+            rows.append(f"| `{name}` | nothing ({one['verdict']}) | | | |")
             continue
-        names = " and ".join(row["id"] for row in one["mechanisms"])
-        names = names or "the force profile (fitted anew without each)"
-        held = one["held_out"]
-        runout = f"{held['rmse_runout_before']:.0f} to {held['rmse_runout_after']:.0f} m"
-        lines.append(
-            f"- `{name}` with {names}: the check gives p = {_number(one.get('p_value_augmented'))}; for"
-            f" avalanches left out the log score changes by {one['evidence']['elpd_diff']:+.1f}"
-            f" (doubled standard error {2.0 * one['evidence']['elpd_se']:.1f}), the error of runout from"
-            f" {runout}."
-        )
-    return "## What is left when it is in\n\n" + "\n".join(lines) + "\n"
+        held, gain = one["held_out"], _gain(one["evidence"])
+        runout = f"{held['rmse_runout_before']:.0f}, {held['rmse_runout_after']:.0f} m"
+        p_value = _number(one.get("p_value_augmented"))
+        rows.append(f"| `{name}` | {_added_terms(one)} | {p_value} | {gain} | {runout} |")
+    return f"""## With what was added
+
+The check of the augmented law, and each avalanche predicted from the others. A force profile is fitted again
+without each avalanche.
+
+| base | added | p of the check | held-out log score (doubled standard error) | runout error before, after |
+| --- | --- | --- | --- | --- |
+{chr(10).join(rows)}
+"""
 
 
 def _unseen(found: Mapping[str, Found]) -> str:
@@ -252,19 +318,19 @@ def _unseen(found: Mapping[str, Found]) -> str:
     k = found["pcm" + UNSEEN]["outer_folds"]["k"]
     return f"""## On avalanches that did not choose it
 
-What was let in was chosen by the avalanches that then judge it. So the whole diagnosis, its naming
-included, is repeated without each of {k} parts of them, which judge what it let in (`--outer-folds {k}`).
-Before that, each avalanche alone: left out by importance sampling, refitted where that is unreliable; and, as
-a check, by a refit without each one (`--exact-loo`; a force profile is fitted anew without each in any case).
-Gains in log score, with twice their standard error:
+All avalanches chose what was added, and then judge it. So the whole diagnosis, its naming included, is
+repeated without each of {k} parts of them. Each part then judges what was added without it
+(`--outer-folds {k}`). Before that, each avalanche is left out alone: by importance sampling, with a refit
+where that is unreliable, and as a check by a refit without each (`--exact-loo`). Changes of the log score,
+with doubled standard errors:
 
-| base | let in by all | left out one by one | refitted without each | whole diagnosis without it |
+| base | added by all | each left out by weights | refitted without each | whole diagnosis without it |
 | --- | --- | --- | --- | --- |
 {chr(10).join(rows)}
 
-Fold by fold:
+Part by part:
 
-| base | fold: avalanches left out | verdict without them | let in | gain on them |
+| base | part: avalanches left out | verdict without them | added | gain on them |
 | --- | --- | --- | --- | --- |
 {chr(10).join(folds)}
 """

@@ -1,21 +1,19 @@
 """How small the probability of nothing must be for the comparison alone to raise the alarm.
 
-``python benchmarks/alarm_limit.py [--n 80] [--workers 2]``. The limit was taken from the answers of opened
-batches of concealed trials: how many campaigns with nothing hidden fall below it, nasty ones counted, and how
-much of what is hidden is found besides by it. Beside them stand n campaigns with nothing hidden that
+``python -m studies.thresholds.alarm_limit [--n 80] [--workers 2]``. The limit was taken from the answers of
+opened batches of concealed trials: how many campaigns with nothing hidden fall below it, nasty ones counted,
+and how much of what is hidden is found besides by it. Beside them stand n campaigns with nothing hidden that
 were drawn after, half of them nasty, by the present code up to its alarm. Kept trial by trial in
 ``results/alarm_limit.json``; the same command goes on with a run that was ended.
 """
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from itertools import pairwise
 from multiprocessing import get_context
-from pathlib import Path
 from typing import Any
 
 import cyclopts
@@ -23,14 +21,14 @@ import cyclopts
 from benchmarks.commit import commit
 from skred.diagnosis.compare.decision import NOTHING_ALONE
 from skred.diagnosis.evidence.prior_odds import NOTHING
-from skred.output import write_json
 from skred.prove.plan import NULLS
 from skred.prove.scoring.answers import Pair
 from skred.simulator.draw import draw_trial
+from studies.files import RESULTS, read, write
 from studies.masked.open import KINDS, alarm_of, as_read
 from studies.proof.record import diagnosed, opened_batches
 
-RESULT = Path(__file__).resolve().parent / "results" / "alarm_limit.json"
+RESULT = RESULTS / "alarm_limit.json"
 SEED = 2_700_000
 LIMITS = (0.01, 0.05, 0.1, NOTHING_ALONE, 0.2, 0.3)
 EDGES = (2.0, 4.0, 5.5, 7.0, 12.0)
@@ -75,7 +73,7 @@ def keep(found: dict[str, Any], before: dict[str, Any]) -> dict[str, Any]:
     """Write all that is known; `before` is what opened trials say."""
     document: dict[str, Any] = {"opened": before, "drawn_after": drawn_after(list(found.values()))}
     document |= {"seed": SEED, "commits": sorted({one["commit"] for one in found.values()})}
-    write_json(RESULT, document | {"trials": dict(sorted(found.items()))})
+    write(RESULT, document | {"trials": dict(sorted(found.items()))})
     return document
 
 
@@ -91,9 +89,7 @@ def main(*, n: int = 80, workers: int = 2) -> None:
         Processes.
     """
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    found: dict[str, Any] = (
-        json.loads(RESULT.read_text(encoding="utf-8"))["trials"] if RESULT.exists() else {}
-    )
+    found: dict[str, Any] = read(RESULT)["trials"] if RESULT.exists() else {}
     before = opened([pair for batch in opened_batches() for pair in diagnosed(batch)])
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         at_work = {pool.submit(look, k): f"{k:04d}" for k in range(n) if f"{k:04d}" not in found}

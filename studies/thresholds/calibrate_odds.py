@@ -1,22 +1,20 @@
 """To which power Bayes factors are to count, so that what is stated means what it says.
 
-``python benchmarks/calibrate_odds.py`` takes opened trials in which something was found, raced again
-(``race_again.py``), and scores what would be stated of them by the log probability of the truth, with Bayes
-factors among all but nothing to one power after the other. Each class of trials has the share that it has
-where trials are drawn by default, masked effects within that of listed ones. Chosen is the weakest change
-whose score is within one standard error of the best one's; what it gains is told by powers chosen without
-each batch. Result: ``results/calibrate_odds.json``; the power is frozen in
+``python -m studies.thresholds.calibrate_odds`` takes opened trials in which something was found, compared
+again (``studies.thresholds.compared_again``), and scores what would be stated of them by the log probability
+of the truth, with Bayes factors among all but nothing to one power after the other. Each class of trials has
+the share that it has where trials are drawn by default, masked effects within that of listed ones. Chosen is
+the weakest change whose score is within one standard error of the best one's; what it gains is told by powers
+chosen without each batch. Result: ``results/calibrate_odds.json``; the power is frozen in
 ``skred.diagnosis.evidence.prior_odds``.
 """
 
 from __future__ import annotations
 
-import json
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import cyclopts
 import numpy as np
@@ -24,21 +22,20 @@ from numpy.typing import NDArray
 
 from skred.diagnosis.compare.decision import decide
 from skred.diagnosis.evidence.prior_odds import UNLISTED
-from skred.output import write_json
 from skred.prove.scoring.standards import LOG_SCORE_FLOOR
 from skred.simulator.draw import SHARES
-from studies.proof.record import RECORD, sealed_of
+from studies.files import RESULTS, read, write
+from studies.proof.record import Batch, sealed_of
 from studies.thresholds.compared_again import CLASSES, found_trials, stated_of
 
 FloatArray = NDArray[np.float64]
-RESULTS = Path(__file__).resolve().parent / "results"
 POWERS = tuple(round(0.05 * k, 2) for k in range(20, 5, -1))
 app = cyclopts.App(help=__doc__)
 
 
 @dataclass(frozen=True)
 class Case:
-    """A trial raced again.
+    """A trial compared again.
 
     Attributes
     ----------
@@ -63,19 +60,19 @@ class Case:
 
 
 def cases() -> list[Case]:
-    """All trials that were raced again; a class weighs what is found of it where it is drawn by default."""
-    again = json.loads((RESULTS / "raced_again.json").read_text(encoding="utf-8"))
+    """All trials compared again; a class weighs what is found of it where it is drawn by default."""
+    again = read(RESULTS / "compared_again.json")
     again = {key: one for key, one in again.items() if "failed" not in one}
     # Of these batches alone: what is opened later must not change what was frozen before.
     batches = sorted({key.partition(":")[0] for key in again})
     drawn = Counter(
-        _class(one["truth"]["hidden"]) for batch in batches for one in sealed_of(RECORD / batch).values()
+        _class(one["truth"]["hidden"]) for batch in batches for one in sealed_of(Batch(batch)).values()
     )
     of_these = found_trials(tuple(map(int, batches)), CLASSES)
     found = Counter(_class(sealed["truth"]["hidden"]) for sealed in of_these.values())
-    raced = Counter(_class(one["hidden"]) for one in again.values())
-    weight = {name: SHARES[name] * found[name] / drawn[name] / n for name, n in raced.items()}
-    total = sum(weight[name] * n for name, n in raced.items())
+    compared = Counter(_class(one["hidden"]) for one in again.values())
+    weight = {name: SHARES[name] * found[name] / drawn[name] / n for name, n in compared.items()}
+    total = sum(weight[name] * n for name, n in compared.items())
     return [
         Case(
             key.partition(":")[0],
@@ -143,7 +140,7 @@ def main() -> None:
     n = dict(sorted(Counter(one.hidden for one in every).items()))
     chosen_elsewhere = {"gained": gained, "standard_error": error}
     found = {"power": power, "trials": n, "chosen_on_other_batches": chosen_elsewhere, "powers": rows}
-    write_json(RESULTS / "calibrate_odds.json", found)
+    write(RESULTS / "calibrate_odds.json", found)
 
 
 if __name__ == "__main__":

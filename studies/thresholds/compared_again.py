@@ -1,19 +1,18 @@
-"""Opened trials raced again by the present code: what it says of forces that are in no list.
+"""Opened trials compared again by the present code: what it says of forces that are in no list.
 
-``python benchmarks/race_again.py [--batches SEED ...] [--hidden CLASS ...] [--workers 2]`` draws trials of
-opened batches in which something was found again from their seeds and comparisons them. The leading listed
-mechanism is let in at its best strength, and the unlisted force fitted about it: each kind, its amplitude,
-smoothness and place open. What its most probable profile gains, before any price of its freedom, is about
-all that could tell a force that is in no list from the listed one that passes for it; beside it stands the
-same for trials whose truth is listed. Results are kept trial by trial in ``results/raced_again.json``; the
-same command goes on with a run that was ended. Trials come in random order, so a run that was ended is a
-sample of them.
+``python -m studies.thresholds.compared_again [--batches SEED ...] [--hidden CLASS ...] [--workers 2]`` draws
+trials of opened batches in which something was found again from their seeds and compares them. The leading
+listed mechanism is added at its best strength, and the unlisted force fitted about it: each kind, its
+amplitude, smoothness and place open. What its most probable profile gains, before any price of its freedom,
+is about all that could tell a force that is in no list from the listed one that passes for it; beside it
+stands the same for trials whose truth is listed. Results are kept trial by trial in
+``results/compared_again.json``; the same command goes on with a run that was ended. Trials come in random
+order, so a run that was ended is a sample of them.
 """
 
 from __future__ import annotations
 
 import itertools
-import json
 import tempfile
 from collections.abc import Collection, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -27,25 +26,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign, read_campaign, write_campaign
-from skred.cli.options import DIAGNOSIS_SAMPLING
 from skred.diagnosis.compare.comparison import Comparison, compare
 from skred.diagnosis.diagnose import as_diagnosed
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS
+from skred.diagnosis.effort import SAMPLING
 from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.population_draws import population_draws, typical
-from skred.diagnosis.evidence.prior_odds import POWER, UNLISTED, prior_odds, stated
+from skred.diagnosis.evidence.prior_odds import NOTHING, POWER, UNLISTED, prior_odds, stated
 from skred.inference.calibrate import calibrate_surely
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
-from skred.output import write_json
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.prove.hashes import source_sha256
-from skred.report.diagnosis.words import leading_name
 from skred.simulator.draw import draw_trial
+from studies.files import RESULTS, read, write
 from studies.proof.record import diagnosed, opened_batches, sealed_of
 
-RESULTS = Path(__file__).resolve().parent / "results"
 FloatArray = NDArray[np.float64]
 REPLICAS = 120
 CLASSES = ("listed", "masked", "two", "instrument", "unlisted")
@@ -62,7 +59,7 @@ def base_and_draws(campaign: Campaign, law_id: str) -> tuple[Base, tuple[FloatAr
     """And draws of its populations, means and factors."""
     law = load_law(law_id)
     problem = as_diagnosed(hierarchical_problem(campaign))
-    calibration = calibrate_surely(problem, law, DIAGNOSIS_SAMPLING.settings("hierarchical"))
+    calibration = calibrate_surely(problem, law, SAMPLING)
     if not calibration.gate.passed:
         return None
     assert isinstance(calibration.problem, HierarchicalProblem)
@@ -85,9 +82,15 @@ def base_of(sealed: dict[str, Any]) -> Base | None:
     return base_on(campaign, truth["base_model"])
 
 
-def beyond(raced: Comparison, name: str) -> float:
+def _leading_name(compared: Comparison) -> str:
+    """The most probable listed mechanism or fault."""
+    shares = compared.probability
+    return max((name for name in shares if name not in (NOTHING, UNLISTED)), key=shares.__getitem__)
+
+
+def beyond(compared: Comparison, name: str) -> float:
     """What the unlisted force gains about a listed mechanism at its best strength, in nats, at most."""
-    under_errors = raced.leading(name)
+    under_errors = compared.leading(name)
     best = under_errors.candidates[name].best
     top = int(np.argmax(best.log_evidence))
     about = replace(
@@ -113,12 +116,12 @@ def look(sealed: dict[str, Any]) -> dict[str, Any]:
         base = base_of(sealed)
         if base is None:
             return told | {"failed": "gate"}
-        raced = compare(base)
-        name = leading_name(raced)
-        gain = beyond(raced, name)
+        compared = compare(base)
+        name = _leading_name(compared)
+        gain = beyond(compared, name)
     except np.linalg.LinAlgError as error:
         return told | {"failed": repr(error)}
-    return told | {"leader": name, "log_bayes_factors": raced.log_factors, "gain_about_leader": gain}
+    return told | {"leader": name, "log_bayes_factors": compared.log_factors, "gain_about_leader": gain}
 
 
 def found_trials(batches: Sequence[int], hidden: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -151,8 +154,8 @@ def main(
     seed
         Of the order.
     """
-    path = RESULTS / "raced_again.json"
-    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    path = RESULTS / "compared_again.json"
+    found: dict[str, Any] = read(path) if path.exists() else {}
     trials = found_trials(batches, hidden)
     open_ones = [key for key in np.random.default_rng(seed).permutation(sorted(trials)) if key not in found]
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
@@ -160,7 +163,7 @@ def main(
         for done in as_completed(at_work):
             key = at_work[done]
             found[key] = done.result()
-            write_json(path, dict(sorted(found.items())))
+            write(path, dict(sorted(found.items())))
             print(key, found[key]["hidden"], found[key].get("leader"), flush=True)
     summarise(found.values())
 
@@ -183,8 +186,8 @@ def summarise(found: Collection[dict[str, Any]]) -> None:
 
 def stated_of(log_factors: Mapping[str, float], power: float = POWER) -> dict[str, float]:
     """Probabilities as they are stated of a comparison, or would be with another power."""
-    raced = [mechanisms()[name] for name in log_factors if name in mechanisms()]
-    return stated(log_factors, prior_odds(raced), power)
+    compared = [mechanisms()[name] for name in log_factors if name in mechanisms()]
+    return stated(log_factors, prior_odds(compared), power)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """The evidence of a force not in the list: by few draws, by many, by Laplace's approximation.
 
-``python benchmarks/free_force_draws.py [--json FILE]`` compares what is missing at Ryggfonn under two base
+``python -m studies.thresholds.free_force_draws`` compares what is missing at Ryggfonn under two base
 laws, fits the unlisted force under each error model and in each way it may go with speed, and takes its
 evidence by either route, with several seeds. Under ``voellmy`` fronts stop near sensors, and Laplace's
 formula fails.
@@ -13,8 +13,7 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import cyclopts
 
@@ -23,10 +22,11 @@ from skred.campaign import find_campaign, read_campaign
 from skred.diagnosis.compare.comparison import ComparisonUnderErrors, compare, free_force
 from skred.diagnosis.discrepancy.profile import KINDS
 from skred.diagnosis.discrepancy.sampled_evidence import sampled_log_factor
-from skred.output import write_json
+from studies.files import RESULTS, write
 from studies.thresholds.compared_again import base_on
 
 app = cyclopts.App(help=__doc__)
+RESULT = RESULTS / "free_force_draws.json"
 LAWS = ("voellmy", "pcm")
 SEEDS, MANY_SEEDS, MANY_TURNS = range(1, 5), range(101, 103), 16
 
@@ -58,9 +58,7 @@ def both_ways(law: str, under_errors: ComparisonUnderErrors, pool: Executor) -> 
 
 
 @app.default
-def main(
-    *, out: Annotated[Path | None, cyclopts.Parameter(name="--json", help="File for the figures.")] = None
-) -> None:
+def main() -> None:
     """Measure."""
     rows = []
     for law in LAWS:
@@ -72,8 +70,7 @@ def main(
                 for row in both_ways(law, under_errors, pool):
                     print(row, flush=True)
                     rows.append(row)
-    if out is not None:
-        write_json(out, {"commit": commit(), "rows": rows})
+    write(RESULT, {"commit": commit(), "rows": rows})
 
 
 if __name__ == "__main__":

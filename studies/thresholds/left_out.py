@@ -1,19 +1,18 @@
 """The left-out score of a base law by three routes: smoothed weights, refits by sampling, by importance.
 
-``python benchmarks/left_out.py [--law pcm]`` writes ``results/left_out.json``. The third is what the force
-profile of an unexplained diagnosis is tried by; the first is what every diagnosis uses.
+``python -m studies.thresholds.left_out [--law pcm]`` writes ``results/left_out.json``. The third is what the
+force profile of an unexplained diagnosis is tried by; the first is what every diagnosis uses.
 """
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import cyclopts
 
-from skred.output import write_json
+from studies.files import RESULTS, write
 
-RESULT = Path(__file__).resolve().parent / "results" / "left_out.json"
+RESULT = RESULTS / "left_out.json"
 app = cyclopts.App(help=__doc__)
 
 
@@ -21,8 +20,8 @@ app = cyclopts.App(help=__doc__)
 def main(*, law: str = "pcm", errors: str = "scaled", seed: int = 0) -> None:
     """Score Ryggfonn's avalanches, each by the others."""
     from skred.campaign import find_campaign, read_campaign
-    from skred.cli.options import DIAGNOSIS_SAMPLING
     from skred.diagnosis.diagnose import as_diagnosed
+    from skred.diagnosis.effort import SAMPLING
     from skred.diagnosis.evidence.coefficient import fit_base
     from skred.diagnosis.evidence.population_draws import population_draws, typical
     from skred.diagnosis.predict.held_out import held_out
@@ -34,7 +33,7 @@ def main(*, law: str = "pcm", errors: str = "scaled", seed: int = 0) -> None:
     campaign = read_campaign(find_campaign("ryggfonn"))
     problem = as_diagnosed(hierarchical_problem(campaign, error_model=errors))
     base_law = load_law(law)
-    calibration = calibrate_surely(problem, base_law, DIAGNOSIS_SAMPLING.settings("hierarchical"))
+    calibration = calibrate_surely(problem, base_law, SAMPLING)
     used: Any = calibration.problem
     routes = {
         "smoothed weights": held_out(calibration, seed),
@@ -47,7 +46,7 @@ def main(*, law: str = "pcm", errors: str = "scaled", seed: int = 0) -> None:
         name: {"elpd": one.elpd, "pointwise": one.pointwise.tolist(), "refitted": list(one.refitted)}
         for name, one in routes.items()
     }
-    write_json(RESULT, {"law": law, "errors": errors, "seed": seed, "routes": found})
+    write(RESULT, {"law": law, "errors": errors, "seed": seed, "routes": found})
     for name, one in routes.items():
         print(f"{name}: {one.elpd:.2f}")
 

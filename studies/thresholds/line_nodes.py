@@ -1,7 +1,7 @@
 """Nodes on a line beside importance nodes: what the comparison's evidences are wrong by, and what that costs.
 
-``python benchmarks/line_nodes.py [--json FILE]`` keeps one in eight of the integrations of Ryggfonn's
-comparison, under each error model that is raced, and does each again by both rules with the comparison's
+``python -m studies.thresholds.line_nodes`` keeps one in eight of the integrations of Ryggfonn's
+comparison, under each candidate error model, and does each again by both rules with the comparison's
 budgets, and with nodes on a line sixteen times as close, which stand for exact. Importance nodes, as many as
 a minute or so allows, are the second route to those.
 """
@@ -11,8 +11,8 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
+from unittest.mock import patch
 
 import cyclopts
 import numpy as np
@@ -20,21 +20,25 @@ from threadpoolctl import threadpool_limits
 
 from skred.campaign import find_campaign, read_campaign
 from skred.diagnosis.compare.comparison import compare
-from skred.diagnosis.evidence import coefficient as curves
+from skred.diagnosis.evidence import refit as curves
+from skred.diagnosis.evidence.conditional_map import Rows
 from skred.diagnosis.evidence.event_quadrature import (
     FINE,
     FIRST,
     FRONTS,
     USUAL,
     Budget,
+    event_nodes,
     importance_nodes,
     on_a_line,
 )
 from skred.diagnosis.evidence.marginal import coordinates, evidence
-from skred.output import write_json
+from skred.inference.hierarchical.surface import Nodes
+from studies.files import RESULTS, write
 from studies.thresholds.compared_again import base_on
 
 app = cyclopts.App(help=__doc__)
+RESULT = RESULTS / "line_nodes.json"
 LAWS = ("coulomb", "constant")
 BUDGETS = {"first round": FIRST, "first look": FRONTS, "usual": USUAL, "fine": FINE}
 EXACT, MANY = USUAL.times(256), USUAL.times(32)
@@ -42,38 +46,43 @@ KEPT = 0.125
 """Share of the comparison's integrations that are done again."""
 MOST = 40
 QUANTILES = {"median": 0.5, "nine in ten": 0.9, "97 in 100": 0.97}
-RULES = {"line": on_a_line, "importance": importance_nodes}
+RULES: dict[str, Any] = {"line": on_a_line, "importance": importance_nodes}
 
 
 @contextmanager
 def watched(calls: list[tuple[Any, ...]]) -> Iterator[None]:
     """Keep some of the integrations by fronts that refits ask for."""
-    rng, plain = np.random.default_rng(0), curves.event_nodes
+    rng = np.random.default_rng(0)
 
     def watch(*given: Any, **more: Any) -> Any:
-        if given[5] in (USUAL, FRONTS) and rng.random() < KEPT:
-            calls.append((*given[:5], given[6]))
-        return plain(*given, **more)
+        if given[3] in (USUAL, FRONTS) and rng.random() < KEPT:
+            calls.append((*given[:3], given[4]))
+        return event_nodes(*given, **more)
 
-    curves.event_nodes = watch
-    try:
+    with patch.object(curves, "event_nodes", watch):
         yield
-    finally:
-        curves.event_nodes = plain
 
 
 def evidences(rule: str, budget: Budget, call: tuple[Any, ...], log_scale: Any) -> tuple[Any, int, float]:
     """Log evidence of each group of rows; nodes of an event; seconds."""
     *given, reference = call
-    rows, population = given[1], given[3]
+    rows, population = given[0].rows, given[1]
     started = time.perf_counter()
     spread = RULES[rule](*given, budget, reference)
     seconds = time.perf_counter() - started
-    parts = curves._split(spread.nodes, rows.n_groups, len(rows.event) // rows.n_groups)
     found = [
-        evidence(part, log_scale, coordinates(population, k)).log_evidence for k, part in enumerate(parts)
+        evidence(nodes_of(spread.nodes, rows, k), log_scale, coordinates(population, k)).log_evidence
+        for k in range(rows.n_groups)
     ]
     return np.array(found), spread.points.shape[1], seconds
+
+
+def nodes_of(nodes: Nodes, rows: Rows, group: int) -> Nodes:
+    """Nodes of one group of rows."""
+    n_events = len(rows.event) // rows.n_groups
+    first = nodes.first[group * n_events : (group + 1) * n_events + 1]
+    inside = slice(first[0], first[-1])
+    return Nodes(first - first[0], np.ascontiguousarray(nodes.points[:, inside]), nodes.log_weights[inside])
 
 
 def measured(law_id: str) -> dict[str, Any]:
@@ -102,13 +111,10 @@ def measured(law_id: str) -> dict[str, Any]:
 
 
 @app.default
-def main(
-    *, out: Annotated[Path | None, cyclopts.Parameter(name="--json", help="File for the figures.")] = None
-) -> None:
+def main() -> None:
     """Measure."""
     found = [measured(law_id) for law_id in LAWS]
-    if out is not None:
-        write_json(out, found)
+    write(RESULT, {"laws": found})
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
 """Ties across groups: what the opened trials answered before there were any say of them.
 
-``python benchmarks/tie_rules.py`` takes the stated probabilities of every opened batch. Ids of the leading
-group are tied as they were answered; here an id of another group, `unlisted` among them, is tied too where
-its log probability is at most so many nats below that of the name. For each limit it tells how often a name
-that is left alone is right, how often a tie set holds what is hidden, and how often one name is given where
-the linearised ceiling expects one; and of the names that stood alone and do so no longer how many were right.
-Writes ``results/tie_rules.json``.
+``python -m studies.thresholds.tie_rules`` takes the stated probabilities of every opened batch. Ids of the
+leading group are tied as they were answered; here an id of another group, `unlisted` among them, is tied too
+where its log probability is at most so many nats below that of the name. For each limit it tells how often a
+name that is left alone is right, how often a tie set holds what is hidden, and how often one name is given
+where the linearised ceiling expects one; and of the names that stood alone and do so no longer how many were
+right. Writes ``results/tie_rules.json``.
 """
 
 from __future__ import annotations
@@ -13,21 +13,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import cyclopts
 
 from skred.diagnosis.compare.decision import TIED_NATS
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
-from skred.output import write_json
 from skred.physics.mechanisms import mechanisms
 from skred.prove.scoring.answers import Pair
 from skred.prove.scoring.intervals import share
-from skred.prove.scoring.naming import honesty, naming
-from studies.proof.record import diagnosed, ledger_of, opened_batches
+from skred.prove.scoring.naming import naming, selectivity
+from studies.files import RESULTS, write
+from studies.proof.record import Batch, diagnosed, ledger_of, opened_batches
 
-RESULTS = Path(__file__).resolve().parent / "results" / "tie_rules.json"
+RESULT = RESULTS / "tie_rules.json"
 BEFORE = "2026-11-23T14:00"
 """Batches sealed from then on answer by the rule itself, which was chosen with those before in sight."""
 NATS = (0.0, 1.0, TIED_NATS, 3.0)
@@ -63,14 +62,14 @@ def told(pairs: Sequence[Pair], nats: float) -> dict[str, Any]:
     ]
     return {
         "nats": nats,
-        **honesty(after),
+        **selectivity(after),
         "right_set_of_3_around_7": naming(after)["around_7"]["right_set_of_3"],
         "sets_of_4_and_more": sum(len(pair.names) > 3 for pair in after),
         "no_longer_alone_was_right": share([pair.right_name for pair in no_longer]),
     }
 
 
-def names(batches: Sequence[Path]) -> list[str]:
+def names(batches: Sequence[Batch]) -> list[str]:
     """Their seeds."""
     return [batch.name for batch in batches]
 
@@ -89,7 +88,7 @@ def main() -> None:
         "dense": [pair for pair in pairs if pair.kind == "dense"],
     }
     found = {name: [told(part, nats) for nats in NATS] for name, part in parts.items()}
-    write_json(RESULTS, {"format": 1, "batches": names(batches), "after": names(after), "parts": found})
+    write(RESULT, {"format": 1, "batches": names(batches), "after": names(after), "parts": found})
     for name, rows in found.items():
         print(name)
         for row in rows:

@@ -1,6 +1,6 @@
-"""How far log scores of avalanches left out are off, by the nodes that each draw's strengths get.
+"""How far log scores of held-out avalanches are off, by the nodes that each draw's strengths get.
 
-``python benchmarks/unseen_nodes.py [--json FILE]``: Ryggfonn under PCM with the most probable force profile,
+``python -m studies.thresholds.unseen_nodes``: Ryggfonn under PCM with the most probable force profile,
 each avalanche scored by 200 draws, with three sets of random shifts of the nodes; against sixteen times the
 nodes. Beside it how much other draws change the scores.
 """
@@ -8,8 +8,8 @@ nodes. Beside it how much other draws change the scores.
 from __future__ import annotations
 
 import time
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
+from unittest.mock import patch
 
 import cyclopts
 import numpy as np
@@ -22,10 +22,11 @@ from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.predict import unseen
 from skred.diagnosis.predict.profile_law import _with
-from skred.output import write_json
+from studies.files import RESULTS, write
 from studies.thresholds.compared_again import base_on
 
 app = cyclopts.App(help=__doc__)
+RESULT = RESULTS / "unseen_nodes.json"
 USED = unseen._NODES
 BUDGETS = {
     "used": USED,
@@ -36,12 +37,14 @@ BUDGETS = {
 EXACT, SHIFTS = USED.times(16), 3
 
 
-def score(base: Base, event: int, let_in: Any, budget: Budget, seed: int) -> float:
+def score(base: Base, event: int, added: Any, budget: Budget, seed: int) -> float:
     """Log score of an avalanche."""
-    extension, draws = let_in
-    unseen._NODES = budget
+    extension, draws = added
     rows = base.rows.take(np.array([event]))
-    densities = unseen.log_densities(extension, rows, *draws, seed)[:, 0]
+    with patch.object(unseen, "_NODES", budget):
+        densities = unseen.log_densities(extension, rows, draws.means, draws.factors, draws.strengths, seed)[
+            :, 0
+        ]
     return float(np.logaddexp.reduce(densities) - np.log(len(densities)))
 
 
@@ -74,16 +77,13 @@ def _row(name: str, errors: Any, nodes: int) -> dict[str, Any]:
 
 
 @app.default
-def main(
-    *, out: Annotated[Path | None, cyclopts.Parameter(name="--json", help="File for the figures.")] = None
-) -> None:
+def main() -> None:
     """Measure."""
     base = base_on(read_campaign(find_campaign("ryggfonn")), "pcm")
     assert base is not None
     under_errors = compare(base).leading(UNLISTED)
     found = measured(under_errors.base, most_probable(under_errors.profiles))
-    if out is not None:
-        write_json(out, found)
+    write(RESULT, {"rows": found})
 
 
 if __name__ == "__main__":

@@ -223,13 +223,6 @@ def test_what_would_not_be_read_is_not_written(folder_with, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["small"]
 
 
-def test_a_wheel_carries_its_campaigns_inside(folder_with, tmp_path, monkeypatch):
-    monkeypatch.setattr("skred.campaign.finding._PACKAGE", tmp_path)
-    (tmp_path / "_campaigns").mkdir()
-    folder_with({}).rename(tmp_path / "_campaigns" / "small")
-    assert find_campaign("small") == tmp_path / "_campaigns" / "small"
-
-
 def test_embedded_campaigns_are_found_anywhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "ryggfonn").mkdir()

@@ -101,6 +101,16 @@ BROKEN = {
         "recordings.csv", "third,upper,,", "third,upper,3,", 10, "value", "carries no value",
     ),
     "negative velocity": ("recordings.csv", "upper,30", "upper,-30", 2, "value", "not negative"),
+    "velocity beyond all physics": (
+        "recordings.csv", "upper,30", "upper,38000", 2, "value", "at most 200 m/s",
+    ),
+    "velocity just beyond": ("recordings.csv", "upper,30", "upper,200.1", 2, "value", "write it in m/s"),
+    "sd that nothing measures to": (
+        "recordings.csv", "span,25,3", "span,25,1e-12", 3, "sd", "at least 0.0001 m/s",
+    ),
+    "sd of a runout that nothing measures to": (
+        "recordings.csv", "stop,180,20", "stop,180,9e-5", 9, "sd", "at least 0.0001 m;",
+    ),
     "runout off the track": ("recordings.csv", "stop,320", "stop,900", 5, "value", "on the track"),
     "runout not reached": (
         "recordings.csv", "third,stop,,,missing", "third,stop,,,not_reached", 11, "status", "runout",
@@ -166,6 +176,20 @@ def test_what_is_no_number_is_refused_with_advice(bad, texts, folder_with):
     assert (problem.file, problem.row, problem.column) == ("recordings.csv", 2, "value")
     assert BAD_NUMBERS[bad] in problem.message
     assert str(problem).isprintable()
+
+
+def test_a_sensor_s_own_sd_is_told_at_each_reading(texts, folder_with):
+    broken = texts["sensors.csv"].replace("100,0.1,1\n", "100,1e-9,1e-12\n")
+    with pytest.raises(CampaignError) as caught:
+        read_campaign(folder_with({"sensors.csv": broken}))
+    assert [(problem.row, problem.column) for problem in caught.value.problems] == [(2, "sd"), (6, "sd")]
+    assert all("sensor 'upper' an absolute_sd" in problem.message for problem in caught.value.problems)
+
+
+def test_bounds_are_read(texts, folder_with):
+    text = texts["recordings.csv"].replace("upper,30", "upper,200").replace("span,25,3", "span,25,1e-4")
+    campaign = read_campaign(folder_with({"recordings.csv": text}))
+    assert campaign.values[0, 0] == 200 and campaign.stated_sd[0, 1] == 1e-4
 
 
 def test_the_span_rule_looks_at_the_span_s_upper_end(texts, folder_with):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 import json
 import sys
@@ -22,7 +23,6 @@ from skred.diagnosis.detect.run import (
     base_of,
     identifiability,
     identify_document,
-    identify_table,
     identify_to,
 )
 from skred.diagnosis.detect.score_test import placed_mechanisms
@@ -32,6 +32,7 @@ from skred.diagnosis.outcome import NotDiagnosed
 from skred.diagnosis.verdict.document import verdict
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.physics.laws import load_law
+from skred.report.diagnosis.identify import identify_table
 from skred.report.diagnosis.report import diagnosis_table
 
 RYGGFONN = read_campaign(find_campaign("ryggfonn"))
@@ -141,7 +142,7 @@ def test_the_command(folder: Path, capsys: pytest.CaptureFixture[str], ryggfonn:
     assert "pcm: fitting" in told.err
     plain = json.loads(json.dumps(ryggfonn))
     assert json.loads((folder / "told" / "identify.json").read_text()) == plain
-    assert [file.name for file in (folder / "told").iterdir()] == ["identify.json"]
+    assert [file.name for file in (folder / "told").glob("[!.]*")] == ["identify.json"]
     assert run(["identify", "--out", "told"]) == 2
     assert "--force" in capsys.readouterr().err
     assert run(["identify", "--out", "told", "--force", "--json"]) == 0
@@ -156,10 +157,90 @@ def test_the_command(folder: Path, capsys: pytest.CaptureFixture[str], ryggfonn:
 
 def test_the_command_on_too_few_avalanches(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_campaign(first_events(5), folder / "few")
-    assert run(["identify", "few", "--out", "told"]) == 1
+    """An answer before anything is fitted: the recordings cannot tell, and what would help."""
+    assert run(["identify", "few", "--out", "told"]) == 0
     out = capsys.readouterr().out
     assert "cannot tell: only 5 avalanches" in " ".join(out.split()) and "[bold]few" in out
-    assert json.loads((folder / "told" / "identify.json").read_text())["reason"].startswith("only 5")
+    reason = json.loads((folder / "told" / "identify.json").read_text())["reason"]
+    assert reason.startswith("only 5") and reason.endswith("record 1 more avalanche")
+
+
+def runouts_only(campaign: Campaign) -> Campaign:
+    """Nothing but where avalanches stopped."""
+    kept = [k for k, sensor in enumerate(campaign.sensors) if sensor.is_runout]
+    arrays = {name: getattr(campaign, name)[:, kept] for name in ("values", "status", "stated_sd")}
+    return replace(campaign, sensors=tuple(campaign.sensors[k] for k in kept), **arrays)
+
+
+@pytest.mark.parametrize(
+    ("campaign", "have", "more"),
+    [
+        (first_events(3), "only 3 avalanches have a reading", "record 3 more avalanches"),
+        (runouts_only(RYGGFONN), "only 1 sensor has readings", "record front speeds at a place"),
+    ],
+    ids=["three avalanches", "runouts only"],
+)
+def test_too_few_recordings_are_an_answer_before_anything_is_sampled(
+    campaign: Campaign, have: str, more: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def sampled(*_: Any) -> Any:
+        raise AssertionError("something was sampled")
+
+    monkeypatch.setattr("skred.diagnosis.diagnose.calibrate_surely", sampled)
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    write_campaign(campaign, folder / "few")
+    assert run(["diagnose", "few", "--quiet", "--out", "told"]) == 0
+    document = json.loads((folder / "told" / "verdict.json").read_text())
+    assert document["verdict"] == "cannot_tell" and document["converged"] is True
+    assert document["reason"].startswith(have) and more in document["statement"]
+    assert run(["identify", "few", "--quiet", "--out", "identified"]) == 0
+    assert json.loads((folder / "identified" / "identify.json").read_text())["reason"] == document["reason"]
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (KeyboardInterrupt, 130, "interrupted; what was finished is in {left}"),
+        (OSError, 2, "what was finished is in {left}"),
+        (ZeroDivisionError, 3, "the traceback is in {left}/traceback.txt"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("command", "module", "function", "file"),
+    [
+        ("identify", "skred.diagnosis.detect.run", "identify_to", "identify.json"),
+        ("diagnose", "skred.diagnosis.run", "diagnose_to", "verdict.json"),
+        ("predict", "skred.prediction.predict", "predict", "predict.json"),
+        ("compare", "skred.model_selection.compare", "compare", "compare.json"),
+    ],
+)
+def test_a_command_that_breaks_off_leaves_earlier_results(
+    command: str,
+    module: str,
+    function: str,
+    file: str,
+    error: type[BaseException],
+    code: int,
+    said: str,
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And says where what it had written is: a verdict is not lost because a figure cannot be drawn."""
+    (folder / "out").mkdir()
+    (folder / "out" / file).write_text("earlier")
+
+    def breaks_off(*given: Any, **more: Any) -> None:
+        (where,) = (one for one in given if isinstance(one, Path))
+        (where / file).write_text("new")
+        raise error
+
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")  # no helpers: they would start for nothing
+    monkeypatch.setattr(importlib.import_module(module), function, breaks_off)
+    assert run([command, "--out", "out", "--force", "--quiet"]) == code
+    left = Path("out") / ".skred-unfinished"
+    assert said.format(left=left) in capsys.readouterr().err
+    assert (folder / "out" / file).read_text() == "earlier" and (left / file).read_text() == "new"
 
 
 BAD = [
@@ -204,13 +285,14 @@ def diagnosed(monkeypatch: pytest.MonkeyPatch) -> Diagnosed:
     monkeypatch.setenv("OMP_NUM_THREADS", "1")  # no helpers: they would start for nothing
     asked: list[dict[str, Any]] = []
 
-    def with_reason(reason: str | None) -> list[dict[str, Any]]:
+    def with_reason(reason: str | None, converged: bool = True) -> list[dict[str, Any]]:
         def made_up(
             problem: Any, law: Any, settings: Any, effort: Any, folder: Any, tell: Any, **more: Any
         ) -> Any:
             tell("a stage")
             asked.append({"problem": problem, "law": law, "settings": settings, "effort": effort, **more})
-            return {"verdict": "cannot_tell", "reason": reason, "statement": "What [it] says."}
+            document = {"verdict": "cannot_tell", "reason": reason, "converged": converged}
+            return document | {"statement": "What [it] says."}
 
         monkeypatch.setattr(module, "diagnose_to", made_up)
         monkeypatch.setattr("skred.report.folders.write_reports", lambda folder: [])
@@ -230,11 +312,20 @@ def test_a_diagnosis_is_told_with_its_statement() -> None:
     assert " ".join(told.getvalue().split()).count(document["statement"]) == 1
 
 
-@pytest.mark.parametrize(("reason", "code"), [(None, 0), ("the gate failed", 1)])
+@pytest.mark.parametrize(
+    ("reason", "converged", "code"),
+    [(None, True, 0), ("the gate failed", False, 1), ("too few avalanches", True, 0), (None, False, 0)],
+)
 def test_what_a_diagnosis_ends_with(
-    reason: str | None, code: int, folder: Path, diagnosed: Diagnosed, capsys: pytest.CaptureFixture[str]
+    reason: str | None,
+    converged: bool,
+    code: int,
+    folder: Path,
+    diagnosed: Diagnosed,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    diagnosed(reason)
+    """A verdict of which a refit did not converge is an answer, and says so."""
+    diagnosed(reason, converged)
     assert run(["diagnose", "--out", "told"]) == code
     told = capsys.readouterr()
     assert told.err == "a stage\nwriting the report\n"

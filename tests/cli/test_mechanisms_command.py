@@ -59,7 +59,7 @@ def test_one_in_full(mechanism_id: str, capsys: pytest.CaptureFixture[str]) -> N
     flat = " ".join(out.split())
     added = mechanism.added
     assert added is not None
-    for text in (mechanism.title, mechanism.equation, mechanism.mark, mechanism.reference, added.reason):
+    for text in (mechanism.title, mechanism.equation, mechanism.signature, mechanism.reference, added.reason):
         assert text in flat
     assert f"https://doi.org/{mechanism.doi}" in out and mechanism.strength.name in out
     assert ("sign either" in flat) is added.either_sign

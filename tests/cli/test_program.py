@@ -115,7 +115,7 @@ def test_a_run_writes_everything(finished: tuple[Path, subprocess.CompletedProce
     files = {file.name for file in out.iterdir()}
     assert {"posterior.nc", "summary.json"} <= files
     assert any(name.endswith(".png") for name in files)
-    assert not [name for name in files if name.startswith(".")]
+    assert [name for name in files if name.startswith(".")] == [".skred-written.json"]
     summary = json.loads((out / "summary.json").read_text())
     assert summary["id"] == "constant" and summary["settings"]["draws"] == 200
     assert summary["gate"]["passed"] is (done.returncode == 0)

@@ -12,7 +12,7 @@ from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.campaign.parts import of_events
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.coefficient import Base, fit_base
-from skred.diagnosis.evidence.conditional_map import campaign_rows
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
 from skred.inference.error_model import ERROR_MODELS
@@ -53,7 +53,9 @@ def base_of(campaign: Campaign, law_id: str, error_model: str = "robust") -> Bas
         [np.tile(population.mean[0], (campaign.n_events, 1)), np.zeros(campaign.n_events)]
     )
     rows = campaign_rows(extension)
-    found, points = fit_population(extension, rows, np.zeros(0), mean_prior(law), (population, points))
+    found, points = fit_population(
+        EventLikelihood(extension, rows, np.zeros(0)), mean_prior(law), (population, points)
+    )
     return fit_base(problem, law, found, points)
 
 

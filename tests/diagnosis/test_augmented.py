@@ -16,21 +16,22 @@ from scipy.special import logsumexp
 from scipy.stats import halfnorm, lognorm, norm
 
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
-from skred.diagnosis.augment.augmented import AugmentedProblem, augmented_problem
+from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.augment.coefficient_grid import finer, locate
+from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.augment.tables import highest
 from skred.diagnosis.augment.tabulated_op import TabulatedLogDensity, tabulated_log_density
 from skred.diagnosis.compare.screening import curve
-from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near, fit_base, repeated
-from skred.diagnosis.evidence.conditional_map import Population, campaign_rows, log_joint
+from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near, fit_base
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, campaign_rows, log_joint
 from skred.diagnosis.evidence.event_quadrature import ROUGH
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
 from skred.inference.calibrate import calibrate
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.problem import hierarchical_problem
-from skred.inference.hierarchical.reading_density import log_likelihoods
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
+from skred.inference.reading_density import log_likelihoods
 from skred.inference.sampling import SamplerSettings
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
@@ -67,9 +68,8 @@ def base_of(campaign: Campaign, law_id: str = "coulomb") -> Base:
     extension = extended(problem, law)
     population = starting_population(law)
     points = np.column_stack([np.tile(population.mean[0], (n, 1)), np.zeros(n)])
-    found, points = fit_population(
-        extension, campaign_rows(extension), np.zeros(0), mean_prior(law), (population, points), n_rounds=40
-    )
+    likelihood = EventLikelihood(extension, campaign_rows(extension), np.zeros(0))
+    found, points = fit_population(likelihood, mean_prior(law), (population, points), n_rounds=40)
     return fit_base(problem, law, found, points)
 
 
@@ -334,24 +334,23 @@ def test_a_table_in_the_lower_mode_is_lifted_by_its_neighbours(
     located = locate(base, extension, [drag])
     points = np.stack([fit.points for fit in located.fits])
     n_tables, n_events, n = points.shape
-    rows = repeated(base.rows, n_tables)
-    given = located.grid.points.repeat(n_events, axis=0)
+    likelihood = EventLikelihood(extension, base.rows, np.empty(0)).in_groups(located.grid.points)
     ones = [fit.found.population(n - 1) for fit in located.fits]
     population = Population(
         np.concatenate([one.mean for one in ones]), np.concatenate([one.covariance for one in ones])
     )
     monkeypatch.setattr(
         "skred.diagnosis.augment.tables.event_modes",
-        lambda _, rows, start, *__, **___: SimpleNamespace(points=start),
+        lambda _, start, *__, **___: SimpleNamespace(points=start),
     )
     spoiled = points.copy()
     spoiled[3, :, 0] += 2.0  # friction seven times
     height, low, lifted = (
-        log_joint(extension, rows, start, given, population).reshape(n_tables, n_events)
+        log_joint(likelihood, start, population).reshape(n_tables, n_events)
         for start in (
             points.reshape(-1, n),
             spoiled.reshape(-1, n),
-            highest(extension, rows, spoiled, given, population),
+            highest(likelihood, spoiled, population),
         )
     )
     assert np.all(low[3] < height[3] - 20.0)

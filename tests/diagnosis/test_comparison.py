@@ -13,15 +13,16 @@ from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
 
 from skred.diagnosis.compare import comparison
 from skred.diagnosis.compare import refinement as looking
-from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.compare.comparison import _first_looks, _that_count, _that_may_count, with_errors
+from skred.diagnosis.compare.candidate import FORM, Candidate
+from skred.diagnosis.compare.comparison import _screened, _that_count, _that_may_count, with_errors
 from skred.diagnosis.compare.recomputed import recomputed
-from skred.diagnosis.compare.refinement import Place, entrants_of, leading
+from skred.diagnosis.compare.refinement import Place, candidates_of, leading
 from skred.diagnosis.compare.screening import curve, screening_budget
 from skred.diagnosis.detect.score_test import ScoreTest, placed_mechanisms
-from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at, curve_near, refit
+from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at, curve_near
 from skred.diagnosis.evidence.event_quadrature import FINE, FIRST, FRONTS, ROUGH, USUAL
 from skred.diagnosis.evidence.extension import extended
+from skred.diagnosis.evidence.refit import Rounds, refit
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Direction, Shape
 
@@ -191,7 +192,7 @@ def test_under_another_error_model_each_mechanism_is_looked_at_until_the_rest_is
     with ThreadPoolExecutor(1) as pool:
         told: list[tuple[int, int]] = []
         base: Any = SimpleNamespace(setting=None)
-        found = _first_looks(base, ROUGH, pool, lambda *of: told.append(of), before)
+        found = _screened(base, ROUGH, pool, lambda *of: told.append(of), before)
     assert looked == [0, 1] and found == [now[0], now[1], before[2]] and told[-1] == (3, 3)
 
 
@@ -199,8 +200,9 @@ def test_strengths_of_other_sensors_are_other_strengths() -> None:
     one, other = made("sensor_bias", 0.0, 1.0), made("sensor_bias", 100.0, 1.0)
     slope = 4.0 * np.arange(len(other.strengths))
     other = replace(other, log_evidence=0.9 + slope - slope.max(), shape=Shape(sensor="b"))
-    (candidate,) = entrants_of([replace(one, shape=Shape(sensor="a")), other], {}).values()
-    assert candidate.strength_between_shapes() == 0.0
+    (candidate,) = candidates_of([replace(one, shape=Shape(sensor="a")), other], {}).values()
+    best = candidate.best.moments
+    assert candidate.strength() == pytest.approx(best)
 
 
 def test_finer_curves_share_the_weight_of_their_place() -> None:
@@ -208,7 +210,7 @@ def test_finer_curves_share_the_weight_of_their_place() -> None:
     same = made("segment_drag", 100.0, 1.0)
     place = Place((same,)).parted(0, [same] * 3).parted(2, [same] * 2)
     assert np.exp(place.log_shares) == pytest.approx([1 / 4, 1 / 4, 1 / 12, 1 / 4, 1 / 12, 1 / 12])
-    (candidate,) = entrants_of(curves, {1: place}).values()
+    (candidate,) = candidates_of(curves, {1: place}).values()
     assert len(candidate.curves) == 8 and np.exp(candidate.log_weights).sum() == pytest.approx(1.0)
     assert candidate.log_bayes_factor == pytest.approx(curves[0].log_bayes_factor)
 
@@ -271,18 +273,31 @@ def test_a_place_is_parted_where_one_part_holds_most(
     assert exact - error < candidate.log_bayes_factor < exact + 0.5
 
 
-def test_not_knowing_the_place_widens_a_strength() -> None:
-    """The variance of a mixture: within shapes, and between their means."""
+def test_a_strength_is_over_all_places() -> None:
+    """A mixture: within shapes, and between their means; and for the form of the term."""
     flat, steep = made("segment_drag", 0.0, 1.0), made("segment_drag", 100.0, 1.0)
     slope = 4.0 * np.arange(len(steep.strengths))
     steep = replace(steep, log_evidence=1.0 + slope - slope.max())
-    (candidate,) = entrants_of([flat, steep], {}).values()
-    weights, between = candidate.shape_weights, candidate.strength_between_shapes()
-    within = weights @ np.array([one.moments[1] ** 2 for one in candidate.curves])
-    mean = candidate.strength()[0]
-    about_best = candidate.strength()[1] ** 2 + (mean - candidate.best.moments[0]) ** 2
-    assert between > 0.0 and about_best == pytest.approx(within + between**2)
-    assert entrants_of([flat], {})["segment_drag"].strength_between_shapes() == 0.0
+    (candidate,) = candidates_of([flat, steep], {}).values()
+    weights = candidate.shape_weights
+    means = np.array([one.moments[0] for one in candidate.curves])
+    mean, sd = candidate.strength()
+    assert mean == pytest.approx(weights @ means) and abs(mean - candidate.best.moments[0]) > 1e-5
+    within, between = candidate.best.moments[1] ** 2, weights @ (means - mean) ** 2
+    assert sd**2 == pytest.approx(within + between + (FORM * mean) ** 2)
+    alone = candidates_of([flat], {})["segment_drag"].strength()
+    assert alone.mean == flat.moments[0]
+    assert alone.sd == pytest.approx(np.hypot(flat.moments[1], FORM * flat.moments[0]))
+
+
+def test_a_place_is_quantiles_over_the_places() -> None:
+    """Of equally probable ones: medians in the middle, and the ends of an interval at the outer ones."""
+    curves = [made("segment_drag", 100.0 * k, 1.0) for k in range(5)]
+    (candidate,) = candidates_of(curves, {}).values()
+    first = [one.shape.s_from_m for one in candidate.curves]
+    assert candidate.stretch() == (curves[2].shape.s_from_m, curves[2].shape.s_to_m)
+    (low, _), (high, _) = candidate.ends(0.05), candidate.ends(0.95)
+    assert (low, high) == (min(first), max(first))
 
 
 def test_other_error_models_start_from_any() -> None:
@@ -334,7 +349,7 @@ def test_nothing_is_the_same_whatever_is_not_added() -> None:
         extension = extended(base.problem, base.law, (*base.directions, job.direction))
         start = (base.population, base.fit.points)
         for budget, first in ((ROUGH, None), (FRONTS, FIRST)):
-            (zero,) = refit(extension, base.rows, np.zeros((1, 1)), start, base.log_scale, budget, first)
+            (zero,) = refit(extension, base.rows, np.zeros((1, 1)), start, Rounds(budget, first))
             found = base.with_nothing(budget)
             assert found.found.log_evidence == pytest.approx(zero.found.log_evidence, abs=1e-6)
             assert base.with_nothing(budget) is found

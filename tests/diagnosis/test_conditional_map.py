@@ -11,8 +11,9 @@ from scipy.stats import kstest
 
 from skred.campaign import Status
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
-from skred.diagnosis.evidence.coefficient import Base, repeated
+from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import (
+    EventLikelihood,
     Population,
     Rows,
     event_modes,
@@ -40,16 +41,17 @@ def test_modes_are_stationary_and_highest(which: str) -> None:
     base = BASES[which]()
     extension, start = from_the_mean(base)
     rows, population = base.rows, base.population
-    found = event_modes(extension, rows, start, NONE, population, n_steps=25).points
-    height = log_joint(extension, rows, found, np.zeros((len(found), 0)), population)
+    likelihood = EventLikelihood(extension, rows, NONE)
+    found = event_modes(likelihood, start, population, n_steps=25).points
+    height = log_joint(likelihood, found, population)
     gradient = np.empty_like(found)
     for k in range(found.shape[1]):
         step = np.zeros(found.shape[1])
         step[k] = 1e-5
-        up = log_joint(extension, rows, found + step, np.zeros((len(found), 0)), population)
-        down = log_joint(extension, rows, found - step, np.zeros((len(found), 0)), population)
+        up = log_joint(likelihood, found + step, population)
+        down = log_joint(likelihood, found - step, population)
         gradient[:, k] = (up - down) / 2e-5
-    modes = look_around(extension, rows, found, NONE)
+    modes = look_around(likelihood, found)
     cover = np.linalg.inv(modes.information + population.precision[rows.group])
     gain = 0.5 * np.einsum("ri,rij,rj->r", gradient, cover, gradient)
     assert np.median(gain) < 1e-4 and gain.max() < 0.02
@@ -58,7 +60,7 @@ def test_modes_are_stationary_and_highest(which: str) -> None:
         one = rows.take(np.array([row]))
 
         def loss(point: np.ndarray, one: Rows = one) -> float:
-            return -float(log_joint(extension, one, point[None, :], np.zeros((1, 0)), population)[0])
+            return -float(log_joint(EventLikelihood(extension, one, NONE), point[None, :], population)[0])
 
         for shift in (-2.0, 0.0, 2.0):
             first = np.append(population.mean[0] + shift * sd, 0.0)
@@ -77,21 +79,19 @@ def test_fronts_that_something_added_stops_too_early_are_found_again(mechanism: 
     direction = added.direction(base.setting, added.shapes(base.setting)[0])
     extension, given = extended(base.problem, base.law, (direction,)), np.array([strength])
     population = Population(base.population.mean - 0.2, 4.0 * base.population.covariance)
-    found = event_modes(extension, base.rows, base.fit.points, given, population, n_steps=6).points
-    height = log_joint(extension, base.rows, found, given[None, :].repeat(len(found), axis=0), population)
+    likelihood = EventLikelihood(extension, base.rows, given)
+    found = event_modes(likelihood, base.fit.points, population, n_steps=6).points
+    height = log_joint(likelihood, found, population)
     grid = np.linspace(-1.2, 0.3, 3001)
     for row in range(len(found)):
         points = base.fit.points[row] + np.column_stack([grid, np.zeros_like(grid)])
-        rows = base.rows.take(np.full(len(grid), row))
-        along = log_joint(extension, rows, points, given[None, :].repeat(len(grid), axis=0), population)
+        along = log_joint(likelihood.take(np.full(len(grid), row)), points, population)
         assert height[row] > along.max() - 0.5, row
     # Beside another group, of another population, as alone.
     other = Population(population.mean + 0.3, population.covariance)
     together = event_modes(
-        extension,
-        repeated(base.rows, 2),
+        likelihood.in_groups(np.tile(given, (2, 1))),
         np.tile(base.fit.points, (2, 1)),
-        given,
         other.with_more(population),
         6,
     )
@@ -113,14 +113,13 @@ def test_no_mode_is_missed_on_ryggfonn() -> None:
     white = np.stack(np.meshgrid(axis, axis, indexing="ij"), axis=-1).reshape(-1, 2)
     grid = np.zeros((len(white), 3))
     grid[:, :2] = population.mean[0] + white @ np.linalg.cholesky(population.covariance[0]).T
-    found = event_modes(extension, rows, start, NONE, population, n_steps=25).points
-    height = log_joint(extension, rows, found, np.zeros((len(found), 0)), population)
+    likelihood = EventLikelihood(extension, rows, NONE)
+    found = event_modes(likelihood, start, population, n_steps=25).points
+    height = log_joint(likelihood, found, population)
     missed = []
     for row in range(len(found)):
         one = rows.take(np.full(len(grid), row))
-        missed.append(
-            log_joint(extension, one, grid, np.zeros((len(grid), 0)), population).max() - height[row]
-        )
+        missed.append(log_joint(EventLikelihood(extension, one, NONE), grid, population).max() - height[row])
     assert max(missed) < 0.5, np.round(missed, 1)
 
 
@@ -133,9 +132,9 @@ def test_groups_are_separate_calls() -> None:
     both = Population(*(np.concatenate([a, b]) for a, b in zip(first, second, strict=True)))
     twice = np.tile(np.arange(n), 2)
     rows = Rows(twice, np.repeat([0, 1], n), take_rows(base.rows.readings, twice), base.rows.errors)
-    together = event_modes(extension, rows, np.tile(start, (2, 1)), NONE, both)
+    together = event_modes(EventLikelihood(extension, rows, NONE), np.tile(start, (2, 1)), both)
     for group, alone in enumerate((first, second)):
-        part = event_modes(extension, base.rows, start, NONE, alone)
+        part = event_modes(EventLikelihood(extension, base.rows, NONE), start, alone)
         for got, expected in zip(together, part, strict=True):
             assert_allclose(got[group * n : (group + 1) * n], expected, rtol=1e-12, atol=1e-12)
     assert rows.n_groups == 2 and np.abs(together.points[:n] - together.points[n:]).max() > 0.01
@@ -153,7 +152,7 @@ def many() -> tuple[Base, Rows, np.ndarray, np.ndarray]:
         np.tile(base.population.mean, (n_groups, 1)),
         np.tile(factor, (n_groups, 1, 1)),
         np.random.default_rng(3),
-        ERROR_MODELS["normal"].errors,
+        ERROR_MODELS["normal"],
     )
     return base, rows, points, extension.predict(rows.event, points, NONE)
 
@@ -209,7 +208,7 @@ def test_replicas_under_other_errors(model: str) -> None:
     factor = np.linalg.cholesky(base.population.covariance)
     rows, points = bootstrap_campaigns(
         extension, NONE, np.tile(base.population.mean, (n_groups, 1)),
-        np.tile(factor, (n_groups, 1, 1)), np.random.default_rng(5), errors,
+        np.tile(factor, (n_groups, 1, 1)), np.random.default_rng(5), ERROR_MODELS[model],
     )  # fmt: skip
     z = standardised(rows, extension.predict(rows.event, points, NONE))
     first, second = z[:, 0], z[:, 1]
@@ -236,7 +235,7 @@ def test_a_front_at_the_edge_of_stopping_has_no_slope_without_end() -> None:
         friction = np.linspace(-1.5, -1.0, 4001)
         points = np.column_stack([friction, np.full((len(friction), 2), [-6.9, 0.0])])
         rows = base.rows.take(np.full(len(friction), 7))
-        around = look_around(extension, rows, points, np.array([0.7]))
+        around = look_around(EventLikelihood(extension, rows, np.array([0.7])), points)
         steepest.append(float(np.sqrt(np.einsum("rii->ri", around.information).max())))
         np.linalg.inv(around.information + np.eye(3))
     assert 1e3 < max(steepest) < 1e5

@@ -22,10 +22,10 @@ from skred.diagnosis.discrepancy.profile import (
     Profile,
     alike,
     combined,
-    hats,
     knots,
     log_evidence_of,
     priors_of,
+    spline_basis,
 )
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.event_quadrature import USUAL
@@ -49,7 +49,7 @@ def planted(base: Base, kind: int, centre: float, size: float) -> Base:
 def test_hats_sum_to_one_inside(base: Base) -> None:
     terrain, at = base.setting.terrain, knots(base.setting)
     middle = 0.5 * (terrain.edge_s_m[1:] + terrain.edge_s_m[:-1])
-    basis = hats(terrain, at)
+    basis = spline_basis(terrain, at)
     inside = (middle >= at[0]) & (middle <= at[-1])
     assert basis.shape == (len(at), terrain.n_cells) and inside.any() and not inside.all()
     assert_allclose(basis.sum(axis=0)[inside], 1.0)
@@ -116,7 +116,7 @@ def made_profile(base: Base, kind: int) -> Profile:
 def test_work_is_the_integral_of_the_force(base: Base) -> None:
     """Between neighbouring sensors, and from the last to the last knot; its standard deviation by draws."""
     profile, terrain = made_profile(base, 0), base.setting.terrain
-    edge, basis = terrain.edge_s_m, hats(terrain, profile.knots_m)
+    edge, basis = terrain.edge_s_m, spline_basis(terrain, profile.knots_m)
     work = _work(base.problem.sensor_places, profile, basis, np.diff(edge), edge)
     ends = sorted(float(s.s_from_m) for s in base.problem.campaign.sensors if not s.is_runout)
     if profile.knots_m[-1] > ends[-1] + 1.0:
@@ -140,7 +140,7 @@ def test_work_is_the_integral_of_the_force(base: Base) -> None:
 def test_band_holds_the_whole_profile(base: Base) -> None:
     """Nine draws in ten, everywhere at once; wider than pointwise, narrower than Bonferroni's."""
     profile = made_profile(base, 0)
-    basis = hats(base.setting.terrain, profile.knots_m)
+    basis = spline_basis(base.setting.terrain, profile.knots_m)
     basis = basis[:, basis.sum(axis=0) > 0.0]
     mean, sd, factor = _band(profile, basis)
     assert_allclose(mean, profile.mean @ basis)

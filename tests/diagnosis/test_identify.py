@@ -13,7 +13,7 @@ from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
 from skred.diagnosis.detect.detectability import LIMIT_Z, Detectability, extra_sensors, mean_power, told
 from skred.diagnosis.detect.score_test import PlacedMechanism, ScoreTest, placed_mechanisms
 from skred.diagnosis.evidence.coefficient import Base
-from skred.diagnosis.evidence.conditional_map import Population, campaign_rows, look_around
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, campaign_rows, look_around
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import efficient_scores, fit_population, mean_prior
 from skred.inference.error_model import ERROR_MODELS
@@ -38,7 +38,7 @@ def typical(base: Base, name: str) -> PlacedMechanism:
     """The candidate of middling information, as the table takes it."""
     own = [c for c in placed_mechanisms(base.setting) if c.mechanism.id == name]
     extension = extended(base.problem, base.law, [c.direction for c in own])
-    around = look_around(extension, base.rows, base.fit.points, np.zeros(len(own)))
+    around = look_around(EventLikelihood(extension, base.rows, np.zeros(len(own))), base.fit.points)
     found = efficient_scores(around, base.rows, base.population, mean_prior(base.law))
     return own[int(np.argsort(found.own[0])[len(own) // 2])]
 
@@ -65,13 +65,15 @@ def test_detection_limit_by_simulation(base: Base, table: dict[str, Detectabilit
     n_groups, strength = 200, table[name].limit
     means = np.tile(base.population.mean, (n_groups, 1))
     factors = np.tile(np.linalg.cholesky(base.population.covariance), (n_groups, 1, 1))
-    errors, found = ERROR_MODELS["normal"].errors, []
+    errors, found = ERROR_MODELS["normal"], []
     for value in (0.0, strength):
         rng = np.random.default_rng(4)
         rows, points = bootstrap_campaigns(with_it, np.array([value]), means, factors, rng, errors)
         start = Population(means.copy(), np.tile(base.population.covariance, (n_groups, 1, 1)))
-        population, modes = fit_population(alone, rows, NONE, mean_prior(base.law), (start, points))
-        around = look_around(with_it, rows, modes, np.zeros(1))
+        population, modes = fit_population(
+            EventLikelihood(alone, rows, NONE), mean_prior(base.law), (start, points)
+        )
+        around = look_around(EventLikelihood(with_it, rows, np.zeros(1)), modes)
         found.append(efficient_scores(around, rows, population, mean_prior(base.law)).z[:, 0])
     null, effect = found
     assert abs(null.mean()) < 0.6 and 0.7 < null.std() < 1.35

@@ -8,7 +8,7 @@ from diagnosis_cases import score_test_of, sparse_base
 from numpy.testing import assert_allclose
 
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
-from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, take_rows
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population, Rows, take_rows
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import (
     MeanPrior,
@@ -128,7 +128,9 @@ def test_population_of_simulated_campaigns_is_recovered() -> None:
     rows, true = bootstrap_campaigns(extension, np.zeros(0), means, factors, np.random.default_rng(1))
     far = Population(means - 0.3, np.full((n_groups, 1, 1), 0.3**2))
     start = np.column_stack([np.tile(mean - 0.3, (len(true), 1)), np.zeros(len(true))])
-    found, points = fit_population(extension, rows, np.zeros(0), mean_prior(base.law), (far, start))
+    found, points = fit_population(
+        EventLikelihood(extension, rows, np.zeros(0)), mean_prior(base.law), (far, start)
+    )
     # Readings tell an event's friction to a few per cent, so the mean's error is that of the draws.
     drawn = true[:, 0].reshape(n_groups, -1)
     n = drawn.shape[1]
@@ -148,9 +150,8 @@ def test_order_of_events_does_not_matter() -> None:
     turned = base.rows._replace(event=base.rows.event[order], readings=take_rows(base.rows.readings, order))
     found = []
     for rows, points in ((base.rows, base.fit.points), (turned, base.fit.points[order])):
-        population, modes = fit_population(
-            score_test.extension, rows, np.zeros(0), score_test.prior, (base.population, points)
-        )
+        likelihood = EventLikelihood(score_test.extension, rows, np.zeros(0))
+        population, modes = fit_population(likelihood, score_test.prior, (base.population, points))
         found.append(score_test.statistic(score_test.scores(rows, modes, population))[0])
     assert_allclose(found[1], found[0], atol=1e-6)
 
@@ -159,9 +160,8 @@ def test_fitted_population_is_that_of_the_evidence() -> None:
     """Expectation-maximisation around modes against the top of the integrated likelihood."""
     base = sparse_base()
     start = (base.population, base.fit.points)
-    found, _ = fit_population(
-        extended(base.problem, base.law), base.rows, np.zeros(0), mean_prior(base.law), start
-    )
+    likelihood = EventLikelihood(extended(base.problem, base.law), base.rows, np.zeros(0))
+    found, _ = fit_population(likelihood, mean_prior(base.law), start)
     sd = np.sqrt(np.diag(base.fit.found.covariance))
     assert abs(found.mean[0, 0] - base.fit.found.psi[0]) < 0.3 * sd[0]
     assert abs(0.5 * np.log(found.covariance[0, 0, 0]) - base.fit.found.psi[1]) < 0.5 * sd[1]

@@ -13,14 +13,14 @@ from scipy.stats import norm
 
 import skred.diagnosis.evidence.event_quadrature as event_nodes_module
 from skred.diagnosis.evidence.coefficient import Base
-from skred.diagnosis.evidence.conditional_map import Population, event_modes
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, event_modes
 from skred.diagnosis.evidence.event_quadrature import FINE, USUAL, Budget, event_nodes
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.marginal import (
     _factor,
     _log_correlation_constant,
     _log_prior,
-    _log_target,
+    _log_targets,
     _slopes,
     coordinates,
     evidence,
@@ -36,8 +36,9 @@ NONE = np.zeros(0)
 
 def nodes_of(base: Base, budget: Budget) -> Nodes:
     extension, population = extended(base.problem, base.law), base.population
-    modes = event_modes(extension, base.rows, base.fit.points, NONE, population)
-    return event_nodes(extension, base.rows, NONE, population, modes, budget).nodes
+    likelihood = EventLikelihood(extension, base.rows, NONE)
+    modes = event_modes(likelihood, base.fit.points, population)
+    return event_nodes(likelihood, population, modes, budget).nodes
 
 
 @pytest.mark.parametrize("law_id", ["constant", "coulomb"])
@@ -137,7 +138,7 @@ def test_slopes_of_the_log_target_are_its_differences(which: str) -> None:
     given = n, base.log_scale, *nodes
 
     def target(change: FloatArray) -> float:
-        return float(_log_target(psi + change, *given))
+        return float(_log_targets((psi + change)[None], *given)[0])
 
     value, gradient, hessian = _slopes(psi, *given)
     steps = 0.02 * np.diag(sd)

@@ -16,8 +16,8 @@ from scipy.stats import multivariate_normal
 
 from skred.diagnosis.compare import recomputed as corrections
 from skred.diagnosis.discrepancy import sampled_evidence as profile_evidence
-from skred.diagnosis.discrepancy.fit import fit_profile, hill_at
-from skred.diagnosis.discrepancy.profile import KINDS, Hill, Prior, Profile, combined, knots, priors_of
+from skred.diagnosis.discrepancy.fit import fit_profile, mode_at
+from skred.diagnosis.discrepancy.profile import KINDS, Mode, Prior, Profile, combined, knots, priors_of
 from skred.diagnosis.discrepancy.sampled_evidence import sampled_log_factor
 from skred.diagnosis.evidence.coefficient import Base
 
@@ -37,12 +37,12 @@ def pool() -> Iterator[ThreadPoolExecutor]:
 
 
 class Target(NamedTuple):
-    """What is integrated over instead of a campaign's evidence: two hills of equal height.
+    """What is integrated over instead of a campaign's evidence: two modes of equal height.
 
     Attributes
     ----------
     profile : Profile
-        Of which the fit knows one hill too narrow and off its top, and the other one too low.
+        Of which the fit knows one mode too narrow and off its top, and the other one too low.
     exact : float
         Log of the integral.
     calls : list of int
@@ -68,15 +68,15 @@ def on_two_hills(base: Base, monkeypatch: pytest.MonkeyPatch, apart: float = 9.0
         ]
         return np.asarray(np.logaddexp.reduce(parts, axis=0))
 
-    def nearest(base: Base, profile: Profile, values: FloatArray) -> Hill:
+    def nearest(base: Base, profile: Profile, values: FloatArray) -> Mode:
         away = [(values - top) @ np.linalg.solve(cover, values - top) for top in tops]
-        return Hill(tops[int(np.argmin(away))], cover, 0.0)
+        return Mode(tops[int(np.argmin(away))], cover, 0.0)
 
     monkeypatch.setattr(profile_evidence, "_heights", heights)
-    monkeypatch.setattr(profile_evidence, "hill_at", nearest)
-    hills = (Hill(tops[0] + 0.5 * factor[:, 0], 0.8 * cover, 20.0), Hill(tops[1], cover, 16.0))
+    monkeypatch.setattr(profile_evidence, "mode_at", nearest)
+    modes = (Mode(tops[0] + 0.5 * factor[:, 0], 0.8 * cover, 20.0), Mode(tops[1], cover, 16.0))
     at = np.linspace(300.0, 900.0, N)
-    profile = Profile(KINDS[0], Prior(1.0, 80.0), at, tops[0], cover, 0.0, 0.0, base.fit, hills)
+    profile = Profile(KINDS[0], Prior(1.0, 80.0), at, tops[0], cover, 0.0, 0.0, base.fit, modes)
     return Target(profile, float(np.logaddexp.reduce(logs)), calls)
 
 
@@ -84,8 +84,8 @@ def on_two_hills(base: Base, monkeypatch: pytest.MonkeyPatch, apart: float = 9.0
 def test_a_known_integral(base: Base, pool: Executor, monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
     profile, exact, _ = on_two_hills(base, monkeypatch)
     assert sampled_log_factor(base, profile, pool, seed=seed) == pytest.approx(exact, abs=0.25)
-    # Without the second hill the log of two is missed, as it should be.
-    alone = replace(profile, hills=profile.hills[:1])
+    # Without the second mode the log of two is missed, as it should be.
+    alone = replace(profile, modes=profile.modes[:1])
     assert sampled_log_factor(base, alone, pool, seed=seed) == pytest.approx(20.0, abs=0.25)
 
 
@@ -95,7 +95,7 @@ def test_a_hill_that_a_draw_is_on_is_added(
 ) -> None:
     """These seeds have such a draw: four standard deviations away not all have."""
     profile, exact, _ = on_two_hills(base, monkeypatch, apart=4.0)
-    alone = replace(profile, hills=profile.hills[:1])
+    alone = replace(profile, modes=profile.modes[:1])
     assert sampled_log_factor(base, alone, pool, seed=seed) == pytest.approx(exact, abs=0.15)
     monkeypatch.setattr(profile_evidence, "_ODD", 2.0)
     assert sampled_log_factor(base, alone, pool, seed=seed) < exact - 0.4
@@ -128,7 +128,7 @@ def test_draws_that_tell_nothing_leave_laplace(
 def test_all_priors_count_by_their_shares(
     base: Base, pool: Executor, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
-    """Against the closed form where the log evidence is quadratic in the values; hills as a fit has them."""
+    """Against the closed form where the log evidence is quadratic in the values; modes as a fit has them."""
     at, kind = knots(base.setting), KINDS[0]
     unit = np.exp(-0.5 * ((at - at.mean()) / 100.0) ** 2)
     information = 40.0 * np.outer(unit, unit) / kind.amplitude**2 + np.diag(0.5 / kind.amplitude**2 * unit)
@@ -140,20 +140,20 @@ def test_all_priors_count_by_their_shares(
         gains = values @ score - 0.5 * np.einsum("ni,ij,nj->n", values, information, values)
         return [SimpleNamespace(found=SimpleNamespace(log_evidence=nothing + gain)) for gain in gains]
 
-    hills = []
+    modes = []
     for prior, share in priors_of(kind, at).items():
         cover = prior.cover(at)
         left = np.linalg.inv(information + np.linalg.inv(cover))
         freedom = 0.5 * np.linalg.slogdet(np.eye(len(at)) + cover @ information)[1]
-        hills.append(Hill(left @ score, 0.5 * (left + left.T), share + 0.5 * score @ left @ score - freedom))
-    exact = float(np.logaddexp.reduce([hill.log_factor for hill in hills]))
-    near = tuple(hill for hill in hills if hill.log_factor > max(one.log_factor for one in hills) - 4.0)
-    assert 1 < len(near) < len(hills)
+        modes.append(Mode(left @ score, 0.5 * (left + left.T), share + 0.5 * score @ left @ score - freedom))
+    exact = float(np.logaddexp.reduce([mode.log_factor for mode in modes]))
+    near = tuple(mode for mode in modes if mode.log_factor > max(one.log_factor for one in modes) - 4.0)
+    assert 1 < len(near) < len(modes)
     fit = base.fit
     profile = Profile(kind, Prior(1.0, 80.0), at, near[0].mean, near[0].covariance, 0.0, 0.0, fit, near)
     monkeypatch.setattr(profile_evidence, "refit", refitted)
-    own = max(near, key=lambda hill: hill.log_factor)
-    monkeypatch.setattr(profile_evidence, "hill_at", lambda base, profile, values: own)
+    own = max(near, key=lambda mode: mode.log_factor)
+    monkeypatch.setattr(profile_evidence, "mode_at", lambda base, profile, values: own)
     assert sampled_log_factor(base, profile, pool, seed=seed) == pytest.approx(exact, abs=0.3)
 
 
@@ -170,14 +170,14 @@ def test_laplace_where_gates_are_dense(
     price = 0.5 * found.mean @ np.linalg.solve(cover, found.mean)
     freedom = 0.5 * (np.linalg.slogdet(cover)[1] - np.linalg.slogdet(found.covariance)[1])
     laplace = max(found.gain - price, 0.0) - freedom
-    alone = replace(found, hills=(Hill(found.mean, found.covariance, 0.0),))
+    alone = replace(found, modes=(Mode(found.mean, found.covariance, 0.0),))
     monkeypatch.setattr(profile_evidence, "priors_of", lambda kind, at: {found.prior: 0.0})
     sampled = [sampled_log_factor(changed, alone, pool, seed=seed) for seed in range(2)]
     assert sampled == pytest.approx([laplace] * 2, abs=0.4)
-    # From a draw beside the top the hill is found again.
+    # From a draw beside the top the mode is found again.
     rng = np.random.default_rng(7)
-    hill = hill_at(changed, found, rng.multivariate_normal(found.mean, found.covariance, method="cholesky"))
-    off = hill.mean - found.mean
+    mode = mode_at(changed, found, rng.multivariate_normal(found.mean, found.covariance, method="cholesky"))
+    off = mode.mean - found.mean
     assert off @ np.linalg.solve(found.covariance, off) < 1.0
 
 

@@ -180,5 +180,5 @@ def test_stated_probabilities_of_what_is_all_but_sure() -> None:
 
 
 def test_the_power_is_the_one_that_trials_gave() -> None:
-    result = Path(__file__).parents[2] / "benchmarks" / "results" / "calibrate_odds.json"
+    result = Path(__file__).parents[2] / "studies" / "results" / "calibrate_odds.json"
     assert json.loads(result.read_text(encoding="utf-8"))["power"] == POWER

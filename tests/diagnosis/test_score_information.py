@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from skred.diagnosis.evidence.score_information import reading_slopes
 from skred.inference.error_model import ERROR_MODELS, EventReadings
-from skred.inference.hierarchical.reading_density import log_likelihoods
+from skred.inference.reading_density import log_likelihoods
 
 MODELS = ["normal", "robust", "student", "scaled", "correlated"]
 INF = np.inf

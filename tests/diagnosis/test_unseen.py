@@ -34,7 +34,7 @@ from skred.diagnosis.predict.unseen import (
 from skred.errors import InputError
 from skred.inference.calibrate import Calibration, calibrate
 from skred.inference.hierarchical.problem import hierarchical_problem
-from skred.inference.hierarchical.reading_density import log_likelihoods
+from skred.inference.reading_density import log_likelihoods
 from skred.inference.sampling import SamplerSettings
 from skred.physics.kernel.columns import Column
 from skred.physics.laws import load_law

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.resources import files
 from typing import Any
 
@@ -17,7 +18,8 @@ from skred.diagnosis.verdict.document import verdict
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.output import plain
 from skred.physics.laws import load_law
-from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms import Mechanism, mechanisms
+from skred.physics.mechanisms.spec import BoundTo, Group
 
 SCHEMA = json.loads((files("skred") / "verdict.schema.json").read_text(encoding="utf-8"))
 VALIDATOR = Draft202012Validator(SCHEMA)
@@ -26,6 +28,8 @@ KEYS = (
     "indistinguishable", "location", "strength", "covariate", "sensor", "equation", "evidence", "held_out",
     "detection_limits", "next_sensor", "diagnostics", "statement",
 )  # fmt: skip
+MORE = ("alarm_by", "converged", "refits_not_converged")
+"""Keys that came later: they are written, and verdicts before them stay whole."""
 NULLABLE = {
     "evidence": ("elpd_diff", "elpd_se", "log_bayes_factor", "p_value"),
     "held_out": ("rmse_velocity_before", "rmse_velocity_after", "rmse_runout_before", "rmse_runout_after"),
@@ -65,8 +69,19 @@ def nothing_missing() -> dict[str, Any]:
 
 
 def named(mechanism: str, kind: str = "missing_physics", **more: Any) -> dict[str, Any]:
-    equation = mechanisms()[mechanism].equation
-    local = {"id": mechanism, "strength": STRENGTH, "location": more.get("location"), "equation": equation}
+    spec = mechanisms()[mechanism]
+    return found(mechanism, kind, spec, **more)
+
+
+def found(mechanism: str, kind: str, spec: Mechanism, **more: Any) -> dict[str, Any]:
+    """A verdict that names a mechanism, in the library or not."""
+    assert spec.added is not None
+    equation = spec.equation
+    local = {
+        "id": mechanism, "group": str(spec.group), "bound_to": str(spec.added.bound_to), "strength": STRENGTH,
+        "location": more.get("location"), "equation": equation, "covariate": more.get("covariate"),
+        "sensor": more.get("sensor"),
+    }  # fmt: skip
     return nothing_missing() | {
         "verdict": kind,
         "mechanism": mechanism,
@@ -85,7 +100,8 @@ def tie() -> dict[str, Any]:
 
 def two() -> dict[str, Any]:
     document = named("segment_drag", location=STRETCH)
-    second = document["mechanisms"][0] | {"id": "sensor_bias", "location": None}
+    fault = {"id": "sensor_bias", "group": "instrument", "bound_to": "sensor", "sensor": "LC"}
+    second = document["mechanisms"][0] | fault | {"location": None}
     return document | {"mechanisms": [*document["mechanisms"], second]}
 
 
@@ -120,6 +136,11 @@ VALID: dict[str, Callable[[], dict[str, Any]]] = {
     "cannot tell": cannot_tell,
     "failed": failed,
     "never seen": lambda: nothing_missing() | {"detection_limits": {"viscous_drag": LIMIT | {"value": None}}},
+    "alarm": lambda: named("segment_drag", location=STRETCH, alarm_by="both", converged=True),
+    "not converged": lambda: nothing_missing() | {"converged": False, "refits_not_converged": ["3"]},
+    "an interval of the place": lambda: named(
+        "segment_drag", location=STRETCH | {"s_from_interval_m": [1850.0, 1900.0], "s_to_interval_m": None}
+    ),
     "more keys": lambda: nothing_missing() | {"reason": None, "seconds": {"comparison": 3.0}},
 }
 
@@ -142,7 +163,7 @@ def changed(document: dict[str, Any], path: str, value: Any) -> dict[str, Any]:
 def test_the_schema_is_one() -> None:
     Draft202012Validator.check_schema(SCHEMA)
     assert tuple(SCHEMA["required"]) == KEYS
-    assert tuple(SCHEMA["properties"]) == (*KEYS, "locked", "outer_folds")  # where they were asked for
+    assert tuple(SCHEMA["properties"]) == (*KEYS, *MORE, "locked", "outer_folds")  # where they were asked for
 
 
 @pytest.mark.parametrize("kind", VALID)
@@ -193,6 +214,10 @@ def test_numbers_may_be_null_but_not_left_out(part: str, key: str) -> None:
         ("nothing", "held_out.unit", None),
         ("nothing", "diagnostics.divergences", 0.5),
         ("nothing", "statement", " "),
+        ("alarm", "alarm_by", "race"),
+        ("not converged", "converged", None),
+        ("not converged", "refits_not_converged", [3]),
+        ("an interval of the place", "location.s_from_interval_m", [1850.0]),
         ("nothing", "indistinguishable", ["obstacle"]),
         ("named", "verdict", "nothing_missing"),
         ("named", "verdict", "instrument"),
@@ -202,6 +227,12 @@ def test_numbers_may_be_null_but_not_left_out(part: str, key: str) -> None:
         ("named", "mechanisms", []),
         ("named", "mechanisms.0.strength", None),
         ("named", "mechanisms.0.equation", ""),
+        ("named", "mechanisms.0.group", "people"),
+        ("named", "mechanisms.0.group", "instrument"),
+        ("named", "mechanisms.0.bound_to", "sensor"),
+        ("named", "mechanisms.0.location", None),
+        ("two", "mechanisms.1.sensor", None),
+        ("named", "location", None),
         ("named", "strength", None),
         ("named", "strength", {"parameter": "segment_drag", "unit": "m-1", "mean": 0.002}),
         ("named", "strength.sd", -1.0),
@@ -213,6 +244,7 @@ def test_numbers_may_be_null_but_not_left_out(part: str, key: str) -> None:
         ("covariate", "covariate", None),
         ("sensor", "sensor", None),
         ("sensor", "verdict", "missing_physics"),
+        ("release", "verdict", "missing_physics"),
         ("tie", "indistinguishable", ["obstacle", "obstacle"]),
         ("tie", "next_sensor.quantity", "temperature"),
         ("tie", "next_sensor.s_from_m", None),
@@ -229,6 +261,32 @@ def test_verdicts_that_are_not(kind: str, path: str, value: Any) -> None:
     assert problems(changed(document, path, value))
 
 
+@pytest.mark.parametrize("bound_to", BoundTo)
+@pytest.mark.parametrize(
+    ("group", "kind"), [(Group.PHYSICS, "missing_physics"), (Group.INSTRUMENT, "instrument")]
+)
+def test_a_mechanism_of_any_other_package(bound_to: BoundTo, group: Group, kind: str) -> None:
+    """Whatever it is called: its group decides the verdict, and what it is bound to must be named."""
+    like = mechanisms()["viscous_drag"]
+    assert like.added is not None
+    spec = replace(like, group=group, added=replace(like.added, bound_to=bound_to))
+    named_at = {
+        BoundTo.PLACE: ("location", STRETCH),
+        BoundTo.SENSOR: ("sensor", "LC"),
+        BoundTo.COVARIATE: ("covariate", "t_degC"),
+    }
+    key, value = named_at.get(bound_to, ("location", None))
+    document = found("snow_of_my_own", kind, spec, **{key: value})
+    assert problems(document) == []
+    other = {"missing_physics": "instrument", "instrument": "missing_physics"}[kind]
+    assert problems(changed(document, "verdict", other))
+    if value is not None:
+        assert problems(changed(document, key, None))
+    for other_key, other_value in named_at.values():
+        if other_key not in (key, "location"):
+            assert problems(changed(document, other_key, other_value))
+
+
 @pytest.mark.parametrize("law_id", ["pcm", "constant"])
 def test_what_is_written_where_no_diagnosis_was_possible(law_id: str) -> None:
     problem = hierarchical_problem(read_campaign(find_campaign("ryggfonn")))
@@ -236,4 +294,5 @@ def test_what_is_written_where_no_diagnosis_was_possible(law_id: str) -> None:
     document = plain(verdict(found))
     assert problems(document) == []
     assert document["verdict"] == "cannot_tell" and "only 3 avalanches" in document["statement"]
+    assert set(MORE) <= set(document) and document["alarm_by"] is None
     json.dumps(document, allow_nan=False)

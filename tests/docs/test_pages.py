@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from skred.diagnosis.augment.coefficient import FORM
+from skred.diagnosis.compare.candidate import FORM
 from skred.diagnosis.compare.decision import ALARMS, HELD, TIED_NATS
 from skred.diagnosis.evidence.prior_odds import POWER, SHARES
 from skred.diagnosis.verdict.document import verdict

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from error_cases import standardised_errors, within_binomial_limits
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skred.campaign import Campaign, Sensor, Status, find_campaign, read_campaign
@@ -94,3 +95,26 @@ def test_readings_in_any_order_of_sensors() -> None:
     assert_array_equal(one.not_reached, two.not_reached)
     assert_array_equal(one.values[:, order], two.values)
     assert_array_equal(one.is_velocity[order], two.is_velocity)
+
+
+@pytest.mark.parametrize("name", ERROR_MODELS)
+def test_drawn_readings_cover(name: str) -> None:
+    """90 % intervals of drawn readings hold 90 % of readings that another route simulates."""
+    is_velocity, front = np.array([True, True, False]), np.array([40.0, 25.0, 2100.0])
+    sd, rng, n = np.array([4.0, 3.0, 12.0]), np.random.default_rng(11), 4000
+    drawn = ERROR_MODELS[name].draw(np.tile(front, (200_000, 1)), sd, is_velocity, rng)
+    low, high = np.quantile(drawn, [0.05, 0.95], axis=0)
+    z = standardised_errors(name, is_velocity, len(drawn), rng)
+    readings = front + sd * z[:n]
+    for covered in ((low <= readings) & (readings <= high)).T:
+        assert within_binomial_limits(covered)
+    if name != "student":  # its fourth moment is infinite
+        assert_allclose(np.cov(((drawn - front) / sd).T), np.cov(z.T), atol=0.05)
+
+
+def test_a_reading_s_own_error_goes_before_its_sensor_s() -> None:
+    readings = event_readings(with_a_span())
+    fronts = np.full((2, 4), 30.0)
+    assert_allclose(readings.sensor_sd(fronts)[0], np.hypot([3.0, 6.0, 3.0, 0.0], [1.0, 0.5, 1.0, 12.0]))
+    assert_allclose(readings.sd(0, fronts)[1, [0, 1, 3]], [3.5, np.hypot(6.0, 0.5), 22.9])
+    assert_array_equal(readings.sd(np.array([0, 2]), fronts), [readings.sd(k, fronts)[0] for k in (0, 2)])

@@ -25,7 +25,7 @@ from skred.inference.hierarchical.event_density import (
     integrated_log_density_pullback,
 )
 from skred.inference.hierarchical.integrated_op import IntegratedLogDensity, IntegratedLogDensityPullback
-from skred.inference.hierarchical.reading_density import assess, log_likelihood_bounds, log_likelihoods
+from skred.inference.reading_density import assess, log_likelihood_bounds, log_likelihoods
 
 # The readings given a front, written down again.
 
@@ -409,8 +409,7 @@ def test_assessment_of_boxes(name: str) -> None:
     factors = np.array([[1.0, 0.97, 1.02, 1.01], [0.9, 0.95, 1.3, 1.25], [1.0, 1.0, 1.0, 1.0]])
     predictions = factors[:, :, None] * prediction
     envelope = -np.arange(15.0).reshape(3, 5) / 10.0
-    change, (bound, top, mean) = np.empty((3, 2)), np.empty((3, 3))
-    assess(np.ones(3, dtype=np.int64), predictions, readings, errors, envelope, change, bound, top, mean)
+    change, bound, top, mean = assess(np.ones(3, dtype=np.int64), predictions, readings, errors, envelope)
     for box in range(3):
         corners = np.array([log_likelihood(1, row, readings, errors) for row in predictions[box]])
         corners += envelope[box, 1:]

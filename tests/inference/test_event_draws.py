@@ -68,7 +68,7 @@ def test_releases_are_cut_off_where_the_track_begins(hierarchical: HierarchicalP
 
 def test_recorded_avalanches_are_those_of_importance_sampling(hierarchical: HierarchicalProblem) -> None:
     """Means against new avalanches weighted by their likelihood: another route to the same posterior."""
-    from skred.inference.hierarchical.reading_density import log_likelihoods
+    from skred.inference.reading_density import log_likelihoods
 
     rng = np.random.default_rng(3)
     drawn = recorded_avalanches(hierarchical, PCM, samples(), rng)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
+import importlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,17 +14,12 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.sampling import SamplerSettings
 from skred.physics.laws import load_law
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 N_EVENTS, N_CAMPAIGNS = 6, 12
 
 
 @pytest.fixture(scope="module")
-def benchmark() -> Iterator[Any]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(BENCHMARKS))
-        import hierarchical_sbc
-
-        yield hierarchical_sbc
+def benchmark() -> Any:
+    return importlib.import_module("benchmarks.hierarchical_sbc")
 
 
 @pytest.fixture(scope="module")

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
+import importlib
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +16,6 @@ from skred.inference.joint_metropolis import JointMetropolis
 from skred.physics.law import Law
 from skred.physics.laws import load_law
 
-FILE = Path(__file__).parents[2] / "benchmarks" / "peers" / "joint_gibbs.py"
 SIX = ["19840302", "19870128", "19890403", "19940318", "20000217", "20050416"]
 LIMIT = 4.0
 """Of a difference, in its standard errors."""
@@ -26,12 +23,7 @@ LIMIT = 4.0
 
 @pytest.fixture(scope="module")
 def gibbs() -> Any:
-    spec = importlib.util.spec_from_file_location("benchmark_joint_gibbs", FILE)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["benchmark_joint_gibbs"] = module
-    spec.loader.exec_module(module)
-    return module
+    return importlib.import_module("benchmarks.peers.joint_gibbs")
 
 
 def problem_of(ids: list[str], errors: str = "robust") -> HierarchicalProblem:

@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 
 from skred.campaign import Status
 from skred.inference.pooled.density import pooled_log_density
+from skred.inference.pooled.problem import pooled_problem
 from skred.inference.pooled.recordings_covariance import observed_log_likelihood
-from skred.inference.problem import pooled_problem
 from skred.physics.laws import load_law
 
 LAW = load_law("pcm")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -150,18 +152,34 @@ def test_plain_xarray_and_arviz_read_it(stored: Path, calibration: Any) -> None:
     assert np.isfinite(from_file.elpd)
 
 
-def test_saving_leaves_nothing_half_written(stored: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert [file.name for file in stored.parent.iterdir()] == ["posterior.nc"]
-    before = stored.read_bytes()
+FULL_DISK = """
+import resource, sys
+from pathlib import Path
+import numpy as np
+import xarray as xr
+from skred.inference.results import save
 
-    def break_off(tree: xr.DataTree, file: Path, **options: Any) -> None:
-        file.write_bytes(b"half")
-        raise KeyboardInterrupt
+file = Path(sys.argv[1])
+save(xr.DataTree(xr.Dataset({"x": 1.0})), file)
+before = file.read_bytes()
+# A limit of the process stands for the end of the disk: both end a write, and HDF5 with it.
+resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+try:
+    save(xr.DataTree(xr.Dataset({"x": ("n", np.random.default_rng(0).normal(size=200_000))})), file)
+except OSError:
+    assert file.read_bytes() == before
+    print("told")
+"""
 
-    monkeypatch.setattr(xr.DataTree, "to_netcdf", break_off)
-    with pytest.raises(KeyboardInterrupt):
-        save(xr.DataTree(), stored)
-    assert stored.read_bytes() == before
+
+def test_a_full_disk_is_an_error_and_leaves_nothing_half_written(tmp_path: Path) -> None:
+    """In a process of its own: HDF5 would end it."""
+    file = tmp_path / "posterior.nc"
+    done = subprocess.run(
+        [sys.executable, "-c", FULL_DISK, str(file)], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (done.returncode, done.stdout) == (0, "told\n"), done.stderr
+    assert list(tmp_path.iterdir()) == [file]
 
 
 def test_statistics_of_smc_can_be_stored(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,22 +13,16 @@ import pytest
 from arviz_stats.ecdf_utils import ecdf_pit
 from numpy.testing import assert_allclose, assert_array_equal
 
+from benchmarks.files import as_rows, read
 from skred.campaign import Status
 from skred.errors import InputError
 from skred.inference.sampling import SamplerSettings
 from skred.physics.laws import load_law
 
-FILE = Path(__file__).parents[2] / "benchmarks" / "sbc.py"
-
 
 @pytest.fixture(scope="module")
 def sbc() -> Any:
-    spec = importlib.util.spec_from_file_location("benchmark_sbc", FILE)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["benchmark_sbc"] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
+    return importlib.import_module("benchmarks.sbc")
 
 
 # A Gaussian toy: mu ~ N(0, 1), three readings y ~ N(mu, 1), whose posterior is known.
@@ -191,9 +184,9 @@ def test_an_interrupted_run_goes_on(sbc: Any, monkeypatch: pytest.MonkeyPatch, t
     run(sbc, monkeypatch, whole)
     with pytest.raises(KeyboardInterrupt):
         run(sbc, monkeypatch, parts, interrupt_at=5)
-    assert [record["number"] for record in json.loads(parts.read_text())["simulations"]] == list(range(5))
+    assert [record["number"] for record in as_rows(read(parts)["simulations"])] == list(range(5))
     run(sbc, monkeypatch, parts)
-    assert json.loads(parts.read_text()) == json.loads(whole.read_text())
+    assert read(parts) == read(whole)
 
 
 def test_a_run_with_other_settings_is_not_mixed_in(

@@ -17,8 +17,8 @@ from skred.campaign import Campaign, Event, Sensor, Status, find_campaign, read_
 from skred.inference.hierarchical.bisection import RELEASE_REACH, Resolution
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
-from skred.inference.hierarchical.reading_density import log_likelihoods
 from skred.inference.hierarchical.surface import Surfaces
+from skred.inference.reading_density import log_likelihoods
 from skred.physics.kernel.fronts import simulate
 from skred.physics.laws import load_law
 

@@ -9,6 +9,15 @@ import pytest
 from skred.model_selection.statement import changes, statement
 
 
+def row(sensor: str, **changes: Any) -> dict[str, Any]:
+    """Check of fit at a sensor where the law fits."""
+    entry: dict[str, Any] = {
+        "sensor": sensor, "unit": "m/s", "n_recorded": 11, "recorded_mean": 15.7, "recorded_sd": 6.0,
+        "predicted_mean": 16.1, "predicted_sd": 5.9, "p_mean": 0.9, "p_sd": 1.0, "fits": True,
+    }  # fmt: skip
+    return entry | changes
+
+
 def model(name: str, elpd: float = -320.0, **changes: Any) -> dict[str, Any]:
     entry: dict[str, Any] = {
         "id": name,
@@ -18,6 +27,9 @@ def model(name: str, elpd: float = -320.0, **changes: Any) -> dict[str, Any]:
         "difference": {"elpd": 0.0, "se": 0.0, "practical": False},
         "evidence": {"mean": elpd - 3.0, "spread": 0.1},
         "loo": {"n_bad": 0, "pareto_k_max": 0.3},
+        "fit": [row("LC"), row("CD")],
+        "fits": True,
+        "fit_level": 0.01,
     }
     return entry | changes
 
@@ -57,13 +69,13 @@ def test_a_close_race_prefers_nobody() -> None:
 def test_a_law_whose_chains_failed_is_not_compared() -> None:
     text = told(model("A"), failed("B"))
     assert "Only law A was calibrated" in text
-    assert "law B failed the gate and is not compared: r-hat 1.200 exceeds 1.01" in text
+    assert "The chains of law B did not converge, so it is not compared: r-hat 1.200 exceeds 1.01" in text
 
 
 def test_nothing_to_compare() -> None:
     text = told(failed("A"), failed("B"))
-    assert text.startswith("No law passed the gate") and "elpd" not in text
-    assert text.count("failed the gate and is not compared") == 2
+    assert text.startswith("The chains of no law converged") and "elpd" not in text
+    assert text.count("did not converge, so it is not compared") == 2
 
 
 def test_evidence_that_disagrees_is_said() -> None:
@@ -124,3 +136,12 @@ def test_avalanches_that_stop_unseen() -> None:
     assert "86 % of new avalanches come to LC, of recorded ones 95 %" in text
     text = both([model("A", new_avalanche=[row | {"recorded_reached": 0.88}])], [model("A")])
     assert "of recorded ones" not in text
+
+
+def test_a_law_that_misses_is_told_to_however_good_its_rank() -> None:
+    missed = row("CD", predicted_mean=32.04, p_mean=0.0002, fits=False)
+    text = told(model("A", fits=False, fit=[row("LC"), missed]), behind("B", 12.0, 3.0, True))
+    assert "the recordings prefer law A" in text
+    assert "law A misses the recordings at CD, more than chance allows" in text
+    assert "At CD it predicts a mean reading of 32.0 m/s; the 11 recorded avalanches have 15.7 m/s." in text
+    assert "law B misses" not in text and "LC" not in text

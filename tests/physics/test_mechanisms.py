@@ -21,10 +21,12 @@ from skred.physics.kernel.columns import Column
 from skred.physics.kernel.fronts import front_speeds
 from skred.physics.kernel.inputs import make_contributions
 from skred.physics.law import Law
-from skred.physics.laws import law_ids, load_law
+from skred.physics.laws import check_library, law_ids, load_law
 from skred.physics.mechanisms import Mechanism, mechanisms
 from skred.physics.mechanisms.coulomb_friction import WITHOUT_CURVATURE
-from skred.physics.mechanisms.spec import Added, Direction, Group, Setting, Shape
+from skred.physics.mechanisms.library import NOT_MECHANISMS
+from skred.physics.mechanisms.placed import shapes_of
+from skred.physics.mechanisms.spec import Added, BoundTo, Direction, Group, Setting, Shape
 from skred.physics.mechanisms.stretches import OPPOSED_SHARE, U_1, ends_of, equation_of, is_opposed, shares
 from skred.physics.terrain import Terrain
 
@@ -99,7 +101,7 @@ def typical_fronts(terrain: Terrain) -> np.ndarray:
 
 
 def test_a_mechanism_is_found_by_its_file() -> None:
-    assert set(ALL) == {file.stem for file in FOLDER.glob("*.py")} - {"__init__", "spec", "stretches"}
+    assert set(ALL) == {file.stem for file in FOLDER.glob("*.py")} - {"__init__", *NOT_MECHANISMS}
 
 
 def test_all_of_the_format_are_there() -> None:
@@ -109,15 +111,35 @@ def test_all_of_the_format_are_there() -> None:
     }  # fmt: skip
 
 
-def test_strengths_have_names_of_their_own() -> None:
-    assert len({mechanism.strength.name for mechanism in ALL.values()}) == len(ALL)
+def test_coefficients_have_names_and_symbols_of_their_own() -> None:
+    for what in ("name", "symbol"):
+        assert len({getattr(mechanism.strength, what) for mechanism in ALL.values()}) == len(ALL)
+
+
+def test_laws_and_the_mechanisms_that_join_them_have_symbols_of_their_own() -> None:
+    for name in law_ids():
+        check_library(load_law(name))
+
+
+@pytest.mark.parametrize("mechanism", ALL.values(), ids=ALL)
+def test_shapes_name_what_it_is_bound_to(mechanism: Mechanism, settings: list[Setting]) -> None:
+    for setting in settings:
+        for shape in shapes_of(mechanism, setting):  # refuses those that do not
+            named = {
+                BoundTo.PLACE: shape.place_m,
+                BoundTo.SENSOR: shape.sensor,
+                BoundTo.COVARIATE: shape.covariate,
+            }
+            assert {key for key, value in named.items() if value is not None} == {
+                added_to(mechanism).bound_to
+            } - {BoundTo.TRACK}
 
 
 @pytest.mark.parametrize("mechanism", ALL.values(), ids=ALL)
 def test_the_spec_is_complete(mechanism: Mechanism) -> None:
     strength, added = mechanism.strength, added_to(mechanism)
     for text in (
-        mechanism.title, mechanism.equation, mechanism.mark, mechanism.reference,
+        mechanism.title, mechanism.equation, mechanism.signature, mechanism.reference,
         strength.name, strength.symbol, strength.unit, strength.prior_reason, added.reason,
     ):  # fmt: skip
         assert text.strip() == text != ""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import json
 import os
-import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +17,6 @@ from skred.campaign import Campaign, write_campaign
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.simulator.draw import draw_trial
 
-BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 NAMES = (
     "integral_regression",
     "sindy",
@@ -36,25 +34,23 @@ VERDICTS = ("missing_physics", "instrument", "unexplained", "nothing_missing")
 
 @pytest.fixture(scope="module")
 def runner() -> Iterator[Any]:
-    """The command's module; the folder of benchmarks is not installed, and asks for one thread."""
+    """The command's module; it asks for one thread."""
     environment = dict(os.environ)
-    sys.path.insert(0, str(BENCHMARKS))
     try:
-        yield importlib.import_module("run_baselines")
+        yield importlib.import_module("benchmarks.run_baselines")
     finally:
-        sys.path.remove(str(BENCHMARKS))
         os.environ.clear()
         os.environ.update(environment)
 
 
 @pytest.fixture(scope="module")
 def baselines(runner: Any) -> Any:
-    return importlib.import_module("baselines")
+    return importlib.import_module("benchmarks.baselines")
 
 
 @pytest.fixture(scope="module")
 def common(runner: Any) -> Any:
-    return importlib.import_module("baselines.common")
+    return importlib.import_module("benchmarks.baselines.common")
 
 
 @pytest.fixture(scope="module")

@@ -69,7 +69,7 @@ def test_every_part_has_every_kind(card: tuple[Path, dict[str, Any]]) -> None:
     own = document["methods"]["skred"]
     assert own["open"]["all"]["n"] + own["masked"]["all"]["n"] == document["n_trials"] == 70
     assert {bar["goal"] for bar in document["bars"]} >= {
-        "false alarms", "detection", "naming", "honesty", "probabilities", "unlisted truth", "place",
+        "false alarms", "detection", "naming", "selectivity", "probabilities", "unlisted truth", "place",
         "improvement", "strength", "time", "baselines",
     }  # fmt: skip
     assert len(document["trials"]) == 70

@@ -12,10 +12,10 @@ from scorecard_cases import CRASH, QUIET, answer, drawn, effect, named, pair, tr
 from skred.prove.scoring.alarms import detection, false_alarms, logistic_coefficients
 from skred.prove.scoring.answers import pairs_of
 from skred.prove.scoring.confusion import confusion
-from skred.prove.scoring.criteria import MET, NOT_MET, TOO_FEW, Bar, bars, judge
+from skred.prove.scoring.criteria import MET, NOT_MET, TOO_FEW, Criterion, acceptance_criteria, judge
 from skred.prove.scoring.gain import failures, gains, held_out, times
 from skred.prove.scoring.intervals import median, share, upper_limit
-from skred.prove.scoring.naming import honesty, naming, unlisted
+from skred.prove.scoring.naming import naming, selectivity, unlisted
 from skred.prove.scoring.paired import compare, roc_area, score_of, threshold
 from skred.prove.scoring.places import places, strengths
 from skred.prove.scoring.probability import (
@@ -163,7 +163,7 @@ def test_honesty_counts_names_where_nothing_listed_is_hidden() -> None:
     pairs = [pair(drag, named("viscous_drag")), pair(NULL, named("obstacle")),
              pair(truth("unlisted", effect("wave")), named("obstacle", "entrainment")),
              pair(drag, named("obstacle", "viscous_drag"))]  # fmt: skip
-    found = honesty(pairs)
+    found = selectivity(pairs)
     assert (found["right_where_named"]["hits"], found["right_where_named"]["n"]) == (1, 2)
     assert (found["set_holds_truth_where_tied"]["hits"], found["set_holds_truth_where_tied"]["n"]) == (1, 2)
     assert found["named_over_ceiling"]["value"] == pytest.approx(1.0 / (2 * 0.49))
@@ -346,14 +346,14 @@ def test_a_loose_method_is_held_to_as_many_false_alarms() -> None:
 
 
 def test_bars_are_called_only_with_enough_trials() -> None:
-    bar = Bar("goal", "what", at_least=0.8)
-    assert judge(bar, 0.9, 0.85, 0.95, 19) == (TOO_FEW, False)
-    assert judge(bar, 0.9, 0.85, 0.95, 20) == (MET, True)
-    assert judge(bar, 0.9, 0.75, 0.95, 20) == (MET, False)
-    assert judge(bar, 0.7, 0.6, 0.85, 20) == (NOT_MET, False)
-    assert judge(bar, 0.1, 0.0, 0.3, 5) == (NOT_MET, True)
-    assert judge(bar, None, None, None, 0) == (TOO_FEW, False)
-    assert judge(Bar("goal", "what", at_least=0.0), 0.0, 0.0, 0.0, 50)[0] == NOT_MET
+    criterion = Criterion("goal", "what", at_least=0.8)
+    assert judge(criterion, 0.9, 0.85, 0.95, 19) == (TOO_FEW, False)
+    assert judge(criterion, 0.9, 0.85, 0.95, 20) == (MET, True)
+    assert judge(criterion, 0.9, 0.75, 0.95, 20) == (MET, False)
+    assert judge(criterion, 0.7, 0.6, 0.85, 20) == (NOT_MET, False)
+    assert judge(criterion, 0.1, 0.0, 0.3, 5) == (NOT_MET, True)
+    assert judge(criterion, None, None, None, 0) == (TOO_FEW, False)
+    assert judge(Criterion("goal", "what", at_least=0.0), 0.0, 0.0, 0.0, 50)[0] == NOT_MET
 
 
 @pytest.mark.parametrize(
@@ -364,13 +364,13 @@ def test_false_alarm_bar_is_on_the_upper_limit(alarms: int, n: int, status: str)
     from skred.prove.scoring.scores import scores_by_kind
 
     pairs = [pair(NULL, named("obstacle"))] * alarms + [pair(NULL, QUIET)] * (n - alarms)
-    rows = bars(scores_by_kind(pairs)["open"], {})
+    rows = acceptance_criteria(scores_by_kind(pairs)["open"], {})
     assert next(row for row in rows if row["what"].startswith("plain nulls"))["status"] == status
 
 
 def test_crashes_count_as_false_alarms_in_the_bar() -> None:
     from skred.prove.scoring.scores import scores_by_kind
 
-    rows = bars(scores_by_kind([pair(NULL, CRASH)] * 120)["open"], {})
+    rows = acceptance_criteria(scores_by_kind([pair(NULL, CRASH)] * 120)["open"], {})
     row = next(row for row in rows if row["what"].startswith("plain nulls"))
     assert row["status"] == NOT_MET and row["measured"] > 0.95

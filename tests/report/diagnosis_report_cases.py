@@ -14,14 +14,15 @@ from skred.diagnosis.augment.step import Step
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
-from skred.diagnosis.compare.decision import Decision
+from skred.diagnosis.compare.decision import Decision, blamed
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Detectability, Identifiability
 from skred.diagnosis.discrepancy.profile import KINDS, Prior, Profile
-from skred.diagnosis.evidence.coefficient import Curve, Fit
+from skred.diagnosis.evidence.coefficient import Curve
 from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.predictive import Predicted
-from skred.diagnosis.evidence.prior_odds import prior_odds
+from skred.diagnosis.evidence.prior_odds import UNLISTED, prior_odds
+from skred.diagnosis.evidence.refit import Fit
 from skred.diagnosis.outcome import (
     Diagnosis,
     MechanismsAdded,
@@ -155,7 +156,7 @@ def calibration(problem: HierarchicalProblem, added: tuple = (), gate: Gate = GA
 
 @cache
 def diagnosis(kind: str, text: str = "") -> Outcome:
-    """A diagnosis of each kind; of a campaign with hostile names where `text` is given."""
+    """A diagnosis of each kind, or one that names a mechanism; with hostile names where `text` is given."""
     problem = hostile_problem(text) if text else hierarchical_ryggfonn()
     if kind == "cannot":
         return NotDiagnosed(problem, LAW, "only 3 avalanches with a reading; at least 6 are needed")
@@ -168,18 +169,19 @@ def diagnosis(kind: str, text: str = "") -> Outcome:
         "two": {"covariate_friction": 40.0},
         "sensor": {"sensor_bias": 40.0},
         "unexplained": {"unlisted": 30.0},
-    }.get(kind, {})
+    }.get(kind, {kind: 40.0})
     comparison = race_of(problem, tops, 2 if kind in ("tie", "sensor") else 1)
     names = {
         "tie": ("entrainment", "segment_drag"), "two": ("covariate_friction",), "sensor": ("sensor_bias",),
-    }.get(kind, ())  # fmt: skip
+    }.get(kind, (kind,) if kind in mechanisms() else ())  # fmt: skip
     verdicts = {
         "tie": "missing_physics", "two": "missing_physics", "sensor": "instrument",
         "unexplained": "unexplained", "nothing": "nothing_missing", "silent": "cannot_tell",
     }  # fmt: skip
     clean = np.random.default_rng(1).normal(0.0, 1.0, 120)
+    verdict_ = verdicts.get(kind) or blamed({kind: 1.0, UNLISTED: 0.0}).verdict
     steps = _steps(problem, comparison, names, clean, second=kind == "two")
-    alarm = kind in ("tie", "two", "sensor", "unexplained")
+    alarm = kind not in ("nothing", "silent")
     table = told(problem, 0.3 if kind == "silent" else 0.8)
     finding = NothingAdded()
     if steps:
@@ -188,7 +190,7 @@ def diagnosis(kind: str, text: str = "") -> Outcome:
         finding = ProfileAdded(profile_law(problem, clean))
     return Diagnosis(
         problem, LAW, calibration(problem), SimpleNamespace(), table,
-        BootstrapTest(30.0 if alarm else 0.3, clean), comparison, Decision(verdicts[kind], names),
+        BootstrapTest(30.0 if alarm else 0.3, clean), comparison, Decision(verdict_, names),
         location(), finding, held(problem, 0.0), {"base": 12.3, "comparison": 45.6},
     )  # fmt: skip
 

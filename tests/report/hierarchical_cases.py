@@ -118,7 +118,7 @@ def hierarchical_entry(law_id: str, pointwise: list[float], best: list[float]) -
         "place_sd_m": PLACE_SD_M,
         "integration": {
             "largest_error_of_an_event": 0.00256195,
-            "largest_error_of_22_events": 0.00566205,
+            "largest_mean_error": 0.00025737,
             "checked_events": 4,
         },
         "new_avalanche": new_avalanche_rows(),

@@ -7,7 +7,8 @@ import xarray as xr
 
 from skred.campaign import Campaign, Sensor, find_campaign, read_campaign
 from skred.inference.along_track import with_along_track
-from skred.inference.problem import PooledProblem, Problem, pooled_problem
+from skred.inference.pooled.problem import PooledProblem, pooled_problem
+from skred.inference.problem import Problem
 from skred.inference.recorded_data import recorded_groups
 from skred.inference.results import law_attributes
 from skred.physics.law import Law

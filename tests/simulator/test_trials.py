@@ -135,8 +135,10 @@ def test_integration_over_events_against_a_grid() -> None:
 
 
 def test_each_mechanism_in_turn_sparse_and_dense(tmp_path: Path) -> None:
-    command = [sys.executable, str(ROOT / "benchmarks" / "development_set.py"), "--each", "--n", "4"]
-    subprocess.run([*command, "--seed", "1000", "--out", str(tmp_path)], check=True, capture_output=True)
+    command = [sys.executable, "-m", "benchmarks.development_set", "--each", "--n", "4"]
+    subprocess.run(
+        [*command, "--seed", "1000", "--out", str(tmp_path)], cwd=ROOT, check=True, capture_output=True
+    )
     truths = [json.loads((tmp_path / "truth" / f"trial-000{k}.json").read_text()) for k in (1, 2, 3, 4)]
     assert [one["kind"] for one in truths] == ["sparse", "dense"] * 2
     ids = [one["mechanisms"][0]["id"] for one in truths]
@@ -144,10 +146,14 @@ def test_each_mechanism_in_turn_sparse_and_dense(tmp_path: Path) -> None:
 
 
 def test_the_development_set_resumes(tmp_path: Path) -> None:
-    command = [sys.executable, str(ROOT / "benchmarks" / "development_set.py"), "--seed", "1000"]
+    command = [sys.executable, "-m", "benchmarks.development_set", "--seed", "1000"]
     command += ["--hidden", "nothing", "--out", str(tmp_path)]
-    first = subprocess.run([*command, "--n", "2"], capture_output=True, text=True, check=True).stdout
-    again = subprocess.run([*command, "--n", "3"], capture_output=True, text=True, check=True).stdout
+    first = subprocess.run(
+        [*command, "--n", "2"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
+    again = subprocess.run(
+        [*command, "--n", "3"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
     assert first.count("trial-") == 2 and again.count("trial-") == 1
     for name in ("trial-0001", "trial-0003"):
         read_campaign(tmp_path / name / "campaign")

@@ -27,8 +27,8 @@ def with_dam():
 
 
 def test_the_script_writes_the_committed_files(tmp_path):
-    script = ROOT / "scripts" / "build_ryggfonn.py"
-    subprocess.run([sys.executable, str(script), "--out", str(tmp_path)], check=True, capture_output=True)
+    command = [sys.executable, "-m", "studies.ryggfonn.build_campaigns", "--out", str(tmp_path)]
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
     for name in ("ryggfonn", "ryggfonn-with-dam"):
         for file in FILES:
             assert (tmp_path / name / file).read_bytes() == (ROOT / "data" / name / file).read_bytes(), file

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import halfnorm, norm, truncnorm
 
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 from skred.physics.kernel.columns import GRAVITY
 from skred.physics.terrain import build_terrain
 from studies.reproduction.cases import (

@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 
+from skred.errors import InputError
+
 SHOWN_CHARACTERS = 60
 SHOWN_PROBLEMS_PER_FILE = 20
 
@@ -77,7 +79,7 @@ class Problem:
         return asdict(self)
 
 
-class CampaignError(ValueError):
+class CampaignError(InputError):
     """A campaign that cannot be read, written or found; carries every problem, not only the first.
 
     Parameters

@@ -14,6 +14,18 @@ from skred.campaign.tables import MOST_PROBLEMS, Row
 # Others compute the same arc length in another order of additions.
 ROUNDING_M = 1e-6
 FEWEST_TRACK_POINTS = 3
+FASTEST_M_S = 200.0
+"""Greatest front velocity that is read, m/s.
+
+Twice that of the fastest avalanches measured, about 100 m/s; a free fall reaches it after 2 km. What lies
+beyond is in another unit or a slip.
+"""
+SMALLEST_SD = 1e-4
+"""Smallest standard deviation of a reading that is read, m/s or m.
+
+A tenth of a millimetre, or of a millimetre a second: what cameras reach in a laboratory. A smaller one claims
+that the model is right to so many digits, and every number that follows is then lost to rounding.
+"""
 TRACK, SENSORS, EVENTS, RECORDINGS = "track.csv", "sensors.csv", "events.csv", "recordings.csv"
 
 
@@ -144,14 +156,26 @@ def _reading_problems(row: Row, sensor: Sensor | None, length_m: float | None) -
         problems += _off_track(RECORDINGS, row, "value", value, length_m)
     elif value < 0:
         problems.append(_at(RECORDINGS, row, "value", "a front velocity is not negative; correct it"))
+    elif value > FASTEST_M_S:
+        message = f"expected a front velocity of at most {FASTEST_M_S:g} m/s; correct it, or write it in m/s"
+        problems.append(_at(RECORDINGS, row, "value", message))
+    return problems + _sd_problems(row, sensor, value)
+
+
+def _sd_problems(row: Row, sensor: Sensor, value: float) -> list[Problem]:
+    """Check that the standard deviation of an observed reading is one that something can measure to."""
+    if "sd" in row.unreadable:
+        return []
     stated = row.number_or_none("sd")
-    by_sensor = hypot(sensor.relative_sd * value, sensor.absolute_sd)
-    if stated is None and by_sensor == 0 and "sd" not in row.unreadable:
-        message = (
-            f"the reading's standard deviation is 0; state one, or give sensor '{sensor.id}' an absolute_sd"
-        )
-        problems.append(Problem(RECORDINGS, row.line, "sd", None, message))
-    return problems
+    sd = hypot(sensor.relative_sd * value, sensor.absolute_sd) if stated is None else stated
+    if sd >= SMALLEST_SD:
+        return []
+    unit = "m" if sensor.is_runout else "m/s"
+    message = f"the reading's standard deviation is {sd:g}, expected at least {SMALLEST_SD:g} {unit}"
+    if stated is not None:
+        return [_at(RECORDINGS, row, "sd", f"{message}; write how far readings of this kind are off")]
+    message += f"; state one, or give sensor '{sensor.id}' an absolute_sd"
+    return [Problem(RECORDINGS, row.line, "sd", None, message)]
 
 
 def not_reached_problems(rows: Sequence[Row], sensors: Mapping[str, Sensor]) -> list[Problem]:

@@ -3,10 +3,11 @@
 Everything heavy is imported inside the function, so that ``--help`` is instant.
 """
 
-from skred.cli.exit_codes import DONE, NOT_CONVERGED
+from skred.cli.exit_codes import DONE
 from skred.cli.inputs import campaign_of, hierarchical_of
-from skred.cli.options import Campaigns, DiagnosedModel, Errors, IdleSeed, Smoothing
+from skred.cli.options import HIERARCHICAL, Campaigns, DiagnosedModel, Hierarchical, IdleSeed
 from skred.cli.output import OUTPUT, Output
+from skred.cli.refused import tell_refused_mechanisms
 
 
 def identify(
@@ -14,20 +15,20 @@ def identify(
     /,
     *,
     base_model: DiagnosedModel = "pcm",
-    errors: Errors = None,
+    likelihood: Hierarchical = HIERARCHICAL,
     seed: IdleSeed = 0,
-    smoothing: Smoothing = 10.0,
     output: Output = OUTPUT,
 ) -> int:
     """Say what these recordings can tell at all: from what strength on each mechanism would be seen."""
     from skred.physics.laws import load_law
 
     law = load_law(base_model)
-    problem = hierarchical_of(campaign_of(campaign), errors, smoothing)
-    folder = output.folder("identify")
+    tell_refused_mechanisms()
+    problem = hierarchical_of(campaign_of(campaign), likelihood.errors, likelihood.smoothing)
+    with output.results("identify") as results:
+        from skred.diagnosis.detect.run import identify_to
+        from skred.report.diagnosis.identify import identify_table
 
-    from skred.diagnosis.detect.run import identify_table, identify_to
-
-    document = identify_to(problem, law, folder, output.tell)
-    output.show(document, identify_table, document["statement"], folder)
-    return DONE if document["reason"] is None else NOT_CONVERGED
+        document = identify_to(problem, law, results.unfinished, output.tell)
+    output.show(document, identify_table, document["statement"], results.path)
+    return DONE  # nothing is sampled, and "these recordings cannot tell" is an answer

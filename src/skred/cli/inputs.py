@@ -10,7 +10,7 @@ from skred.errors import InputError
 if TYPE_CHECKING:
     from skred.campaign import Campaign
     from skred.inference.hierarchical.problem import HierarchicalProblem
-    from skred.inference.problem import PooledProblem
+    from skred.inference.pooled.problem import PooledProblem
     from skred.physics.law import Law
 
 
@@ -61,7 +61,7 @@ def hierarchical_of(campaign: "Campaign", errors: str | None, smoothing: float) 
 
 def pooled_or_reason(campaign: "Campaign", smoothing: float) -> "PooledProblem | str":
     """The pooled problem of a campaign, or why there is none."""
-    from skred.inference.problem import pooled_problem
+    from skred.inference.pooled.problem import pooled_problem
 
     try:
         problem = pooled_problem(campaign, smoothing_m=smoothing)

@@ -6,6 +6,7 @@ imported inside the functions, so that ``--help`` is instant.
 
 import sys
 
+from skred.cli.calibrate import calibrate
 from skred.cli.compare import compare
 from skred.cli.diagnose import diagnose
 from skred.cli.identify import identify
@@ -20,6 +21,7 @@ app = new_program(
     "skred", "Calibrate avalanche models against recordings, and find the physics that they miss."
 )
 app.command(validate)
+app.command(calibrate)
 app.command(compare)
 app.command(predict)
 app.command(diagnose)

@@ -1,12 +1,13 @@
 """Options that commands share, each with its check and its help."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter, validators
 
 if TYPE_CHECKING:
+    from skred.diagnosis.effort import Effort
     from skred.inference.sampling import SamplerSettings
 
 Campaigns = Annotated[str, Parameter(help="A folder, or the name of an embedded campaign.")]
@@ -20,11 +21,9 @@ MaxMechanisms = Annotated[
     int | None,
     Parameter(
         validator=validators.Number(gte=1, lte=2),
-        help="Mechanisms let in at most, one after the other; by default 2, with --quick 1.",
+        help="Mechanisms added at most, one after the other; by default 2, with --quick 1.",
     ),
 ]
-MAX_MECHANISMS = {False: 2, True: 1}
-"""Mechanisms let in where no number is asked for, by whether it is to be quick."""
 Quick = Annotated[
     bool,
     Parameter(
@@ -116,7 +115,8 @@ Force = Annotated[
     Parameter(
         name="--force",
         negative="",
-        help="Use a folder that holds files, and replace or remove those that the command writes.",
+        help="Use a folder that holds files, and replace or remove what the same command wrote there before. "
+        "The earlier results stay until the run is done.",
     ),
 ]
 Quiet = Annotated[bool, Parameter(name="--quiet", negative="", help="Write nothing but errors.")]
@@ -143,5 +143,54 @@ class Sampling:
 
 SAMPLING = Sampling()
 """How a command samples unless told otherwise."""
-DIAGNOSIS_SAMPLING = Sampling(draws=600, tune=1000)
-"""How a diagnosis samples: enough to pass the gate nearly always; with more where it did not."""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Hierarchical:
+    """Options of a command for which every avalanche has its own parameters."""
+
+    errors: Errors = None
+    smoothing: Smoothing = 10.0
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Likelihood:
+    """Options of a command that takes both likelihoods."""
+
+    likelihood: Likelihoods = "pooled"
+    errors: Errors = None
+    smoothing: Smoothing = 10.0
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Diagnosing:
+    """How much a diagnosis does."""
+
+    max_mechanisms: MaxMechanisms = None
+    exact_loo: ExactHeldOut = False
+    outer_folds: OuterFolds = None
+    lock: Lock = None
+    quick: Quick = False
+    seed: Seed = 0
+
+    def settings(self) -> "SamplerSettings":
+        """As the sampler wants them."""
+        from skred.diagnosis.effort import SAMPLING
+
+        return replace(SAMPLING, seed=self.seed)
+
+    def effort(self) -> "Effort":
+        """As the diagnosis wants it."""
+        from skred.diagnosis.effort import effort_of
+
+        effort = replace(effort_of(self.quick), exact_loo=self.exact_loo)
+        if self.max_mechanisms is None:
+            return effort
+        return replace(effort, max_mechanisms=self.max_mechanisms)
+
+
+HIERARCHICAL, LIKELIHOOD, DIAGNOSING = Hierarchical(), Likelihood(), Diagnosing()
+"""What a command does unless told otherwise."""

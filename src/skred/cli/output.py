@@ -2,14 +2,18 @@
 
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cyclopts import Parameter
 
 from skred.cli.options import Force, Json, Out, Quiet
+
+if TYPE_CHECKING:
+    from skred.output import ResultsFolder
 
 
 @Parameter(name="*")
@@ -32,11 +36,13 @@ class Output:
         """Whether a sampler shows its progress."""
         return sys.stderr.isatty() and not self.silent
 
-    def folder(self, command: str) -> Path:
-        """Make or take the folder for results; see `skred.output.output_folder`."""
-        from skred.output import output_folder
+    @contextmanager
+    def results(self, command: str, name: str | None = None) -> "Iterator[ResultsFolder]":
+        """Where the results go; see `skred.output.results_folder`."""
+        from skred.output import results_folder
 
-        return output_folder(self.out, command, force=self.force)
+        with results_folder(self.out, command, force=self.force, name=name) as results:
+            yield results
 
     def tell(self, line: str) -> None:
         """Tell of one stage, on stderr."""

@@ -72,8 +72,8 @@ class Sealing:
         float | None,
         Parameter(
             validator=_SHARE,
-            help="Share of trials, to the nearest whole number, that hide nothing, half of them nasty; "
-            "by default each is drawn so with probability 0.35.",
+            help="Share of trials, to the nearest whole number, that hide nothing, half of them contaminated "
+            "(by a bad reading, say); by default each is drawn so with probability 0.35.",
         ),
     ] = None
     unlisted_share: Annotated[
@@ -249,7 +249,7 @@ def _begun(out: Path) -> bool:
 def _new(out: Path | None) -> Path:
     from skred.output import output_folder
 
-    return output_folder(out, "prove", force=False)
+    return output_folder(out, "prove")
 
 
 def _seal(folder: "ProofFolder", sealing: Sealing, working: Working, silent: bool) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from skred.diagnosis.augment.add import add_mechanisms
-from skred.diagnosis.augment.augmented import CLAIM_LIMIT
+from skred.diagnosis.augment.problem import CLAIM_LIMIT
 from skred.diagnosis.augment.reference import Reference
 from skred.diagnosis.augment.step import Augmented, NotAugmented
 from skred.diagnosis.check.bootstrap_test import bootstrap_test
@@ -21,6 +21,7 @@ from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.detect.too_little import too_little
 from skred.diagnosis.effort import Effort, Run
 from skred.diagnosis.evidence.coefficient import fit_base
+from skred.diagnosis.evidence.compile_ahead import compile_ahead
 from skred.diagnosis.evidence.population_draws import population_draws, typical
 from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.outcome import (
@@ -37,6 +38,7 @@ from skred.diagnosis.predict.profile_law import profile_law
 from skred.inference.calibrate import Calibration, calibrate_surely
 from skred.inference.hierarchical.problem import COARSER, HierarchicalProblem
 from skred.inference.sampling import SamplerSettings
+from skred.parallel.processes import meanwhile
 from skred.physics.law import Law
 
 
@@ -71,6 +73,7 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
     """All steps of a diagnosis."""
     clock, effort = run.clock, run.effort
     clock.stage("base", f"{law.id}: calibrating the base law")
+    meanwhile(compile_ahead, asked.readings, asked.error_model)  # where there are workers
     calibration = calibrate_surely(as_diagnosed(asked), law, run.settings)
     problem = _problem_of(calibration)
     if not calibration.gate.passed:

@@ -7,8 +7,12 @@ from dataclasses import dataclass
 from skred.diagnosis.clock import Clock
 from skred.inference.sampling import SamplerSettings
 
+SAMPLING = SamplerSettings("metropolis", draws=600, tune=1000, chains=4, seed=0)
+"""How a diagnosis samples: enough to converge nearly always; with more draws where it did not."""
+QUICK_MECHANISMS = 1
+"""Mechanisms that a quick diagnosis adds at most: a second one takes another comparison, half of the time."""
 QUICK_REPLICAS = 100
-"""Bootstrap campaigns of a quick diagnosis: the fewest with which a p-value can reach 0.01."""
+"""Bootstrap campaigns of a quick diagnosis: nearly the fewest with which a p-value can reach 0.01."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +32,11 @@ class Effort:
     replicas: int = 120
     max_mechanisms: int = 2
     exact_loo: bool = False
+
+
+def effort_of(quick: bool) -> Effort:
+    """How much a diagnosis computes for a person who sets nothing, or only asks for a quick one."""
+    return Effort(QUICK_REPLICAS, QUICK_MECHANISMS) if quick else Effort()
 
 
 @dataclass(frozen=True)

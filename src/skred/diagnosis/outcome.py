@@ -111,6 +111,11 @@ class NotDiagnosed:
         """That the recordings cannot tell."""
         return Decision("cannot_tell", ())
 
+    @property
+    def refits_not_converged(self) -> tuple[str, ...]:
+        """None: nothing was refitted."""
+        return ()
+
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
@@ -159,6 +164,23 @@ class Diagnosis:
     def reason(self) -> str:
         """Why what the comparison named could not be added; empty where there is no such reason."""
         return self.finding.reason if isinstance(self.finding, NothingAdded) else ""
+
+    @property
+    def after(self) -> HeldOut | None:
+        """Avalanches left out, as the law with what was added predicts them; None where nothing was added."""
+        return None if isinstance(self.finding, NothingAdded) else self.finding.after
+
+    @property
+    def refits_not_converged(self) -> tuple[str, ...]:
+        """Avalanches whose refit did not converge, before or after, in the order of the campaign."""
+        held = (self.before, self.after)
+        failed = {event for one in held if one is not None for event in one.not_converged}
+        return tuple(event for event in self.problem.campaign.event_ids if event in failed)
+
+    @property
+    def converged(self) -> bool:
+        """Whether every number of the verdict rests on chains that converged."""
+        return not self.refits_not_converged and not self.reason
 
     @property
     def steps(self) -> tuple[Step, ...]:

@@ -1,7 +1,7 @@
 """Diagnoses judged on avalanches that they have not seen: locked ones opened once, and an outer fold.
 
-The gain that selected a model must not be the gain that is reported: avalanches are set aside before anything
-is looked at, and in an outer fold the whole diagnosis is repeated without each part of them.
+The gain that selected a model must not be the gain that is reported. So avalanches are set aside before
+anything is looked at; and in an outer fold the whole diagnosis is repeated without each part of them.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def set_aside(problem: HierarchicalProblem, n: int, seed: int) -> tuple[Hierarch
 
 
 def open_locked(found: Outcome, locked: Campaign, seed: int) -> dict[str, Any]:
-    """What locked avalanches make of a diagnosis; null where nothing was let in, or calibrated at all."""
+    """What locked avalanches make of a diagnosis; null where nothing was added, or calibrated at all."""
     document: dict[str, Any] = {"events": list(locked.event_ids)}
     keys = ("log_score", *_ERRORS)
     document |= {f"{key}_{when}": None for when in ("before", "after") for key in keys}
@@ -107,9 +107,9 @@ def outer_folds(
     k: int,
     tell: Tell = lambda line: None,
 ) -> dict[str, Any]:
-    """Repeat the whole diagnosis without each fold, and score the fold before and after by what it let in.
+    """Repeat the whole diagnosis without each fold, and score the fold before and after what it added.
 
-    Where it lets nothing in, after is before.
+    Where it adds nothing, after is before.
     """
     folds = folds_of(problem, k, settings.seed)
     entries, pairs = list[dict[str, Any]](), list[float]()

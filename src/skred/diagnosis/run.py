@@ -14,6 +14,7 @@ from skred.diagnosis.effort import Effort
 from skred.diagnosis.outcome import NotDiagnosed, Outcome
 from skred.diagnosis.repeated import folds_of, open_locked, outer_folds, set_aside
 from skred.diagnosis.verdict.document import verdict
+from skred.diagnosis.verdict.draws import augmented_draws
 from skred.diagnosis.verdict.figure_data import figure_data
 from skred.diagnosis.verdict.report_facts import report_facts
 from skred.inference.hierarchical.problem import HierarchicalProblem
@@ -81,9 +82,9 @@ def diagnose_to(
 
 def _draws_of(found: Outcome) -> dict[str, xr.DataTree]:
     """Draws of every calibration of a diagnosis, by the name of their file."""
-    kept = {"base.nc": found.calibration}
+    trees = {} if found.calibration is None else {"base.nc": found.calibration.tree}
     if not isinstance(found, NotDiagnosed) and found.steps:
         if found.reference is not found.calibration:
-            kept["base_same_errors.nc"] = found.reference
-        kept["augmented.nc"] = found.steps[-1].calibration
-    return {name: one.tree for name, one in kept.items() if one is not None}
+            trees["base_same_errors.nc"] = found.reference.tree
+        trees["augmented.nc"] = augmented_draws(found)
+    return trees

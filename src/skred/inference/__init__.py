@@ -1,1 +1,1 @@
-"""Ring 2, inference: the Op around the kernel, likelihoods, sampling, comparison."""
+"""Inference: likelihoods of recordings, sampling of posteriors, and scores of predictions."""

@@ -1,4 +1,4 @@
-"""Calibrate one law on one campaign: sample, gate, gather, write."""
+"""Calibrate one law on one campaign: sample, check convergence, gather the results, write them."""
 
 from __future__ import annotations
 
@@ -13,18 +13,20 @@ import arviz_stats as az
 import pymc as pm
 import xarray as xr
 
+import skred.inference.hierarchical.results  # noqa: F401 - registers what it says of readings
+import skred.inference.pooled.results  # noqa: F401 - likewise
 from skred.inference.along_track import with_along_track
 from skred.inference.gate import Gate, check_gate
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY, interval
 from skred.inference.joint_metropolis import JointMetropolis
 from skred.inference.problem import Problem
-from skred.inference.results import assemble, save
+from skred.inference.results import assemble, save, summary
 from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior
 from skred.output import write_json
 from skred.physics.law import Law, Parameter
 
 MORE, LONGER = 4, 2
-"""How many times the draws a further attempt makes, and how many attempts with more there are."""
+"""Factor on the number of draws in each further attempt, and the number of such attempts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +36,7 @@ class Calibration:
     Attributes
     ----------
     law, problem, settings :
-        What was asked for.
+        The law, the campaign with its likelihood, and how it was sampled.
     tree : DataTree
         See `skred.inference.results.assemble`.
     gate : Gate
@@ -53,29 +55,29 @@ class Calibration:
 
     @cached_property
     def step(self) -> JointMetropolis:
-        """Compiled for the model, its event terms weightable."""
+        """The sampler's step, compiled for the model; every event's term can be weighted."""
         return JointMetropolis(model=self.model, pointwise="recordings")
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what is compiled: it is compiled anew where it is asked for."""
+        """Without compiled functions; they are compiled again when they are needed."""
         return {name: value for name, value in vars(self).items() if name not in ("model", "step")}
 
     def entry(self) -> dict[str, Any]:
-        """The calibration as plain data: gate, parameters and mean response, with units."""
+        """The calibration as plain data, with units: convergence, parameters, fit and predictions."""
         return {
             "id": self.law.id,
             "title": self.law.title,
             "equation": self.law.equation,
             "gate": self.gate.as_dict(),
             "parameters": _parameter_rows(self.tree, self.problem.parameters(self.law)),
-            **self.problem.summary(self.law, self.tree),
+            **summary(self.problem, self.law, self.tree),
         }
 
 
 def calibrate(
     problem: Problem, law: Law, settings: SamplerSettings, *, progress: bool = False
 ) -> Calibration:
-    """Sample the posterior of a law and diagnose it."""
+    """Sample the posterior of a law and check its convergence."""
     model = law.build(problem)
     prior = sample_prior(model, law, settings.seed)
     step = JointMetropolis(model=model, pointwise="recordings")
@@ -84,17 +86,17 @@ def calibrate(
     gate = gate.with_numerical_problems(problem.numerical_problems(law, posterior["posterior"].to_dataset()))
     tree = assemble(problem, law, posterior, prior, gate, settings)
     found = Calibration(law, problem, settings, tree, gate)
-    vars(found).update(model=model, step=step)  # there already: not to be compiled again
+    vars(found).update(model=model, step=step)  # compiled already
     return found
 
 
 def calibrate_surely(problem: Problem, law: Law, settings: SamplerSettings) -> Calibration:
-    """As `calibrate`, and again where the gate failed.
+    """Calibrate, and repeat it where the convergence criteria are not met.
 
-    With finer numerics as long as those were too rough and can be made finer: the calibration's problem is
-    then another than was given. Chains can be stuck in a mode that only rough numerics make. Then, as long as
-    chains are too short, with `MORE` times the draws: along a bent ridge of two strengths that stand for each
-    other chains go slowly, and need that twice.
+    First with finer numerics, as long as they are too rough and can be refined: rough numerics can create
+    a mode that is not there, in which chains get stuck. The problem of the result is then the refined one.
+    Then, as long as chains are too short, with `MORE` times the draws. Chains mix slowly along a curved
+    ridge of two coefficients that compensate each other, and need that twice.
     """
     found = calibrate(problem, law, settings)
     while not found.gate.numerics:
@@ -116,7 +118,7 @@ def write_calibration(calibration: Calibration, folder: Path) -> None:
     tree = with_along_track(calibration.tree, calibration.law, calibration.problem)
     save(tree, folder / "posterior.nc")
     attributes = calibration.tree.attrs
-    summary = {
+    document = {
         "format": 1,
         "campaign": attributes["campaign"],
         "campaign_fingerprint": attributes["campaign_fingerprint"],
@@ -127,7 +129,7 @@ def write_calibration(calibration: Calibration, folder: Path) -> None:
         "interval": {"kind": INTERVAL_KIND, "probability": INTERVAL_PROBABILITY},
         **calibration.entry(),
     }
-    write_json(folder / "summary.json", summary)
+    write_json(folder / "summary.json", document)
 
 
 def _parameter_rows(tree: xr.DataTree, parameters: Sequence[Parameter]) -> list[dict[str, Any]]:

@@ -1,8 +1,8 @@
-"""How readings scatter about what one front does: the error models, and recordings as they read them.
+"""Error models: how readings scatter about what one front does; and recordings as they enter the likelihood.
 
-The relative part of an error is taken of the prediction, not of the noisy reading. Where a front
-stopped enters once, as an interval between the lowest sensor that it reached and the highest that
-it did not, softened by how well the places are known.
+The relative part of an error refers to the prediction, not to the noisy reading. The place where a front
+stopped enters once: as an interval between the lowest sensor that the front reached and the highest that it
+did not reach, with soft ends because places are uncertain.
 """
 
 from __future__ import annotations
@@ -17,12 +17,14 @@ from skred.campaign import Campaign, Status
 
 FloatArray = NDArray[np.float64]
 DEFAULT_ERRORS = "robust"
+OUTLIER_FACTOR = 6.0
+"""How much wider than its stated error an outlying reading scatters."""
 PLACE_SD_M = 8.0
-"""How well it is known where a front stopped relative to a sensor."""
+"""Standard deviation [m] of the place where a front stopped, relative to a sensor."""
 
 
 class Errors(NamedTuple):
-    """An error model as numba reads it: a mixture over what an event's errors are like.
+    """An error model for compiled code: a mixture of cases, one case for each event.
 
     Attributes
     ----------
@@ -59,6 +61,45 @@ class ErrorModel:
     title: str
     errors: Errors
 
+    def draw(
+        self,
+        predictions: FloatArray,
+        sd: FloatArray,
+        is_velocity: NDArray[np.bool_],
+        rng: np.random.Generator,
+    ) -> FloatArray:
+        """Readings of avalanches, with errors.
+
+        Parameters
+        ----------
+        predictions : (..., n_sensors) array, m/s or m
+            Readings without errors. A row is one avalanche: its readings share what the model has in common.
+        sd : (..., n_sensors) array
+            Stated standard deviations, as `EventReadings.sd` gives them.
+        is_velocity : (n_sensors,) boolean array
+        rng : numpy Generator
+        """
+        errors, shape = self.errors, predictions.shape
+        case = rng.choice(len(errors.weights), size=shape[:-1], p=errors.weights)[..., None]
+        noise = rng.standard_normal(shape)
+        if errors.common > 0.0:
+            shared = np.sqrt(errors.common) * rng.standard_normal((*shape[:-1], 1))
+            noise = np.where(is_velocity, shared + np.sqrt(1.0 - errors.common) * noise, noise)
+        if errors.degrees > 0.0:
+            noise = noise * np.sqrt(errors.degrees / rng.chisquare(errors.degrees, shape))
+        outlying = rng.random(shape) < errors.shares[case]
+        noise = noise * np.where(outlying, OUTLIER_FACTOR, 1.0) * errors.scales[case]
+        readings: FloatArray = predictions + sd * noise
+        return readings
+
+    @property
+    def variance(self) -> float:
+        """Variance of an error that `draw` makes, in stated variances."""
+        errors = self.errors
+        widened = 1.0 + errors.shares * (OUTLIER_FACTOR**2 - 1.0)
+        tails = errors.degrees / (errors.degrees - 2.0) if errors.degrees > 0.0 else 1.0
+        return float(tails * (errors.weights @ (errors.scales**2 * widened)))
+
 
 def _errors(
     weights: Any = 1.0, scales: Any = 1.0, shares: Any = 0.0, degrees: float = 0.0, common: float = 0.0
@@ -69,8 +110,8 @@ def _errors(
 
 
 _NODES = np.linspace(-4.0, 4.0, 27)
-"""Of a standard normal variable, evenly: many readings tell an event's factor to a tenth, which Gauss-Hermite
-nodes would step over."""
+"""Evenly spaced nodes of a standard normal variable. Many readings determine an event's factor to a tenth;
+Gauss-Hermite nodes would be too far apart for that."""
 _WEIGHTS = np.exp(-0.5 * _NODES**2)
 ERROR_MODELS: dict[str, ErrorModel] = {
     model.id: model
@@ -94,11 +135,11 @@ ERROR_MODELS: dict[str, ErrorModel] = {
         ),
     )
 }
-"""Error models by name; compared, not assumed."""
+"""Error models by name. A comparison of laws compares them too."""
 
 
 class EventReadings(NamedTuple):
-    """The recordings as the error models read them, made by `event_readings`.
+    """The recordings as they enter the likelihood, made by `event_readings`.
 
     Attributes
     ----------
@@ -125,6 +166,22 @@ class EventReadings(NamedTuple):
     reached: FloatArray
     not_reached: FloatArray
     place_sd: float
+
+    def sd(self, event: int | NDArray[np.int64], predictions: FloatArray) -> FloatArray:
+        """Stated standard deviations of events' readings: their own where they state one, else the sensor's.
+
+        Parameters
+        ----------
+        event : int or (n,) integer array
+        predictions : (n, n_sensors) array, m/s or m
+        """
+        own = self.stated_sd[event]
+        return np.where(own > 0.0, own, self.sensor_sd(predictions))
+
+    def sensor_sd(self, predictions: FloatArray) -> FloatArray:
+        """Standard deviations as the sensors state them, (..., n_sensors)."""
+        sd: FloatArray = np.hypot(self.relative_sd * predictions, self.absolute_sd)
+        return sd
 
 
 def event_readings(campaign: Campaign, place_sd_m: float = PLACE_SD_M) -> EventReadings:

@@ -1,4 +1,7 @@
-"""The gate: whether the chains of a calibration can be trusted."""
+"""Convergence criteria: whether the chains of a calibration found the posterior.
+
+They say nothing of fit, which `skred.inference.fit` checks.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ class Gate:
     divergences : int
         Of NUTS; 0 for other samplers.
     problems : tuple of str
-        What failed and what to do; empty if the gate is passed.
+        What failed and what to do; empty if all criteria are met.
     numerics : bool
         Whether the numerics of the likelihood were good enough.
     """
@@ -41,7 +44,7 @@ class Gate:
 
     @property
     def passed(self) -> bool:
-        """Whether the result may be used."""
+        """Whether all criteria are met."""
         return not self.problems
 
     @property
@@ -50,7 +53,7 @@ class Gate:
         return not (self.r_hat_max <= R_HAT_LIMIT and min(self.ess_bulk_min, self.ess_tail_min) >= ESS_LIMIT)
 
     def with_numerical_problems(self, more: Sequence[str]) -> Gate:
-        """The same gate with what is wrong with the numerics, if anything is."""
+        """The same with numerical problems added, if there are any."""
         return replace(self, problems=(*self.problems, *more), numerics=not more)
 
     def as_dict(self) -> dict[str, Any]:
@@ -61,7 +64,7 @@ class Gate:
 
 
 def check_gate(tree: xr.DataTree, parameters: Sequence[str]) -> Gate:
-    """Diagnose a posterior.
+    """Check the convergence of a posterior.
 
     Parameters
     ----------
@@ -71,7 +74,7 @@ def check_gate(tree: xr.DataTree, parameters: Sequence[str]) -> Gate:
         The free random variables.
     """
     posterior = tree["posterior"].to_dataset()[list(parameters)]
-    # Chains that never moved have no variance to divide by: NaN, which fails below.
+    # Chains that never moved have no variance: NaN, which fails below.
     with np.errstate(divide="ignore", invalid="ignore"):
         r_hat = _extreme(az.rhat(posterior), max)
         ess_bulk = _extreme(az.ess(posterior, method="bulk"), min)
@@ -79,7 +82,7 @@ def check_gate(tree: xr.DataTree, parameters: Sequence[str]) -> Gate:
     stats = tree["sample_stats"].to_dataset() if "sample_stats" in tree.children else xr.Dataset()
     divergences = int(stats["diverging"].sum()) if "diverging" in stats else 0
     problems = []
-    # Written so that NaN, as from chains that never moved, fails too.
+    # Written so that NaN fails too.
     if not r_hat <= R_HAT_LIMIT:
         problems.append(
             f"r-hat {r_hat:.3f} exceeds {R_HAT_LIMIT}: more --tune, or look at the trace for modes"

@@ -1,4 +1,4 @@
-"""What is told of numbers: the kind of interval in all tables and files, and which differences count."""
+"""Conventions of all tables and files: the kind of interval, and the least difference that counts."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 INTERVAL_KIND, INTERVAL_PROBABILITY = "equal-tailed", 0.9
 PRACTICAL_DIFFERENCE = 4.0
-"""Differences of elpd below this are called no practical difference."""
+"""Smaller differences of elpd are called no practical difference."""
 
 
 def interval(values: Any) -> tuple[float, float]:

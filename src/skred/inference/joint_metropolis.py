@@ -26,22 +26,22 @@ from pymc.pytensorf import join_nonshared_inputs
 from pymc.step_methods.metropolis import MetropolisState
 from pymc.step_methods.state import dataclass_state
 
-from skred.inference.compiled import compiled
+from skred.parallel.compile_cache import compiled, inner
 
 FloatArray = NDArray[np.float64]
 MOVES_PER_DRAW = 4
-"""Moves between two draws that are kept, half of them jumps; the others would be all but copies."""
+"""Moves between two draws that are kept, half of them jumps. Draws after fewer moves are nearly copies."""
 DEGREES_OF_FREEDOM = 6.0
-"""Of the jumps: tails heavier than the posterior's, so that no jump is too good to leave."""
+"""Degrees of freedom of the jumps. Their tails must be heavier than the posterior's, or chains get stuck."""
 _BLOCK = 100
-"""Draws made at once when tuning is over and the proposals are fixed."""
+"""Draws made in one call after tuning, when proposals are fixed."""
 TARGET_ACCEPTANCE = {1: 0.44, 2: 0.35}
 _TARGET_ELSE = 0.25
 _FORGET_UNTIL = 10
 """Adaptation steps after which the chain's past counts in full (the start is forgotten)."""
 
 
-@compiled()
+@inner()
 def _weighted_sum(rest, pointwise, weights):  # type: ignore[no-untyped-def]
     """Log density of the model with every pointwise term weighted; NaN becomes -inf."""
     total = rest.item()
@@ -51,7 +51,7 @@ def _weighted_sum(rest, pointwise, weights):  # type: ignore[no-untyped-def]
     return -np.inf if np.isnan(total) else total
 
 
-@compiled()
+@inner()
 def _log_t(z):  # type: ignore[no-untyped-def]
     """Log density of a multivariate Student t at standardised z, but for its constant."""
     square = 0.0
@@ -60,7 +60,7 @@ def _log_t(z):  # type: ignore[no-untyped-def]
     return -0.5 * (DEGREES_OF_FREEDOM + z.size) * np.log1p(square / DEGREES_OF_FREEDOM)
 
 
-@compiled()
+@inner()
 def _standardise(x, mean, factor, z):  # type: ignore[no-untyped-def]
     """Solve x = mean + factor z."""
     for i in range(x.size):
@@ -70,7 +70,7 @@ def _standardise(x, mean, factor, z):  # type: ignore[no-untyped-def]
         z[i] /= factor[i, i]
 
 
-@compiled()
+@inner()
 def _add_product(start, factor, z, result):  # type: ignore[no-untyped-def]
     """Write start + factor z to `result`."""
     for i in range(z.size):
@@ -88,6 +88,7 @@ def _run_chain(  # type: ignore[no-untyped-def]
     pointwise terms there in `terms` unless that is empty. Returns the share of all moves that was
     accepted and the mean probability of acceptance of the walks.
     """
+    # Eleven parameters: compiled for a signature of plain arrays, some of which it fills.
     n_draws, n_moves, n = noise.shape
     accepted, acceptance, n_walks = 0, 0.0, 0
     proposal, z = np.empty(n), np.empty(n)
@@ -112,12 +113,16 @@ def _run_chain(  # type: ignore[no-untyped-def]
                 n_walks += 1
                 acceptance += np.exp(min(difference, 0.0))
             if log_uniforms[draw, move] < difference:
-                q[:] = proposal
+                for i in range(n):
+                    q[i] = proposal[i]
                 current = proposed
                 accepted += 1
-        draws[draw] = q
+        for i in range(n):
+            draws[draw, i] = q[i]
         if terms.size > 0:
-            terms[draw] = density((q, *data))[1]
+            _, pointwise = density((q, *data))
+            for i in range(pointwise.size):
+                terms[draw, i] = pointwise[i]
     return accepted / (n_draws * n_moves), acceptance / n_walks
 
 
@@ -137,7 +142,7 @@ def _chain_for(density: types.FunctionType, data: types.BaseTuple) -> Callable[.
 
 
 class _WithoutDensity:
-    """A model for PyMC's own step, which would compile a density for moves that are not made here."""
+    """A model for PyMC's own step, without a density: PyMC would compile one that is not used here."""
 
     def __init__(self, model: pm.Model) -> None:
         self._model = model
@@ -154,7 +159,7 @@ class _WithoutDensity:
 
 @dataclass_state
 class JointMetropolisState(MetropolisState):
-    """PyMC's state and what the adaptation has learnt."""
+    """PyMC's state, and the state of the adaptation."""
 
     mean: np.ndarray
     covariance: np.ndarray
@@ -239,7 +244,7 @@ class JointMetropolis(pm.Metropolis):
         return tuple(np.require(container.storage[0], requirements=("C", "W")) for container in self._data)
 
     def reset_tuning(self) -> None:
-        """Forget what was learnt."""
+        """Reset the adaptation."""
         super().reset_tuning()
         if hasattr(self, "_start"):
             self.mean, self.covariance = np.zeros(len(self._start)), self._start.copy()
@@ -248,7 +253,7 @@ class JointMetropolis(pm.Metropolis):
             self._forget_block()
 
     def _forget_block(self) -> None:
-        """Drop the draws made ahead."""
+        """Drop draws that were made in advance."""
         self._block, self._used = np.empty((0, len(self._start))), 0
         self._stood, self._stats = np.empty(0), {"accept": 0.0, "accepted": 0.0}
 
@@ -265,7 +270,7 @@ class JointMetropolis(pm.Metropolis):
         return RaveledVars(q, q0.point_map_info), [stats]
 
     def _next_of_block(self, q: FloatArray) -> FloatArray:
-        """The draw after q from a block made at once, or from a new one if q is not where it stood."""
+        """The draw after q, from the present block of draws, or from a new block if q was changed."""
         if self._used >= len(self._block) or not np.array_equal(q, self._stood):
             self._block, _, accepted, acceptance = self._run(q, _BLOCK, self.rng, with_terms=False)
             self._stats = {"accept": acceptance, "accepted": accepted}

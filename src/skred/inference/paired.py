@@ -1,4 +1,4 @@
-"""Paired differences of elpd between models of the same events, and when such a difference counts."""
+"""Paired differences of elpd between models of the same events, and whether they are practical ones."""
 
 from __future__ import annotations
 
@@ -46,6 +46,6 @@ def sum_se(values: ArrayLike) -> float:
 
 
 def best_first(entries: Sequence[Entry], elpd: Callable[[Entry], float]) -> tuple[list[Entry], list[Entry]]:
-    """Entries that passed the gate, best first, and those that failed it."""
+    """Entries that converged, best first, and those that did not."""
     passed = sorted((entry for entry in entries if entry["gate"]["passed"]), key=lambda entry: -elpd(entry))
     return passed, [entry for entry in entries if not entry["gate"]["passed"]]

@@ -1,12 +1,12 @@
-"""A calibration as one DataTree: named dims, units, and everything needed to trust or redo it."""
+"""A calibration as one DataTree: named dimensions, units, diagnostics, and what is needed to repeat it."""
 
 from __future__ import annotations
 
 import json
-import os
 import platform
 from collections.abc import Sequence
 from dataclasses import asdict
+from functools import singledispatch
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -18,11 +18,29 @@ from skred.inference.gate import Gate
 from skred.inference.problem import Problem
 from skred.inference.recorded_data import recorded_groups
 from skred.inference.sampling import SamplerSettings
+from skred.output import write_bytes
 from skred.physics.law import Law, Parameter, parameter_of
 
 FORMAT = 1
 """Of the files with trees; figures are made from no other."""
 _PACKAGES = ("skred", "pymc", "pytensor", "arviz", "numba", "numpy", "scipy", "xarray")
+
+
+@singledispatch
+def predictive(
+    problem: Problem, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
+) -> dict[str, xr.Dataset]:
+    """Groups of a result that are a likelihood's own, from draws of the parameters.
+
+    Each kind of problem registers its own in the module that makes its results.
+    """
+    raise TypeError(f"no predictive groups are registered for problems of type {type(problem).__name__}")
+
+
+@singledispatch
+def summary(problem: Problem, law: Law, tree: xr.DataTree) -> dict[str, Any]:
+    """Plain data for a summary beside the parameters, from the whole result; registered likewise."""
+    raise TypeError(f"no summary is registered for problems of type {type(problem).__name__}")
 
 
 def assemble(
@@ -38,7 +56,7 @@ def assemble(
     Groups
     ------
     posterior, prior : parameters of the law, and of the population in a hierarchical calibration
-    posterior_predictive, prior_predictive, event_posterior : see `pooled_results`, `hierarchical_results`
+    posterior_predictive, prior_predictive, event_posterior : see `predictive`
     log_likelihood : ``recordings`` (chain, draw, event)
     observed_data, constant_data : see `skred.inference.recorded_data.recorded_groups`
     """
@@ -54,7 +72,7 @@ def assemble(
             coords={**chain_and_draw(parameters), "event": problem.coords["event"]},
         ),
         "prior": _with_units(prior, own, law),
-        **problem.predictive(law, parameters, prior, settings.seed),
+        **predictive(problem, law, parameters, prior, settings.seed),
         **recorded_groups(problem),
     }
     if "sample_stats" in posterior.children:
@@ -70,10 +88,18 @@ def chain_and_draw(dataset: xr.Dataset) -> dict[str, Any]:
 
 
 def save(tree: xr.DataTree, file: Path) -> None:
-    """Write a tree as netCDF, whole or not at all."""
-    partial = file.with_name(f".{file.name}.partial")
-    tree.to_netcdf(partial, engine="h5netcdf")
-    os.replace(partial, file)
+    """Write a tree as netCDF, whole or not at all.
+
+    By way of memory: where the disk is full, HDF5 ends the whole process instead of raising an error.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    content = tree.to_netcdf(engine="h5netcdf")
+    assert isinstance(content, memoryview)
+    write_bytes(file, content)
 
 
 def _with_units(parameters: xr.Dataset, own: Sequence[Parameter], law: Law) -> xr.Dataset:

@@ -1,1 +1,1 @@
-"""Laws compared on one campaign: leave-one-out, WAIC, evidence, weights."""
+"""Comparison of laws on one campaign: leave-one-event-out, WAIC, evidence, stacking weights."""

@@ -13,8 +13,8 @@ from skred.inference.problem import Problem
 def alpha_beta_entry(problem: Problem) -> dict[str, Any]:
     """The alpha-beta model's extreme runout beside the largest recorded one.
 
-    It predicts where the extreme avalanche of a path stops, not the distribution of its runouts,
-    so it has no place in a comparison by leave-one-event-out.
+    It predicts the runout of the extreme avalanche of a path, not the distribution of runouts. It cannot be
+    compared by leave-one-event-out.
     """
     campaign, terrain = problem.campaign, problem.terrain
     runouts = [j for j, sensor in enumerate(campaign.sensors) if sensor.is_runout]

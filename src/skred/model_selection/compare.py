@@ -1,4 +1,4 @@
-"""Compare laws on one campaign: leave-one-event-out, information criteria, evidence, weights."""
+"""Compare laws on one campaign: leave-one-event-out, WAIC, evidence, stacking weights."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY, PRACTICAL_DIFFERENCE
 from skred.inference.leave_one_out import ExactLoo, exact_leave_one_out
 from skred.inference.paired import best_first, paired_difference, sum_se
-from skred.inference.problem import PooledProblem, Problem
+from skred.inference.pooled.problem import PooledProblem
+from skred.inference.problem import Problem
 from skred.inference.results import save
 from skred.inference.sampling import SamplerSettings
 from skred.inference.waic import waic
@@ -42,7 +43,7 @@ def compare(
     folder: Path,
     tell: Tell = lambda line: None,
 ) -> dict[str, Any]:
-    """Calibrate and compare by the pooled likelihood, writing each law's results as soon as they are there.
+    """Calibrate and compare laws by the pooled likelihood; each law's results are written at once.
 
     Parameters
     ----------
@@ -52,7 +53,7 @@ def compare(
     folder : Path
         Gets a folder for each law, and ``compare.json``: report and figures are made from these.
     tell : callable
-        Detectability one line for each stage.
+        Takes one line for each stage.
 
     Returns
     -------
@@ -73,7 +74,7 @@ def score(
     *,
     exact: bool,
 ) -> dict[str, Any]:
-    """Calibrate laws and score their predictions; `exact` refits without every event in turn.
+    """Calibrate laws and score their predictions; with `exact` all events are left out by refits.
 
     Returns
     -------
@@ -91,7 +92,7 @@ def score(
             entry |= scores(calibration, exact=exact)
             trees[law.id] = calibration.tree
         else:
-            tell(f"{law.id}: the gate failed: {'; '.join(calibration.gate.problems)}")
+            tell(f"{law.id}: the chains did not converge: {'; '.join(calibration.gate.problems)}")
             entry |= dict.fromkeys(("loo", "waic", "exact", "difference", "evidence", "weight"))
         entries.append(entry)
         law_folder = folder / law.id
@@ -115,9 +116,9 @@ def scores(
     evidence_seeds: int = EVIDENCE_SEEDS,
     evidence_draws: int = SMC_DRAWS,
 ) -> dict[str, Any]:
-    """Everything a law's entry says of its predictions.
+    """Scores of a law's predictions.
 
-    Events whose importance sampling is unreliable are refitted exactly, with `exact` all.
+    Events are left out by refits where importance sampling is unreliable; with `exact` all are.
     """
     events = calibration.problem.campaign.event_ids
     seed = calibration.settings.seed
@@ -177,7 +178,7 @@ def _exact_entry(
 def rank(entries: list[dict[str, Any]], trees: dict[str, Any]) -> list[dict[str, Any]]:
     """Entries, best first by exact elpd, with paired differences to the best and stacking weights.
 
-    Entries whose gate failed come last and are not compared.
+    Entries whose chains did not converge come last and are not compared.
     """
     valid, failed = best_first(entries, lambda entry: entry["exact"]["elpd"])
     weights = _stacking([e["id"] for e in valid], trees)
@@ -230,7 +231,7 @@ def _document(
 
 @contextmanager
 def _told_elsewhere() -> Iterator[None]:
-    """Silence ArviZ's warnings of large Pareto k: these are in the tables, and such events are refitted."""
+    """Silence ArviZ's warnings of large Pareto k: the tables show them, and such events are refitted."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Estimated shape parameter", category=UserWarning)
         yield

@@ -1,4 +1,4 @@
-"""Compare laws with every avalanche its own friction, beside the pooled comparison."""
+"""Compare laws by the hierarchical likelihood, beside the pooled comparison."""
 
 from __future__ import annotations
 
@@ -11,14 +11,17 @@ from skred.inference.calibrate import calibrate
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.paired import best_first, paired_difference
-from skred.inference.problem import PooledProblem
+from skred.inference.pooled.problem import PooledProblem
 from skred.inference.sampling import SamplerSettings
 from skred.model_selection.compare import Tell, score, scores, write_comparison
 from skred.model_selection.statement import changes
 from skred.physics.law import Law
 
 _ERROR_MODEL_SEEDS, _ERROR_MODEL_SMC_DRAWS = 1, 500
-_SHOWN = ("id", "title", "gate", "parameters", "loo", "waic", "exact", "difference", "evidence", "weight")
+_SHOWN = (
+    "id", "title", "gate", "parameters", "fit", "fits", "fit_level",
+    "loo", "waic", "exact", "difference", "evidence", "weight",
+)  # fmt: skip
 
 
 def compare_hierarchical(
@@ -31,7 +34,7 @@ def compare_hierarchical(
     *,
     exact: bool = False,
 ) -> dict[str, Any]:
-    """Calibrate and compare by both likelihoods, and the error models under the best law.
+    """Calibrate and compare laws by both likelihoods, and error models under the best law.
 
     Parameters
     ----------
@@ -44,7 +47,7 @@ def compare_hierarchical(
         Gets a folder for each law, ``pooled`` with the same, and ``compare.json``: report and figures are
         made from these.
     tell : callable
-        Detectability one line for each stage.
+        Takes one line for each stage.
     exact : bool
         Refit without every event in turn, not only where importance sampling is unreliable.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from skred.inference.fit import fit_sentences, missed_sensors
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
 
 _NOTABLE_SHARE = 0.05
@@ -16,13 +17,15 @@ def statement(comparison: dict[str, Any]) -> list[str]:
     failed = [model for model in models if not model["gate"]["passed"]]
     sentences = []
     if not valid:
-        sentences.append("No law passed the gate of convergence: there is nothing to compare.")
+        sentences.append("The chains of no law converged: there is nothing to compare.")
     else:
         sentences += _preference(valid, comparison["campaign"]["n_events"])
+        sentences += _fit(valid)
         sentences += _agreement(valid)
     for model in failed:
         sentences.append(
-            f"{model['title']} failed the gate and is not compared: {'; '.join(model['gate']['problems'])}."
+            f"The chains of {model['title']} did not converge, so it is not compared:"
+            f" {'; '.join(model['gate']['problems'])}."
         )
     return sentences
 
@@ -43,13 +46,25 @@ def _preference(valid: list[dict[str, Any]], n_events: int) -> list[str]:
         sentences.append(f"{model['title']} predicts worse by {_by(model)}.")
     for model in close:
         sentences.append(
-            f"{model['title']} is behind by {_by(model)}: no practical difference by the rule of at least"
+            f"{model['title']} is behind by {_by(model)}: no practical difference. One is at least"
             f" {PRACTICAL_DIFFERENCE:.0f} and more than twice the standard error."
         )
     if n_events < 100:
         sentences.append(
-            "With fewer than 100 events these standard errors are optimistic; they are doubled in the rule."
+            "With fewer than 100 events standard errors are optimistic; that is why they are doubled."
         )
+    return sentences
+
+
+def _fit(valid: list[dict[str, Any]]) -> list[str]:
+    """Where laws miss the recordings: the best of several need not be good."""
+    sentences = []
+    for model in valid:
+        if not model["fits"]:
+            sentences.append(
+                f"{model['title']} misses the recordings at {missed_sensors(model)}, more than chance allows."
+            )
+            sentences += fit_sentences(model)
     return sentences
 
 
@@ -85,7 +100,7 @@ def _agreement(valid: list[dict[str, Any]]) -> list[str]:
         if model["exact"]["failed_refits"]:
             sentences.append(
                 f"{_count(len(model['exact']['failed_refits']), 'refit')} of {model['title']} did not"
-                " converge: do not build on its place in the ranking."
+                " converge: its rank is not reliable."
             )
     return sentences
 
@@ -99,10 +114,10 @@ def changes(comparison: dict[str, Any]) -> list[str]:
     ours = [model for model in comparison["models"] if model["gate"]["passed"]]
     theirs = [model for model in comparison["pooled"]["models"] if model["gate"]["passed"]]
     sentences = [
-        "The pooled likelihood gives the path one parameter vector and compares every event with it through"
-        " the recordings' own covariance, which holds the differences between events and whatever else the"
-        " law misses. The hierarchical one gives every avalanche its own parameters and lets its"
-        " readings differ from its own front only by what instruments are stated to err."
+        "The pooled likelihood has one parameter vector for the path. Events differ from its mean response by"
+        " the covariance of the recordings, which also contains what the law misses. The hierarchical"
+        " likelihood has parameters for every avalanche. Its readings differ from its own front only by the"
+        " stated reading errors."
     ]
     if ours:
         sentences += _selection(ours[0])
@@ -127,8 +142,8 @@ def _selection(best: dict[str, Any]) -> list[str]:
     predicted, recorded = 100 * row["reached"], 100 * row["recorded_reached"]
     return [
         f"Under {best['title']} {predicted:.0f} % of new avalanches come to {row['sensor']}, of recorded"
-        f" ones {recorded:.0f} %: an avalanche that stops above the instruments is not recorded, which the"
-        " likelihood does not know, or its parameters vary in another way than assumed."
+        f" ones {recorded:.0f} %. Either avalanches that stop above the instruments were not recorded, which"
+        " the likelihood does not model, or parameters do not vary as assumed."
     ]
 
 
@@ -149,13 +164,13 @@ def _order_change(ours: list[dict[str, Any]], theirs: list[dict[str, Any]]) -> s
 def _level_change(best: dict[str, Any], gain: float) -> str:
     if gain < 0:
         return (
-            f"Under {best['title']} the hierarchical likelihood predicts an unseen event worse, by"
-            f" {-gain:.1f} in elpd: parameters that vary between events, and errors and places of sensors as"
-            " stated, do not account for how the readings of one avalanche differ from its front, while the"
-            " pooled covariance, taken from these same recordings, absorbs that. It is a reason to ask what"
-            " the law or the stated errors miss, not one for the pooled model."
+            f"Under {best['title']} the hierarchical likelihood predicts a left-out event worse, by"
+            f" {-gain:.1f} in elpd. Event-to-event variability and the stated errors do not explain how the"
+            " readings of one avalanche differ from its front. The pooled covariance absorbs that, because it"
+            " is estimated from the same recordings. Ask what the law or the stated errors miss; the pooled"
+            " model is not better for it."
         )
     return (
-        f"Under {best['title']} the hierarchical likelihood predicts an unseen event better, by {gain:.1f} in"
-        " elpd: what differs between events is largely their own parameters."
+        f"Under {best['title']} the hierarchical likelihood predicts a left-out event better, by {gain:.1f}"
+        " in elpd: events differ mostly by their own parameters."
     )

@@ -1,9 +1,8 @@
-"""Helper processes beside this one, for work that is as much Python as compiled code.
+"""Worker processes, for work that is as much Python as compiled code.
 
-Threads of such work wait for each other's Python; processes do not. They start while something else is done
-that only one core is needed for, and are there only within `helpers`: a command asks for them, and code that
-is called from elsewhere never starts a process by itself. Where one was killed, perhaps for its memory, its
-work is done here.
+Threads of such work wait for Python's global lock; processes do not. Workers exist only within `helpers`. A
+command asks for them, and starts them while it does something that needs one core only. Library code never
+starts a process by itself. If a worker is killed, perhaps for its memory, its work is done in this process.
 """
 
 from __future__ import annotations
@@ -20,25 +19,25 @@ from typing import Any
 from skred.parallel.threads import threads
 
 _MOST = 3
-"""Helpers at most: each holds all the packages in memory."""
+"""Most workers; each holds all packages in memory."""
 _seat = threading.local()
 _there: list[Executor] = []
 
 
 @contextmanager
 def helpers(*modules: str) -> Iterator[None]:
-    """Have a helper for each further core, if there is one, until the end of the context.
+    """Keep a worker process for each further core until the end of the context.
 
     Parameters
     ----------
     modules : str
-        Names of what the helpers are to import as they start.
+        Names of modules that workers import when they start.
     """
     n = _wanted()
     if n < 1 or _there:
         yield
         return
-    from loky import ProcessPoolExecutor  # it does not run the caller's own script again, as others do
+    from loky import ProcessPoolExecutor  # it does not run the caller's script again, as others do
 
     executor = ProcessPoolExecutor(n, env={"OMP_NUM_THREADS": "1"})
     _there.append(executor)
@@ -61,12 +60,12 @@ def _prepare(modules: tuple[str, ...]) -> None:
 
 
 def meanwhile[Result](work: Callable[..., Result], *given: Any) -> Callable[[], Result]:
-    """Let a helper do something while this process goes on.
+    """Start work in a worker process and go on.
 
     Returns
     -------
     callable
-        Waits for what comes of it; without helpers it is done then, here.
+        Waits for the result. Without workers the work is done then, in this process.
     """
     begun = _begun(work, *given)
 
@@ -80,7 +79,7 @@ def meanwhile[Result](work: Callable[..., Result], *given: Any) -> Callable[[], 
 
 
 def _begun[Result](work: Callable[..., Result], *given: Any) -> Future[Result] | None:
-    """What a helper has been asked for; None where there is none, or it was killed before."""
+    """Work submitted to a worker; None if there is no worker, or it was killed."""
     try:
         return _there[0].submit(work, *given) if _there else None
     except BrokenProcessPool:
@@ -88,10 +87,11 @@ def _begun[Result](work: Callable[..., Result], *given: Any) -> Future[Result] |
 
 
 def worker_pool() -> ThreadPoolExecutor:
-    """A pool for jobs that know nothing of each other, to be used in a ``with`` statement.
+    """A pool for independent jobs, to be used in a ``with`` statement.
 
-    One of its threads works in this process, and each other one lets a helper work: jobs and results are
-    copied then, and what a job changes elsewhere is lost. Threads alone without helpers.
+    One of its threads works in this process. Each other one passes its jobs to a worker process: jobs and
+    results are copied, and changes that a job makes to other objects are lost. Without workers there are
+    threads only.
     """
     if not _there:
         return ThreadPoolExecutor(threads())

@@ -1,4 +1,4 @@
-"""Work in threads: the compiled code and the linear algebra let others run meanwhile."""
+"""Work in threads. Compiled code and linear algebra release the GIL, so that threads run in parallel."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ _inside = threading.local()
 
 
 def threads() -> int:
-    """As many as OMP_NUM_THREADS allows, which `skred prove` sets for its trials; all cores without it.
+    """Number of threads: OMP_NUM_THREADS, which `skred prove` sets for its trials, or else all cores.
 
-    One within a thread of `side_by_side`: threads of threads would wait for each other.
+    Within a thread of `side_by_side` it is one: threads of threads would wait for each other.
     """
     if getattr(_inside, "one_of_many", False):
         return 1
@@ -25,7 +25,7 @@ def threads() -> int:
 
 
 def side_by_side[Job, Result](work: Callable[[Job], Result], jobs: Sequence[Job]) -> list[Result]:
-    """What comes of jobs that know nothing of each other, in their order."""
+    """Results of independent jobs, in their order."""
     if threads() == 1:
         return [work(job) for job in jobs]
     with ThreadPoolExecutor(threads(), initializer=_enter) as pool:
@@ -37,6 +37,6 @@ def _enter() -> None:
 
 
 def in_parts(n: int) -> list[slice]:
-    """Numbers from 0 to n in as many parts of like size as there are threads, none empty."""
+    """Split 0 to n into parts of similar size, at most one for each thread, none empty."""
     ends = np.unique(np.linspace(0, n, threads() + 1).round().astype(int))
     return [slice(int(first), int(end)) for first, end in pairwise(ends)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,8 +30,22 @@ class Parameter:
     paper_symbol: str = ""
 
 
+class SymbolClashError(ValueError):
+    """One name or symbol that stands for two things.
+
+    Attributes
+    ----------
+    owners : tuple of str
+        Ids of the law or mechanisms whose parameters they are.
+    """
+
+    def __init__(self, message: str, owners: tuple[str, str]) -> None:
+        super().__init__(message)
+        self.owners = owners
+
+
 def parameter_of(strength: Strength) -> Parameter:
-    """The parameter that is a mechanism's strength itself."""
+    """The parameter that is a mechanism's coefficient itself."""
     return Parameter(strength.name, strength.symbol, strength.unit, strength.paper_symbol)
 
 
@@ -41,7 +55,7 @@ def _as_they_are(*parameters: Any) -> tuple[Any, ...]:
 
 @dataclass(frozen=True)
 class Law:
-    """A friction law of the pack.
+    """A friction law: what brakes a front, and the prior of how much.
 
     Attributes
     ----------
@@ -52,13 +66,13 @@ class Law:
     parameters : tuple of Parameter
         The free random variables of its model.
     build : callable
-        ``build(problem) -> pymc.Model``, see `skred.inference.problem.PooledProblem`.
+        ``build(problem) -> pymc.Model``, see `skred.inference.problem.Problem`.
     reference : str
         Where the law comes from.
     strengths : callable
-        Parameters, in order, to the strengths of the mechanisms, in order.
+        Parameters, in order, to the coefficients of the mechanisms, in order.
     inverse : callable
-        Strengths, in order, to parameters, in order.
+        Coefficients, in order, to parameters, in order.
     derived : tuple of Parameter
         Quantities that its model computes from the parameters, for display.
     relation : str
@@ -77,10 +91,41 @@ class Law:
     relation: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse an inverse that is none."""
+        """Refuse an inverse that is none, and symbols that stand for two things."""
         some = np.linspace(0.3, 0.7, len(self.parameters))
         if not np.allclose(self.inverse(*self.strengths(*some)), some):
             raise ValueError(f"{self.id}: inverse does not give back the parameters of strengths")
+        for k, mechanism in enumerate(self.mechanisms):
+            self.check_symbols(mechanism.strength, mechanism.id, self.mechanisms[:k])
+
+    def check_symbols(self, strength: Strength, owner: str, others: Iterable[Mechanism]) -> None:
+        """Refuse a coefficient that has the name or the symbol of something else.
+
+        Parameters
+        ----------
+        strength : Strength
+            The coefficient.
+        owner : str
+            Id of its mechanism.
+        others : iterable of Mechanism
+            Other mechanisms, none of which may use either. Of the law's parameters one may be it, with both.
+
+        Raises
+        ------
+        SymbolClashError
+        """
+        own = {"name": strength.name, "symbol": strength.symbol}
+        parameters: list[tuple[str, Parameter | Strength]] = [
+            (self.id, one)
+            for one in (*self.parameters, *self.derived)
+            if (one.name, one.symbol) != (strength.name, strength.symbol)
+        ]
+        for other, one in [*parameters, *((other.id, other.strength) for other in others)]:
+            for what, word in own.items():
+                if getattr(one, what) == word:
+                    raise SymbolClashError(
+                        f"the {what} {word!r} is used twice, by {owner!r} and by {other!r}", (owner, other)
+                    )
 
     @property
     def equation(self) -> str:
@@ -95,10 +140,10 @@ class Law:
         return [parameter.name for parameter in self.parameters]
 
     def strength_rows(self, samples: Mapping[str, Any]) -> NDArray[np.float64]:
-        """Strengths of many parameter vectors: arrays by name to (n, n_mechanisms)."""
+        """Coefficients of many parameter vectors: arrays by name to (n, n_mechanisms)."""
         columns = [np.asarray(samples[name], dtype=float).ravel() for name in self.parameter_names]
         return np.column_stack(self.strengths(*columns))
 
     def parameter_rows(self, strengths: NDArray[np.float64]) -> dict[str, NDArray[np.float64]]:
-        """Parameters by name, n values each, of many strengths of the mechanisms, (n, n_mechanisms)."""
+        """Parameters by name, n values each, of many coefficients of the mechanisms, (n, n_mechanisms)."""
         return dict(zip(self.parameter_names, self.inverse(*strengths.T), strict=True))

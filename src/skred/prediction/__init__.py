@@ -1,1 +1,1 @@
-"""A calibrated population of avalanches carried to a track: front speed and runout with probabilities."""
+"""Predictions on a track by a calibrated population: probabilities of front speed and runout."""

@@ -32,9 +32,9 @@ def named_places(problem: HierarchicalProblem, track: PredictionTrack) -> list[t
 def prediction_document(
     calibration: Calibration, track: PredictionTrack, data: xr.Dataset | None
 ) -> dict[str, Any]:
-    """Summary of a prediction as plain data; without data, as failed and without any number.
+    """Summary of a prediction as plain data; without `data` it is marked as failed and has no numbers.
 
-    Its ``statement`` is what may be said of it, sentence by sentence.
+    Its ``statement`` says in sentences what it means.
     """
     problem, law, campaign = calibration.problem, calibration.law, calibration.problem.campaign
     assert isinstance(problem, HierarchicalProblem)

@@ -43,7 +43,7 @@ def write_prediction(
 
 
 def tables(data: xr.Dataset) -> tuple[str, str, str]:
-    """The three tables as CSV: exceedance of speeds, of runout, and uncertainty by where it comes from."""
+    """The three tables as CSV: exceedance of speeds, exceedance of runouts, and parts of the uncertainty."""
     place = [[f"{value:.2f}" for value in data[name].values] for name in ("s", "x", "z")]
     rows = list(zip(*place, strict=True))
     speeds = data["speed"].values

@@ -1,8 +1,8 @@
-"""New avalanches from many populations down one track, kept as counts and sums.
+"""New avalanches from many populations on one track, stored as counts and sums.
 
-Every population meets the same points of a unit cube (common random numbers), spread evenly by a
-scrambled Sobol sequence, so that what differs between populations is the populations. Two halves, scrambled
-independently, tell how much of a result is the simulation's own error.
+All populations use the same points of a unit cube (common random numbers), a scrambled Sobol sequence, so
+that only the populations differ. Two halves are scrambled independently; their difference gives the error of
+the simulation.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ SPEED_STEP_M_S = 0.5
 HALVES = 2
 MOST_AVALANCHES = 2**15
 _LEAST_STEPS = 3
-"""So many speeds are counted at least: up to 1 m/s."""
+"""Least number of speeds counted: up to 1 m/s."""
 _EDGE = 2.0**-32
 """Points of the cube keep this far from its faces, where a normal variable is infinite."""
 
 
 class NewFronts(NamedTuple):
-    """New avalanches by population, and where they are looked at.
+    """New avalanches by population, and the places where they are observed.
 
     Attributes
     ----------

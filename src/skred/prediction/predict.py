@@ -1,7 +1,7 @@
-"""Carry a calibrated population of avalanches to a track: how far, how fast, and how sure.
+"""Predict avalanches on a track from a calibrated population: runout, speed and their uncertainty.
 
-What is predicted is the next avalanche like those recorded. Three uncertainties stay apart: of the
-population (how well the recordings determine it), from one avalanche to another, and of a reading.
+What is predicted is the next avalanche like those recorded. Three uncertainties are kept apart: that of the
+population (how well the recordings determine it), the variability between avalanches, and the reading error.
 """
 
 from __future__ import annotations
@@ -17,12 +17,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from skred.inference.calibrate import calibrate
+from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.population import population_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY
 from skred.inference.results import FORMAT, save
-from skred.inference.sampling import SamplerSettings
 from skred.physics.law import Law
 from skred.prediction.document import named_places, prediction_document, recorded_runouts
 from skred.prediction.files import write_prediction
@@ -39,7 +38,7 @@ _MOST_STEPS = 150
 
 @dataclass(frozen=True)
 class Simulation:
-    """How much is simulated.
+    """Size of the simulation.
 
     Attributes
     ----------
@@ -54,32 +53,26 @@ class Simulation:
 
 
 def predict(
-    problem: HierarchicalProblem,
-    law: Law,
-    settings: SamplerSettings,
+    calibration: Calibration,
     folder: Path,
     track: PredictionTrack | None = None,
     tell: Tell = lambda line: None,
     *,
     simulation: Simulation | None = None,
-    progress: bool = False,
 ) -> dict[str, Any]:
-    """Calibrate a law and predict with it.
+    """Predict with a calibrated law.
 
     Parameters
     ----------
-    problem : HierarchicalProblem
-    law : Law
-    settings : SamplerSettings
+    calibration : Calibration
+        Hierarchical.
     folder : Path
         Gets ``posterior.nc`` and the files of `write_prediction`.
     track : PredictionTrack, optional
         By default the campaign's own, from its own releases.
     tell : callable
-        Detectability one line for each stage.
+        Takes one line for each stage.
     simulation : Simulation, optional
-    progress : bool
-        Whether the sampler shows its progress.
 
     Returns
     -------
@@ -87,19 +80,19 @@ def predict(
         The content of ``prediction.json``.
     """
     started = time.monotonic()
+    problem, law = calibration.problem, calibration.law
+    assert isinstance(problem, HierarchicalProblem)
     track = prediction_track(problem) if track is None else track
-    tell(f"{law.id}: calibrating on {problem.campaign.name}")
-    calibration = calibrate(problem, law, settings, progress=progress)
     save(calibration.tree, folder / "posterior.nc")
     data = None
     if calibration.gate.passed:
         tell(f"{law.id}: predicting on {track.name}")
         data = prediction_of(problem, law, calibration.tree, track, simulation or Simulation())
     else:
-        tell(f"{law.id}: the gate failed: {'; '.join(calibration.gate.problems)}")
+        tell(f"{law.id}: the chains did not converge: {'; '.join(calibration.gate.problems)}")
     document = prediction_document(calibration, track, data)
     document["seconds"] = time.monotonic() - started
-    tell(f"writing {folder}")
+    tell("writing the results")
     write_prediction(document, data, problem, folder)
     return document
 
@@ -111,7 +104,7 @@ def prediction_of(
     track: PredictionTrack,
     simulation: Simulation,
 ) -> xr.Dataset:
-    """What a calibration's populations do on a track.
+    """Avalanches of a calibration's populations on a track.
 
     Parameters
     ----------
@@ -133,7 +126,8 @@ def prediction_of(
     places = _places(problem, track)
     seed = int(tree.attrs["seed"])
     fronts = new_fronts(law, populations, track.terrain, track.releases, places, simulation.avalanches, seed)
-    velocity, runout = (reading_error(problem.campaign, runout=which) for which in (False, True))
+    campaign, errors = problem.campaign, problem.error_model
+    velocity, runout = (reading_error(campaign, errors, runout=which) for which in (False, True))
     recorded = recorded_runouts(problem, track)
     shortest = recorded[0] if recorded else None
     data = prediction_dataset(fronts, velocity, runout, shortest)
@@ -172,7 +166,7 @@ def _thinned(problem: HierarchicalProblem, law: Law, tree: xr.DataTree, most: in
 
 
 def _places(problem: HierarchicalProblem, track: PredictionTrack) -> FloatArray:
-    """Where fronts are looked at: every so many metres, at the sensors and the reference, at the end."""
+    """Places of the predictions: at even steps, at the sensors and the reference, and at the end."""
     length = track.length_m
     fitting = (step for step in _STEPS_M if length <= _MOST_STEPS * step)
     step = next(fitting, length / _MOST_STEPS)

@@ -1,4 +1,4 @@
-"""From simulated avalanches to probabilities with bands, and to uncertainty by where it comes from."""
+"""Probabilities with intervals from simulated avalanches, and the parts of the uncertainty."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from skred.prediction.reading_errors import ReadingError
 
 FloatArray = NDArray[np.float64]
 SPEEDS_M_S = (1.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0, 80.0, 100.0)
-"""Speeds whose exceedance is told, as far as they occur."""
+"""Speeds whose probability of exceedance is given, as far as they occur."""
 SHARES = (0.5, 0.1, 0.01)
-"""Shares of avalanches that are faster, or go further."""
+"""Probabilities for which speeds and runouts are given that are exceeded with them."""
 LEAST_PROBABILITY = 0.001
-"""A speed that nowhere has this probability of being exceeded does not occur."""
+"""A speed occurs if it is exceeded somewhere with at least this probability."""
 LEAST_ARRIVAL = 0.01
-"""Where fewer come, the speed of those that do is not described."""
+"""Least probability of arrival at which the speed is described."""
 PARTS = ("parameter", "event", "residual")
 
 
@@ -81,7 +81,7 @@ def prediction_dataset(
 
 
 def simulation_errors(fronts: NewFronts) -> dict[str, float]:
-    """How far the avalanches simulated for each population are too few, from their two halves.
+    """Error of the simulation from the limited number of avalanches, from their two halves.
 
     Returns
     -------
@@ -161,7 +161,7 @@ class _Sums(NamedTuple):
     square: FloatArray
 
     def parts(self, error: ReadingError) -> tuple[FloatArray, list[FloatArray]]:
-        """Mean, and variance by where it comes from.
+        """Mean, and the parts of the variance.
 
         A population counts by how many avalanches it has here. The covariance over populations of the
         means of two independent halves is the variance of the mean itself: the halves' own errors cancel.
@@ -187,7 +187,7 @@ def _add_speed_parts(data: xr.Dataset, fronts: NewFronts, error: ReadingError) -
 def _add_runout_parts(
     data: xr.Dataset, name: str, fronts: NewFronts, error: ReadingError, beyond_m: float = -np.inf
 ) -> None:
-    """Runout of the avalanches that run beyond a place; the track's end stands for what goes further."""
+    """Runout of the avalanches that pass a place; those that leave the track count with its end."""
     n = fronts.n_avalanches // 2
     runout = np.stack([fronts.runout[:, :n], fronts.runout[:, n:]])
     chosen = np.asarray(runout > beyond_m, dtype=float)

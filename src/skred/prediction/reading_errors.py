@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign, Status
+from skred.inference.error_model import ErrorModel
 
 FloatArray = NDArray[np.float64]
 
 
 class ReadingError(NamedTuple):
-    """Standard deviation of a reading of x: sqrt((relative x)^2 + absolute^2).
+    """Stated standard deviation of a reading of x: sqrt((relative x)^2 + absolute^2).
 
     Attributes
     ----------
@@ -21,18 +22,21 @@ class ReadingError(NamedTuple):
         NaN where the campaign has no such sensor.
     rule : str
         Where it comes from.
+    inflation : float
+        Variance of an error under the error model, in stated variances.
     """
 
     relative: float
     absolute: float
     rule: str
+    inflation: float = 1.0
 
     def variance(self, mean_square: FloatArray | float) -> FloatArray:
         """Mean variance over readings whose mean square is given."""
-        return np.asarray(self.relative**2 * np.asarray(mean_square) + self.absolute**2)
+        return self.inflation * np.asarray(self.relative**2 * np.asarray(mean_square) + self.absolute**2)
 
 
-def reading_error(campaign: Campaign, *, runout: bool) -> ReadingError:
+def reading_error(campaign: Campaign, error_model: ErrorModel, *, runout: bool) -> ReadingError:
     """The campaign's usual error of a front velocity or of a runout.
 
     Where most readings state their own, the median of those; else the medians over the sensors.
@@ -45,10 +49,10 @@ def reading_error(campaign: Campaign, *, runout: bool) -> ReadingError:
     stated = campaign.stated_sd[:, columns][observed]
     own = stated[np.isfinite(stated)]
     if 2 * len(own) > len(stated):
-        return ReadingError(0.0, float(np.median(own)), f"median of what the recorded {what} state")
-    sensors = [campaign.sensors[k] for k in columns]
-    return ReadingError(
-        float(np.median([sensor.relative_sd for sensor in sensors])),
-        float(np.median([sensor.absolute_sd for sensor in sensors])),
-        f"medians over the campaign's sensors of {what}",
-    )
+        relative, absolute, rule = 0.0, float(np.median(own)), f"median of what the recorded {what} state"
+    else:
+        sensors = [campaign.sensors[k] for k in columns]
+        relative = float(np.median([sensor.relative_sd for sensor in sensors]))
+        absolute = float(np.median([sensor.absolute_sd for sensor in sensors]))
+        rule = f"medians over the campaign's sensors of {what}"
+    return ReadingError(relative, absolute, rule, error_model.variance)

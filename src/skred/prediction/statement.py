@@ -1,4 +1,4 @@
-"""What a prediction says, in plain sentences, and what it does not say."""
+"""A prediction in sentences: its results, and the conditions they depend on."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any
 
 
 def prediction_statement(document: dict[str, Any]) -> list[str]:
-    """Sentences: how far, how fast, how sure, and on what all of it rests."""
+    """Sentences on runout, speed and uncertainty, and on the assumptions."""
     if not document["valid"]:
         problems = "; ".join(document["gate"]["problems"])
-        return [f"The gate of convergence failed, so nothing is predicted: {problems}."]
+        return [f"The chains did not converge, so nothing is predicted: {problems}."]
     return [*_distances(document), *_at_places(document), _parts(document), *_conditions(document)]
 
 
@@ -22,18 +22,17 @@ def _distances(document: dict[str, Any]) -> list[str]:
         which = f"{100 * row['share']:g} %"
         low, high = (_end_or(row[key], length) for key in ("low", "high"))
         if row["at_least"]:
-            told.append(f"{which} to the end of the track, s = {length:.0f} m, or beyond ({low} to {high} m)")
+            told.append(
+                f"{which} run to the end of the track, s = {length:.0f} m, or beyond ({low} to {high} m)"
+            )
             continue
         offset = "" if zero is None else f", {_from_reference(row['value'] - zero)}"
-        told.append(f"{which} beyond s = {row['value']:.0f} m{offset} ({low} to {high} m)")
-    sentences = [
-        "Of avalanches like those recorded, from " + track["release"] + ", run: " + "; ".join(told) + "."
-    ]
+        told.append(f"{which} run beyond s = {row['value']:.0f} m{offset} ({low} to {high} m)")
+    sentences = [f"Of avalanches like those recorded, from {track['release']}, {'; '.join(told)}."]
     end = runout["end_of_track"]
     if end["high"] >= 0.001:
         sentences.append(
-            f"The end of the track (s = {length:.0f} m) is reached by {_chance(end)}: their runout"
-            " is at least that."
+            f"{_chance(end)} reach the end of the track (s = {length:.0f} m): their runout is at least that."
         )
     if runout["does_not_start"] >= 0.001:
         sentences.append(
@@ -48,55 +47,61 @@ def _at_places(document: dict[str, Any]) -> list[str]:
         fast = next((row for row in place["faster"] if row["speed_m_s"] == 10.0), None)
         speed = "" if fast is None else f"; {_chance(fast)} are faster than 10 m/s there"
         name = "the reference" if place["name"] == "reference" else place["name"]
-        sentences.append(f"{_chance(place['beyond'])} come past {name} (s = {place['s_m']:.0f} m){speed}.")
+        sentences.append(f"{_chance(place['beyond'])} pass {name} (s = {place['s_m']:.0f} m){speed}.")
     return sentences
 
 
 def _parts(document: dict[str, Any]) -> str:
     runout, n_events = document["runout"], document["campaign"]["n_events"]
-    parts, whose = runout["beyond_shortest_recorded"], " that goes as far as recorded ones"
+    parts, whose = runout["beyond_shortest_recorded"], " of avalanches that run as far as recorded ones"
     if parts is None:
         parts, whose = runout["all"], ""
     residual = parts["sd_residual_m"]
-    reading = "" if math.isnan(residual) else f", {residual:.0f} m error of a reading"
+    named = [
+        f"event-to-event variability ({parts['sd_event_m']:.0f} m)",
+        f"uncertainty of the population, known from {n_events} avalanches ({parts['sd_parameter_m']:.0f} m)",
+    ]
+    if not math.isnan(residual):
+        named.append(f"reading error ({residual:.0f} m)")
+    count = {2: "two", 3: "three"}[len(named)]
     return (
-        f"Standard deviation of the runout of the next avalanche{whose}: {parts['sd_event_m']:.0f} m from one"
-        f" avalanche to another, {parts['sd_parameter_m']:.0f} m because {n_events} avalanches do not tell"
-        f" the population better{reading}."
+        f"The predictive spread of the runout{whose} has {count} parts, as standard deviations:"
+        f" {', '.join(named[:-1])} and {named[-1]}."
     )
 
 
 def _conditions(document: dict[str, Any]) -> list[str]:
     campaign, track = document["campaign"], document["track"]
     sentences = [
-        "Probabilities are per avalanche like those recorded, not per year: how often avalanches come is not"
-        " in the recordings.",
-        "Recorded avalanches are a selection, those that went far enough for the instruments; nothing here"
-        f" corrects for that.{_outside(document)}",
-        f"Every share below about {_percent(1.0 / campaign['n_events'])} (1 in {campaign['n_events']}), and"
-        " what lies outside the recorded range, is an extrapolation: by the law, and by strengths that are"
-        " log-normal across avalanches.",
-        f"Bands hold {100 * document['interval']['probability']:.0f} % of the posterior probability"
-        f" ({document['interval']['kind']}) if the law is right; that it may be wrong is not in them.",
+        "Probabilities are per avalanche like those recorded, not per year: the recordings do not say how"
+        " often avalanches occur.",
+        "Recorded avalanches are a selection: they went far enough to reach the instruments. The prediction"
+        f" does not correct for that.{_outside(document)}",
+        f"Probabilities below about {_percent(1.0 / campaign['n_events'])} (1 in {campaign['n_events']}) and"
+        " values outside the recorded range are extrapolations. They rest on the law and on parameters that"
+        " are log-normal across avalanches.",
+        f"Intervals are {document['interval']['kind']} and hold"
+        f" {100 * document['interval']['probability']:.0f} % of the posterior probability if the law is"
+        " right. They do not allow for an error of the law itself.",
     ]
     if not track["is_own"]:
         sentences.append(
-            f"The population is that of {campaign['name']}; that avalanches on {track['name']} come from"
-            " the same one (snow, size, release) is assumed, and no recording here tests it."
+            f"The population is that of {campaign['name']}. The prediction assumes that avalanches on"
+            f" {track['name']} come from the same one (snow, size, release); no recording tests that."
         )
     return sentences
 
 
 def _outside(document: dict[str, Any]) -> str:
-    """How much of what is predicted lies outside of what was recorded."""
+    """Share of the predicted runouts outside the recorded range."""
     if not document["runout"]["beyond_recorded"]:
         return ""
     shortest, longest = document["runout"]["beyond_recorded"]
     above = {"value": 1 - shortest["value"], "low": 1 - shortest["high"], "high": 1 - shortest["low"]}
     low, high = shortest["s_m"], longest["s_m"]
     return (
-        f" Of those predicted, {_chance(above)} stop above the shortest recorded runout (s = {low:.0f} m),"
-        f" {_chance(longest)} run beyond the longest (s = {high:.0f} m)."
+        f" Of the predicted ones, {_chance(above)} stop above the shortest recorded runout"
+        f" (s = {low:.0f} m) and {_chance(longest)} run beyond the longest (s = {high:.0f} m)."
     )
 
 

@@ -1,4 +1,4 @@
-"""Where avalanches are predicted: the campaign's own track or another, and where fronts start on it."""
+"""The track of a prediction, the campaign's own or another, and the releases on it."""
 
 from __future__ import annotations
 

@@ -10,15 +10,17 @@ import subprocess
 import sys
 import tempfile
 import time
+import uuid
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from skred.errors import InputError
+from skred.output import alone_in
 from skred.prove.folder import read_object
 from skred.prove.hashes import package_folder
-from skred.prove.task import CAMPAIGN, VERDICT
+from skred.prove.task import CAMPAIGN, MARKER, TOKEN, VERDICT
 
 MODULE = "skred.prove.task"
 _KEPT = (
@@ -27,6 +29,7 @@ _KEPT = (
 )  # fmt: skip
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _POLL_SECONDS = 0.05
+_PREFIX = "campaign-"
 _TAIL = 4000
 """Characters of what a crashed process had to say."""
 
@@ -71,16 +74,28 @@ def answer_of(
     dict
         Its verdict, or ``crash`` or ``timeout``, with the seconds it took.
     """
-    own = Path(tempfile.mkdtemp(prefix="campaign-")).resolve()
-    try:
-        shutil.copytree(campaign, own / CAMPAIGN)
-        (own / "tmp").mkdir()
-        what = [module] if module.endswith(".py") else ["-m", module]
-        ended = _run([sys.executable, "-P", *what, base_model, json.dumps(settings)], own, time_limit_s)
-        answer = _answer(own, ended)
-    finally:
-        shutil.rmtree(own, ignore_errors=True)
+    _remove_abandoned()
+    own = Path(tempfile.mkdtemp(prefix=_PREFIX)).resolve()
+    with alone_in(own, "diagnosis"):
+        try:
+            (own / MARKER).write_text(uuid.uuid4().hex, encoding="utf-8")
+            shutil.copytree(campaign, own / CAMPAIGN)
+            (own / "tmp").mkdir()
+            what = [module] if module.endswith(".py") else ["-m", module]
+            ended = _run([sys.executable, "-P", *what, base_model, json.dumps(settings)], own, time_limit_s)
+            answer = _answer(own, ended)
+        finally:
+            shutil.rmtree(own, ignore_errors=True)
     return answer | {"wall_seconds": ended.wall_seconds, "cpu_seconds": ended.cpu_seconds}
+
+
+def _remove_abandoned() -> None:
+    """Remove folders of trials whose worker was killed: marked by a worker, and in use by none."""
+    for folder in Path(tempfile.gettempdir()).glob(f"{_PREFIX}*"):
+        with suppress(OSError, InputError):
+            if (folder / MARKER).is_file() and folder.stat().st_uid == os.getuid():
+                with alone_in(folder, "diagnosis"):
+                    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _environment(own: Path) -> dict[str, str]:
@@ -90,7 +105,9 @@ def _environment(own: Path) -> dict[str, str]:
         kept["PYTHONPATH"] = os.pathsep.join(
             os.path.abspath(one) for one in kept["PYTHONPATH"].split(os.pathsep)
         )
-    return kept | dict.fromkeys(_ONE_THREAD, "1") | {"TMPDIR": str(own / "tmp"), "PYTHONHASHSEED": "0"}
+    token = (own / MARKER).read_text(encoding="utf-8")
+    told = {"TMPDIR": str(own / "tmp"), "PYTHONHASHSEED": "0", TOKEN: token}
+    return kept | dict.fromkeys(_ONE_THREAD, "1") | told
 
 
 def _run(command: list[str], own: Path, time_limit_s: float) -> Ended:

@@ -30,7 +30,7 @@ def with_gains(
         By method, then by trial.
     pool : WorkerPool
     tell : callable
-        Detectability how many there are.
+        Is told how many there are.
 
     Returns
     -------

@@ -32,8 +32,8 @@ class Plan:
     masked_share : float
         Of the trials with one listed mechanism, how many are masked.
     nothing_share : float or None
-        Of all trials, how many hide nothing, half of them nasty: to the nearest number of trials. None draws
-        each trial's class by `skred.simulator.draw.SHARES`.
+        Of all trials, how many hide nothing, half of them contaminated: to the nearest number of trials.
+        None draws each trial's class by `skred.simulator.draw.SHARES`.
     unlisted_share : float or None
         Of the trials that hide something, how many hide what is in no list; None by the same shares.
     quick : bool
@@ -79,13 +79,13 @@ def asked(plan: Plan) -> list[dict[str, Any]]:
 
 
 def _nulls(plan: Plan, kinds: list[str]) -> dict[int, str]:
-    """Which trials hide nothing, where their number was asked for: evenly over kinds, nasty or not."""
+    """Which trials hide nothing, where their number was asked for: evenly over kinds, contaminated or not."""
     if plan.nothing_share is None:
         return {}
     order = np.random.default_rng([plan.seed, 61_031]).permutation(plan.n).tolist()
     by_kind = [[i for i in order if kinds[i] == kind] for kind in KINDS]
     longest = max(len(one) for one in by_kind)
-    # Alternating kinds by pairs, so that each kind has as many nasty as plain ones, up to one.
+    # Alternating kinds by pairs, so that each kind has as many contaminated as plain ones, up to one.
     in_turn = [one[i] for i in range(longest) for one in by_kind if i < len(one)]
     n_nulls = round(plan.nothing_share * plan.n)
     pairs = 2 if plan.kind == "mixed" else 1
@@ -123,15 +123,13 @@ def _shares(plan: Plan) -> dict[str, float]:
 
 def diagnosis_settings(quick: bool) -> dict[str, Any]:
     """How ``skred diagnose`` diagnoses for a user who sets nothing, or only ``--quick``."""
-    from skred.cli.options import DIAGNOSIS_SAMPLING, MAX_MECHANISMS
-    from skred.diagnosis.effort import QUICK_REPLICAS, Effort
+    from skred.diagnosis.effort import SAMPLING, effort_of
     from skred.inference.error_model import DEFAULT_ERRORS
     from skred.physics.terrain import SMOOTHING_M
 
-    effort = Effort(QUICK_REPLICAS if quick else Effort.replicas, MAX_MECHANISMS[quick])
     return {
-        "sampler": DIAGNOSIS_SAMPLING.settings("hierarchical").as_dict(),
-        "effort": asdict(effort),
+        "sampler": SAMPLING.as_dict(),
+        "effort": asdict(effort_of(quick)),
         "errors": DEFAULT_ERRORS,
         "smoothing_m": SMOOTHING_M,
     }

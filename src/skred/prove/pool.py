@@ -1,20 +1,16 @@
-"""Who does the work: Dask workers, here or elsewhere; and one command at a time in a folder."""
+"""Who does the work: Dask workers, here or elsewhere."""
 
 from __future__ import annotations
 
 import logging
-import sys
 import uuid
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from skred.errors import InputError
 
-_PATIENCE_S = 60
-"""How long to wait for the first worker."""
 _MANY = 1_000_000
 Job = dict[str, Any]
 
@@ -29,15 +25,23 @@ class WorkerPool:
         Processes of a cluster on this machine.
     scheduler : str, optional
         Address of a Dask scheduler instead. Its workers must see the same files and have the same code.
+    patience_s : float
+        How long to wait for the first worker, s.
     """
 
     workers: int = 2
     scheduler: str | None = None
+    patience_s: float = 60.0
 
     @contextmanager
     def client(self) -> Iterator[Any]:
         """A Dask client; a cluster on this machine is gone afterwards, whatever happened."""
-        with _client_of(self.scheduler) if self.scheduler else _local_client(self.workers) as client:
+        there = (
+            _client_of(self.scheduler, self.patience_s)
+            if self.scheduler
+            else _local_client(self.workers, self.patience_s)
+        )
+        with there as client:
             yield client
 
     def carry_out(
@@ -56,9 +60,9 @@ class WorkerPool:
         jobs : sequence of dict
             Each with the name of its trial.
         done : callable
-            Detectability of each job and what came out as it is finished.
+            Is told of each job and what came out as it is finished.
         lost : callable
-            Detectability of a job that Dask has given up, because every worker that took it died.
+            Is told of a job that Dask has given up, because every worker that took it died.
         """
         if not jobs:
             return
@@ -87,7 +91,7 @@ def _distributed() -> Any:
 
 
 @contextmanager
-def _local_client(workers: int) -> Iterator[Any]:
+def _local_client(workers: int, patience_s: float) -> Iterator[Any]:
     """A cluster of processes on this machine; each worker does one job at a time."""
     import dask
 
@@ -96,7 +100,7 @@ def _local_client(workers: int) -> Iterator[Any]:
         # What was only waiting on a worker that died is not to blame; the jobs count their own deaths.
         "distributed.scheduler.allowed-failures": _MANY,
         "distributed.scheduler.worker-saturation": 1.0,
-        "distributed.comm.timeouts.connect": f"{_PATIENCE_S}s",
+        "distributed.comm.timeouts.connect": f"{patience_s}s",
         # Jobs are few and long; by default Dask watches itself fifty times a second and more.
         "distributed.worker.profile.enabled": False,
         "distributed.admin.system-monitor.interval": "10s",
@@ -120,14 +124,14 @@ def _local_client(workers: int) -> Iterator[Any]:
 
 
 @contextmanager
-def _client_of(scheduler: str) -> Iterator[Any]:
+def _client_of(scheduler: str, patience_s: float) -> Iterator[Any]:
     """A client of a scheduler that is there already."""
     try:
         # Not the default of the process: one that finds nobody would stay it, and whatever is written
         # to a netCDF file afterwards would ask it for a lock.
-        client = _distributed().Client(scheduler, timeout=f"{_PATIENCE_S}s", set_as_default=False)
+        client = _distributed().Client(scheduler, timeout=f"{patience_s}s", set_as_default=False)
         try:
-            client.wait_for_workers(1, timeout=_PATIENCE_S)
+            client.wait_for_workers(1, timeout=patience_s)
         except TimeoutError:
             client.close()
             raise
@@ -136,25 +140,3 @@ def _client_of(scheduler: str) -> Iterator[Any]:
         raise InputError(message) from error
     with client:
         yield client
-
-
-@contextmanager
-def alone_in(folder: Path) -> Iterator[None]:
-    """Refuse a second command at work in the same folder; the first one's claim ends with its process."""
-    if sys.platform == "win32":
-        yield
-        return
-    import fcntl
-
-    with (folder / ".lock").open("w") as claim:
-        try:
-            fcntl.flock(claim, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(f"{folder}: another `skred prove` is at work here; wait for it") from None
-        except OSError:
-            pass  # some network file systems know no locks
-        try:
-            yield
-        finally:
-            with suppress(OSError):
-                fcntl.flock(claim, fcntl.LOCK_UN)

@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from skred.errors import InputError
+from skred.output import alone_in
 from skred.prove.folder import METHOD, TRIAL_NAME, ProofFolder, read_object
 from skred.prove.gains import with_gains
 from skred.prove.hashes import document_sha256, file_sha256, files_sha256
 from skred.prove.ledger import ledger_sha256, read_ledger, require_same_code, trial_names
-from skred.prove.pool import WorkerPool, alone_in
+from skred.prove.pool import WorkerPool
 
 Scorer = Callable[[Path, dict[str, Any], list[dict[str, Any]], dict[str, dict[str, Any]]], dict[str, Any]]
 Tell = Callable[[str], None]
@@ -30,7 +31,7 @@ def reveal(
     pool : WorkerPool
         Who scores fresh avalanches.
     tell : callable
-        Detectability of stages.
+        Is told of stages.
     partial : bool
         Score also where trials have no answer yet.
     score : callable, optional
@@ -48,7 +49,7 @@ def reveal(
     """
     ledger = read_ledger(folder)
     require_same_code(ledger, str(folder.ledger))
-    with alone_in(folder.path):
+    with alone_in(folder.path, "`skred prove`"):
         answers = read_answers(folder, ledger)
         missing = ledger["n"] - len(answers.get(METHOD, {}))
         if missing and not partial:

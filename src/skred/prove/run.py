@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from skred.errors import InputError
+from skred.output import alone_in
 from skred.prove.child import MODULE, answer_of
 from skred.prove.folder import ProofFolder, read_object, write_once
 from skred.prove.ledger import code_of, ledger_sha256, read_ledger, require_same_code, trial_names
-from skred.prove.pool import WorkerPool, alone_in
+from skred.prove.pool import WorkerPool
 from skred.prove.sandbox import allowed_roots, within
 
 Tell = Callable[[str], None]
@@ -50,7 +51,7 @@ def run(
         Sealed.
     pool : WorkerPool
     tell, advance : callable
-        Detectability of stages, and of each trial as it is answered.
+        Is told of stages, and of each trial as it is answered.
     limits : Limits, optional
 
     Returns
@@ -70,7 +71,7 @@ def run(
             f"{folder.path}: a diagnosis may read there, and so the truth; choose a folder outside of "
             "Python, the package and their caches"
         )
-    with alone_in(folder.path):
+    with alone_in(folder.path, "`skred prove`"):
         jobs = _jobs(folder, ledger, limits or Limits())
         before = ledger["n"] - len(jobs)
         tell(f"diagnosing {len(jobs)} of {ledger['n']} trials")

@@ -9,7 +9,7 @@ from typing import Any
 
 from skred.output import plain, write_json
 from skred.prove.scoring.answers import Pair, pairs_of
-from skred.prove.scoring.criteria import bars
+from skred.prove.scoring.criteria import acceptance_criteria
 from skred.prove.scoring.intervals import LEVEL, RESAMPLES, SEED
 from skred.prove.scoring.paired import compare
 from skred.prove.scoring.places import right_stretch
@@ -74,7 +74,7 @@ def scorecard(
             "interval": {"probability": LEVEL, "n_resamples": RESAMPLES, "seed": SEED},
             "standards": as_plain(),
             "ledger": {key: value for key, value in ledger.items() if _is_single(value)},
-            "bars": bars(methods[DIAGNOSIS]["open"], paired),
+            "bars": acceptance_criteria(methods[DIAGNOSIS]["open"], paired),
             "methods": methods,
             "paired": paired,
             "trials": [_line(pair) for pair in pairs[DIAGNOSIS]],

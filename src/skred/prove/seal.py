@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skred.errors import InputError
-from skred.output import write_text
+from skred.output import alone_in, write_text
 from skred.prove.folder import ProofFolder, read_object, trial_name, write_once
 from skred.prove.hashes import document_sha256, file_sha256, files_sha256
 from skred.prove.ledger import FORMAT, code_identity, read_ledger, require_same_code
 from skred.prove.plan import Plan, asked, diagnosis_settings
-from skred.prove.pool import WorkerPool, alone_in
+from skred.prove.pool import WorkerPool
 
 if TYPE_CHECKING:
     from skred.simulator.draw import Trial
@@ -36,7 +36,7 @@ def seal(folder: ProofFolder, plan: Plan, pool: WorkerPool, tell: Tell, advance:
     plan : Plan
     pool : WorkerPool
     tell, advance : callable
-        Detectability of stages, and of each trial as it is sealed.
+        Is told of stages, and of each trial as it is sealed.
 
     Returns
     -------
@@ -49,7 +49,7 @@ def seal(folder: ProofFolder, plan: Plan, pool: WorkerPool, tell: Tell, advance:
         If the folder holds something else, or the source changed since sealing was begun.
     """
     folder.path.mkdir(parents=True, exist_ok=True)
-    with alone_in(folder.path):
+    with alone_in(folder.path, "`skred prove`"):
         if folder.ledger.exists():
             return _published(folder, plan)
         begun = _begin(folder, plan)

@@ -7,9 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skred.physics.mechanisms import mechanisms
-from skred.physics.mechanisms.spec import Group, Mechanism, Setting
-from skred.physics.mechanisms.stretches import OPPOSED_SCALES, is_opposed
+from skred.errors import InputError
+from skred.physics.mechanisms import library, mechanisms
+from skred.physics.mechanisms.placed import can_join, direction_of, parts_of, shapes_of
+from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism, Setting, Shape
+from skred.physics.mechanisms.stretches import OPPOSED_SCALES, ends_of, is_opposed
+from skred.physics.plugins import OWN_PACKAGE
 from skred.physics.terrain import Terrain
 from skred.report.shared.tables import plain_table, plain_text
 
@@ -19,11 +22,13 @@ if TYPE_CHECKING:
 
     from skred.physics.law import Law
 
-_BLAMES = {
-    Group.PHYSICS: "the physics: a term of the equation of motion",
-    Group.INSTRUMENT: "the instruments: the recordings are off",
+_GROUPS = {
+    Group.PHYSICS: "physics: a term of the equation of motion",
+    Group.INSTRUMENT: "instrument: the recordings are off",
 }
 _CELL_M, _N_CELLS, _SLOPE_RAD = 5.0, 800, 0.5
+_MOST_LISTED = 5
+"""Values that are listed one by one; of more the first and the last are told."""
 
 
 def mechanism_document(mechanism: Mechanism, laws: Sequence[Law]) -> dict[str, Any]:
@@ -42,7 +47,10 @@ def mechanism_document(mechanism: Mechanism, laws: Sequence[Law]) -> dict[str, A
     return {
         "id": mechanism.id,
         "title": mechanism.title,
+        "package": library().packages.get(mechanism.id, OWN_PACKAGE),
         "group": str(mechanism.group),
+        "bound_to": str(added.bound_to),
+        "needs": list(added.needs),
         "equation": mechanism.equation,
         "strength": {
             "parameter": strength.name,
@@ -61,8 +69,8 @@ def mechanism_document(mechanism: Mechanism, laws: Sequence[Law]) -> dict[str, A
         if mechanism.column is None
         else {"kind": "half-normal", "scale": strength.prior_scale, "reason": strength.prior_reason},
         "looked_for": looked_for(mechanism),
-        "missing_from": [law_id for law_id, base in ids if added.joins(base)],
-        "mark": mechanism.mark,
+        "missing_from": [law_id for law_id, base in ids if can_join(mechanism, base)],
+        "signature": mechanism.signature,
         "reference": mechanism.reference,
         "doi": mechanism.doi,
         "same_term": same_term(mechanism),
@@ -77,37 +85,47 @@ def same_term(mechanism: Mechanism) -> list[str]:
 
 def looked_for(mechanism: Mechanism) -> str:
     """The shapes that it is looked for in, in words; read off its shapes on a made-up track."""
-    added, setting = mechanism.added, _example()
-    assert added is not None
-    shapes = added.shapes(setting)
-    first = shapes[0]
-    if first.place_m is not None:
-        lengths = sorted(
-            {round(s.s_to_m - s.s_from_m) for s in shapes if s.s_to_m and s.s_from_m is not None}
-        )
-        where = f"stretches of {_either(lengths)} m over the recorded part of the track"
-        if added.split(setting, first, 1.0):
-            where += ", finer around the likeliest"
-    elif first.sensor is not None:
-        where = "each sensor of front velocity, where there are several"
-    elif first.covariate is not None:
-        where = "each covariate of the events that is a number, or a text of two kinds"
-    elif added.direction(setting, first).columns:
-        where = "the whole track"
-    else:
-        where = "all avalanches alike"
+    assert mechanism.added is not None
+    setting = _example(mechanism.added.needs)
+    try:
+        shapes = shapes_of(mechanism, setting)
+        if not shapes:
+            return "nothing that a made-up campaign has; `skred identify` says it for recordings"
+        where = _where(mechanism, setting, shapes)
+    except InputError as error:
+        return f"unknown: {error}"
     if any(is_opposed(shape) for shape in shapes):
         where += (
             "; the longer ones also, and from above it, with a relief that equals it at the typical speed,"
         )
-        where += f" the prior of its strength {OPPOSED_SCALES:g} times as wide"
+        where += f" the prior of its coefficient {OPPOSED_SCALES:g} times as wide"
     plain = [shape for shape in shapes if not is_opposed(shape)]
     names = dict.fromkeys(name for shape in plain for name, _ in shape.constants)
     values = {name: sorted({dict(shape.constants)[name] for shape in plain}) for name in names}
     return "; ".join([where, *(f"{name} of {_either(found)}" for name, found in values.items())])
 
 
-def _example() -> Setting:
+def _where(mechanism: Mechanism, setting: Setting, shapes: Sequence[Shape]) -> str:
+    """What the shapes name: stretches, sensors, covariates, or nothing."""
+    added = mechanism.added
+    assert added is not None
+    match added.bound_to:
+        case BoundTo.PLACE:
+            lengths = sorted({round(last - first) for first, last in map(ends_of, shapes)})
+            finer = ", finer around the likeliest" if parts_of(mechanism, setting, shapes[0], 1.0) else ""
+            return f"stretches of {_either(lengths)} m over the recorded part of the track{finer}"
+        case BoundTo.SENSOR:
+            return "each sensor of front velocity, where there are several"
+        case BoundTo.COVARIATE if added.needs:
+            return f"the covariate {_either(added.needs)}, in campaigns that have it"
+        case BoundTo.COVARIATE:
+            return "each covariate of the events that is a number, or a text of two kinds"
+        case BoundTo.TRACK:
+            moves = direction_of(mechanism, setting, shapes[0]).columns
+            return "the whole track" if moves else "all avalanches alike"
+
+
+def _example(covariates: Sequence[str]) -> Setting:
     """A straight slope with something of everything that a mechanism can refer to."""
     ones = np.ones(_N_CELLS)
     terrain = Terrain(
@@ -122,14 +140,16 @@ def _example() -> Setting:
         recorded_m=(0.25 * terrain.length_m, 0.75 * terrain.length_m),
         sensors=("first", "second"),
         velocities=(True, True),
-        covariates={"covariate": np.array([-1.0, 1.0])},
+        covariates={name: np.array([-1.0, 1.0]) for name in covariates or ("covariate",)},
         n_events=2,
         front_speed=20.0 * np.ones(_N_CELLS + 1),
     )
 
 
-def _either(values: Sequence[float]) -> str:
-    words = [f"{value:g}" for value in values]
+def _either(values: Sequence[float] | Sequence[str]) -> str:
+    words = [value if isinstance(value, str) else f"{value:g}" for value in values]
+    if len(words) > _MOST_LISTED:
+        return f"{words[0]} to {words[-1]}"
     return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"
 
 
@@ -143,7 +163,7 @@ def mechanisms_table(documents: Sequence[dict[str, Any]], n_laws: int) -> Table:
     n_laws : int
         Number of laws that were asked about.
     """
-    columns = ("mechanism", "what it is", "blames", "strength", "prior\nscale", "missing\nfrom")
+    columns = ("mechanism", "what it is", "group", "symbol", "prior\nscale", "missing\nfrom")
     table = plain_table(plain_text("Mechanisms"), left=columns, right=())
     for column in (0, 2, 3, 4):
         table.columns[column].no_wrap = True
@@ -156,7 +176,7 @@ def mechanisms_table(documents: Sequence[dict[str, Any]], n_laws: int) -> Table:
         words = (one["id"], one["title"], one["group"], symbol, scale, _missing_from(one, n_laws))
         table.add_row(*map(plain_text, words))
     table.caption = plain_text(
-        "Prior scale: of the strength as an added mechanism; half-normal, or with ± normal, either sign."
+        "Prior scale: of the coefficient as an added mechanism; half-normal, or with ± normal, either sign."
         " Missing from: base laws that may leave it out. One in full: skred mechanisms ID."
     )
     table.caption_justify = "left"
@@ -172,9 +192,9 @@ def mechanism_table(document: dict[str, Any], n_laws: int) -> RenderableType:
     paper = f", in the paper {strength['paper_symbol']}" if strength["paper_symbol"] else ""
     unit = "" if strength["unit"] == "1" else f" {strength['unit']}"
     rows = {
-        "blames": _BLAMES[document["group"]],
+        "group": _GROUPS[document["group"]],
         "enters as": document["equation"],
-        "strength": f"{strength['parameter']}, symbol {strength['symbol']}{paper}",
+        "coefficient": f"{strength['parameter']}, symbol {strength['symbol']}{paper}",
         "unit": strength["unit"],
         "sign": "either" if strength["either_sign"] else "positive only",
         "prior": f"{prior['kind']}, scale {prior['scale']:g}{unit}: {prior['reason']}",
@@ -184,10 +204,11 @@ def mechanism_table(document: dict[str, Any], n_laws: int) -> RenderableType:
         else f"{in_base['kind']}, scale {in_base['scale']:g}{unit}: {in_base['reason']}",
         "missing from": _missing_from(document, n_laws),
         "looked for in": document["looked_for"],
-        "mark": document["mark"],
+        "diagnostic signature": document["signature"],
         "same term as": ", ".join(document["same_term"]) or "none other",
         "reference": document["reference"],
-        "doi": f"https://doi.org/{document['doi']}",
+        "doi": f"https://doi.org/{document['doi']}" if document["doi"] else "none",
+        "package": document["package"],
     }
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
     table.add_column(no_wrap=True)

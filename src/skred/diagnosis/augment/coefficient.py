@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.augment.augmented import AugmentedProblem
+from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.augment.step import Step
+from skred.diagnosis.compare.candidate import Strength
 from skred.inference.calibrate import Calibration
-from skred.physics.mechanisms.spec import Group
 
 FloatArray = NDArray[np.float64]
-FORM = 0.3
-"""Relative standard deviation of a physical strength for the form of its term: edges, exponents, supply that
-real forces have otherwise. Set on 28 opened trials, whose true forms differ on purpose: 90 % intervals held
-16 of the true strengths without it, 24 with it."""
 
 
 def augmented_of(calibration: Calibration) -> AugmentedProblem:
@@ -36,16 +31,12 @@ def added_draws(calibration: Calibration) -> FloatArray:
     return np.column_stack(columns)
 
 
-def strength_of(steps: Sequence[Step], number: int) -> tuple[float, float]:
-    """Mean and standard deviation of an added strength, as the last calibration has it.
+def strength_of(steps: Sequence[Step], number: int) -> Strength:
+    """An added strength, as the last calibration has it, over all places.
 
-    Shrunk by its prior. The calibration holds its shape fixed; what the shapes in the comparison differ by is
-    in the standard deviation too, and so is what no comparison knows of: that a term stands for a force of a
-    somewhat other form.
+    The calibration holds its place at the best one, and shrinks it by its prior.
     """
-    calibration, candidate = steps[-1].calibration, steps[number].candidate
+    calibration = steps[-1].calibration
     name = augmented_of(calibration).added[number].name
     draws = np.asarray(calibration.tree["posterior"].to_dataset()[name].values)
-    mean = float(draws.mean())
-    form = FORM * abs(mean) if candidate.mechanism.group is Group.PHYSICS else 0.0
-    return mean, math.hypot(float(draws.std(ddof=1)), candidate.strength_between_shapes(), form)
+    return steps[number].candidate.over_places(float(draws.mean()), float(draws.std(ddof=1)))

@@ -10,25 +10,39 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import RegularGridInterpolator
 
-from skred.diagnosis.evidence.coefficient import Base, Curve, Fit, refit
+from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 from skred.parallel.threads import in_parts, side_by_side
 from skred.physics.mechanisms.spec import Added
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-_LOOKING, _FINAL = {1: 11, 2: 6}, {1: 13, 2: 8}
-"""Strengths along each axis while the posterior is looked for, and of the tables, by the number of axes."""
+_LOOKING = {1: 11, 2: 6}
+"""Strengths along each axis while the posterior is looked for, by the number of axes."""
+_FINAL = {1: 13, 2: 8}
+"""Strengths along each axis of the tables, between which cubic polynomials go."""
 _COVERED_NATS = 11.0
-"""How far below its top the density of strengths still counts: 4.7 standard deviations."""
+"""How far below its maximum the density of strengths still counts: 4.7 standard deviations."""
 _ENDS_NATS = 8.0
-"""How far below the top the edge of a grid must be to be the end."""
+"""How far below the maximum the edge of a grid must be to be the end: four standard deviations."""
 _STARTING_REACH = 5.0
+"""Standard deviations, by the comparison, that the first grid reaches from the mean."""
 _MOST_SCALES = 4.5
-_LOOKS, _SETTLED, _BEYOND, _FARTHEST = 6, 0.12, 0.25, 7.0
+"""Scales of its prior that a strength reaches at most: beyond are seven in a million."""
+_LOOKS = 6
+"""Grids tried at most, which bounds the time."""
+_SETTLED = 0.12
+"""Shift of a grid's corners, in its widths, below which it has arrived: a step of the tables or so."""
+_BEYOND = 0.25
+"""By which share of its width a grid goes on beyond an edge where there is still something."""
+_FARTHEST = 7.0
+"""Standard deviations from the mean at which it ends in any case."""
 _DEEP = 60.0
+"""Nats below the maximum from which on densities count as equally small: a spline through them is smooth."""
 _FINE = {1: 601, 2: 121}
+"""Points along each axis at which the interpolated density is summed."""
 
 
 class Grid(NamedTuple):
@@ -180,8 +194,8 @@ def _fitted(
 
     def fitted(part: slice) -> list[Fit]:
         if near is None:
-            return refit(extension, base.rows, given[part], start, base.log_scale)
-        return refit(extension, base.rows, given[part], start, base.log_scale, n_rounds=1, fits=near[part])
+            return refit(extension, base.rows, given[part], start)
+        return refit(extension, base.rows, given[part], start, Rounds(least=1), near[part])
 
     return [fit for found in side_by_side(fitted, in_parts(len(added))) for fit in found]
 

@@ -1,4 +1,4 @@
-"""The base law under the error model of what was let in: before and after then differ by that alone."""
+"""The base law under the error model of what was added: before and after then differ by that alone."""
 
 from __future__ import annotations
 

@@ -9,23 +9,32 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from skred.diagnosis.augment.augmented import AugmentedProblem
+from skred.diagnosis.augment.added_strength import AddedStrength
+from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.extension import Extension
 from skred.inference.hierarchical.event_density import draw_nodes
 from skred.inference.hierarchical.event_draws import Avalanches, new_avalanches
 from skred.inference.hierarchical.population import population_of
-from skred.inference.hierarchical.results import add_readings, avalanche_dataset, thinned
+from skred.inference.hierarchical.results import (
+    add_readings,
+    avalanche_dataset,
+    hierarchical_summary,
+    thinned,
+)
+from skred.inference.results import predictive, summary
 from skred.physics.geometry import sensor_table
 from skred.physics.kernel.fronts import simulate
 from skred.physics.law import Law
+from skred.physics.mechanisms.stretches import equation_of
 
 FloatArray = NDArray[np.float64]
 
 
-def predictive_groups(
+@predictive.register
+def augmented_predictive(
     problem: AugmentedProblem, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
 ) -> dict[str, xr.Dataset]:
-    """Groups as `skred.inference.hierarchical.results.predictive_groups` gives them, with what is added.
+    """Groups as `hierarchical_predictive` in `skred.inference` gives them, with what is added.
 
     Strengths of an avalanche contain the effect of a covariate, releases their offset, fronts the factor
     of a sensor: what it would read but for errors. The prior's added strengths are within the tables.
@@ -40,6 +49,27 @@ def predictive_groups(
         "event_posterior": avalanche_dataset(problem, law, kept, recorded, fronts),
         "posterior_predictive": _predict(problem, law, kept, rng),
         "prior_predictive": _predict(problem, law, thinned(prior, n_events), rng),
+    }
+
+
+@summary.register
+def augmented_summary(problem: AugmentedProblem, law: Law, tree: xr.DataTree) -> dict[str, Any]:
+    """As of any hierarchical calibration, and what was added."""
+    return {**hierarchical_summary(problem, law, tree), "added": [_added_row(one) for one in problem.added]}
+
+
+def _added_row(one: AddedStrength) -> dict[str, Any]:
+    shape = one.shape
+    return {
+        "id": one.mechanism.id,
+        "title": one.mechanism.title,
+        "parameter": one.name,
+        "equation": equation_of(one.mechanism, shape),
+        "s_from_m": shape.s_from_m,
+        "s_to_m": shape.s_to_m,
+        "covariate": shape.covariate,
+        "sensor": shape.sensor,
+        "constants": dict(shape.constants),
     }
 
 

@@ -1,4 +1,4 @@
-"""Tables of nodes on a grid of added strengths that covers their posterior."""
+"""Tables of quadrature points on a grid of added strengths that covers their posterior."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.augment.coefficient_grid import Grid, Located
-from skred.diagnosis.evidence.coefficient import Base, repeated
-from skred.diagnosis.evidence.conditional_map import Population, Rows, event_modes, log_joint
+from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, event_modes, log_joint
 from skred.diagnosis.evidence.event_quadrature import Budget, Spread, event_nodes
 from skred.diagnosis.evidence.extension import Extension
 from skred.inference.hierarchical.surface import Nodes
@@ -18,6 +18,7 @@ from skred.parallel.threads import in_parts, side_by_side
 
 FloatArray = NDArray[np.float64]
 _LEAST = Budget(128, 128, 256, 1.5, 1.8)
+"""Of the first tables, tried before others of twice the cost."""
 BUDGETS = _LEAST, _LEAST.times(2)
 """Of the tables: each where the one before is not good enough."""
 
@@ -72,13 +73,13 @@ def build_tables(
     """
     grid, fits = located.grid, located.fits
     n, n_tables, n_events = len(base.law.mechanisms), len(fits), len(base.rows.event)
-    rows = repeated(base.rows, n_tables)
-    given = np.column_stack([np.tile(base.strengths, (n_tables, 1)), grid.points]).repeat(n_events, axis=0)
+    given = np.column_stack([np.tile(base.strengths, (n_tables, 1)), grid.points])
+    likelihood = EventLikelihood(extension, base.rows, base.strengths).in_groups(given)
     found = [fit.found.population(n) for fit in fits]
     population = Population(
         np.concatenate([one.mean for one in found]), np.concatenate([one.covariance for one in found])
     )
-    start = highest(extension, rows, np.stack([fit.points for fit in fits]), given, population)
+    start = highest(likelihood, np.stack([fit.points for fit in fits]), population)
     # Populations of the posterior differ in mean and in spread.
     covariances = np.stack([fit.found.covariance for fit in fits])
     wider = np.exp(np.minimum(np.sqrt(np.einsum("tii->ti", covariances)[:, n : 2 * n]), 0.7))
@@ -88,18 +89,16 @@ def build_tables(
     around = Population(population.mean, wide)
 
     def spread(part: slice) -> tuple[Spread, FloatArray]:
-        own, at = rows.take(np.arange(len(start))[part]), given[part]
-        modes = event_modes(extension, own, start[part], at, population, n_steps=8)
-        return event_nodes(extension, own, at, around, modes, budget, reference), modes.points
+        own = likelihood.part(part)
+        modes = event_modes(own, start[part], population, n_steps=8)
+        return event_nodes(own, around, modes, budget, reference), modes.points
 
     spreads, modes = zip(*side_by_side(spread, in_parts(len(start))), strict=True)
     nodes, points = Spread.joined(spreads), np.concatenate(modes).reshape(n_tables, n_events, n + 1)
     return Tables(located, nodes.nodes, nodes.points[:, :, n].ravel(), points, budget)
 
 
-def highest(
-    extension: Extension, rows: Rows, points: FloatArray, strengths: FloatArray, population: Population
-) -> FloatArray:
+def highest(likelihood: EventLikelihood, points: FloatArray, population: Population) -> FloatArray:
     """The highest of the modes found from each table's own points and from its neighbours', as rows.
 
     Avalanches that stop at a place or pass it have two modes, and a table that is in the lower one of an
@@ -108,9 +107,9 @@ def highest(
 
     def climbed(start: FloatArray) -> tuple[FloatArray, FloatArray]:
         def climb(part: slice) -> tuple[FloatArray, FloatArray]:
-            own, at = rows.take(np.arange(len(start))[part]), strengths[part]
-            top = event_modes(extension, own, start[part], at, population, n_steps=8).points
-            return top, log_joint(extension, own, top, at, population)
+            own = likelihood.part(part)
+            top = event_modes(own, start[part], population, n_steps=8).points
+            return top, log_joint(own, top, population)
 
         tops, heights = zip(*side_by_side(climb, in_parts(len(start))), strict=True)
         return np.concatenate(tops), np.concatenate(heights)
@@ -130,9 +129,7 @@ def _flat(points: FloatArray) -> FloatArray:
 
 
 def exact_nodes(
-    extension: Extension,
-    rows: Rows,
-    strengths: FloatArray,
+    likelihood: EventLikelihood,
     population: Population,
     start: FloatArray,
     budget: Budget,
@@ -143,9 +140,8 @@ def exact_nodes(
 
     Parameters
     ----------
-    rows : Rows
-        Of one group.
-    strengths : (n_groups, n_directions) array
+    likelihood : EventLikelihood
+        One group of rows for each population.
     population : Population
     start : (n_groups, n_rows, n_base + 1) array
         Points near the modes.
@@ -154,14 +150,13 @@ def exact_nodes(
     shifts : (n_groups * n_rows, n_base + 1) array, optional
         As in `event_nodes`.
     """
-    n_rows = len(rows.event)
-    many, given = repeated(rows, len(strengths)), strengths.repeat(n_rows, axis=0)
-    at = start.reshape(len(given), -1)
+    n_rows = len(likelihood.rows.event)
+    at = start.reshape(n_rows, -1)
 
     def spread(part: slice) -> Spread:
-        own, added = many.take(np.arange(len(given))[part]), given[part]
-        modes = event_modes(extension, own, at[part], added, population)
+        own = likelihood.part(part)
+        modes = event_modes(own, at[part], population)
         shifted = None if shifts is None else shifts[part]
-        return event_nodes(extension, own, added, population, modes, budget, reference, shifted)
+        return event_nodes(own, population, modes, budget, reference, shifted)
 
-    return Spread.joined(side_by_side(spread, in_parts(len(given)))).nodes
+    return Spread.joined(side_by_side(spread, in_parts(n_rows))).nodes

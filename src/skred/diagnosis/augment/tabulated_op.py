@@ -1,8 +1,7 @@
-"""Integrated log densities of a law with mechanisms added, between the strengths at which there are nodes.
+"""Integrated log densities of a law with mechanisms added, interpolated between tables of quadrature points.
 
-Tables of nodes stand on a regular grid of the added strengths, skewed where two go together. Between them
-the log density of each event is interpolated by cubic polynomials, along every axis through the four
-tables nearest.
+Tables stand on a regular grid of the added strengths, skewed where two go together. Between them the log
+density of each event is interpolated by cubic polynomials, along every axis through the four tables nearest.
 """
 
 from __future__ import annotations
@@ -15,9 +14,9 @@ import numpy as np
 from pytensor.graph.basic import Variable
 from pytensor.link.numba.dispatch.basic import numba_njit, register_funcify_default_op_cache_key
 
-from skred.diagnosis.compiled import DIAGNOSIS_CACHE_KEY, compiled
 from skred.inference.array_op import ArrayOp
 from skred.inference.hierarchical.event_density import integrated_log_density
+from skred.parallel.compile_cache import cache_key, compiled, inner
 
 LEAST_TABLES = 4
 """Along each axis: what a cubic polynomial goes through."""
@@ -27,7 +26,7 @@ _OVERSHOOT = 0.5
 """How far beyond the densities at the tables an interpolated one may be, in nats."""
 
 
-@compiled()
+@inner()
 def _cubic_weights(place, size, weights):  # type: ignore[no-untyped-def]
     """Fill the weights of four neighbours on the grid 0, 1, ..., size - 1; returns the first of them."""
     lowest = int(min(max(math.floor(place) - 1.0, 0.0), size - 4.0))
@@ -170,4 +169,4 @@ def _funcify(op: TabulatedLogDensity, node: Any = None, **kwargs: Any) -> Any:
             means, factor, strengths, origin, steps, size, first, points, log_weights
         )
 
-    return tabulated_density, DIAGNOSIS_CACHE_KEY
+    return tabulated_density, cache_key(tabulated_log_density)

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from skred.campaign import Status
 from skred.diagnosis.evidence.conditional_map import Rows
 from skred.diagnosis.evidence.extension import Extension
-from skred.inference.error_model import Errors, EventReadings
+from skred.inference.error_model import ErrorModel, EventReadings
 from skred.inference.hierarchical.problem import HierarchicalProblem
-from skred.inference.hierarchical.reading_density import OUTLIER_FACTOR
 from skred.physics.kernel.inputs import VELOCITY_TO_STOP
 
 FloatArray = NDArray[np.float64]
@@ -22,7 +21,7 @@ def bootstrap_campaigns(
     means: FloatArray,
     factors: FloatArray,
     rng: np.random.Generator,
-    errors: Errors | None = None,
+    error_model: ErrorModel | None = None,
 ) -> tuple[Rows, FloatArray]:
     """Simulated recordings, one campaign for each population.
 
@@ -36,8 +35,8 @@ def bootstrap_campaigns(
     means : (n_groups, n_base) array
     factors : (n_groups, n_base, n_base) array
         Cholesky factors of the populations' covariances.
-    errors : Errors, optional
-        The problem's unless given.
+    error_model : ErrorModel, optional
+        Of the simulated readings; the problem's unless given.
 
     Returns
     -------
@@ -52,8 +51,7 @@ def bootstrap_campaigns(
     logs = means[group] + np.einsum("rij,rj->ri", factors[group], normal)
     points = np.column_stack([logs, rng.standard_normal(len(event))])
     predictions = extension.predict(event, points, strengths)
-    errors = problem.error_model.errors if errors is None else errors
-    readings = _read(problem, event, predictions, errors, rng)
+    readings = _read(problem, event, predictions, error_model or problem.error_model, rng)
     return Rows(event, group, readings, problem.error_model.errors), points
 
 
@@ -61,7 +59,7 @@ def _read(
     problem: HierarchicalProblem,
     event: NDArray[np.int64],
     predictions: FloatArray,
-    errors: Errors,
+    error_model: ErrorModel,
     rng: np.random.Generator,
 ) -> EventReadings:
     """Readings of the fronts, with errors."""
@@ -79,31 +77,14 @@ def _read(
     passed &= np.where(spans[None, :] | ~velocity[None, :], True, predictions[:, :-1] > 0.0)
     observed = recorded & passed
     prediction = predictions[:, :-1]
-    own = readings.stated_sd[event]
-    sd = np.where(own > 0.0, own, np.hypot(readings.relative_sd * prediction, readings.absolute_sd))
-    noise = _noise(errors, velocity, n, rng)
-    values = np.where(observed, prediction + sd * noise, 0.0)
+    drawn = error_model.draw(prediction, readings.sd(event, prediction), velocity, rng)
+    values = np.where(observed, drawn, 0.0)
     moved = observed & velocity[None, :] & (values > 0.0)
     stopped = recorded & velocity[None, :] & ~passed
     return readings._replace(
         values=values,
         observed=observed,
-        stated_sd=np.where(observed, own, 0.0),
+        stated_sd=np.where(observed, readings.stated_sd[event], 0.0),
         reached=np.where(moved, ends, -np.inf).max(axis=1, initial=-np.inf),
         not_reached=np.where(stopped, ends, np.inf).min(axis=1, initial=np.inf),
     )
-
-
-def _noise(errors: Errors, velocity: NDArray[np.bool_], n: int, rng: np.random.Generator) -> FloatArray:
-    """Standardised errors, (n, n_sensors), as the error model says."""
-    shape = (n, len(velocity))
-    case = rng.choice(len(errors.weights), size=n, p=errors.weights)
-    noise = rng.standard_normal(shape)
-    if errors.common > 0.0:
-        shared = np.sqrt(errors.common) * rng.standard_normal((n, 1))
-        noise = np.where(velocity, shared + np.sqrt(1.0 - errors.common) * noise, noise)
-    if errors.degrees > 0.0:
-        noise = noise * np.sqrt(errors.degrees / rng.chisquare(errors.degrees, shape))
-    outlying = rng.random(shape) < errors.shares[case][:, None]
-    result: FloatArray = noise * np.where(outlying, OUTLIER_FACTOR, 1.0) * errors.scales[case][:, None]
-    return result

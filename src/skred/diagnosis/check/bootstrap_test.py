@@ -1,8 +1,8 @@
-"""Is anything wrong? The evidence for anything at all, against what clean campaigns show.
+"""Is anything wrong? A parametric bootstrap test of the evidence for anything at all.
 
-Whole campaigns are simulated from the base law's posterior and everything is refitted to each, so that the
-price of looking at many mechanisms and places is paid; sampling stops as soon as the answer is clear
-(Besag and Clifford, 1991, doi 10.1093/biomet/78.2.301).
+Whole campaigns are simulated from the base law's posterior and everything is refitted to each, so that
+looking at many mechanisms and places is accounted for. Sampling stops as soon as the answer is clear (Besag
+and Clifford, 1991, doi 10.1093/biomet/78.2.301).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
 from skred.diagnosis.detect.score_test import ScoreTest
-from skred.diagnosis.evidence.conditional_map import Population, Rows
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
 from skred.diagnosis.evidence.linear_mixed_model import fit_population
 from skred.parallel.threads import side_by_side, threads
 
@@ -23,7 +23,9 @@ FloatArray = NDArray[np.float64]
 LIMIT = 0.01
 """Share of clean campaigns that may be called wrong."""
 _ENOUGH_ABOVE = 8
+"""Clean campaigns at least as odd after which sampling stops: the p-value is then known to a third of it."""
 _BATCH = 25
+"""Campaigns refitted together: large enough for arrays, small enough to stop early."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +98,6 @@ def _simulated(
 
 def _refitted(score_test: ScoreTest, rows: Rows, start: tuple[Population, FloatArray]) -> FloatArray:
     """The statistic after refitting populations and events, (n_groups,)."""
-    population, points = fit_population(
-        score_test.extension, rows, score_test.strengths, score_test.prior, start
-    )
+    likelihood = EventLikelihood(score_test.extension, rows, score_test.strengths)
+    population, points = fit_population(likelihood, score_test.prior, start)
     return score_test.statistic(score_test.scores(rows, points, population))

@@ -4,15 +4,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.evidence.coefficient import Curve
-from skred.physics.mechanisms.spec import Mechanism
+from skred.physics.mechanisms.spec import Group, Mechanism
 from skred.physics.mechanisms.stretches import is_opposed
 
 FloatArray = NDArray[np.float64]
+FORM = 0.3
+"""Relative standard deviation of a physical strength for the form of its term: edges, exponents, supply that
+real forces have otherwise. Set on 28 opened trials, whose true forms differ on purpose: 90 % intervals held
+16 of the true strengths without it, 24 with it."""
+
+
+class Strength(NamedTuple):
+    """Posterior mean and standard deviation of a strength, in its unit."""
+
+    mean: float
+    sd: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,35 +73,48 @@ class Candidate:
         """The curve of the highest Bayes factor."""
         return self.curves[int(np.argmax([one.log_bayes_factor for one in self.curves]))]
 
-    def strength(self) -> tuple[float, float]:
-        """Posterior mean and standard deviation of the strength over all shapes."""
-        moments = np.array([one.moments for one in self.curves])
-        weights = self.shape_weights
-        mean = float(weights @ moments[:, 0])
-        return mean, math.sqrt(float(weights @ (moments[:, 1] ** 2 + (moments[:, 0] - mean) ** 2)))
+    def strength(self) -> Strength:
+        """The strength by the comparison, over all places."""
+        return self.over_places(*self.best.moments)
 
-    def strength_between_shapes(self) -> float:
-        """What not knowing the place adds to the standard deviation about the best shape's mean.
+    def over_places(self, mean: float, sd: float) -> Strength:
+        """The strength over all places, from what it is at the best one.
 
-        Over the shapes whose strengths mean the same: of one sensor, covariate, speed scale, opposed or not.
+        A mixture over the shapes whose strengths are the same quantity: of one sensor, one covariate, one
+        speed scale, compensated or not. What their means differ by moves the mean and is in the standard
+        deviation; so is what no comparison knows of, that a term stands for a force of a somewhat other form.
+
+        Parameters
+        ----------
+        mean, sd : float
+            Of the strength at the best shape.
         """
         best = self.best
-        same = [k for k, one in enumerate(self.curves) if _means_the_same(one, best)]
+        same = [k for k, one in enumerate(self.curves) if _is_same_quantity(one, best)]
+        weights = self.shape_weights[same] / self.shape_weights[same].sum()
         apart = np.array([self.curves[k].moments[0] - best.moments[0] for k in same])
-        weights = self.shape_weights[same]
-        return math.sqrt(float(weights @ apart**2 / weights.sum()))
+        moved = float(weights @ apart)
+        between = math.sqrt(float(weights @ (apart - moved) ** 2))
+        mean += moved
+        form = FORM * abs(mean) if self.mechanism.group is Group.PHYSICS else 0.0
+        return Strength(mean, math.hypot(sd, between, form))
 
     def stretch(self) -> tuple[float, float] | None:
-        """Where it acts: weighted medians of both ends [m], None where it is not local."""
+        """Where it acts: medians of both ends over the place's posterior [m], None where it is not local."""
+        ends = self.ends(0.5)
+        return None if ends is None else (ends[0], ends[1])
+
+    def ends(self, share: float) -> tuple[float, float] | None:
+        """Quantiles of both ends over the place's posterior [m], None where it is not local."""
         if self.best.shape.place_m is None:
             return None
         first = np.array([one.shape.s_from_m for one in self.curves], dtype=float)
         last = np.array([one.shape.s_to_m for one in self.curves], dtype=float)
         weights = self.shape_weights
-        return _weighted_median(first, weights), _weighted_median(last, weights)
+        return _weighted_quantile(first, weights, share), _weighted_quantile(last, weights, share)
 
 
-def _means_the_same(one: Curve, other: Curve) -> bool:
+def _is_same_quantity(one: Curve, other: Curve) -> bool:
     """Whether strengths of two shapes are the same quantity."""
 
     def meaning(curve: Curve) -> tuple[str | None, str | None, bool, float | None]:
@@ -99,7 +124,7 @@ def _means_the_same(one: Curve, other: Curve) -> bool:
     return meaning(one) == meaning(other)
 
 
-def _weighted_median(values: FloatArray, weights: FloatArray) -> float:
+def _weighted_quantile(values: FloatArray, weights: FloatArray, share: float) -> float:
     order = np.argsort(values)
-    share = np.cumsum(weights[order])
-    return float(values[order][min(int(np.searchsorted(share, 0.5 * share[-1])), len(values) - 1)])
+    reached = np.cumsum(weights[order])
+    return float(values[order][min(int(np.searchsorted(reached, share * reached[-1])), len(values) - 1)])

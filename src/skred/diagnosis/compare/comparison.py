@@ -1,11 +1,11 @@
-"""The candidates compared: nothing, each mechanism, each instrument fault, a force not in the list.
+"""The model comparison: nothing, each mechanism, each instrument fault, a force that is not in the list.
 
-Two error models run: the one that the base law alone prefers and, if that is another, the robust one, so that
-odd events, heavy tails and correlated errors stay error models and do not become findings. Where the robust
-one is so far behind that no candidate can bring it back it does not run.
+Two error models take part: the one that the base law alone prefers and, if that is another, the robust one.
+So odd events, heavy tails and correlated errors stay error models and do not become findings. The robust one
+is left out where it is so far behind that no candidate can bring it back.
 
-Curves are computed in threads and by helpers. scipy's `logsumexp` asks there for JAX, which ArviZ loads only
-when asked, and two threads that ask at once find half of it; NumPy's does not.
+Curves are computed in threads and by worker processes. scipy's `logsumexp` asks there for JAX, which ArviZ
+loads only when asked, and two threads that ask at once find half of it; NumPy's does not.
 """
 
 from __future__ import annotations
@@ -27,15 +27,17 @@ from skred.diagnosis.compare.screening import curve, screening_budget
 from skred.diagnosis.detect.score_test import ScoreTest, placed_mechanisms
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, alike, log_evidence_of
-from skred.diagnosis.evidence.coefficient import Base, Curve, refit
-from skred.diagnosis.evidence.conditional_map import campaign_rows
+from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
 from skred.diagnosis.evidence.event_quadrature import FINE, USUAL, Budget
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds, stated
+from skred.diagnosis.evidence.refit import Rounds, refit
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
 from skred.parallel.processes import worker_pool
 from skred.parallel.threads import side_by_side
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import can_join
 from skred.physics.mechanisms.spec import Shape
 
 FloatArray = NDArray[np.float64]
@@ -43,13 +45,14 @@ Tell = Callable[[int, int], None]
 ERROR_SHARES = {"robust": 0.55, "student": 0.15, "correlated": 0.15, "scaled": 0.15}
 """Prior probability of each error model in the comparison."""
 _PREFERRED_BY = 1.0
+"""Nats by which another error model must be better for the base law alone to be compared under as well."""
 _FAR_BEHIND = 10.0
-"""Nats behind its mechanism's best at which a place is not looked at under another error model: it counts for
+"""Nats behind its mechanism's best at which a place is not screened under another error model: it counts for
 nothing."""
 _OTHER_ERRORS = 5.0
 """Nats that a candidate may have more under the less probable of two error models, beside as many again as it
 has under the other. Where a model is farther behind than that, mechanisms to which these are too few are not
-raced under it, and count for nothing there."""
+compared under it, and count for nothing there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +65,8 @@ class ComparisonUnderErrors:
     base : Base
     candidates : mapping of str to Candidate
     profiles : list of Profile
-    first_look : list of Curve
-        A rough one for each candidate of the mechanisms raced; that under another error model where it
+    screened : list of Curve
+        A rough one for each candidate of the mechanisms compared; that under another error model where it
         cannot count.
     """
 
@@ -71,7 +74,7 @@ class ComparisonUnderErrors:
     base: Base
     candidates: dict[str, Candidate]
     profiles: list[Profile]
-    first_look: list[Curve]
+    screened: list[Curve]
 
     @property
     def log_factors(self) -> dict[str, float]:
@@ -82,7 +85,7 @@ class ComparisonUnderErrors:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """All under_each, and what they say together.
+    """The comparisons under each error model, and what they say together.
 
     Attributes
     ----------
@@ -123,7 +126,7 @@ class Comparison:
         return math.log(max(1.0 - nothing, 1e-300)) - math.log(max(nothing, 1e-300))
 
     def leading(self, name: str) -> ComparisonUnderErrors:
-        """The under_errors in which an id has most of its evidence."""
+        """The comparison under the error model that an id has most of its evidence under."""
 
         def height(under_errors: ComparisonUnderErrors) -> float:
             return (
@@ -145,7 +148,7 @@ def compare(base: Base, tell: Tell = lambda done, of: None) -> Comparison:
     base : Base
         Under any error model.
     tell : callable
-        Detectability how many first looks are done, and of how many, under each error model.
+        Is told how many candidates are screened, and of how many, under each error model.
     """
     fitted = side_by_side(lambda name: with_errors(base, name), list(ERROR_SHARES))
     bases = dict(zip(ERROR_SHARES, fitted, strict=True))
@@ -157,32 +160,32 @@ def compare(base: Base, tell: Tell = lambda done, of: None) -> Comparison:
         chosen.insert(0, preferred)
     under_each = [_under_errors(chosen[0], bases[chosen[0]], tell)]
     for name in chosen[1:]:
-        before, behind = under_each[0].first_look, height[preferred] - height[name]
+        before, behind = under_each[0].screened, height[preferred] - height[name]
         if behind > _OTHER_ERRORS:
             before = _that_may_count(before, behind)
         if before:
             best = max(under_each[0].log_factors.values()) + behind
             under_each.append(_under_errors(name, bases[name], tell, before, best))
-    # The evidence of an error model without a under_errors counts for nothing and everything alike.
-    raced = [candidate.mechanism for candidate in under_each[0].candidates.values()]
+    # The evidence of an error model that is left out counts for nothing and everything alike.
+    listed = [candidate.mechanism for candidate in under_each[0].candidates.values()]
     evidence = {under_errors.error_model: heights[under_errors.error_model] for under_errors in under_each}
-    return Comparison(tuple(under_each), prior_odds(raced), evidence)
+    return Comparison(tuple(under_each), prior_odds(listed), evidence)
 
 
 def with_errors(base: Base, error_model: str) -> Base:
-    """The base law refitted under an error model, with nodes around its own fit."""
+    """The base law refitted under an error model, with quadrature points around its own fit."""
     problem = base.problem
     if problem.error_model.id != error_model:
         problem = replace(problem, error_model=ERROR_MODELS[error_model])
     extension = extended(problem, base.law, base.directions)
     rows = campaign_rows(extension)
     start = (base.population, base.fit.points)
-    fit = refit(extension, rows, base.strengths[None, :], start, base.log_scale, FINE, USUAL, 3)[0]
+    fit = refit(extension, rows, base.strengths[None, :], start, Rounds(FINE, USUAL, 3))[0]
     population = fit.found.population(len(base.law.mechanisms))
-    points = better_modes(extension, rows, fit.points, base.strengths, population)
+    points = better_modes(EventLikelihood(extension, rows, base.strengths), fit.points, population)
     if not np.array_equal(points, fit.points):
         start = (population, points)
-        fit = refit(extension, rows, base.strengths[None, :], start, base.log_scale, FINE, USUAL, 3)[0]
+        fit = refit(extension, rows, base.strengths[None, :], start, Rounds(FINE, USUAL, 3))[0]
     return replace(base, problem=problem, rows=rows, fit=fit)
 
 
@@ -194,26 +197,26 @@ def _under_errors(
     Parameters
     ----------
     before : sequence of Curve, optional
-        First looks by another one, at the mechanisms that are raced.
+        Screened under another one: the mechanisms that are compared.
     best : float, optional
         The most that a candidate has under that, in nats above nothing under this one.
     """
     budget = screening_budget(base)
     base.with_nothing(budget)  # before anyone else does it once more
     with worker_pool() as pool:
-        curves = _first_looks(base, budget, pool, tell, before)
+        curves = _screened(base, budget, pool, tell, before)
         candidates = refine(base, curves, budget, pool)
         profiles = list(pool.map(partial(free_force, base, candidates=candidates), KINDS))
         candidates, profiles = recomputed(base, candidates, profiles, pool, best)
     for mechanism in mechanisms().values():
         other = candidates.get(mechanism.same_term_as)
-        if other is not None and mechanism.added is not None and mechanism.added.joins(base.setting.base):
+        if other is not None and can_join(mechanism, base.setting.base):
             same = tuple(replace(one, mechanism=mechanism) for one in other.curves)
             candidates[mechanism.id] = replace(other, mechanism=mechanism, curves=same)
     return ComparisonUnderErrors(error_model, base, candidates, profiles, curves)
 
 
-def _first_looks(
+def _screened(
     base: Base, budget: Budget, pool: ThreadPoolExecutor, tell: Tell, before: Sequence[Curve]
 ) -> list[Curve]:
     """A rough curve for each candidate; those `before`, by another error model, where they cannot count."""
@@ -234,7 +237,7 @@ def _first_looks(
 
 
 def _that_may_count(before: Sequence[Curve], behind: float) -> list[Curve]:
-    """Of first looks those of mechanisms that may count by an error model so many nats behind."""
+    """Of what was screened the mechanisms that may count under an error model so many nats behind."""
     heights = np.array([one.log_bayes_factor for one in before])
     may_have = heights + np.maximum(heights, 0.0) + _OTHER_ERRORS - behind
     best = max(float(heights.max()), 0.0)
@@ -261,7 +264,7 @@ def _that_count(curves: Mapping[int, Curve]) -> list[int]:
 
 
 def free_force(base: Base, kind: Kind, candidates: Mapping[str, Candidate]) -> Profile:
-    """The unlisted force of one kind: from no force, and from the best listed one that enters alike."""
+    """The force not in the list, of one kind: from no force, and from the best listed one of that kind."""
     near = [one for candidate in candidates.values() for one in candidate.curves if alike(kind, one)]
     if not near:
         return fit_profile(base, kind)

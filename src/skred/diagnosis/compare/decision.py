@@ -1,4 +1,4 @@
-"""How probabilities become a verdict: the rule of the campaign format, and ties across groups beside it."""
+"""How probabilities become a verdict: the rule of the campaign format, and ties across groups."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group
 
 HELD = 0.9
-"""Share of its group that a tie set holds."""
+"""Share of its group that a credible set holds: that of all intervals."""
 TIED_NATS = 2.0
-"""An id of another group is tied with the named one where its log probability is at most so far below: some
-such ties no recordings split (a low dam and a bias of the sensor beside it), and a group leads by less. Which
-group leads decides the verdict, not whether its name stands alone."""
+"""An id of another group is tied with the named one where its log probability is at most so far below. Some
+such ties no recordings split: a low dam and a bias of the sensor beside it. Which group leads decides the
+verdict, not whether its name stands alone."""
 NOTHING_AT_MOST, NOTHING_ALONE = 0.5, 0.15
 ALARMS = ((LIMIT, NOTHING_AT_MOST), (1.0, NOTHING_ALONE))
 """The alarm is raised where, for any of these, the check's p-value is at most the first and the probability
-of nothing below the second: the check, unless the comparison denies it; the comparison alone. By the evidence
-alone a clean campaign falls below the latter with at most a sixth of probability (Markov's inequality for a
-Bayes factor); it is far rarer (``benchmarks/alarm_limit.py``)."""
+of nothing below the second. That is: by the check, unless the comparison denies it; or by the comparison
+alone. By the evidence alone a clean campaign falls below the latter with at most a sixth of probability
+(Markov's inequality for a Bayes factor); it is far rarer (``studies/thresholds/alarm_limit.py``)."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def decide(probability: Mapping[str, float], p_value: float, can_tell: bool) -> 
     probability : mapping
         Of each id.
     p_value : float
-        Of the omnibus check.
+        Of the check.
     can_tell : bool
         Whether relevant strengths would mostly have been found.
 
@@ -91,7 +91,7 @@ def decide(probability: Mapping[str, float], p_value: float, can_tell: bool) -> 
 
 
 def blamed(probability: Mapping[str, float]) -> Decision:
-    """What is off, if something is: the smallest set of the leading group, and what is tied with its name."""
+    """What is off, if something is: the credible set of the leading group, and what is tied with its name."""
     groups: dict[str, dict[str, float]] = {UNLISTED: {UNLISTED: probability[UNLISTED]}}
     for name, share in probability.items():
         if name not in (NOTHING, UNLISTED):

@@ -1,4 +1,4 @@
-"""What many more nodes, and sampling, change for those that lead a comparison: mechanisms and free forces."""
+"""Re-computed evidence of what leads a comparison: with many more quadrature points, and by sampling."""
 
 from __future__ import annotations
 
@@ -12,21 +12,26 @@ from numpy.typing import NDArray
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.discrepancy.profile import KINDS, Profile
 from skred.diagnosis.discrepancy.sampled_evidence import sampled_log_factor
-from skred.diagnosis.evidence.coefficient import Base, Fit, refit
-from skred.diagnosis.evidence.conditional_map import event_modes
+from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, event_modes
 from skred.diagnosis.evidence.event_quadrature import FINE, event_nodes
 from skred.diagnosis.evidence.extension import Extension, extended
 from skred.diagnosis.evidence.marginal import evidence, importance_evidence
+from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 
 FloatArray = NDArray[np.float64]
-_CHECKED, _DRAWS = 5, 500
-"""Mechanisms looked at, at most, and populations drawn for each."""
+_CHECKED = 5
+"""Mechanisms re-computed at most, which bounds the time."""
+_DRAWS = 500
+"""Populations drawn for each."""
 _BEHIND = 6.0
-"""Nats behind the best of all at which nothing is looked at: it counts for a ninetieth, as stated
-(`odds.POWER`), and a look changes what a mechanism has by a nat or so."""
-_COUNTS, _TOO_LOW = 4.0, 4.0
+"""Nats behind the best of all at which nothing is re-computed: it counts for a ninetieth, as stated
+(`prior_odds.POWER`), and what a mechanism has changes by a nat or so."""
+_COUNTS = 4.0
 """Nats behind the best at which what a force has need not be known better than its first draws tell: two nats
-more there are a tenth of a nat for all together. Nats that it may have more than by Laplace's formula."""
+more there are a tenth of a nat for all together."""
+_TOO_LOW = 4.0
+"""Nats that a force may have more than by the Laplace approximation, where fronts stop near sensors."""
 
 
 def recomputed(
@@ -36,10 +41,10 @@ def recomputed(
     pool: ThreadPoolExecutor,
     best: float = -np.inf,
 ) -> tuple[dict[str, Candidate], list[Profile]]:
-    """All candidates under one error model, those that lead looked at once more.
+    """All candidates under one error model, those that lead with re-computed evidence.
 
-    Mechanisms at the top of their best curve, if it was computed with fronts: what is wrong with a rough one
-    is its own. Profiles by sampling their values.
+    A mechanism's is re-computed at the maximum of its best curve, if that was computed with fronts: a rough
+    one is wrong in its own way. A profile's is computed by sampling its values.
 
     Parameters
     ----------
@@ -70,7 +75,7 @@ def recomputed(
 def _looked_at(
     base: Base, candidates: Mapping[str, Candidate], leading: Sequence[str], pool: ThreadPoolExecutor
 ) -> dict[str, Candidate]:
-    """All mechanisms, those that lead with many more nodes at the top of their best curve."""
+    """All mechanisms, those that lead with many more quadrature points at the maximum of their best curve."""
     looked = {name: pool.submit(_at_top, base, candidates[name]) for name in leading}
     plain = extended(base.problem, base.law, base.directions)
     nothing = pool.submit(_finely, base, plain, base.strengths, base.fit) if leading else None
@@ -85,7 +90,7 @@ def _looked_at(
 
 
 def _at_top(base: Base, candidate: Candidate) -> tuple[float, float]:
-    """At the top of a mechanism's best curve."""
+    """At the maximum of a mechanism's best curve."""
     best = candidate.best
     top = int(np.argmax(best.log_evidence))
     extension = extended(base.problem, base.law, (*base.directions, best.direction))
@@ -93,12 +98,13 @@ def _at_top(base: Base, candidate: Candidate) -> tuple[float, float]:
 
 
 def _finely(base: Base, extension: Extension, strengths: FloatArray, fit: Fit) -> tuple[float, float]:
-    """Log evidence with many nodes, from where a fit is: by Laplace's formula, by importance sampling."""
+    """Log evidence with many quadrature points: by the Laplace approximation, and by importance sampling."""
     start = (fit.found.population(len(base.law.mechanisms)), fit.points)
-    fits = refit(extension, base.rows, strengths[None, :], start, base.log_scale, FINE, n_rounds=2)
+    fits = refit(extension, base.rows, strengths[None, :], start, Rounds(FINE))
     population = fits[0].found.population(len(base.law.mechanisms))
-    modes = event_modes(extension, base.rows, fits[0].points, strengths, population)
-    nodes = event_nodes(extension, base.rows, strengths, population, modes, FINE, base.population).nodes
+    likelihood = EventLikelihood(extension, base.rows, strengths)
+    modes = event_modes(likelihood, fits[0].points, population)
+    nodes = event_nodes(likelihood, population, modes, FINE, base.population).nodes
     found = evidence(nodes, base.log_scale, fits[0].found.psi)
     sampled, _ = importance_evidence(nodes, base.log_scale, found, _DRAWS, seed=0)
     return found.log_evidence, sampled

@@ -1,9 +1,9 @@
-"""Local refinement: leading places with fronts, then split as finely as the recordings resolve.
+"""Local refinement: leading places computed with fronts, then split as finely as the recordings resolve.
 
-A first look stands for all that is near its place. Where a mechanism leads, its place is computed with
-fronts and moved, shortened and lengthened. Where one of these parts holds most of the evidence it is parted
-in its turn, in smaller steps: a strong effect on a stretch whose ends are wrong by a tenth of its length
-loses several nats, and a force of no shape in particular would not.
+Screening takes one place for all that is near it. Where a mechanism leads, its place is computed with
+fronts, and moved, shortened and lengthened. A part that holds most of the evidence is parted in its turn, in
+smaller steps. A strong effect on a stretch whose ends are wrong by a tenth of its length loses several nats,
+and a force of any shape would not.
 """
 
 from __future__ import annotations
@@ -18,23 +18,30 @@ import numpy as np
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
 from skred.diagnosis.evidence.event_quadrature import Budget
+from skred.physics.mechanisms.placed import parts_of
 from skred.physics.mechanisms.spec import Shape
 from skred.physics.mechanisms.stretches import shares
 
-_WITHIN, _AT_MOST, _TURNS = 3.0, 2, 3
-"""Places of a mechanism that are looked at again: within so many nats of its best, so many, so many times
-after the leader's."""
+_WITHIN = 3.0
+"""Nats behind its mechanism's best within which a place is refined: screening is off by nats where fronts
+stop."""
+_AT_MOST = 2
+"""Places of a mechanism that are refined at most at a time, which bounds the time."""
+_TURNS = 3
+"""Turns after the leader's: others lead once a place has fallen behind."""
 _MORE, _MORE_OF_OWN = 20.0, 0.6
 """Nats that the parts of a place may have more than it, or share of its own if that is more: a place that
-does not come up to the best of all even so is not looked at again. Drag between the dam and the sensor above
-it has 71 nats at a first look and 112 in parts, under M1 at Ryggfonn."""
+does not come up to the best of all even so is not refined. Drag between the dam and the sensor above it has
+71 nats by screening and 112 in parts, under M1 at Ryggfonn."""
 _SPLIT_FROM = 1.0
 """Nats in favour of a place from which it is split: parts of a place without evidence have hardly any."""
-_HOLDS_MOST, _LEVELS = 0.5, 4
-"""Share of its place's evidence from which a part is parted itself, and how many times places are parted."""
+_HOLDS_MOST = 0.5
+"""Share of its place's evidence from which a part is parted itself: most of it then hangs on where it is."""
+_LEVELS = 4
+"""How many times places are parted: the last steps are an eighth of the first, some metres."""
 _SMALLER = 0.5
 """Steps within a part, in those that led to it. At 0.38 a part of a stretch would stand for as much of the
-prior as it has of the weight; half finds narrow peaks that 0.38 misses, and costs them up to 0.6 nats each
+prior as it has of the weight; half finds narrow maxima that 0.38 misses, and costs them up to 0.6 nats each
 time."""
 
 
@@ -79,7 +86,7 @@ class Place:
 def refine(
     base: Base, curves: Sequence[Curve], budget: Budget, pool: ThreadPoolExecutor
 ) -> dict[str, Candidate]:
-    """Entrants whose leading places are computed with fronts and then split; rough curves for the others.
+    """Candidates whose leading places are computed with fronts and then split; rough curves for the others.
 
     The leading mechanism comes first: others have to keep up with what its parts have. Once a place is looked
     at it may fall behind others that then lead, and are looked at in their turn.
@@ -98,7 +105,7 @@ def refine(
         places.update(zip(todo, pool.map(look, [curves[k] for k in todo]), strict=True))
         height = {k: max(curves[k].log_bayes_factor, places[k].log_bayes_factor) for k in todo}
         _split(base, [k for k in todo if height[k] > _SPLIT_FROM], places, budget, pool)
-    return entrants_of(curves, places)
+    return candidates_of(curves, places)
 
 
 def _split(
@@ -128,13 +135,12 @@ def _split(
 def _parts(base: Base, place: Place, number: int, steps: float) -> list[Shape]:
     """The finer shapes that a part stands for beside its own; steps are in those of the whole place."""
     part, whole = place.curves[number], place.curves[0].shape
-    added, shape = part.mechanism.added, part.shape
-    assert added is not None
+    mechanism, shape = part.mechanism, part.shape
     if shape.s_from_m is not None and shape.s_to_m is not None:
         assert whole.s_from_m is not None and whole.s_to_m is not None
         steps *= (whole.s_to_m - whole.s_from_m) / (shape.s_to_m - shape.s_from_m)
     known = {one.shape for one in place.curves}
-    return [one for one in dict.fromkeys(added.split(base.setting, shape, steps)) if one not in known]
+    return [one for one in dict.fromkeys(parts_of(mechanism, base.setting, shape, steps)) if one not in known]
 
 
 def leading(curves: Sequence[Curve], places: Mapping[int, Place]) -> list[int]:
@@ -154,7 +160,7 @@ def _may_have(height: float) -> float:
     return height + max(_MORE, _MORE_OF_OWN * height)
 
 
-def entrants_of(curves: Sequence[Curve], places: Mapping[int, Place]) -> dict[str, Candidate]:
+def candidates_of(curves: Sequence[Curve], places: Mapping[int, Place]) -> dict[str, Candidate]:
     """Curves by mechanism; parts of a place share the weight of the one that they stand in for."""
     gathered: dict[str, tuple[list[Curve], list[float]]] = {}
     for name in dict.fromkeys(one.mechanism.id for one in curves):

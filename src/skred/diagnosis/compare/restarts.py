@@ -1,7 +1,7 @@
-"""Modes that nodes have found and climbs from elsewhere have not.
+"""Modes that quadrature points have found and climbs from elsewhere have not.
 
-Where a gate stands just above the stops, a front that stops a little too early is in a valley of its own, and
-no step out of it gains anything. Nodes that are spread over the whole population land beyond.
+Where a gate stands just above the stops, a front that stops a little too early is at a mode of its own, and
+no step away from it gains anything. Points that are spread over the whole population lie beyond.
 """
 
 from __future__ import annotations
@@ -9,39 +9,35 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.evidence.conditional_map import Population, Rows, event_modes, log_joint
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, event_modes, log_joint
 from skred.diagnosis.evidence.event_quadrature import FINE, event_nodes
-from skred.diagnosis.evidence.extension import Extension
 
 FloatArray = NDArray[np.float64]
 _GAINED = 1.0
-"""Nats by which another mode must be higher."""
+"""Nats by which another mode must be higher: less is what is left of integration errors."""
 
 
-def better_modes(
-    extension: Extension, rows: Rows, points: FloatArray, strengths: FloatArray, population: Population
-) -> FloatArray:
+def better_modes(likelihood: EventLikelihood, points: FloatArray, population: Population) -> FloatArray:
     """Each event's mode, or a higher one that a climb from the node with most of its integral leads to.
 
     Parameters
     ----------
     points : (n_rows, n_base + 1) array
         Where climbs ended.
-    strengths : (n_directions,) array
 
     Returns
     -------
     (n_rows, n_base + 1) array
         The same points but for rows with a higher mode.
     """
-    modes = event_modes(extension, rows, points, strengths, population)
-    spread = event_nodes(extension, rows, strengths, population, modes, FINE)
+    modes = event_modes(likelihood, points, population)
+    spread = event_nodes(likelihood, population, modes, FINE)
     n_rows, _, n = spread.points.shape
     away = spread.points - np.append(population.mean[0], 0.0)
     precision = population.precision[0][: n - 1, : n - 1]
     log_prior = -0.5 * np.einsum("rki,ij,rkj->rk", away[:, :, :-1], precision, away[:, :, :-1])
     best = (spread.log_weights + log_prior).argmax(axis=1)
     start = spread.points[np.arange(n_rows), best]
-    again = event_modes(extension, rows, start, strengths, population).points
-    heights = [log_joint(extension, rows, one, strengths, population) for one in (points, again)]
+    again = event_modes(likelihood, start, population).points
+    heights = [log_joint(likelihood, one, population) for one in (points, again)]
     return np.where((heights[1] > heights[0] + _GAINED)[:, None], again, points)

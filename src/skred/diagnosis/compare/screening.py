@@ -1,4 +1,4 @@
-"""The comparison's first look at a place: quick, and by fronts where tangents mislead."""
+"""Linearised screening: the evidence at every place along tangents, and by fronts where tangents mislead."""
 
 from __future__ import annotations
 
@@ -11,17 +11,20 @@ from skred.diagnosis.evidence.event_quadrature import FRONTS, ROUGH, Budget
 from skred.diagnosis.evidence.extension import extended
 from skred.physics.mechanisms.spec import Mechanism, Shape
 
-_GRID, _STRONGER = (0.2, 0.6, 1.2), (2.2, 3.5)
-"""Strengths at first, in scales of the prior; and those beyond, where one from the last of these on is not
-hopeless."""
+_GRID = (0.2, 0.6, 1.2)
+"""Strengths at first, in scales of the prior: 45 % of a half-normal prior is below the second."""
+_STRONGER = (2.2, 3.5)
+"""Strengths beyond, where one from the last of these on is not hopeless: five in ten thousand are larger."""
 _HOPELESS = 12.0
-"""Nats behind the best."""
+"""Nats behind the best at which stronger is not tried: it would count for one in a hundred thousand."""
 _OUTSIDE = 2.2
 """A strength beyond the one that the linear model finds, relative to it, where no other is."""
 _PROMISED = 0.3
-"""Nats that a rough curve must promise for fronts to be asked at its top."""
-_FAR_OFF, _FAR_SHARE = 4.0, 0.02
-"""Standard deviations beyond which a reading is far off, and the share of such readings that is many."""
+"""Nats that a rough curve must have for fronts to be asked at its maximum."""
+_FAR_OFF = 4.0
+"""Standard deviations beyond which a reading is far off: one in sixteen thousand is by chance."""
+_FAR_SHARE = 0.02
+"""Share of such readings that is many: that of the robust error model's larger outlier share."""
 
 
 def screening_budget(base: Base) -> Budget:

@@ -1,9 +1,9 @@
-"""What these recordings can tell, before any residual is looked at.
+"""Detectability: what these recordings can tell, before any residual is looked at.
 
-For each mechanism: how much of its information is left once base strengths, their scatter and releases
-have had their share; the smallest strength that would be found in 90 % of cases; what it cannot be told
-from; and the one extra sensor that would help most. It depends on track, sensors and number of events, and
-on where the events' modes are, not on whether the readings fit.
+For each mechanism: how much of its information is retained once base strengths, their scatter and releases
+have had their share; the smallest strength that would be found in 90 % of cases; what it is confounded with;
+and the one extra sensor that would help most. It depends on track, sensors and number of events, and on
+where the events' modes are, not on whether the readings fit.
 """
 
 from __future__ import annotations
@@ -12,24 +12,28 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
 from skred.campaign import Sensor, Status
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, campaign_rows
 from skred.diagnosis.evidence.linear_mixed_model import Scores, efficient_scores, without
 from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Added, Group, Mechanism
 
 FloatArray = NDArray[np.float64]
-LIMIT_Z = 2.85
-"""Score at which one of about 18 distinguishable candidates stands out in 1 % of clean campaigns."""
+LIMIT_Z, LIMIT_FOR = 2.85, 13
+"""Score above which a mechanism counts as seen, and for a library of how many it was calculated."""
 _NINE_IN_TEN = 1.2816
+"""Standard normal quantile of 0.9: how far above that score nine in ten scores are."""
 ALIKE = 0.9
-"""Size of the cosine between two efficient scores above which mechanisms look alike."""
+"""Size of the cosine between two efficient scores above which mechanisms look alike: then four fifths of the
+information about one is information about the other."""
 _PLACES = 12
+"""Places tried for one more sensor, evenly over the recorded part and a little above."""
 _NO_INFORMATION = 1e-6
-"""About a strength in scales of its prior."""
+"""About a strength in scales of its prior: rounding errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +107,15 @@ def identify(
     return Identifiability(tuple(table), float(places[best]), power, powers[best])
 
 
+def limit_z(n_mechanisms: int) -> float:
+    """Score above which a mechanism of a library of so many counts as seen.
+
+    In a longer list more of them stand out by chance. The limit rises with its length, so that some mechanism
+    stands out in as many clean campaigns as with the list that `LIMIT_Z` was calculated for.
+    """
+    return -float(ndtri(ndtr(-LIMIT_Z) * LIMIT_FOR / n_mechanisms))
+
+
 def mean_power(table: list[Detectability]) -> float:
     """Mean power over the listed physics."""
     powers = [row.power for row in table if row.mechanism.group is Group.PHYSICS]
@@ -140,7 +153,7 @@ def told(score_test: ScoreTest, scores: Scores) -> list[Detectability]:
                 _limit(information[0, typical], informed[typical]),
                 _limit(information[0, best], informed[best]),
                 stretch,
-                float(np.mean(ndtr(np.sqrt(own) * added.relevant - LIMIT_Z))),
+                float(np.mean(ndtr(np.sqrt(own) * added.relevant - limit_z(len(mechanisms()))))),
                 tuple(sorted(alike)),
             )
         )
@@ -154,7 +167,9 @@ def _added(mechanism: Mechanism) -> Added:
 
 def _limit(information: float, informed: bool) -> float:
     """Strength found in 90 % of cases; infinite where the recordings say nothing."""
-    return (LIMIT_Z + _NINE_IN_TEN) / float(np.sqrt(information)) if informed else float("inf")
+    if not informed:
+        return float("inf")
+    return (limit_z(len(mechanisms())) + _NINE_IN_TEN) / float(np.sqrt(information))
 
 
 def extra_sensors(

@@ -1,10 +1,10 @@
-"""What a campaign's recordings can tell, without sampling: identify.json and a table for the terminal."""
+"""What a campaign's recordings can tell, without sampling, as identify.json holds it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,24 +13,20 @@ from skred.diagnosis.detect.detectability import identify as look
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.detect.too_little import too_little
 from skred.diagnosis.evidence.coefficient import Base, fit_base
-from skred.diagnosis.evidence.conditional_map import campaign_rows
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
+from skred.diagnosis.words import percent
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.output import write_json
 from skred.physics.law import Law
-from skred.report.shared.labels import shortened
-from skred.report.shared.numbers import decimals_for, rounded, share
-from skred.report.shared.tables import plain_table, plain_text
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 Tell = Callable[[str], None]
 FILE = "identify.json"
 _ROUNDS = 40
-_UNSEEN = 20.0
-"""In scales of the prior: a limit beyond is none, as in the verdict."""
+"""Rounds of expectation-maximisation at most: from the prior's medians more than from a posterior."""
+_NO_LIMIT = 20.0
+"""Prior scales from which on a detection limit is none, as in the verdict."""
 
 
 def identify_to(
@@ -70,9 +66,8 @@ def base_of(problem: HierarchicalProblem, law: Law) -> Base:
     rows = campaign_rows(extension)
     points = np.zeros((len(rows.event), len(law.mechanisms) + 1))
     points[:, :-1] = population.mean[0]
-    start = fit_population(
-        extension, rows, np.empty(0), mean_prior(law), (population, points), n_rounds=_ROUNDS
-    )
+    likelihood = EventLikelihood(extension, rows, np.empty(0))
+    start = fit_population(likelihood, mean_prior(law), (population, points), n_rounds=_ROUNDS)
     return fit_base(problem, law, *start)
 
 
@@ -121,7 +116,7 @@ def _row(told: Detectability) -> dict[str, Any]:
         "group": str(mechanism.group),
         "parameter": mechanism.strength.name,
         "unit": mechanism.strength.unit,
-        "kept": told.kept if told.limit < _UNSEEN * added.scale else 0.0,
+        "kept": told.kept if told.limit < _NO_LIMIT * added.scale else 0.0,
         "limit": _seen(told.limit, added.scale),
         "best_limit": _seen(told.best_limit, added.scale),
         "best_stretch_m": told.limit_m,
@@ -132,7 +127,7 @@ def _row(told: Detectability) -> dict[str, Any]:
 
 
 def _seen(limit: float, scale: float) -> float | None:
-    return limit if limit < _UNSEEN * scale else None
+    return limit if limit < _NO_LIMIT * scale else None
 
 
 def _next_sensor(table: Identifiability) -> dict[str, Any] | None:
@@ -151,8 +146,8 @@ def _statement(document: dict[str, Any]) -> list[str]:
         return [f"These recordings cannot tell: {document['reason']}."]
     silence = "would mean something" if document["can_tell"] else "would mean little"
     sentences = [
-        "A relevant strength of the listed physics would be found, on average, in a share of"
-        f" {share(document['power'])} of cases: silence {silence}."
+        "A relevant strength of the listed physics would be found, on average, in"
+        f" {percent(document['power'])} of cases: silence {silence}."
     ]
     unseen = [row["id"] for row in document["identifiability"] if row["best_limit"] is None]
     if unseen:
@@ -165,34 +160,7 @@ def _statement(document: dict[str, Any]) -> list[str]:
     sensor = document["next_sensor"]
     if sensor is not None and sensor["power_with"] > document["power"]:
         sentences.append(
-            f"One more speed, at s = {sensor['s_from_m']:.0f} m, would raise that share to"
-            f" {share(sensor['power_with'])}."
+            f"One more speed, at s = {sensor['s_from_m']:.0f} m, would raise that to"
+            f" {percent(sensor['power_with'])}."
         )
     return sentences
-
-
-def identify_table(document: dict[str, Any]) -> Table:
-    """The content of identify.json for the terminal."""
-    campaign = document["campaign"]
-    name = f"{shortened(campaign['name'], 30)}, {campaign['n_events']} avalanches"
-    title = f"{name}: what could be told missing from {document['base_model']}"
-    columns = ("unit", "kept", "rele-\nvant", "found\nin", "seen\nfrom", "best\nfrom", "best place,\ns \\[m]")
-    table = plain_table(plain_text(title), left=("mechanism",), right=columns)
-    table.columns[0].no_wrap = True
-    for row in document["identifiability"]:
-        numbers = [
-            "never" if value is None else rounded(value, decimals_for(value))
-            for value in (row["relevant"], row["limit"], row["best_limit"])
-        ]
-        stretch = row["best_stretch_m"]
-        where = "-" if stretch is None else f"{stretch[0]:.0f}-{stretch[1]:.0f}"
-        words = (row["id"], row["unit"], share(row["kept"]), numbers[0], share(row["power"]), *numbers[1:])
-        table.add_row(*map(plain_text, (*words, where)))
-    table.caption = plain_text(
-        "Kept: share of the information left after the base law, its scatter and releases. Relevant: the"
-        " median size under the prior, found in that share of cases, over all places. Seen from: the strength"
-        " found in 90 % of cases at a typical place, and at the best. It depends on track, sensors and"
-        " avalanches, not on whether the readings fit."
-    )
-    table.caption_justify = "left"
-    return table

@@ -1,8 +1,8 @@
-"""The cheap look at everything that could be missing: efficient scores at the events' modes.
+"""The score test of everything that could be missing: efficient scores at the events' modes.
 
-It is what detection limits come from, and the omnibus check's statistic: the evidence for anything at all
-over every mechanism, place, instrument and the unlisted force, with their prior odds, in the linear
-model. Being cheap, it is computed for the recordings and for simulated ones alike.
+Detection limits come from it, and so does the check's statistic: the evidence for anything at all in the
+linear model, over every mechanism, place, instrument fault and the force that is not in the list, with their
+prior odds. It is cheap, so it is computed for the recordings and for bootstrap campaigns alike.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
-from skred.diagnosis.discrepancy.profile import KINDS, entering, hats, knots, priors_of
-from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, look_around
+from skred.diagnosis.discrepancy.profile import KINDS, entering, knots, priors_of, spline_basis
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population, Rows, look_around
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.linear_mixed_model import (
     MeanPrior,
@@ -30,6 +30,7 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.kernel.columns import Column
 from skred.physics.law import Law
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import can_join, direction_of, shapes_of
 from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
 from skred.physics.mechanisms.stretches import shares
 
@@ -52,14 +53,14 @@ class PlacedMechanism:
 
 def placed_mechanisms(setting: Setting, *, ties: bool = True) -> list[PlacedMechanism]:
     """All that could be missing from a base law; without `ties`, one of each two that are the same term."""
-    found = []
-    for mechanism in mechanisms().values():
-        added = mechanism.added
-        if added is None or not added.joins(setting.base) or (mechanism.same_term_as and not ties):
-            continue
-        for shape in added.shapes(setting):
-            found.append(PlacedMechanism(mechanism, shape, added.direction(setting, shape)))
-    return found
+    could = [one for one in mechanisms().values() if can_join(one, setting.base)]
+    shapes = {one.id: shapes_of(one, setting) for one in could}
+    return [
+        PlacedMechanism(one, shape, direction_of(one, setting, shape))
+        for one in could
+        if ties or not shapes.get(one.same_term_as)
+        for shape in shapes[one.id]
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +96,7 @@ class ScoreTest:
     @cached_property
     def _parts(self) -> list[Extension]:
         """Extensions whose directions follow each other: candidates, profiles; then candidates with U."""
-        basis = hats(self.setting.terrain, self.knots_m)
+        basis = spline_basis(self.setting.terrain, self.knots_m)
         profiles = [entering(self.setting, kind, row) for kind in KINDS for row in basis]
         plain = [c.direction for c in self.placed_mechanisms if not c.with_speed]
         parts = [[*plain, *profiles]]
@@ -137,7 +138,7 @@ class ScoreTest:
         for part in self._parts:
             strengths = np.zeros(len(part.directions))
             strengths[:n_in] = self.strengths
-            around.append(look_around(part, rows, points, strengths))
+            around.append(look_around(EventLikelihood(part, rows, strengths), points))
         changes = [part.by_strengths[:, :, 0 if k == 0 else n_in :] for k, part in enumerate(around)]
         by_strengths = np.concatenate(changes, axis=2)
         return around[0]._replace(by_strengths=by_strengths)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from skred.diagnosis.words import counted
 from skred.inference.hierarchical.problem import HierarchicalProblem
 
 LEAST_EVENTS = 6
+"""Avalanches with a reading that a diagnosis needs: from fewer neither the spread of a population nor what
+bootstrap campaigns look like can be told."""
 LEAST_SENSORS = 2
+"""Sensors that a diagnosis needs: of one, every difference is one of the base law's own strengths."""
 
 
 def too_little(problem: HierarchicalProblem) -> str:
@@ -13,8 +17,14 @@ def too_little(problem: HierarchicalProblem) -> str:
     seen = problem.observed
     n_events = int(seen.any(axis=1).sum())
     if n_events < LEAST_EVENTS:
-        return f"only {n_events} avalanches with a reading; at least {LEAST_EVENTS} are needed"
+        have = f"only {counted(n_events, 'avalanche')} {'has' if n_events == 1 else 'have'} a reading"
+        more = counted(LEAST_EVENTS - n_events, "more avalanche")
+        return f"{have}, and a diagnosis needs {LEAST_EVENTS}; record {more}"
     n_sensors = int((seen.sum(axis=0) >= 2).sum())
     if n_sensors < LEAST_SENSORS:
-        return f"only {n_sensors} sensor with readings of two avalanches or more; at least {LEAST_SENSORS}"
+        have = f"only {counted(n_sensors, 'sensor')} {'has' if n_sensors == 1 else 'have'} readings of two"
+        return (
+            f"{have} avalanches or more, and a diagnosis needs {LEAST_SENSORS}; record front speeds at a"
+            " place that the avalanches pass"
+        )
     return ""

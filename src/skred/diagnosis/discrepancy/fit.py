@@ -1,6 +1,7 @@
-"""The unlisted force fitted: climbed to under one prior after the other, and its evidence over all of them.
+"""The force that is not in the list, fitted, with its evidence over all of its priors.
 
-Gauss-Newton steps around the events' modes; the evidence with nodes at each top.
+Gauss-Newton steps, around the events' modes, lead to the maximum of the posterior under one prior after the
+other; from there on by the Laplace approximation.
 """
 
 from __future__ import annotations
@@ -16,36 +17,45 @@ from scipy.stats import multivariate_normal
 
 from skred.diagnosis.discrepancy.profile import (
     NEAR_M,
-    Hill,
     Kind,
+    Mode,
     Prior,
     Profile,
     combined,
-    hats,
     knot_by_knot,
     knots,
     priors_of,
+    spline_basis,
 )
-from skred.diagnosis.evidence.coefficient import Base, Curve, Fit, refit
-from skred.diagnosis.evidence.conditional_map import Population, look_around
+from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, look_around
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import efficient_scores, mean_prior
+from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 
 FloatArray = NDArray[np.float64]
 Start = tuple[FloatArray, tuple[Population, FloatArray]]
-_PRIORS_TRIED, _PRIORS_AGAIN = 12, 4
-"""Priors climbed under at most; again, by some of the avalanches: close to the best one of all, or those that
-lead then."""
-_ROUNDS, _SURE, _NO_FORCE = 6, 1.0, -0.5
+_PRIORS_TRIED = 12
+"""Priors climbed under at most, which bounds the time; climbs end before where those left hold little."""
+_PRIORS_AGAIN = 4
+"""The same where a fit to all avalanches is at hand: those close to its prior, and those that lead then."""
+_ROUNDS = 6
+"""Gauss-Newton steps at most: at kinks where fronts stop a climb could go to and fro."""
+_SURE = 1.0
+"""Nats that decide nothing: priors not climbed under that could add less together are left."""
+_NO_FORCE = -0.5
+"""Log Bayes factor below which the force is less probable than none under every prior, and climbs end."""
 _SHARES = (1.0, 0.4, 0.15, 0.05)
+"""Shares of a step that are tried one after the other: a full step can stop fronts that went on."""
 _SETTLED = 0.05
-_HILLS_WITHIN = 4.0
+"""Nats gained by a step below which a climb has arrived."""
+_MODES_WITHIN = 4.0
 """Nats behind the most probable prior from which on none is worth to be sampled under."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Peak:
-    """A profile's values, the fit with it in, and the likelihood's slope and curvature there."""
+class _Maximum:
+    """A profile's values, the fit with them, and score and information of the likelihood there."""
 
     values: FloatArray
     fit: Fit
@@ -54,10 +64,10 @@ class _Peak:
 
 
 def fit_profile(base: Base, kind: Kind, near: Start | None = None, again: Prior | None = None) -> Profile:
-    """Fit the profile by Gauss-Newton steps around the events' modes; its evidence with nodes at the top.
+    """Fit the profile by Gauss-Newton steps around the events' modes; evidence by quadrature at the maximum.
 
-    Climbed to under one prior after the other, as long as those left could matter; the evidence under them
-    follows from the likelihood's slope and curvature at the tops. The most probable one is kept.
+    One prior is tried after the other, as long as those left could matter. The evidence under the others
+    follows from score and information at the maxima that were found. The most probable prior is kept.
 
     Parameters
     ----------
@@ -72,29 +82,29 @@ def fit_profile(base: Base, kind: Kind, near: Start | None = None, again: Prior 
     # Nothing like everything else, so that what is left of integration errors is the same there.
     none = np.zeros(len(at))
     nothing = _fit_at(base, kind, at, none, (base.population, base.fit.points))
-    starts = [_peak(base, kind, at, none, nothing)]
+    starts = [_around(base, kind, at, none, nothing)]
     if near is not None:
-        starts.append(_peak(base, kind, at, near[0], _fit_at(base, kind, at, *near)))
+        starts.append(_around(base, kind, at, near[0], _fit_at(base, kind, at, *near)))
     height = nothing.found.log_evidence
-    seen = _Seen(height, at, priors_of(kind, at))
+    explored = _Explored(height, at, priors_of(kind, at))
     if again is None:
-        waiting, climb, most = _first(kind, starts[-1], seen), _top, _PRIORS_TRIED
+        waiting, climb, most = _first(kind, starts[-1], explored), _maximum_under, _PRIORS_TRIED
     else:
-        waiting, climb, most = [again], _top_from_one, _PRIORS_AGAIN
-    while waiting and len(seen.peaks) < most:
+        waiting, climb, most = [again], _maximum_from_one, _PRIORS_AGAIN
+    while waiting and len(explored.maxima) < most:
         prior = waiting.pop()
-        seen.add(prior, climb(base, kind, at, [*starts, *seen.peaks.values()], prior.cover(at)))
-        waiting = waiting or seen.open
-    prior = max(seen.peaks, key=seen.factor)
-    peak = seen.peaks[prior]
-    cover = np.linalg.inv(peak.information + np.linalg.inv(prior.cover(at)))
-    gain = peak.fit.found.log_evidence - height
-    factor, cover = seen.log_factor, 0.5 * (cover + cover.T)
-    return Profile(kind, prior, at, peak.values, cover, factor, gain, peak.fit, seen.hills)
+        explored.add(prior, climb(base, kind, at, [*starts, *explored.maxima.values()], prior.cover(at)))
+        waiting = waiting or explored.open
+    prior = max(explored.maxima, key=explored.factor)
+    maximum = explored.maxima[prior]
+    cover = np.linalg.inv(maximum.information + np.linalg.inv(prior.cover(at)))
+    gain = maximum.fit.found.log_evidence - height
+    factor, cover = explored.log_factor, 0.5 * (cover + cover.T)
+    return Profile(kind, prior, at, maximum.values, cover, factor, gain, maximum.fit, explored.modes)
 
 
-def hill_at(base: Base, profile: Profile, values: FloatArray) -> Hill:
-    """The hill that values are on, climbed under the prior that suits them best; its log factor is 0."""
+def mode_at(base: Base, profile: Profile, values: FloatArray) -> Mode:
+    """The mode near some values, under the prior that suits them best; its log factor is 0."""
     kind, at = profile.kind, profile.knots_m
     shares = priors_of(kind, at)
     prior = max(
@@ -103,90 +113,90 @@ def hill_at(base: Base, profile: Profile, values: FloatArray) -> Hill:
     )
     cover = prior.cover(at)
     fit = _fit_at(base, kind, at, values, _start(base, profile.fit))
-    peak = _climb(base, kind, at, _peak(base, kind, at, values, fit), cover)
-    left = np.linalg.inv(peak.information + np.linalg.inv(cover))
-    return Hill(peak.values, 0.5 * (left + left.T), 0.0)
+    maximum = _climb(base, kind, at, _around(base, kind, at, values, fit), cover)
+    left = np.linalg.inv(maximum.information + np.linalg.inv(cover))
+    return Mode(maximum.values, 0.5 * (left + left.T), 0.0)
 
 
-class _Promise(NamedTuple):
-    """What slope and curvature at a peak say of a prior.
+class _Laplace(NamedTuple):
+    """The Laplace approximation of a prior's evidence, from score and information at a maximum.
 
     Attributes
     ----------
     gain : float
         Of the log likelihood, at the most probable values under the prior.
-    price : float
-        Of those values.
-    freedom : float
-        Price of their freedom.
+    prior_penalty : float
+        What the prior takes off at those values.
+    occam_penalty : float
+        What it takes off for the room that it gives to all others.
     values : (n_knots,) array
     covariance : (n_knots, n_knots) array
-        Of what is left of their freedom.
+        Of the values, by prior and recordings together.
     """
 
     gain: float
-    price: float
-    freedom: float
+    prior_penalty: float
+    occam_penalty: float
     values: FloatArray
     covariance: FloatArray
 
     def log_factor(self, most: float = math.inf) -> float:
-        """Log Bayes factor if no values gain more than the most; at least that of no force at all."""
-        return max(self._above_none(most), 0.0) - self.freedom
+        """Log Bayes factor if no values gain more than `most`; at least that of no force at all."""
+        return max(self._above_none(most), 0.0) - self.occam_penalty
 
-    def hill(self, most: float, log_factor: float) -> Hill:
+    def mode(self, most: float, log_factor: float) -> Mode:
         """Where values are; around none where no force at all is better."""
         mean = self.values if self._above_none(most) > 0.0 else np.zeros_like(self.values)
-        return Hill(mean, self.covariance, log_factor)
+        return Mode(mean, self.covariance, log_factor)
 
     def _above_none(self, most: float) -> float:
-        return min(self.gain, most) - self.price
+        return min(self.gain, most) - self.prior_penalty
 
 
-class _Seen:
-    """Peaks under some priors, and what they say of all of them.
+class _Explored:
+    """Maxima under some priors, and what they say of all of them.
 
-    Where fronts stop, slope and curvature at one peak are a poor guide to another far away. A prior that was
-    climbed under has its own factor; one about the same place as some that were, the least that they promise;
-    any other the most that any peak promises, so that it is climbed under while it could matter. What is only
-    promised in the end counts as if no values gained more than the best that were computed.
+    Where fronts stop, score and information at one maximum are a poor guide to another far away. A prior that
+    was climbed under has its own factor. One about the same place as some that were has the least of their
+    approximations. Any other has the largest of all, so that it is climbed under while it could matter. What
+    is only approximated in the end counts as if no values gained more than the best that were computed.
     """
 
     def __init__(self, height: float, at: FloatArray, priors: dict[Prior, float]) -> None:
         self.height = height
         self.shares = priors
         self.covers = {prior: prior.cover(at) for prior in priors}
-        self.peaks: dict[Prior, _Peak] = {}
-        self.promises: dict[Prior, dict[Prior, _Promise]] = {prior: {} for prior in priors}
+        self.maxima: dict[Prior, _Maximum] = {}
+        self.approximations: dict[Prior, dict[Prior, _Laplace]] = {prior: {} for prior in priors}
 
-    def add(self, climbed: Prior, peak: _Peak) -> None:
-        """A peak under a prior."""
-        self.peaks[climbed] = peak
+    def add(self, climbed: Prior, maximum: _Maximum) -> None:
+        """A maximum under a prior."""
+        self.maxima[climbed] = maximum
         for prior, cover in self.covers.items():
-            self.promises[prior][climbed] = _promise(peak, self.height, cover)
+            self.approximations[prior][climbed] = _laplace(maximum, self.height, cover)
 
     def factor(self, prior: Prior, most: float = math.inf) -> float:
         """Log Bayes factor and log prior probability of a prior, as far as is known."""
         most = self._counted(prior, most)
-        return self.promise(prior, most).log_factor(most) + self.shares[prior]
+        return self.approximation(prior, most).log_factor(most) + self.shares[prior]
 
-    def promise(self, prior: Prior, most: float = math.inf) -> _Promise:
-        """What counts of what peaks say of a prior."""
-        promises = self.promises[prior]
-        if prior in promises:
-            return promises[prior]
-        near = [one for climbed, one in promises.items() if climbed.centre_m == prior.centre_m]
+    def approximation(self, prior: Prior, most: float = math.inf) -> _Laplace:
+        """The approximation of a prior that counts, of those from all maxima."""
+        approximations = self.approximations[prior]
+        if prior in approximations:
+            return approximations[prior]
+        near = [one for climbed, one in approximations.items() if climbed.centre_m == prior.centre_m]
         if near:
             return min(near, key=lambda one: one.log_factor(most))
-        return max(promises.values(), key=lambda one: one.log_factor(most))
+        return max(approximations.values(), key=lambda one: one.log_factor(most))
 
     @property
     def open(self) -> list[Prior]:
         """The most probable prior not climbed under; none where all of those are improbable together.
 
-        Nor where all priors are less probable than no force, even by what is promised.
+        Nor where all priors are less probable than no force, even by their approximations.
         """
-        left = {prior: self.factor(prior) for prior in self.shares if prior not in self.peaks}
+        left = {prior: self.factor(prior) for prior in self.shares if prior not in self.maxima}
         known = np.logaddexp.reduce([self.factor(prior) for prior in self.shares])
         if not left or known < _NO_FORCE or np.logaddexp.reduce(list(left.values())) < known - _SURE:
             return []
@@ -198,115 +208,120 @@ class _Seen:
         return float(np.logaddexp.reduce([self.factor(prior, self._most) for prior in self.shares]))
 
     @property
-    def hills(self) -> tuple[Hill, ...]:
+    def modes(self) -> tuple[Mode, ...]:
         """Where values may be, under each prior that is not far behind the most probable one."""
         factors = {prior: self.factor(prior, self._most) for prior in self.shares}
-        least = max(factors.values()) - _HILLS_WITHIN
+        least = max(factors.values()) - _MODES_WITHIN
         chosen = {prior: factor for prior, factor in factors.items() if factor > least}
         return tuple(
-            self.promise(prior, self._most).hill(self._counted(prior, self._most), factor)
+            self.approximation(prior, self._most).mode(self._counted(prior, self._most), factor)
             for prior, factor in chosen.items()
         )
 
     def _counted(self, prior: Prior, most: float) -> float:
         """The most that values under a prior may gain: what was climbed to needs no limit."""
-        return math.inf if prior in self.peaks else most
+        return math.inf if prior in self.maxima else most
 
     @property
     def _most(self) -> float:
         """The most that any values computed have gained."""
-        most = max(peak.fit.found.log_evidence - self.height for peak in self.peaks.values())
+        most = max(maximum.fit.found.log_evidence - self.height for maximum in self.maxima.values())
         return max(most, 0.0)
 
 
-def _promise(peak: _Peak, height: float, cover: FloatArray) -> _Promise:
-    """What a peak, perhaps one under another prior, says of a prior of this covariance."""
+def _laplace(maximum: _Maximum, height: float, cover: FloatArray) -> _Laplace:
+    """Of a prior with this covariance, from a maximum that may be under another prior."""
     precision = np.linalg.inv(cover)
-    left = np.linalg.inv(peak.information + precision)
-    step = left @ (peak.score - precision @ peak.values)
-    gain = peak.fit.found.log_evidence - height + peak.score @ step - 0.5 * step @ peak.information @ step
-    values, price = peak.values + step, _price(peak.values + step, precision)
-    return _Promise(float(gain), price, _freedom(peak, cover), values, 0.5 * (left + left.T))
+    left = np.linalg.inv(maximum.information + precision)
+    step = left @ (maximum.score - precision @ maximum.values)
+    score, information = maximum.score, maximum.information
+    gain = maximum.fit.found.log_evidence - height + score @ step - 0.5 * step @ information @ step
+    values = maximum.values + step
+    penalties = _prior_penalty(values, precision), _occam_penalty(maximum, cover)
+    return _Laplace(float(gain), *penalties, values, 0.5 * (left + left.T))
 
 
-def _highest(peaks: Sequence[_Peak], cover: FloatArray) -> _Peak:
+def _highest(maxima: Sequence[_Maximum], cover: FloatArray) -> _Maximum:
     """The one with the highest posterior under a prior."""
     precision = np.linalg.inv(cover)
-    return max(peaks, key=lambda one: one.fit.found.log_evidence - _price(one.values, precision))
+    return max(maxima, key=lambda one: one.fit.found.log_evidence - _prior_penalty(one.values, precision))
 
 
-def _first(kind: Kind, start: _Peak, seen: _Seen) -> list[Prior]:
-    """Under which priors to climb whatever is promised: the usual one, and last, that is first, one more.
+def _first(kind: Kind, start: _Maximum, explored: _Explored) -> list[Prior]:
+    """Under which priors to climb in any case, the last one first: the usual one, and perhaps one more.
 
     Where a start is more probable than no force, the prior under which it is most so.
     """
     usual = Prior(kind.amplitude, NEAR_M)
-    gain = start.fit.found.log_evidence - seen.height
-    price = {prior: _price(start.values, np.linalg.inv(cover)) for prior, cover in seen.covers.items()}
-    if gain <= min(price.values()):
+    gain = start.fit.found.log_evidence - explored.height
+    covers = explored.covers.items()
+    penalty = {prior: _prior_penalty(start.values, np.linalg.inv(cover)) for prior, cover in covers}
+    if gain <= min(penalty.values()):
         return [usual]
-    freedom = {prior: _freedom(start, cover) for prior, cover in seen.covers.items()}
-    own = max(price, key=lambda prior: seen.shares[prior] - price[prior] - freedom[prior])
+    occam = {prior: _occam_penalty(start, cover) for prior, cover in covers}
+    own = max(penalty, key=lambda prior: explored.shares[prior] - penalty[prior] - occam[prior])
     return [usual, own] if own != usual else [usual]
 
 
-def _price(values: FloatArray, precision: FloatArray) -> float:
-    """What a prior takes off the log density of values."""
+def _prior_penalty(values: FloatArray, precision: FloatArray) -> float:
+    """What a prior takes off the log density at some values."""
     return 0.5 * float(values @ precision @ values)
 
 
-def _top(base: Base, kind: Kind, at: FloatArray, starts: Sequence[_Peak], cover: FloatArray) -> _Peak:
-    """The top under a prior, from the start with the highest posterior and from the one that fits best.
+def _maximum_under(
+    base: Base, kind: Kind, at: FloatArray, starts: Sequence[_Maximum], cover: FloatArray
+) -> _Maximum:
+    """The maximum under a prior, from the start with the highest posterior and from the one that fits best.
 
     Sharp edges of a listed shape cost more under a smooth prior than they gain; but where recordings are far
     from what no force does, there may be no other way up.
     """
-    top = _top_from_one(base, kind, at, starts, cover)
+    found = _maximum_from_one(base, kind, at, starts, cover)
     best = max(starts, key=lambda one: one.fit.found.log_evidence)
-    if best.fit.found.log_evidence < top.fit.found.log_evidence + _SURE:
-        return top
-    return _highest([top, _climb(base, kind, at, best, cover)], cover)
+    if best.fit.found.log_evidence < found.fit.found.log_evidence + _SURE:
+        return found
+    return _highest([found, _climb(base, kind, at, best, cover)], cover)
 
 
-def _top_from_one(
-    base: Base, kind: Kind, at: FloatArray, starts: Sequence[_Peak], cover: FloatArray
-) -> _Peak:
-    """The top under a prior, from the start with the highest posterior."""
+def _maximum_from_one(
+    base: Base, kind: Kind, at: FloatArray, starts: Sequence[_Maximum], cover: FloatArray
+) -> _Maximum:
+    """The maximum under a prior, from the start with the highest posterior."""
     return _climb(base, kind, at, _highest(starts, cover), cover)
 
 
-def _freedom(peak: _Peak, cover: FloatArray) -> float:
-    """What the freedom of values under a prior takes off the log evidence."""
-    _, log_det = np.linalg.slogdet(np.eye(len(cover)) + cover @ peak.information)
+def _occam_penalty(maximum: _Maximum, cover: FloatArray) -> float:
+    """What the room that a prior gives to the values takes off the log evidence."""
+    _, log_det = np.linalg.slogdet(np.eye(len(cover)) + cover @ maximum.information)
     return 0.5 * float(log_det)
 
 
-def _climb(base: Base, kind: Kind, at: FloatArray, peak: _Peak, cover: FloatArray) -> _Peak:
-    """To the top of the posterior under a prior."""
+def _climb(base: Base, kind: Kind, at: FloatArray, maximum: _Maximum, cover: FloatArray) -> _Maximum:
+    """To the maximum of the posterior under a prior."""
     precision = np.linalg.inv(cover)
     for _ in range(_ROUNDS):
-        step = np.linalg.solve(peak.information + precision, peak.score - precision @ peak.values)
-        height = peak.fit.found.log_evidence - _price(peak.values, precision)
-        promised = 0.5 * float(step @ (peak.score - precision @ peak.values))
+        step = np.linalg.solve(maximum.information + precision, maximum.score - precision @ maximum.values)
+        height = maximum.fit.found.log_evidence - _prior_penalty(maximum.values, precision)
+        expected = 0.5 * float(step @ (maximum.score - precision @ maximum.values))
         for share in _SHARES:
-            if share * (2.0 - share) * promised < _SETTLED:
-                return _at_top(peak, precision)
-            values = peak.values + share * step
-            fit = _fit_at(base, kind, at, values, _start(base, peak.fit))
-            gained = fit.found.log_evidence - _price(values, precision) - height
+            if share * (2.0 - share) * expected < _SETTLED:
+                return _arrived(maximum, precision)
+            values = maximum.values + share * step
+            fit = _fit_at(base, kind, at, values, _start(base, maximum.fit))
+            gained = fit.found.log_evidence - _prior_penalty(values, precision) - height
             if gained > 0.0:
                 break
         else:
             break
-        peak = _peak(base, kind, at, values, fit)
+        maximum = _around(base, kind, at, values, fit)
         if gained < _SETTLED:
             break
-    return _at_top(peak, precision)
+    return _arrived(maximum, precision)
 
 
-def _at_top(peak: _Peak, precision: FloatArray) -> _Peak:
-    """A peak that was climbed to: a slope that is left over, at kinks where fronts stop, promises none."""
-    return replace(peak, score=precision @ peak.values)
+def _arrived(maximum: _Maximum, precision: FloatArray) -> _Maximum:
+    """A maximum that was climbed to: a score that is left over, at kinks where fronts stop, leads nowhere."""
+    return replace(maximum, score=precision @ maximum.values)
 
 
 def _start(base: Base, fit: Fit) -> tuple[Population, FloatArray]:
@@ -315,12 +330,12 @@ def _start(base: Base, fit: Fit) -> tuple[Population, FloatArray]:
 
 def as_profile(base: Base, kind: Kind, near: Curve) -> Start:
     """A listed mechanism that enters like a kind, at its best strength: values at the knots, and its fit."""
-    at, top = knots(base.setting), int(np.argmax(near.log_evidence))
+    at, best = knots(base.setting), int(np.argmax(near.log_evidence))
     edge = np.asarray(base.setting.terrain.edge_s_m)
     profile = near.direction.profiles[near.direction.columns.index(kind.column)]
-    cells = hats(base.setting.terrain, at) * np.diff(edge)
-    values = near.strengths[top] * (cells @ profile) / np.maximum(cells.sum(axis=1), 1e-9)
-    return values, _start(base, near.fits[top])
+    cells = spline_basis(base.setting.terrain, at) * np.diff(edge)
+    values = near.strengths[best] * (cells @ profile) / np.maximum(cells.sum(axis=1), 1e-9)
+    return values, _start(base, near.fits[best])
 
 
 def _fit_at(
@@ -330,14 +345,14 @@ def _fit_at(
     direction = combined(base.setting, kind, at, values)
     extension = extended(base.problem, base.law, [*base.directions, direction])
     strengths = np.append(base.strengths, 1.0)[None, :]
-    return refit(extension, base.rows, strengths, start, base.log_scale, n_rounds=1)[0]
+    return refit(extension, base.rows, strengths, start, Rounds(least=1))[0]
 
 
-def _peak(base: Base, kind: Kind, at: FloatArray, values: FloatArray, fit: Fit) -> _Peak:
+def _around(base: Base, kind: Kind, at: FloatArray, values: FloatArray, fit: Fit) -> _Maximum:
     """With efficient score and information of the knots' values at what they are."""
     wide = knot_by_knot(base, kind, at)
     population, points = _start(base, fit)
-    around = look_around(wide, base.rows, points, np.concatenate([base.strengths, values]))
+    around = look_around(EventLikelihood(wide, base.rows, np.concatenate([base.strengths, values])), points)
     found = efficient_scores(around, base.rows, population, mean_prior(base.law))
     n_before = len(base.directions)
-    return _Peak(values, fit, found.score[0, n_before:], found.information[0, n_before:, n_before:])
+    return _Maximum(values, fit, found.score[0, n_before:], found.information[0, n_before:, n_before:])

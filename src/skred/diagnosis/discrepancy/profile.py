@@ -1,11 +1,12 @@
-"""The unlisted force: a profile along the track, of no shape in particular, inside the equation of motion.
+"""The model discrepancy: a force that is not in the list, as a profile along the track.
 
-A normal process for the missing retardation per unit mass, independent of speed, in proportion to U^2, or to
-the difference of U^2 from its typical value, which shows only in what is unusual about each front; of several
-correlation lengths, and amplitudes about what listed mechanisms do; everywhere, or about one place. It is the
-way out of the list, and it says where: missing forces estimated inside the equation, not in the residuals
-(Hooker, 2009, doi 10.1111/j.1541-0420.2008.01172.x), with base strengths, events' deviations and releases
-having their share first (orthogonal model error: Sargsyan, Huan and Najm, 2019, doi
+It is a Gaussian process for the missing retardation per unit mass. It is independent of speed, in proportion
+to U^2, or to the difference of U^2 from its typical value; the last is compensated, and shows only in what
+is unusual about each front. It has several correlation lengths, and amplitudes like those of listed
+mechanisms; it acts everywhere, or about one place. It is the way out of the list, and it says where: the
+missing force is estimated inside the equation of motion, not in the residuals (Hooker, 2009, doi
+10.1111/j.1541-0420.2008.01172.x), and base strengths, events' deviations and releases have their share first
+(orthogonal model error: Sargsyan, Huan and Najm, 2019, doi
 10.1615/Int.J.UncertaintyQuantification.2019027384).
 """
 
@@ -19,8 +20,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.evidence.coefficient import Base, Curve, Fit
+from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.extension import Extension, extended
+from skred.diagnosis.evidence.refit import Fit
 from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import Direction, Setting
 from skred.physics.mechanisms.stretches import OPPOSED_SCALES, OPPOSED_SHARE, is_opposed
@@ -90,15 +92,24 @@ KINDS = (
     Kind(Column.QUADRATIC, False, "m-1", 1.5e-3, 0.5 * (1.0 - OPPOSED_SHARE), "-f(s) U^2"),
     Kind(Column.QUADRATIC, True, "m-1", OPPOSED_SCALES * 1.5e-3, OPPOSED_SHARE, "-f(s) (U^2 - U_0^2)"),
 )
-AMPLITUDES, LENGTHS_M = (1.0 / 3.0, 1.0, 3.0), (40.0, 120.0, 400.0)
-"""Amplitudes in typical ones, and correlation lengths, all of equal prior probability. With one amplitude, a
-profile pays for each of its freedoms what the amplitude is off by; a listed mechanism pays that once."""
-NEAR_M, _CENTRES_M = 120.0, 150.0
-"""Standard deviation of the window of a profile that is local, and the distance of the windows' centres."""
-MOST_KNOTS, _LEAST_STEP_M = 32, 30.0
+"""The ways to go with speed. Amplitudes and shares are those of listed mechanisms of the same kind, so that
+neither has an advantage by its prior."""
+AMPLITUDES = (1.0 / 3.0, 1.0, 3.0)
+"""Amplitudes in typical ones, all of equal prior probability. With one amplitude alone the Occam penalty
+applies to every coefficient of the profile, but only once to a one-parameter mechanism."""
+LENGTHS_M = (40.0, 120.0, 400.0)
+"""Correlation lengths, all of equal prior probability: from a dam to a good part of a track."""
+NEAR_M = 120.0
+"""Standard deviation of the window of a profile that is local: about the length of a listed stretch."""
+_CENTRES_M = 150.0
+"""Distance of the windows' centres, so that they overlap."""
+MOST_KNOTS = 32
+"""Coefficients at most: what the cost of a fit grows with."""
+_LEAST_STEP_M = 30.0
+"""Distance of the knots at least: below it recordings do not tell one from the next."""
 
 
-class Hill(NamedTuple):
+class Mode(NamedTuple):
     """Roughly what is known of a profile's values under one prior.
 
     Attributes
@@ -134,7 +145,7 @@ class Profile:
         Gain in log evidence at the mean itself, before the price of its freedom.
     fit : Fit
         Population and events with the mean in.
-    hills : tuple of Hill
+    modes : tuple of Mode
         Where values are to be looked for: one for each prior that may count.
     """
 
@@ -146,7 +157,7 @@ class Profile:
     log_bayes_factor: float
     gain: float
     fit: Fit
-    hills: tuple[Hill, ...]
+    modes: tuple[Mode, ...]
 
 
 def priors_of(kind: Kind, at: FloatArray) -> dict[Prior, float]:
@@ -169,7 +180,7 @@ def knots(setting: Setting) -> FloatArray:
     return np.linspace(first, min(last, setting.terrain.length_m), n)
 
 
-def hats(terrain: Terrain, at: FloatArray) -> FloatArray:
+def spline_basis(terrain: Terrain, at: FloatArray) -> FloatArray:
     """Piecewise linear basis, (n_knots, n_cells): 1 at its own knot, 0 at all others and outside."""
     middle = 0.5 * (terrain.edge_s_m[1:] + terrain.edge_s_m[:-1])
     inside = (middle >= at[0]) & (middle <= at[-1])
@@ -179,13 +190,13 @@ def hats(terrain: Terrain, at: FloatArray) -> FloatArray:
 
 def knot_by_knot(base: Base, kind: Kind, at: FloatArray) -> Extension:
     """The base law with the profile's value at each knot as a strength."""
-    added = [entering(base.setting, kind, row) for row in hats(base.setting.terrain, at)]
+    added = [entering(base.setting, kind, row) for row in spline_basis(base.setting.terrain, at)]
     return extended(base.problem, base.law, [*base.directions, *added])
 
 
 def combined(setting: Setting, kind: Kind, at: FloatArray, values: FloatArray) -> Direction:
     """The profile as one direction, of strength 1."""
-    return entering(setting, kind, values @ hats(setting.terrain, at))
+    return entering(setting, kind, values @ spline_basis(setting.terrain, at))
 
 
 def entering(setting: Setting, kind: Kind, profile: FloatArray) -> Direction:

@@ -1,8 +1,8 @@
-"""The evidence of an unlisted force, its values sampled: the second route beside Laplace's formula.
+"""The evidence of a force that is not in the list by importance sampling, beside the Laplace approximation.
 
-Where fronts stop near sensors, a climb ends on what is left of integration errors, next to the top and not at
-it, and the hill is not as curved as the readings' tangents say. By Laplace's formula alone the free force can
-have four nats less than its due, and a listed mechanism its place.
+Where fronts stop near sensors, a climb ends on what is left of integration errors, near the mode and not at
+it, and the density is not as curved there as the readings' tangents say. By the Laplace approximation alone
+this force can have four nats less than its due, and a listed mechanism its place.
 """
 
 from __future__ import annotations
@@ -16,36 +16,45 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import multivariate_normal, multivariate_t
 
-from skred.diagnosis.discrepancy.fit import hill_at
-from skred.diagnosis.discrepancy.profile import KINDS, Hill, Profile, knot_by_knot, priors_of
-from skred.diagnosis.evidence.coefficient import Base, refit
+from skred.diagnosis.discrepancy.fit import mode_at
+from skred.diagnosis.discrepancy.profile import KINDS, Mode, Profile, knot_by_knot, priors_of
+from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.event_quadrature import USUAL
+from skred.diagnosis.evidence.refit import Rounds, refit
 
 FloatArray = NDArray[np.float64]
-_FEWEST, _MOST, _DRAWS = 2, 6, 64
-"""Turns of sampling, and draws of each."""
+_FEWEST = 2
+"""Turns of sampling in any case: the first proposals are rough, the second are adapted to what they found."""
+_MOST = 6
+"""Turns of sampling at most, which bounds the time."""
+_DRAWS = 64
+"""Draws of each turn: two lots of those fitted together, one for each of two cores."""
 _ENOUGH = 25.0
 """Effective draws that are enough: right to a fifth of a nat."""
-_ODD, _NEW_SHARE = 0.1, 0.3
-"""Share of all weight on one draw from which on a hill is looked for there, and of draws on it."""
+_ODD = 0.1
+"""Share of all weight on one draw from which on a mode is looked for there: the proposals have missed one."""
+_NEW_SHARE = 0.3
+"""Share of the draws on a mode that was found so: its weight is not known yet."""
 _AT_ONCE = 32
 """Draws fitted together."""
-_WIDER, _DEGREES = 1.1, 7
-"""Width of the proposals in that of Laplace's approximation, and their degrees of freedom."""
-_EVENED = 0.5
-"""Power of the hills' Bayes factors in how many draws each one has: what is known of them is rough."""
+_WIDER = 1.1
+"""Width of the proposals in that of the Laplace approximation, which is rather too narrow."""
+_DEGREES = 7
+"""Degrees of freedom of the proposals: tails heavy enough to bound the weights."""
+_TEMPERED = 0.5
+"""Tempering exponent of the modes' Bayes factors in how many draws each one has: they are rough."""
 
 
 class _Proposal(NamedTuple):
-    """A mixture of Student distributions, one on each hill.
+    """A mixture of Student distributions, one on each mode.
 
     Attributes
     ----------
-    log_weights : (n_hills,) array
-    means : (n_hills, n_knots) array
-    covariances : (n_hills, n_knots, n_knots) array
+    log_weights : (n_modes,) array
+    means : (n_modes, n_knots) array
+    covariances : (n_modes, n_knots, n_knots) array
     centred : list of frozen distributions
-        Each hill's, around 0.
+        Each mode's, around 0.
     """
 
     log_weights: FloatArray
@@ -54,20 +63,20 @@ class _Proposal(NamedTuple):
     centred: list[Any]
 
     def drawn(self, n: int, rng: np.random.Generator) -> FloatArray:
-        """Values of the profile, (n, n_knots); of each hill as many as its weight says."""
+        """Values of the profile, (n, n_knots); of each mode as many as its weight says."""
         steps = (np.arange(n) + rng.random()) / n
-        hills = np.searchsorted(np.cumsum(np.exp(self.log_weights)), steps).clip(max=len(self.means) - 1)
-        counts = np.bincount(hills, minlength=len(self.means)).tolist()
-        return np.concatenate([self._of_hill(k, count, rng) for k, count in enumerate(counts) if count])
+        modes = np.searchsorted(np.cumsum(np.exp(self.log_weights)), steps).clip(max=len(self.means) - 1)
+        counts = np.bincount(modes, minlength=len(self.means)).tolist()
+        return np.concatenate([self._of_mode(k, count, rng) for k, count in enumerate(counts) if count])
 
-    def _of_hill(self, k: int, n: int, rng: np.random.Generator) -> FloatArray:
+    def _of_mode(self, k: int, n: int, rng: np.random.Generator) -> FloatArray:
         # Not by scipy's own draws: singular vectors turn with the last digit, Cholesky's factor does not.
         zero = np.zeros(self.means.shape[1])
         normal = rng.multivariate_normal(zero, self.covariances[k], n, method="cholesky")
         return self.means[k] + normal / np.sqrt(rng.chisquare(_DEGREES, n) / _DEGREES)[:, None]
 
     def log_densities(self, values: FloatArray) -> FloatArray:
-        """Of each hill with its weight, (n_hills, n)."""
+        """Of each mode with its weight, (n_modes, n)."""
         pairs = zip(self.centred, self.means, strict=True)
         found = [one.logpdf(values - mean).reshape(-1) for one, mean in pairs]
         return np.array(found) + self.log_weights[:, None]
@@ -81,18 +90,18 @@ class _Proposal(NamedTuple):
         shares = weights * np.exp(log_densities - np.logaddexp.reduce(log_densities, axis=0))
         total = shares.sum(axis=1)
         effective = total**2 / np.maximum(np.sum(shares**2, axis=1), 1e-300)
-        # A mean of fewer effective draws than knots would be farther off than the hill's own.
+        # A mean of fewer effective draws than knots would be farther off than the mode's own.
         trust = effective / (self.means.shape[1] + effective)
         found = (shares @ values) / np.maximum(total, 1e-300)[:, None]
         means = self.means + trust[:, None] * (found - self.means)
         return self._replace(log_weights=np.log(0.5 * np.exp(self.log_weights) + 0.5 * total), means=means)
 
-    def joined_by(self, hill: Hill) -> _Proposal:
-        """With one hill more, and a share of the draws on it."""
-        covariance = _WIDER**2 * hill.covariance
+    def joined_by(self, mode: Mode) -> _Proposal:
+        """With one mode more, and a share of the draws on it."""
+        covariance = _WIDER**2 * mode.covariance
         return _Proposal(
             np.append(self.log_weights + math.log1p(-_NEW_SHARE), math.log(_NEW_SHARE)),
-            np.vstack([self.means, hill.mean]),
+            np.vstack([self.means, mode.mean]),
             np.concatenate([self.covariances, covariance[None]]),
             [*self.centred, multivariate_t(shape=covariance, df=_DEGREES)],
         )
@@ -121,7 +130,7 @@ def sampled_log_factor(
         Effective draws from which on there is none further.
     """
     rng = np.random.default_rng([seed, 61, KINDS.index(profile.kind)])
-    proposals, values, heights = [_on_hills(profile)], np.empty((0, len(profile.mean))), np.empty(0)
+    proposals, values, heights = [_on_modes(profile)], np.empty((0, len(profile.mean))), np.empty(0)
     while True:
         drawn = proposals[-1].drawn(_DRAWS, rng)
         values = np.concatenate([values, drawn])
@@ -138,10 +147,10 @@ def sampled_log_factor(
             return factor
         proposal = proposals[-1].adapted(values, weights)
         if weights.max() > _ODD:
-            # Where fronts stop there are more hills than climbs find: so do Raftery and Bao, 2010,
+            # Where fronts stop there are more modes than climbs find: so do Raftery and Bao, 2010,
             # doi 10.1111/j.1541-0420.2010.01399.x.
             odd = values[np.argmax(weights)]
-            proposal = proposal.joined_by(pool.submit(hill_at, base, profile, odd).result())
+            proposal = proposal.joined_by(pool.submit(mode_at, base, profile, odd).result())
         proposals.append(proposal)
 
 
@@ -154,11 +163,11 @@ def _mean(log_weights: FloatArray) -> float:
     return float(np.logaddexp.reduce(np.minimum(log_weights, most))) - math.log(len(log_weights))
 
 
-def _on_hills(profile: Profile) -> _Proposal:
+def _on_modes(profile: Profile) -> _Proposal:
     """Where the fit says that values are."""
-    evened = _EVENED * np.array([hill.log_factor for hill in profile.hills])
-    means = np.array([hill.mean for hill in profile.hills])
-    covariances = _WIDER**2 * np.array([hill.covariance for hill in profile.hills])
+    evened = _TEMPERED * np.array([mode.log_factor for mode in profile.modes])
+    means = np.array([mode.mean for mode in profile.modes])
+    covariances = _WIDER**2 * np.array([mode.covariance for mode in profile.modes])
     centred = [multivariate_t(shape=one, df=_DEGREES) for one in covariances]
     return _Proposal(evened - np.logaddexp.reduce(evened), means, covariances, centred)
 
@@ -183,5 +192,5 @@ def _log_evidence(base: Base, profile: Profile, values: FloatArray) -> FloatArra
     start = profile.fit.found.population(len(base.law.mechanisms)), profile.fit.points
     given = np.column_stack([np.tile(base.strengths, (len(values), 1)), values])
     # With as many nodes and rounds as the peak and nothing: what is left of integration errors is alike.
-    fits = refit(extension, base.rows, given, start, base.log_scale, USUAL, n_rounds=1)
+    fits = refit(extension, base.rows, given, start, Rounds(USUAL, least=1))
     return np.array([fit.found.log_evidence for fit in fits])

@@ -1,62 +1,47 @@
 """The evidence along the strength of an added mechanism: everything else refitted at each value.
 
-No derivative by the strength is taken at the null: a strong effect may hide there, behind base strengths
-and scatter that absorb it, and show only when it is let in.
+No derivative by the strength is taken at nothing: base strengths and scatter can absorb a strong effect,
+which shows only where it is added.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import Akima1DInterpolator
 
 from skred.diagnosis.evidence.conditional_map import (
+    EventLikelihood,
     Population,
     Rows,
     campaign_rows,
     event_modes,
     log_joint,
-    take_rows,
 )
-from skred.diagnosis.evidence.event_quadrature import FIRST, USUAL, Budget, event_nodes
+from skred.diagnosis.evidence.event_quadrature import FIRST, USUAL, Budget
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of, typical_speed
 from skred.diagnosis.evidence.linear_mixed_model import mean_prior
-from skred.diagnosis.evidence.marginal import Evidence, coordinates, evidence, prior_log_scale
+from skred.diagnosis.evidence.marginal import coordinates, evidence, prior_log_scale
+from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.hierarchical.surface import Nodes
 from skred.physics.law import Law
+from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
 
 FloatArray = NDArray[np.float64]
 _NEAR = (-3.5, -2.0, -1.0, 0.0, 1.0, 2.0, 3.5)
-"""Strengths around what was found before, in its standard deviations."""
+"""Strengths around what was found before, in its standard deviations: to two thousandths of the density."""
 _PASSES = 4
-_ROUNDS, _MOST_ROUNDS = 2, 6
-_FAR_MEAN, _FAR_SPREAD = 0.7, 0.35
-"""Change of a population after which nodes are made anew: of its mean in spreads, of a log spread."""
+"""Times that strengths are put around what was found at most, which bounds the time."""
 _BETWEEN = 60
 """Points at which a curve is integrated between each two strengths."""
 _DEEP = 40.0
-
-
-class Fit(NamedTuple):
-    """A law, perhaps extended, fitted at fixed strengths of what is added.
-
-    Attributes
-    ----------
-    found : Evidence
-    points : (n_events, n_base + 1) array
-        The events' modes.
-    """
-
-    found: Evidence
-    points: FloatArray
+"""Nats below the maximum from which on evidence counts as equally small: a spline through it is smooth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,94 +89,6 @@ class Base:
             extension = extended(self.problem, self.law, self.directions)
             self._nothing[budget] = _refit_from(self, extension, np.empty(0), budget)[0]
         return self._nothing[budget]
-
-
-def refit(
-    extension: Extension,
-    rows: Rows,
-    strengths: FloatArray,
-    start: tuple[Population, FloatArray],
-    log_scale: FloatArray,
-    budget: Budget = USUAL,
-    first_budget: Budget | None = None,
-    n_rounds: int = _ROUNDS,
-    fits: Sequence[Fit] | None = None,
-) -> list[Fit]:
-    """Refit population and events at some strengths, one group of rows each.
-
-    Parameters
-    ----------
-    rows : Rows
-        The campaign's rows.
-    strengths : (n_groups, n_directions) array
-    start : (Population, (n_events, n_base + 1) array)
-        Of one group: where to begin, and a population that nodes cover in any case.
-    first_budget : Budget, optional
-        Of the rounds before the last, which only move the population there.
-    fits : sequence of Fit, optional
-        Where to begin instead, one for each group.
-    """
-    n_groups, n_events, n = len(strengths), len(rows.event), start[0].mean.shape[1]
-    state = list(fits) if fits is not None else [Fit(_unfitted(start[0]), start[1])] * n_groups
-    active = list(range(n_groups))
-    for number in range(_MOST_ROUNDS):
-        many = repeated(rows, len(active))
-        given = np.repeat(strengths[active], n_events, axis=0)
-        parts = [state[k].found.population(n) for k in active]
-        population = Population(*(np.concatenate([part[a] for part in parts]) for a in range(2)))
-        points = np.concatenate([state[k].points for k in active])
-        modes = event_modes(extension, many, points, given, population, n_steps=6)
-        spent = budget if number > 0 or first_budget is None else first_budget
-        nodes = event_nodes(extension, many, given, population, modes, spent, start[0]).nodes
-        moved = []
-        for k, part, own in zip(
-            active,
-            _split(nodes, len(active), n_events),
-            modes.points.reshape(len(active), n_events, -1),
-            strict=True,
-        ):
-            before = state[k].found.psi
-            found = evidence(part, log_scale, before)
-            state[k] = Fit(found, own)
-            if number + 1 < n_rounds or _moved(before, found.psi, n):
-                moved.append(k)
-        active = moved
-        if not active:
-            break
-    return state
-
-
-def _unfitted(population: Population) -> Evidence:
-    """A population to begin with."""
-    psi = coordinates(population)
-    return Evidence(-np.inf, psi, np.eye(len(psi)))
-
-
-def _moved(before: FloatArray, after: FloatArray, n: int) -> bool:
-    """Whether a population is far from the one that its nodes were made for."""
-    mean = np.abs(after[:n] - before[:n]) / np.exp(before[n : 2 * n])
-    spread = np.abs(after[n : 2 * n] - before[n : 2 * n])
-    return bool(mean.max() > _FAR_MEAN or spread.max() > _FAR_SPREAD)
-
-
-def repeated(rows: Rows, n_groups: int) -> Rows:
-    """The same rows for each of several groups."""
-    n = len(rows.event)
-    group_rows = np.tile(np.arange(n), n_groups)
-    repeated = take_rows(rows.readings, group_rows)
-    group = np.repeat(np.arange(n_groups), n)
-    return Rows(np.tile(rows.event, n_groups), group, repeated, rows.errors)
-
-
-def _split(nodes: Nodes, n_groups: int, n_events: int) -> list[Nodes]:
-    """Nodes of each group."""
-    parts = []
-    for k in range(n_groups):
-        first = nodes.first[k * n_events : (k + 1) * n_events + 1]
-        inside = slice(first[0], first[-1])
-        points = np.ascontiguousarray(nodes.points[:, inside])
-        parts.append(Nodes(first - first[0], points, nodes.log_weights[inside]))
-    return parts
 
 
 @dataclass(frozen=True, eq=False)
@@ -326,7 +223,7 @@ def curve_at(
     """
     added = mechanism.added
     assert added is not None
-    direction = added.direction(base.setting, shape)
+    direction = direction_of(mechanism, base.setting, shape)
     extension = extended(base.problem, base.law, (*base.directions, direction))
     strengths = np.sort(strengths[np.abs(strengths) > 1e-3 * added.scale_of(shape)])
     place = int(np.searchsorted(strengths, 0.0))
@@ -353,8 +250,8 @@ def _refit_from(
         given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
     start = (base.population, base.fit.points)
     first = None if budget.linear or fits is not None else FIRST
-    n_rounds = _ROUNDS if fits is None else 1
-    return refit(extension, base.rows, given, start, base.log_scale, budget, first, n_rounds, fits)
+    rounds = Rounds(budget, first) if fits is None else Rounds(budget, first, 1)
+    return refit(extension, base.rows, given, start, rounds, fits)
 
 
 def fit_base(
@@ -375,15 +272,16 @@ def fit_base(
         points = np.zeros((len(rows.event), len(law.mechanisms) + 1))
         points[:, :-1] = population.mean[0]
     given = np.empty(0) if strengths is None else strengths
-    log_scale = prior_log_scale(mean_prior(law))
     if directions:
-        fit = refit(extension, rows, given[None, :], (population, points), log_scale, n_rounds=4)[0]
+        fit = refit(extension, rows, given[None, :], (population, points), Rounds(least=4))[0]
     else:
+        log_scale = prior_log_scale(mean_prior(law))
         found = evidence(problem.surfaces(law.mechanisms).nodes, log_scale, coordinates(population), 30)
         exact = found.population(len(law.mechanisms))
         starts = (points, _best_nodes(problem.surfaces(law.mechanisms).nodes, exact))
-        tried = [event_modes(extension, rows, start, given, exact, n_steps=20).points for start in starts]
-        heights = [log_joint(extension, rows, one, given, exact) for one in tried]
+        likelihood = EventLikelihood(extension, rows, given)
+        tried = [event_modes(likelihood, start, exact, n_steps=20).points for start in starts]
+        heights = [log_joint(likelihood, one, exact) for one in tried]
         fit = Fit(found, np.where((heights[1] > heights[0])[:, None], tried[1], tried[0]))
     setting = setting_of(problem, law, typical_speed(extension.speeds(fit.points, given)))
     return Base(problem, law, setting, rows, fit, directions, given)

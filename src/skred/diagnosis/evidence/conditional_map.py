@@ -1,7 +1,8 @@
-"""The most probable strengths and release of each event, given its population: Gauss-Newton, row by row."""
+"""The conditional MAP: the most probable strengths and release of each event, given its population."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -10,14 +11,17 @@ from numpy.typing import NDArray
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.score_information import reading_slopes
 from skred.inference.error_model import Errors, EventReadings
-from skred.inference.hierarchical.reading_density import log_likelihoods
+from skred.inference.reading_density import log_likelihoods
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 _LARGEST_STEP = 1.0
+"""Largest change of a log strength in one step: tangents say nothing of a front three times as strong."""
 _STARTING_DAMPING = 1e-3
+"""Of the Levenberg-Marquardt steps, relative to the diagonal: nearly none."""
 _SETTLED = 1e-2
+"""Nats gained by a step below which a row has arrived."""
 _LOST, _GAINED = 20.0, 1.0
 """Nats less than at best that the readings of a lost row have, and that another place must have more."""
 _ASIDE = np.multiply.outer((-1.0, 1.0), (0.01, 0.03, 0.08, 0.2, 0.5, 1.0)).ravel()
@@ -49,6 +53,12 @@ class Rows(NamedTuple):
     def take(self, chosen: IntArray) -> Rows:
         """Some of the rows, of the same groups."""
         return Rows(self.event[chosen], self.group[chosen], take_rows(self.readings, chosen), self.errors)
+
+    def repeated(self, n_groups: int) -> Rows:
+        """The same rows, of one group, for each of several."""
+        n = len(self.event)
+        readings = take_rows(self.readings, np.tile(np.arange(n), n_groups))
+        return Rows(np.tile(self.event, n_groups), np.repeat(np.arange(n_groups), n), readings, self.errors)
 
     @property
     def n_groups(self) -> int:
@@ -127,9 +137,56 @@ class Modes(NamedTuple):
         return weighed
 
 
-def look_around(extension: Extension, rows: Rows, points: FloatArray, strengths: FloatArray) -> Modes:
-    """Tangents and slopes at some points; strengths are (n_directions,) or (n_rows, n_directions)."""
-    predictions, by_points, by_strengths = extension.tangents(rows.event, points, strengths)
+@dataclass(frozen=True)
+class EventLikelihood:
+    """How likely rows of readings are, as functions of each row's own point.
+
+    Attributes
+    ----------
+    extension : Extension
+        A law with mechanisms added.
+    rows : Rows
+    strengths : (n_directions,) or (n_rows, n_directions) array
+        Of what is added.
+    """
+
+    extension: Extension
+    rows: Rows
+    strengths: FloatArray
+
+    @property
+    def given(self) -> FloatArray:
+        """Strengths of each row, (n_rows, n_directions)."""
+        shape = len(self.rows.event), len(self.extension.directions)
+        found: FloatArray = np.broadcast_to(self.strengths, shape)
+        return found
+
+    def take(self, chosen: IntArray) -> EventLikelihood:
+        """Some of the rows, perhaps repeated."""
+        return EventLikelihood(self.extension, self.rows.take(chosen), self.given[chosen])
+
+    def part(self, rows: slice) -> EventLikelihood:
+        """Rows that follow each other."""
+        return self.take(np.arange(len(self.rows.event))[rows])
+
+    def in_groups(self, strengths: FloatArray) -> EventLikelihood:
+        """The rows, of one group, at each of several strengths, (n_groups, n_directions)."""
+        given = np.repeat(strengths, len(self.rows.event), axis=0)
+        return EventLikelihood(self.extension, self.rows.repeated(len(strengths)), given)
+
+    def at(self, points: FloatArray) -> FloatArray:
+        """Log likelihood of each row at its point, (n_rows, n_base + 1) to (n_rows,)."""
+        predictions = self.extension.predict(self.rows.event, points, self.strengths)
+        found: FloatArray = log_likelihoods(
+            np.arange(len(points)), predictions, self.rows.readings, self.rows.errors
+        )
+        return found
+
+
+def look_around(likelihood: EventLikelihood, points: FloatArray) -> Modes:
+    """Tangents, and score and information of the readings, at each row's point."""
+    extension, rows = likelihood.extension, likelihood.rows
+    predictions, by_points, by_strengths = extension.tangents(rows.event, points, likelihood.strengths)
     at = np.arange(len(points))
     slope, curvature, shared = reading_slopes(at, predictions, rows.readings, rows.errors)
     # Where friction falls with speed a front can be at the very edge of stopping: a slope without end.
@@ -139,64 +196,52 @@ def look_around(extension: Extension, rows: Rows, points: FloatArray, strengths:
     return Modes(points, points, predictions, by_points, by_strengths, slope, curvature, shared)
 
 
-def log_joint(
-    extension: Extension, rows: Rows, points: FloatArray, strengths: FloatArray, population: Population
-) -> FloatArray:
+def log_joint(likelihood: EventLikelihood, points: FloatArray, population: Population) -> FloatArray:
     """Log likelihood of each row plus the exponent of its population's density, (n_rows,)."""
-    predictions = extension.predict(rows.event, points, strengths)
-    likelihood: FloatArray = log_likelihoods(np.arange(len(points)), predictions, rows.readings, rows.errors)
+    group = likelihood.rows.group
     deviation = points.copy()
-    deviation[:, :-1] -= population.mean[rows.group]
-    return likelihood - 0.5 * np.einsum(
-        "ri,rij,rj->r", deviation, population.precision[rows.group], deviation
+    deviation[:, :-1] -= population.mean[group]
+    return likelihood.at(points) - 0.5 * np.einsum(
+        "ri,rij,rj->r", deviation, population.precision[group], deviation
     )
 
 
 def event_modes(
-    extension: Extension,
-    rows: Rows,
-    start: FloatArray,
-    strengths: FloatArray,
-    population: Population,
-    n_steps: int = 12,
+    likelihood: EventLikelihood, start: FloatArray, population: Population, n_steps: int = 12
 ) -> Modes:
     """Most probable points by damped Gauss-Newton steps; a step that makes a row worse is not taken.
 
     Rows that are far from their readings then, as where a front stops before a sensor that the recorded one
     passed and no slope leads it on, climb once more from the best of some places along the first strength,
     where one is better.
+
+    Parameters
+    ----------
+    start : (n_rows, n_base + 1) array
     """
-    given = np.broadcast_to(strengths, (len(start), len(extension.directions)))
-    found = _climbed(extension, rows, start, given, population, n_steps)
-    lost = _lost(rows, found.predictions)
+    found = _climbed(likelihood, start, population, n_steps)
+    lost = _lost(likelihood.rows, found.predictions)
     if len(lost):
-        points, gained = _aside(extension, rows.take(lost), found.points[lost], given[lost], population)
+        points, gained = _aside(likelihood.take(lost), found.points[lost], population)
         moved = lost[gained]
-        again = _climbed(extension, rows.take(moved), points[gained], given[moved], population, n_steps)
+        again = _climbed(likelihood.take(moved), points[gained], population, n_steps)
         for whole, part in zip(found, again, strict=True):
             whole[moved] = part
     return found
 
 
-def _climbed(
-    extension: Extension,
-    rows: Rows,
-    start: FloatArray,
-    given: FloatArray,
-    population: Population,
-    n_steps: int,
-) -> Modes:
+def _climbed(likelihood: EventLikelihood, start: FloatArray, population: Population, n_steps: int) -> Modes:
     """Where damped Gauss-Newton steps from one place lead."""
     points, precision = start.copy(), population.precision
-    best = log_joint(extension, rows, points, given, population)
+    best = log_joint(likelihood, points, population)
     damping = np.full(len(points), _STARTING_DAMPING)
     active, found = np.arange(len(points)), list[FloatArray]()
     for _ in range(n_steps):
-        part = rows.take(active)
-        around = look_around(extension, part, points[active], given[active])
+        part = likelihood.take(active)
+        around = look_around(part, points[active])
         deviation = points[active].copy()
-        deviation[:, :-1] -= population.mean[part.group]
-        prior = precision[part.group]
+        deviation[:, :-1] -= population.mean[part.rows.group]
+        prior = precision[part.rows.group]
         gradient = np.einsum("ri,rij->rj", around.slope, around.by_points)
         gradient -= np.einsum("rij,rj->ri", prior, deviation)
         damped = around.information + prior
@@ -205,7 +250,7 @@ def _climbed(
         step = np.linalg.solve(damped, gradient[:, :, None])[:, :, 0]
         size = np.abs(step).max(axis=1)
         step *= np.minimum(1.0, _LARGEST_STEP / np.maximum(size, 1e-12))[:, None]
-        new = log_joint(extension, part, points[active] + step, given[active], population)
+        new = log_joint(part, points[active] + step, population)
         gained = new - best[active]
         better = gained >= -1e-9
         points[active[better]] += step[better]
@@ -231,17 +276,15 @@ def _lost(rows: Rows, predictions: FloatArray) -> IntArray:
 
 
 def _aside(
-    extension: Extension, rows: Rows, points: FloatArray, given: FloatArray, population: Population
+    likelihood: EventLikelihood, points: FloatArray, population: Population
 ) -> tuple[FloatArray, BoolArray]:
     """The best of each row's point and some places on either side of it, and whether it is one of those."""
     n_rows, n_places = len(points), len(_ASIDE)
     around = np.repeat(points, n_places, axis=0)
     around[:, 0] += np.tile(_ASIDE, n_rows)
     which = np.repeat(np.arange(n_rows), n_places)
-    heights = log_joint(extension, rows.take(which), around, given[which], population).reshape(
-        n_rows, n_places
-    )
-    before = log_joint(extension, rows, points, given, population)
+    heights = log_joint(likelihood.take(which), around, population).reshape(n_rows, n_places)
+    before = log_joint(likelihood, points, population)
     gained = heights.max(axis=1) > before + _GAINED
     best = around.reshape(n_rows, n_places, -1)[np.arange(n_rows), heights.argmax(axis=1)]
     return np.where(gained[:, None], best, points), gained

@@ -1,10 +1,10 @@
-"""Nodes: each event's likelihood over its own strengths, where a population makes them likely.
+"""Quadrature points of each event's likelihood over its own strengths, where a population makes them likely.
 
-A mixture of proposals, many nodes around the event's own mode, some over the whole population, and many
-where those have found the weight to be, weighs each node by the mixture's density; so a second mode
-(reached, not reached) that the first proposal misses is still counted. The same quasi-random numbers serve
-every strength, which makes differences between strengths smoother than the integrals themselves. Where there
-is one strength and nothing else that is free, nodes lie on a line (`line_nodes`) and nothing is random.
+Points come from a mixture of proposals: many around the event's own mode, some over the whole population,
+and many where those have found the weight to be. Each is weighed by the mixture's density. So a second mode
+(reached, not reached) that the first proposal misses still counts. The same quasi-random numbers serve every
+strength, which makes differences between strengths smoother than the integrals themselves. Where one
+strength is all that is free, points lie on a line (`line_nodes`) and nothing is random.
 """
 
 from __future__ import annotations
@@ -19,19 +19,18 @@ from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
-from skred.diagnosis.compiled import compiled
-from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows
-from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population, Rows
 from skred.diagnosis.evidence.line_quadrature import line_nodes
-from skred.inference.hierarchical.reading_density import log_likelihoods
 from skred.inference.hierarchical.surface import Nodes
+from skred.inference.reading_density import log_likelihoods
+from skred.parallel.compile_cache import compiled
 
 FloatArray = NDArray[np.float64]
 _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 
 
 class Budget(NamedTuple):
-    """How many nodes an event gets, and how much wider than the linear model the proposals are.
+    """How many quadrature points an event gets, and how much wider than the linear model the proposals are.
 
     On a line only their total counts.
 
@@ -43,7 +42,7 @@ class Budget(NamedTuple):
         Put where the others have found the weight to be: around modes that nobody looked for, along the
         edges that stops make.
     linear : bool
-        Take readings at the nodes from the tangents at the mode instead of from fronts: quick, and wrong
+        Take readings at the points from the tangents at the mode instead of from fronts: quick, and wrong
         where a front stops near a sensor.
     """
 
@@ -56,11 +55,11 @@ class Budget(NamedTuple):
 
     @property
     def total(self) -> int:
-        """All of an event's nodes."""
+        """All of an event's points."""
         return self.around_mode + self.over_population + self.adapted
 
     def times(self, more: int) -> Budget:
-        """So many times the nodes."""
+        """So many times the points."""
         return self._replace(
             around_mode=more * self.around_mode,
             over_population=more * self.over_population,
@@ -68,18 +67,27 @@ class Budget(NamedTuple):
         )
 
 
-USUAL, FIRST, FINE = Budget(), Budget(32, 16, 0), Budget(256, 128, 512, 1.5, 1.8)
-ROUGH, FRONTS = Budget(32, 16, 0, linear=True), Budget(16, 32, 32)
-"""For a first look: along tangents, and with fronts where those mislead."""
+USUAL = Budget()
+"""Of every integral that counts: the same for all that is compared, so that errors left are alike."""
+FIRST = Budget(32, 16, 0)
+"""Of rounds that only move the population."""
+FINE = Budget(256, 128, 512, 1.5, 1.8)
+"""Of re-computed evidence, and of the base law under each error model."""
+ROUGH = Budget(32, 16, 0, linear=True)
+"""Of linearised screening."""
+FRONTS = Budget(16, 32, 32)
+"""Of screening with fronts, where tangents mislead."""
 _CENTRES = 16
-"""Places that adapted nodes are put around, of each event."""
+"""Places that adapted points are put around, of each event."""
 _SHRUNK = 3.0
 """As how many effective nodes the linear model counts for the width around those places."""
 _ADAPTED_WIDER = 1.3
+"""Bandwidth around those places, in that of a kernel density of normal points: what is adapted to may be
+narrower than it."""
 
 
 class Spread(NamedTuple):
-    """Nodes of all rows, as many each.
+    """Quadrature points of all rows, as many each.
 
     Attributes
     ----------
@@ -105,12 +113,12 @@ class Spread(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """A share of the nodes: mixtures of normal densities of one width each, one for each row.
+    """A share of the points: mixtures of normal densities of one width each, one for each row.
 
     Attributes
     ----------
     size : int
-        Nodes of a row.
+        Points of a row.
     centres : (n_rows, n_centres, n_axes) array
     factor : (n_rows, n_axes, n_axes) array
     """
@@ -120,7 +128,7 @@ class _Part(NamedTuple):
     factor: FloatArray
 
     def points(self, numbers: FloatArray) -> FloatArray:
-        """Nodes from normal numbers, both (n_rows, size, n_axes)."""
+        """Points from normal numbers, both (n_rows, size, n_axes)."""
         # Around each centre a run of the quasi-random sequence: every sixteenth number would fill a sliver.
         at = np.arange(self.size) * self.centres.shape[1] // self.size
         points: FloatArray = self.centres[:, at] + numbers @ self.factor.transpose(0, 2, 1)
@@ -172,42 +180,37 @@ def _normal_numbers(n_events: int, n: int, n_axes: int, seed: int) -> FloatArray
 
 
 def event_nodes(
-    extension: Extension,
-    rows: Rows,
-    strengths: FloatArray,
+    likelihood: EventLikelihood,
     population: Population,
     modes: Modes,
     budget: Budget = USUAL,
     reference: Population | None = None,
     shifts: FloatArray | None = None,
 ) -> Spread:
-    """Nodes of all rows, as many for each: on a line where one strength is free, else importance nodes.
+    """Quadrature points of all rows, as many for each: on a line where one strength is free, else random.
 
     Parameters
     ----------
-    strengths : (n_directions,) or (n_rows, n_directions) array
-        Of what is added.
+    likelihood : EventLikelihood
     population : Population
         Roughly where the events' strengths are.
     modes : Modes
-        Around which many nodes are put.
+        Around which many points are put.
     reference : Population, optional
-        Other populations that the nodes of all rows must cover: those over the population are shared with
+        Other populations that the points of all rows must cover: those over the population are shared with
         them. Without any, a population that has become too narrow would never see what it misses.
     shifts : (n_rows, n_base + 1) array, optional
         By which each row's quasi-random numbers are moved round along each axis, 0 to 1. For means over
         rows, not differences: what is left of the integration errors then averages out. On a line there are
         no such numbers, and nothing is moved.
     """
-    if _axes(extension, rows) == 1:
-        return on_a_line(extension, rows, strengths, population, modes, budget, reference)
-    return importance_nodes(extension, rows, strengths, population, modes, budget, reference, shifts)
+    if _axes(likelihood) == 1:
+        return on_a_line(likelihood, population, modes, budget, reference)
+    return importance_nodes(likelihood, population, modes, budget, reference, shifts)
 
 
 def importance_nodes(
-    extension: Extension,
-    rows: Rows,
-    strengths: FloatArray,
+    likelihood: EventLikelihood,
     population: Population,
     modes: Modes,
     budget: Budget,
@@ -219,7 +222,8 @@ def importance_nodes(
     All are weighted by the mixture of all that was proposed, what was found by adaptation included (adaptive
     multiple importance sampling: Cornuet and others, 2012, doi 10.1111/j.1467-9469.2011.00756.x).
     """
-    n, axes = population.mean.shape[1], _axes(extension, rows)
+    rows = likelihood.rows
+    n, axes = population.mean.shape[1], _axes(likelihood)
     cover = _cover(rows, population, modes, axes)
     parts = [
         _Part(budget.around_mode, modes.points[:, None, :axes], budget.wider * np.linalg.cholesky(cover))
@@ -232,10 +236,11 @@ def importance_nodes(
         parts.append(_Part(size, centre[:, None, :], over))
 
     def spread(part: _Part, seed: int) -> tuple[FloatArray, FloatArray]:
-        """Nodes of a part, and the log likelihoods there, the release's prior included."""
-        numbers = _normal_numbers(extension.problem.campaign.n_events, part.size, axes, seed)[rows.event]
+        """Points of a part, and the log likelihoods there, the release's prior included."""
+        n_events = likelihood.extension.problem.campaign.n_events
+        numbers = _normal_numbers(n_events, part.size, axes, seed)[rows.event]
         points = part.points(_rotated(numbers, shifts))
-        return points, _log_likelihoods(extension, rows, strengths, modes, points, budget.linear)
+        return points, _log_likelihoods(likelihood, modes, points, budget.linear)
 
     found = [spread(part, seed) for seed, part in enumerate(parts)]
     points, log_l = (np.concatenate([one[k] for one in found], axis=1) for k in range(2))
@@ -254,15 +259,14 @@ def importance_nodes(
 
 
 def on_a_line(
-    extension: Extension,
-    rows: Rows,
-    strengths: FloatArray,
+    likelihood: EventLikelihood,
     population: Population,
     modes: Modes,
     budget: Budget,
     reference: Population | None = None,
 ) -> Spread:
     """As `event_nodes`, where one strength is all that is free; see `line_nodes`."""
+    rows = likelihood.rows
     cover = _cover(rows, population, modes, 1)
     over = [_over(one, rows, 1, 1.0) for one in _covered(population, reference)]
     centres = np.column_stack([modes.points[:, 0], *(centre[:, 0] for centre, _ in over)])
@@ -270,7 +274,7 @@ def on_a_line(
     widths += [budget.population_wider * factor[:, 0, 0] for _, factor in over]
 
     def log_likelihoods_at(points: FloatArray) -> FloatArray:
-        return _log_likelihoods(extension, rows, strengths, modes, points[:, :, None], budget.linear)
+        return _log_likelihoods(likelihood, modes, points[:, :, None], budget.linear)
 
     populations = centres[:, 1:], np.column_stack([factor[:, 0, 0] for _, factor in over])
     points, log_weights = line_nodes(
@@ -281,13 +285,14 @@ def on_a_line(
     return Spread(full, log_weights)
 
 
-def _axes(extension: Extension, rows: Rows) -> int:
+def _axes(likelihood: EventLikelihood) -> int:
     """How many there are to integrate over: the base's strengths, and the release where it is uncertain."""
-    return extension.n_base + int((extension.problem.releases.sd[rows.event] > 0.0).any())
+    extension = likelihood.extension
+    return extension.n_base + int((extension.problem.releases.sd[likelihood.rows.event] > 0.0).any())
 
 
 def _covered(population: Population, reference: Population | None) -> list[Population]:
-    """The rows' own population first, then each that the nodes of all rows must cover."""
+    """The rows' own population first, then each that the points of all rows must cover."""
     return [population, *([] if reference is None else reference.groups)]
 
 
@@ -299,19 +304,18 @@ def _cover(rows: Rows, population: Population, modes: Modes, axes: int) -> Float
 
 
 def _log_likelihoods(
-    extension: Extension, rows: Rows, strengths: FloatArray, modes: Modes, points: FloatArray, linear: bool
+    likelihood: EventLikelihood, modes: Modes, points: FloatArray, linear: bool
 ) -> FloatArray:
-    """At nodes, (n_rows, k, n_axes) to (n_rows, k); with the prior of a release that is an axis."""
+    """At points, (n_rows, k, n_axes) to (n_rows, k); with the prior of a release that is an axis."""
     n_rows, size, axes = points.shape
-    n = extension.n_base
+    extension, rows, n = likelihood.extension, likelihood.rows, likelihood.extension.n_base
     flat = np.zeros((n_rows * size, n + 1))
     flat[:, :axes] = points.reshape(-1, axes)
     which = np.repeat(np.arange(n_rows), size)
     if linear:
         predictions = _linear_predictions(modes, flat.reshape(n_rows, size, n + 1))
     else:
-        given = np.broadcast_to(strengths, (n_rows, len(extension.directions)))
-        predictions = extension.predict(rows.event[which], flat, given[which])
+        predictions = extension.predict(rows.event[which], flat, likelihood.given[which])
     log_l: FloatArray = log_likelihoods(which, predictions, rows.readings, rows.errors)
     if axes > n:
         log_l = log_l - 0.5 * flat[:, n] ** 2 - _LOG_SQRT_2PI
@@ -326,7 +330,7 @@ def _log_proposal(parts: list[_Part], points: FloatArray) -> FloatArray:
 
 
 def _adapted(points: FloatArray, log_posterior: FloatArray, cover: FloatArray, size: int) -> _Part:
-    """Where weighted nodes say that each row's posterior is: normal densities around some of them."""
+    """Where weighted points say that each row's posterior is: normal densities around some of them."""
     weights = np.exp(log_posterior - log_posterior.max(axis=1, keepdims=True))
     weights /= weights.sum(axis=1, keepdims=True)
     effective = 1.0 / np.sum(weights**2, axis=1)
@@ -354,7 +358,7 @@ def _rotated(numbers: FloatArray, shifts: FloatArray | None) -> FloatArray:
 
 
 def _linear_predictions(modes: Modes, points: FloatArray) -> FloatArray:
-    """Readings at nodes along the tangents at each row's mode; a speed below zero is none."""
+    """Readings at points along the tangents at each row's mode; a speed below zero is none."""
     change = (points - modes.tangents_at[:, None, :]) @ modes.by_points.transpose(0, 2, 1)
     result: FloatArray = np.maximum(modes.predictions[:, None, :] + change, 0.0)
     return result.reshape(-1, result.shape[2])

@@ -10,11 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.evidence.covariates import standard_of
+from skred.errors import InputError
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.geometry import WEAKENING_SPEED_M_S
+from skred.physics.kernel.columns import Column
 from skred.physics.kernel.fronts import front_speeds, simulate, simulate_with_jacobian
 from skred.physics.kernel.inputs import Contributions, make_contributions
 from skred.physics.law import Law
+from skred.physics.laws import check_library
 from skred.physics.mechanisms.spec import Direction, Setting
 
 FloatArray = NDArray[np.float64]
@@ -28,7 +31,13 @@ def setting_of(problem: HierarchicalProblem, law: Law, front_speed: FloatArray |
     ----------
     front_speed : (n_cells + 1,) array, optional
         Typical speed of the fitted fronts [m/s]; left at 0 nothing is looked for that refers to it.
+
+    Raises
+    ------
+    InputError
+        If a mechanism that may be added has a symbol of the law.
     """
+    check_library(law)
     campaign = problem.campaign
     names = sorted({name for event in campaign.events for name in event.covariates})
     standards = {name: standard_of(campaign.events, name) for name in names}
@@ -88,17 +97,29 @@ class Extension:
 
     @cached_property
     def contributions(self) -> Contributions:
-        """How the base's and the added strengths enter the equation of motion."""
+        """How the base's and the added strengths enter the equation of motion.
+
+        Raises
+        ------
+        InputError
+            If two of them weaken with different speed scales: the kernel has one.
+        """
         base = self.problem.contributions(self.law.mechanisms)
         columns = [base.columns] + [
             np.array([int(c) for c in d.columns]) for d in self.directions if d.columns
         ]
         profiles = [base.profiles] + [d.profiles for d in self.directions if d.columns]
-        speeds = [d.weakening_speed for d in self.directions if d.weakening_speed is not None]
+        speeds = {d.weakening_speed for d in self.directions if d.weakening_speed is not None}
+        if Column.WEAKENING in base.columns:
+            speeds.add(base.weakening_speed)
+        if len(speeds) > 1:
+            raise InputError(
+                f"friction that falls with speed has the scales {sorted(speeds)} m/s: a law can have one"
+            )
         contributions: Contributions = make_contributions(
             np.concatenate(columns).astype(np.int64),
             np.ascontiguousarray(np.concatenate(profiles)),
-            float(speeds[0] if speeds else WEAKENING_SPEED_M_S),
+            float(speeds.pop() if speeds else WEAKENING_SPEED_M_S),
         )
         return contributions
 

@@ -1,9 +1,9 @@
-"""Nodes on a line: where an event has one free strength, trapezoids between nodes put where they are needed.
+"""Quadrature on a line: where an event has one free strength, trapezoids between well chosen points.
 
-Over one strength an event's likelihood is mostly smooth, with jumps where its front just passes or just stops
-and spikes as narrow as a hundredth of its population beside them. Random nodes, however weighted, miss the
-spikes and know jumps no better than the distance between them; nodes put between those that differ most close
-in on both.
+Over one strength an event's likelihood is mostly smooth. It has jumps where its front just passes or just
+stops, and spikes as narrow as a hundredth of its population beside them. Random points miss the spikes and
+know jumps no better than the distance between them. Points put between those that differ most close in on
+both.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.compiled import compiled
+from skred.parallel.compile_cache import compiled, inner
 
 FloatArray = NDArray[np.float64]
 _PER_ROOT = 5.0
@@ -22,6 +22,7 @@ _PER_ROOT = 5.0
 _REACH = 3.0
 """How far the first nodes go from each centre, in widths."""
 _TURNS = 2
+"""Turns in which half of the points are put between those before: a second one closes in on spikes."""
 _AS_WIDE = 0.1
 """What width alone counts for, against a change as large as what is there."""
 
@@ -66,6 +67,21 @@ def line_nodes(
     return points, log_l + np.log(np.maximum(weights, np.finfo(float).tiny))
 
 
+@inner()
+def _add_changes(points, height, share, changes):  # type: ignore[no-untyped-def]
+    """What is between each point and the one before it counts for, of the share that they have together."""
+    most, total = height.max(), 0.0
+    own = np.zeros(points.size)
+    before = math.exp(height[0] - most)
+    for k in range(1, points.size):
+        after, apart = math.exp(height[k] - most), points[k] - points[k - 1]
+        own[k] = apart * (abs(after - before) + _AS_WIDE * max(after, before))
+        total += own[k]
+        before = after
+    if total > 0.0:
+        changes += share / total * own
+
+
 @compiled()
 def _between(points, log_l, means, sds, n):  # type: ignore[no-untyped-def]
     """New points of each row, (n_rows, n), between points in order whose log likelihoods are given."""
@@ -90,18 +106,3 @@ def _between(points, log_l, means, sds, n):  # type: ignore[no-untyped-def]
             share = (target - reached[k - 1]) / gap if gap > 0.0 else 0.5
             result[row, j] = points[row, k - 1] + share * (points[row, k] - points[row, k - 1])
     return result
-
-
-@compiled()
-def _add_changes(points, height, share, changes):  # type: ignore[no-untyped-def]
-    """What is between each point and the one before it counts for, of the share that they have together."""
-    most, total = height.max(), 0.0
-    own = np.zeros(points.size)
-    before = math.exp(height[0] - most)
-    for k in range(1, points.size):
-        after, apart = math.exp(height[k] - most), points[k] - points[k - 1]
-        own[k] = apart * (abs(after - before) + _AS_WIDE * max(after, before))
-        total += own[k]
-        before = after
-    if total > 0.0:
-        changes += share / total * own

@@ -1,10 +1,10 @@
 """The linear mixed model around the events' own modes: population fit, efficient scores and information.
 
 Around its mode, an event's readings are linear in its own strengths, in its release and in the strength of
-anything added; the population makes the own strengths random. What is left of a direction after the
-population's mean, the events' own deviations and the releases have had their share is its efficient
-score and information (Lindstrom and Bates, 1990, doi 10.2307/2532087). Linearised at each event's own
-mode, never at the population's mean: that would alarm on clean recordings with small errors.
+anything added; the population makes the own strengths random. The population's mean, the events' own
+deviations and the releases have their share first; what is left of a direction is its efficient score and
+information (Lindstrom and Bates, 1990, doi 10.2307/2532087). It is linearised at each event's own mode,
+never at the population's mean: that would alarm on clean recordings with small errors.
 """
 
 from __future__ import annotations
@@ -15,8 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, event_modes
-from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.evidence.conditional_map import (
+    EventLikelihood,
+    Modes,
+    Population,
+    Rows,
+    event_modes,
+)
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 from skred.physics.law import Law
 
@@ -25,7 +30,9 @@ IntArray = NDArray[np.int64]
 MEDIAN_LOG_MEAN, MEDIAN_LOG_SD = -0.64, 1.1
 """Mean and standard deviation of the log of a half-normal variable of scale 1."""
 _PRIOR_EVENTS = 2.0
+"""Events that the prior's spread, without correlation, counts for in a covariance."""
 _STARTING_SPREAD = 0.3
+"""Spread of the population that a fit begins with: wider than most."""
 
 
 class MeanPrior(NamedTuple):
@@ -137,9 +144,7 @@ def without(scores: Scores, n_first: int) -> Scores:
 
 
 def fit_population(
-    extension: Extension,
-    rows: Rows,
-    strengths: FloatArray,
+    likelihood: EventLikelihood,
     prior: MeanPrior,
     start: tuple[Population, FloatArray],
     n_rounds: int = 25,
@@ -149,8 +154,8 @@ def fit_population(
 
     Parameters
     ----------
-    strengths : (n_directions,) or (n_rows, n_directions) array
-        Of what is added, held fixed.
+    likelihood : EventLikelihood
+        Strengths of what is added are held fixed.
     start : (Population, (n_rows, n_base + 1) array)
         Population and points to begin with.
 
@@ -161,9 +166,10 @@ def fit_population(
         The modes.
     """
     population, points = start
+    rows = likelihood.rows
     n, per_group = population.mean.shape[1], len(rows.event) // rows.n_groups
     for _ in range(n_rounds):
-        modes = event_modes(extension, rows, points, strengths, population, n_steps=2)
+        modes = event_modes(likelihood, points, population, n_steps=2)
         points = modes.points
         cover = np.linalg.inv(modes.information + population.precision[rows.group])
         # The mean by a full step of its linear model, the spreads by expectation.
@@ -183,7 +189,7 @@ def fit_population(
         population = Population(population.mean + step, covariance)
         if change < tolerance:
             break
-    return population, event_modes(extension, rows, points, strengths, population).points
+    return population, event_modes(likelihood, points, population).points
 
 
 def _most_probable_covariance(moment: FloatArray, n_events: int) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Evidence over the population, its events' strengths integrated already: Laplace, and importance sampling.
+"""Evidence over the population, its events' strengths integrated already: by Laplace, by importance sampling.
 
 Coordinates of the population: means of the log strengths, logarithms of the spreads, inverse hyperbolic
 tangents of the partial correlations. Compiled, because a diagnosis asks for it a thousand times.
@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
-from skred.diagnosis.compiled import compiled
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.linear_mixed_model import MeanPrior
 from skred.inference.hierarchical.event_density import integrated_log_density, inverse_factor
 from skred.inference.hierarchical.population import LKJ_SHAPE
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 from skred.inference.hierarchical.surface import Nodes
+from skred.parallel.compile_cache import compiled, inner
 
 FloatArray = NDArray[np.float64]
 _LOG_MEDIAN, _LOG_SD, _SHAPE = math.log(SPREAD_MEDIAN), SPREAD_LOG_SD, LKJ_SHAPE
@@ -28,7 +28,11 @@ _HALF_LOG_2PI = 0.5 * _LOG_2PI
 _NEGLIGIBLE = -25.0
 """Log share of an event's integral below which a node does not count for slopes."""
 _STEP = 2e-3
-_DEGREES, _RESAMPLED_FROM = 5.0, 8
+"""Of the differences that a curvature is taken from, in the population's coordinates."""
+_DEGREES = 5.0
+"""Degrees of freedom of the importance proposal: tails heavy enough to bound the weights."""
+_RESAMPLED_FROM = 8
+"""Draws for each population that is kept: so many that resampling repeats few."""
 _NARROWEST = _LOG_MEDIAN - 6.0 * _LOG_SD
 """Least log of a spread, six standard deviations of its prior below the median: 0.0036. Narrower populations
 are between the nodes, whose sums then promise what is not there, tens of nats."""
@@ -49,7 +53,7 @@ def _factor(psi, n):  # type: ignore[no-untyped-def]
     return factor
 
 
-@compiled()
+@inner()
 def _means(psi, n, n_events):  # type: ignore[no-untyped-def]
     """The population's mean, the same for each event."""
     means = np.empty((n_events, n))
@@ -78,7 +82,7 @@ def _log_prior(psi, n, log_scale):  # type: ignore[no-untyped-def]
     return total
 
 
-@compiled()
+@inner()
 def _log_target(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-untyped-def]
     for i in range(n):
         if psi[n + i] < _NARROWEST:
@@ -89,7 +93,7 @@ def _log_target(psi, n, log_scale, first, points, log_weights):  # type: ignore[
     return total if total == total else -np.inf
 
 
-@compiled()
+@inner()
 def _fill_statistics(point, mean, whiten, statistics):  # type: ignore[no-untyped-def]
     """Statistics of a normal density: whitened strengths, then their products (0, 0), (1, 0), (1, 1), ...
 
@@ -108,7 +112,7 @@ def _fill_statistics(point, mean, whiten, statistics):  # type: ignore[no-untype
     return exponent
 
 
-@compiled()
+@inner()
 def _node_moments(psi, n, first, points, log_weights):  # type: ignore[no-untyped-def]
     """Sums over events: of log integrals, and of means and covariances of the statistics over the nodes.
 
@@ -133,32 +137,49 @@ def _node_moments(psi, n, first, points, log_weights):  # type: ignore[no-untype
                 own[i] += part
                 for j in range(size):
                     square[i, j] += part * statistics[j]
-        mean += own
         for i in range(size):
-            covariance[i] += square[i] - own[i] * own
+            mean[i] += own[i]
+            for j in range(size):
+                covariance[i, j] += square[i, j] - own[i] * own[j]
     return density.sum(), mean, covariance
 
 
-@compiled()
+@inner()
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    """Scalar product; written out, as are those below, because ``@`` takes seconds to compile."""
+    total = 0.0
+    for i in range(a.size):
+        total += a[i] * b[i]
+    return total
+
+
+@inner()
 def _natural(psi, n, centre, whiten):  # type: ignore[no-untyped-def]
     """Natural parameters of a population in coordinates whitened about another, and its normalising term."""
-    between = whiten @ _factor(psi, n)
+    factor, between, offset = _factor(psi, n), np.zeros((n, n)), np.zeros(n)
+    for i in range(n):
+        for k in range(i + 1):
+            offset[i] += whiten[i, k] * (psi[k] - centre[k])
+            for j in range(k + 1):
+                between[i, j] += whiten[i, k] * factor[k, j]
     inverse, log_determinant = inverse_factor(between)
-    offset, precision = whiten @ (psi[:n] - centre), inverse.T @ inverse
-    found, place = np.empty(n + n * (n + 1) // 2), n
-    found[:n] = precision @ offset
+    found, place = np.zeros(n + n * (n + 1) // 2), n
     for i in range(n):
         for j in range(i + 1):
-            found[place] = -precision[i, j] if j < i else -0.5 * precision[i, i]
+            precision = _dot(inverse[i:, i], inverse[i:, j])
+            found[place] = -precision if j < i else -0.5 * precision
+            found[i] += precision * offset[j]
+            if j < i:
+                found[j] += precision * offset[i]
             place += 1
-    return found, 0.5 * offset @ found[:n] - log_determinant
+    return found, 0.5 * _dot(offset, found[:n]) - log_determinant
 
 
-@compiled()
+@inner()
 def _smooth(psi, n, log_scale, mean, n_events, centre, whiten):  # type: ignore[no-untyped-def]
     """What the log target is beside its log integrals, those along a tangent; and natural parameters."""
     parameters, normaliser = _natural(psi, n, centre, whiten)
-    return mean @ parameters - n_events * normaliser + _log_prior(psi, n, log_scale), parameters
+    return _dot(mean, parameters) - n_events * normaliser + _log_prior(psi, n, log_scale), parameters
 
 
 @compiled()
@@ -184,7 +205,8 @@ def _slopes(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-u
         there[i] = psi[i] - _STEP
         low, down = _smooth(there, *fixed)
         there[i] = psi[i]
-        natural[i] = (up - down) / (2.0 * _STEP)
+        for k in range(mean.size):
+            natural[i, k] = (up[k] - down[k]) / (2.0 * _STEP)
         gradient[i] = (high - low) / (2.0 * _STEP)
         sides[i] = high - 2.0 * middle + low
         hessian[i, i] = -sides[i] / _STEP**2
@@ -196,44 +218,12 @@ def _slopes(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-u
             there[i], there[j] = psi[i], psi[j]
             both = total - 2.0 * middle
             hessian[i, j] = hessian[j, i] = -(both - sides[i] - sides[j]) / (2.0 * _STEP**2)
-    return value, gradient, hessian - natural @ covariance @ natural.T
-
-
-@compiled()
-def _allowed(psi, n):  # type: ignore[no-untyped-def]
-    """The nearest coordinates whose spreads are not too narrow."""
-    allowed = psi.copy()
-    for i in range(n, 2 * n):
-        allowed[i] = max(psi[i], _NARROWEST)
-    return allowed
-
-
-@compiled()
-def _climb(psi, n, log_scale, first, points, log_weights, n_steps):  # type: ignore[no-untyped-def]
-    """Newton's method with halved steps: the top, its height, and minus the Hessian there."""
-    psi = _allowed(psi, n)
-    best, gradient, hessian = _slopes(psi, n, log_scale, first, points, log_weights)
-    for _ in range(n_steps):
-        values, axes = np.linalg.eigh(hessian)
-        along = axes.T @ gradient
-        step = axes @ (along / np.maximum(np.abs(values), 0.5))
-        largest = np.abs(step).max()
-        if largest > 1.0:
-            step /= largest
-        gained, there = -1.0, psi
-        for _ in range(8):
-            there = _allowed(psi + step, n)
-            gained = _log_target(there, n, log_scale, first, points, log_weights) - best
-            if gained >= -1e-9:
-                break
-            step = 0.4 * (there - psi)
-        if gained < -1e-9:
-            break
-        psi = there
-        best, gradient, hessian = _slopes(psi, n, log_scale, first, points, log_weights)
-        if gained < 1e-3:
-            break
-    return psi, best, hessian
+    for i in range(size):
+        for k in range(mean.size):
+            along = _dot(natural[i], covariance[:, k])
+            for j in range(size):
+                hessian[i, j] -= along * natural[j, k]
+    return value, gradient, hessian
 
 
 @compiled()
@@ -242,6 +232,39 @@ def _log_targets(psis, n, log_scale, first, points, log_weights):  # type: ignor
     for k in range(len(psis)):
         result[k] = _log_target(psis[k], n, log_scale, first, points, log_weights)
     return result
+
+
+def _allowed(psi: FloatArray, n: int) -> FloatArray:
+    """The nearest coordinates whose spreads are not too narrow."""
+    allowed = psi.copy()
+    allowed[n : 2 * n] = np.maximum(psi[n : 2 * n], _NARROWEST)
+    return allowed
+
+
+def _climb(
+    psi: FloatArray, n: int, log_scale: FloatArray, nodes: Nodes, n_steps: int
+) -> tuple[FloatArray, float, FloatArray]:
+    """Newton's method with halved steps: the top, its height, and minus the Hessian there."""
+    psi = _allowed(psi, n)
+    best, gradient, hessian = _slopes(psi, n, log_scale, *nodes)
+    for _ in range(n_steps):
+        values, axes = np.linalg.eigh(hessian)
+        step = axes @ (axes.T @ gradient / np.maximum(np.abs(values), 0.5))
+        step /= max(np.abs(step).max(), 1.0)
+        gained, there = -1.0, psi
+        for _ in range(8):
+            there = _allowed(psi + step, n)
+            gained = _log_targets(there[None], n, log_scale, *nodes)[0] - best
+            if gained >= -1e-9:
+                break
+            step = 0.4 * (there - psi)
+        if gained < -1e-9:
+            break
+        psi = there
+        best, gradient, hessian = _slopes(psi, n, log_scale, *nodes)
+        if gained < 1e-3:
+            break
+    return psi, best, hessian
 
 
 class Evidence(NamedTuple):
@@ -305,7 +328,7 @@ def evidence(nodes: Nodes, log_scale: FloatArray, start: FloatArray, n_steps: in
     start : (n_psi,) array
     """
     n = len(log_scale)
-    psi, best, hessian = _climb(start, n, log_scale, *nodes, n_steps)
+    psi, best, hessian = _climb(start, n, log_scale, nodes, n_steps)
     values, axes = np.linalg.eigh(hessian)
     values = np.maximum(values, 0.05)
     covariance = (axes / values) @ axes.T

@@ -57,13 +57,12 @@ def predict_event(
     added : (n, n_directions) array
         Strengths of what is added.
     """
-    readings = extension.problem.readings
+    problem = extension.problem
+    readings = problem.readings
     normal = rng.standard_normal((len(means), means.shape[1]))
     logs = means + np.einsum("rij,rj->ri", factors, normal)
     points = np.column_stack([logs, rng.standard_normal(len(means))])
     fronts = extension.predict(np.full(len(means), event), points, added)[:, :-1]
-    own = readings.stated_sd[event]
-    sd = np.where(own > 0.0, own, np.hypot(readings.relative_sd * fronts, readings.absolute_sd))
-    noisy = fronts + sd * rng.standard_normal(fronts.shape)
+    noisy = problem.error_model.draw(fronts, readings.sd(event, fronts), readings.is_velocity, rng)
     low, high = np.quantile(noisy, [0.05, 0.95], axis=0)
     return Predicted(fronts.mean(axis=0), low, high)

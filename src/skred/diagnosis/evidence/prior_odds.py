@@ -14,21 +14,22 @@ SHARES = {NOTHING: 0.5, Group.PHYSICS: 0.35, Group.INSTRUMENT: 0.1, UNLISTED: 0.
 """Prior probability of each group, shared equally by its members."""
 
 CALIBRATION_VERSION = 1
+"""Of how evidence becomes probability; it changes with `SHARES` and `POWER`."""
 POWER = 0.75
-"""Of Bayes factors between whatever may be missing. Every model is wrong in edges and exponents, and evidence
-says more for the less wrong one than trials bear out. Frozen from opened trials, by
-``benchmarks/calibrate_odds.py``, before those that claims are made from."""
+"""Tempering exponent of Bayes factors between whatever may be missing. Every model is wrong in edges and
+exponents, and evidence says more for the less wrong one than trials bear out. Frozen from opened trials, by
+``studies/thresholds/calibrate_odds.py``, before those that claims are made from."""
 
 
-def prior_odds(raced: Iterable[Mechanism]) -> dict[str, float]:
+def prior_odds(compared: Iterable[Mechanism]) -> dict[str, float]:
     """Prior probability of each id, `nothing` and `unlisted` included.
 
     A group without members gives its share to none: the rest is what it is relative to each other.
     """
-    raced = list(raced)
+    compared = list(compared)
     odds = {NOTHING: SHARES[NOTHING], UNLISTED: SHARES[UNLISTED]}
     for group in Group:
-        members = [mechanism.id for mechanism in raced if mechanism.group is group]
+        members = [mechanism.id for mechanism in compared if mechanism.group is group]
         odds |= {name: SHARES[group] / len(members) for name in members}
     total = sum(odds.values())
     return {name: share / total for name, share in odds.items()}
@@ -46,7 +47,7 @@ def probabilities(log_factors: Mapping[str, float], odds: Mapping[str, float]) -
 def stated(
     log_factors: Mapping[str, float], odds: Mapping[str, float], power: float = POWER
 ) -> dict[str, float]:
-    """Probabilities with Bayes factors to a power among all but nothing, which keeps its own."""
+    """Probabilities with tempered Bayes factors among all but nothing, which keeps its own."""
     nothing = probabilities(log_factors, odds)[NOTHING]
     among = probabilities({name: power * value for name, value in log_factors.items()}, odds)
     something = math.fsum(share for name, share in among.items() if name != NOTHING)

@@ -10,23 +10,23 @@ import math
 
 import numpy as np
 
-from skred.diagnosis.compiled import compiled
-from skred.inference.hierarchical.reading_density import (
+from skred.inference.error_model import OUTLIER_FACTOR
+from skred.inference.reading_density import (
     OBSERVED,
-    OUTLIER_FACTOR,
     RELATIVE,
     VALUE,
     VELOCITY,
     reading_sd,
     tabled,
 )
+from skred.parallel.compile_cache import compiled, inner
 
 _SQRT_2 = math.sqrt(2.0)
 _SQRT_2PI = math.sqrt(2.0 * math.pi)
 _FAR = 6.0
 
 
-@compiled()
+@inner()
 def _stop_slopes(stop, reached, not_reached, place_sd):  # type: ignore[no-untyped-def]
     """Slope and curvature of the log probability that a stop is seen between two places."""
     if reached == -np.inf and not_reached == np.inf:
@@ -46,7 +46,7 @@ def _stop_slopes(stop, reached, not_reached, place_sd):  # type: ignore[no-untyp
     return slope / place_sd, min(max(curvature, 0.0), 1.0) / place_sd**2
 
 
-@compiled()
+@inner()
 def _common_slopes(table, row, predictions, i, common, slope, curvature, shared):  # type: ignore[no-untyped-def]
     """Fill slope, curvature and what is shared of a run whose velocities have an error in common."""
     n_velocities, total = 0, 0.0
@@ -109,7 +109,8 @@ def reading_slopes(rows, predictions, readings, errors):  # type: ignore[no-unty
         if common > 0.0:
             _common_slopes(table, row, predictions, i, common, slope, curvature, shared)
             continue
-        log_case[:] = log_weights
+        for case in range(n_cases):
+            log_case[case] = log_weights[case]
         for j in range(n_columns - 1):
             if table[row, j, OBSERVED] == 0.0:
                 continue

@@ -10,8 +10,8 @@ from arviz_stats.base import array_stats
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from skred.diagnosis.augment.augmented import AugmentedProblem
 from skred.diagnosis.augment.coefficient import added_draws
+from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.predictive import Predicted, predict_event
 from skred.inference.calibrate import Calibration
@@ -21,9 +21,12 @@ from skred.inference.leave_one_out import exact_leave_one_out
 
 FloatArray = NDArray[np.float64]
 K_LIMIT = 0.7
+"""Pareto k above which importance sampling is not trusted: Vehtari and others, 2024,
+https://jmlr.org/papers/v25/19-556.html."""
 _DRAWS = 300
+"""Populations drawn for the predictions of an avalanche."""
 _FRONTS = 4
-"""New fronts for each draw of a population."""
+"""New fronts for each of them, 1200 in all."""
 
 
 @dataclass(frozen=True, eq=False)

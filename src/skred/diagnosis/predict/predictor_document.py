@@ -21,7 +21,9 @@ from skred.physics.mechanisms.spec import Mechanism, Shape
 FloatArray = NDArray[np.float64]
 FORMAT = 1
 MOST_DRAWS, MOST_TERMS, MOST_CONSTANTS = 10_000, 4, 8
+"""Draws, terms and constants of a term in a document at most: many times what is ever written."""
 _MOST_EDGES = 20_000
+"""Places of a profile at most, many times those of a track."""
 _LARGEST_LOG, _LARGEST_SCALES, _LARGEST_M, _LARGEST_SPEED, _LARGEST_NUMBER = 50.0, 20.0, 1e6, 1e3, 1e12
 """Beyond which a number is no draw of a posterior: logarithms, strengths in scales of their priors, places,
 speeds, others."""

@@ -1,10 +1,10 @@
-"""The unlisted force let in: the law with a fitted profile, checked again, tried on avalanches left out.
+"""A force that is not in the list, added: the law with it checked again, and tried on avalanches left out.
 
-A profile has many freedoms, so nothing that it was fitted to may try it: for each avalanche the base law and
-the profile, its amplitude, correlation length and place too, are fitted to the others alone. Only how it goes
-with speed is not chosen again. Populations are drawn by importance sampling, profiles around their mean by
-Laplace's approximation. The base law is tried likewise, so that before and after differ
-by the profile alone.
+A profile has many coefficients, so nothing that it was fitted to may try it. For each avalanche the base law
+and the profile, with its amplitude, correlation length and place, are fitted to the others alone; only how
+it goes with speed is not chosen again. Populations are drawn by importance sampling, profiles around their
+mean by the Laplace approximation. The base law is tried likewise, so that before and after differ by the
+profile alone.
 """
 
 from __future__ import annotations
@@ -22,20 +22,25 @@ from skred.diagnosis.compare.comparison import ComparisonUnderErrors
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, combined, knot_by_knot, most_probable
-from skred.diagnosis.evidence.coefficient import Base, Fit, refit
-from skred.diagnosis.evidence.conditional_map import event_modes
+from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, event_modes
 from skred.diagnosis.evidence.event_quadrature import USUAL, event_nodes
 from skred.diagnosis.evidence.extension import Extension, extended
 from skred.diagnosis.evidence.marginal import evidence, importance_draws, population_at
 from skred.diagnosis.evidence.predictive import Predicted, predict_event
+from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.predict.unseen import log_densities
 from skred.parallel.threads import side_by_side
 from skred.physics.mechanisms.spec import Direction
 
 FloatArray = NDArray[np.float64]
-_DRAWS, _FRONTS = 200, 1200
+_DRAWS = 200
+"""Populations and profiles drawn: as many as a predictor keeps."""
+_FRONTS = 1200
+"""New fronts for the predictions of an avalanche, as of mechanisms."""
 _BUDGET = USUAL.times(2)
+"""Quadrature points of a population fitted to the others: their draws are weighed, not only its maximum."""
 
 
 class Draws(NamedTuple):
@@ -82,12 +87,12 @@ class _Event(NamedTuple):
 
 
 def profile_law(under_errors: ComparisonUnderErrors, most: int, seed: int) -> ProfileLaw:
-    """Let the most probable profile of a comparison in.
+    """Add the most probable profile of a comparison.
 
     Parameters
     ----------
     under_errors : ComparisonUnderErrors
-        The comparison under the error model that the unlisted force has most evidence under.
+        The comparison under the error model that the force has most evidence under.
     most : int
         Campaigns simulated at most for the check.
     """
@@ -168,7 +173,7 @@ def _without(base: Base, event: int) -> Base:
     rows, start = base.rows.take(others), (base.population, base.fit.points[others])
     extension = extended(base.problem, base.law, base.directions)
     given = base.strengths[None, :]
-    fit = refit(extension, rows, given, start, base.log_scale, _BUDGET, USUAL)[0]
+    fit = refit(extension, rows, given, start, Rounds(_BUDGET, USUAL))[0]
     return replace(base, rows=rows, fit=fit)
 
 
@@ -183,8 +188,9 @@ def _draws(
     """Populations by the base's events at the middle strengths, as many as there are draws of strengths."""
     n = len(base.law.mechanisms)
     population = fit.found.population(n)
-    modes = event_modes(extension, base.rows, fit.points, middle, population)
-    nodes = event_nodes(extension, base.rows, middle, population, modes, _BUDGET, base.population).nodes
+    likelihood = EventLikelihood(extension, base.rows, middle)
+    modes = event_modes(likelihood, fit.points, population)
+    nodes = event_nodes(likelihood, population, modes, _BUDGET, base.population).nodes
     found = evidence(nodes, base.log_scale, fit.found.psi)
     drawn = population_at(importance_draws(nodes, base.log_scale, found, len(strengths), rng), n)
     return Draws(drawn.mean, np.linalg.cholesky(drawn.covariance), strengths)

@@ -1,7 +1,7 @@
 """Avalanches that a calibration has not seen: how probable they were, and what was predicted of them.
 
-A `Predictor` is what is left of a calibration for that: draws of the population and of what is added, small
-enough to be written beside an answer, and plain data, so that it can be kept and used elsewhere.
+A `Predictor` is what is left of a calibration for that: draws of the population and of what is added. It is
+small enough to be written beside an answer, and plain data, so that it can be kept and used elsewhere.
 """
 
 from __future__ import annotations
@@ -14,10 +14,17 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from skred.campaign import Campaign
-from skred.diagnosis.augment.augmented import AugmentedProblem
+from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.augment.tables import exact_nodes
-from skred.diagnosis.discrepancy.profile import Kind, Profile, entering, hats
-from skred.diagnosis.evidence.conditional_map import Population, Rows, campaign_rows, event_modes, log_joint
+from skred.diagnosis.discrepancy.profile import Kind, Profile, entering, spline_basis
+from skred.diagnosis.evidence.conditional_map import (
+    EventLikelihood,
+    Population,
+    Rows,
+    campaign_rows,
+    event_modes,
+    log_joint,
+)
 from skred.diagnosis.evidence.covariates import Standard, standard_of
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of
@@ -32,14 +39,17 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.law import Law
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Direction, Setting, Shape
 from skred.physics.terrain import build_terrain
 
 FloatArray = NDArray[np.float64]
 N_DRAWS = 200
+"""Draws that a predictor keeps: few enough to be written beside an answer."""
 _NODES = Budget(32, 32, 0, 1.5, 1.8)
-"""Nodes of an event for each draw; their errors average out over the draws. None are adapted: where those go
-depends on the others' weights, and few of them are too low in the mean (``benchmarks/unseen_nodes.py``)."""
+"""Quadrature points of an event for each draw; their errors average out over the draws. None are adapted:
+where those go depends on the others' weights, and few of them are too low in the mean
+(``studies.thresholds.unseen_nodes``)."""
 _SHARED = 16
 """As many times the nodes where all draws share them."""
 _AT_ONCE = 20
@@ -100,7 +110,7 @@ class ProfileTerm:
         """One for each knot."""
         speed = np.interp(setting.terrain.edge_s_m, self.edge_m, self.front_speed)
         setting = replace(setting, front_speed=speed)
-        return [entering(setting, self.kind, row) for row in hats(setting.terrain, self.knots_m)]
+        return [entering(setting, self.kind, row) for row in spline_basis(setting.terrain, self.knots_m)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,10 +281,9 @@ def _direction(term: Term, problem: HierarchicalProblem, law: Law) -> Direction:
         if np.abs(values).max(initial=0.0) > _FARTHEST:
             raise InputError(f"{campaign.name}: {shape.covariate!r} is far off what the predictor knows")
         covariates = {shape.covariate: values}
-    added = mechanisms()[term.mechanism].added
-    assert added is not None
+    setting = replace(setting_of(problem, law), covariates=covariates)
     try:
-        return added.direction(replace(setting_of(problem, law), covariates=covariates), shape)
+        return direction_of(mechanisms()[term.mechanism], setting, shape)
     except (AssertionError, KeyError, TypeError, ValueError) as error:
         raise InputError(f"the predictor's {term.mechanism} has a shape that it cannot have") from error
 
@@ -294,13 +303,13 @@ def log_densities(
     covariances = np.einsum("nij,nkj->nik", factors, factors)
     typical = Population(means.mean(axis=0)[None], covariances.mean(axis=0)[None])
     rng = np.random.default_rng([seed, 35])
-    start = _points(extension, rows, typical, strengths.mean(axis=0), rng)
+    start = _points(EventLikelihood(extension, rows, strengths.mean(axis=0)), typical, rng)
     n_events = len(rows.event)
     result = np.empty((len(means), n_events))
     if (strengths == strengths[0]).all():
         # Readings are then as likely at a node whichever draw it is: one set of many nodes serves all.
-        given, at = strengths[:1], start[None]
-        nodes = exact_nodes(extension, rows, given, typical, at, _NODES.times(_SHARED), typical)
+        shared = EventLikelihood(extension, rows, strengths[0])
+        nodes = exact_nodes(shared, typical, start[None], _NODES.times(_SHARED), typical)
         for k, mean in enumerate(means):
             result[k] = integrated_log_density(np.tile(mean, (n_events, 1)), factors[k], *nodes)
         return result
@@ -309,7 +318,8 @@ def log_densities(
         population = Population(means[part], covariances[part])
         starts = np.tile(start, (len(population.mean), 1, 1))
         shifts = rng.random((starts.shape[0] * n_events, starts.shape[2]))
-        nodes = exact_nodes(extension, rows, strengths[part], population, starts, _NODES, typical, shifts)
+        likelihood = EventLikelihood(extension, rows, strengths[0]).in_groups(strengths[part])
+        nodes = exact_nodes(likelihood, population, starts, _NODES, typical, shifts)
         for k in range(len(population.mean)):
             of_draw = nodes.first[k * n_events : (k + 1) * n_events + 1]
             mean = np.tile(population.mean[k], (n_events, 1))
@@ -319,23 +329,15 @@ def log_densities(
     return result
 
 
-def _points(
-    extension: Extension,
-    rows: Rows,
-    population: Population,
-    strengths: FloatArray,
-    rng: np.random.Generator,
-) -> FloatArray:
+def _points(likelihood: EventLikelihood, population: Population, rng: np.random.Generator) -> FloatArray:
     """Each event's most probable point, (n_events, n_base + 1): climbed to from the best of many."""
-    n_events, n = len(rows.event), population.mean.shape[1]
+    n_events, n = len(likelihood.rows.event), population.mean.shape[1]
     tried = np.zeros((_TRIED, n + 1))
     tried[1:] = rng.standard_normal((_TRIED - 1, n + 1))
     tried[:, :n] = tried[:, :n] @ (_TRIED_WIDER * np.linalg.cholesky(population.covariance[0])).T
     tried[:, :n] += population.mean[0]
-    many = rows.take(np.repeat(np.arange(n_events), _TRIED))
-    points = np.tile(tried, (n_events, 1))
-    given = np.broadcast_to(strengths, (len(points), len(strengths)))
-    heights = log_joint(extension, many, points, given, population).reshape(n_events, _TRIED)
+    many = likelihood.take(np.repeat(np.arange(n_events), _TRIED))
+    heights = log_joint(many, np.tile(tried, (n_events, 1)), population).reshape(n_events, _TRIED)
     start = tried[heights.argmax(axis=1)]
-    found: FloatArray = event_modes(extension, rows, start, strengths, population, n_steps=20).points
+    found: FloatArray = event_modes(likelihood, start, population, n_steps=20).points
     return found

@@ -7,13 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from skred.diagnosis.augment.coefficient import augmented_of, strength_of
-from skred.diagnosis.augment.step import Left, Step
-from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.compare.comparison import Comparison
+from skred.diagnosis.augment.coefficient import augmented_of
+from skred.diagnosis.augment.step import Left
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Detectability, Identifiability
-from skred.diagnosis.evidence.covariates import standard_of
 from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER
 from skred.diagnosis.outcome import (
     Diagnosis,
@@ -26,14 +23,20 @@ from skred.diagnosis.outcome import (
 )
 from skred.diagnosis.predict.held_out import HeldOut, errors, paired
 from skred.diagnosis.predict.profile_law import ProfileLaw
-from skred.diagnosis.verdict.next_sensor import next_sensor
+from skred.diagnosis.verdict.mechanisms import (
+    added_document,
+    candidate_documents,
+    place_of,
+    strength_document,
+)
+from skred.diagnosis.verdict.next_sensor import detection_sensor, next_sensor
 from skred.diagnosis.verdict.statement import statement
 from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.mechanisms.stretches import equation_of
 
 _NO_LIMIT = 20.0
-"""Strengths so many prior scales large are no limit: these recordings say nothing of the mechanism."""
+"""Prior scales from which on a detection limit is none: no strength that could be is so large."""
 
 
 def verdict(found: Outcome) -> dict[str, Any]:
@@ -69,80 +72,47 @@ def _told(found: Diagnosis) -> dict[str, Any]:
     candidate = found.steps[0].candidate if found.steps else None
     shape = candidate.best.shape if candidate is not None else None
     names = found.decision.names if found.steps else ()
-    after = None if isinstance(found.finding, NothingAdded) else found.finding.after
     return {
         "format": 1,
         "campaign": found.problem.campaign.name,
         "base_model": found.law.id,
         "verdict": found.decision.verdict,
         "mechanism": names[0] if names else None,
-        "mechanisms": [_mechanism(found, number) for number in range(len(found.steps))],
+        "mechanisms": [added_document(found, number) for number in range(len(found.steps))],
         "probability": found.comparison.probability,
         "indistinguishable": list(names[1:]),
-        "location": _location(found, candidate),
-        "strength": _strength(found.steps, 0) if found.steps else None,
+        "location": _location(found),
+        "strength": strength_document(found, 0) if found.steps else None,
         "covariate": shape.covariate if shape is not None else None,
         "sensor": shape.sensor if shape is not None else None,
         "equation": equation_of(candidate.mechanism, candidate.best.shape) if candidate is not None else None,
-        "evidence": _evidence(found, after),
-        "held_out": _held_out(found.before, after, found.problem),
+        "evidence": _evidence(found),
+        "held_out": _held_out(found.before, found.after, found.problem),
         "detection_limits": _detection_limits(found.table),
         "next_sensor": next_sensor(found),
         "diagnostics": _diagnostics(
             [found.calibration, found.reference, *(step.calibration for step in found.steps)],
-            [found.before] if after is None else [found.before, after],
+            [found.before] if found.after is None else [found.before, found.after],
         ),
         "left": _left(found.left),
     }
 
 
-def _location(found: Diagnosis, candidate: Candidate | None) -> dict[str, float] | None:
-    if candidate is not None:
-        stretch = candidate.stretch()
-    elif found.decision.verdict == "unexplained":
-        stretch = found.location.stretch_m
-    else:
-        stretch = None
-    return None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]}
+def _location(found: Diagnosis) -> dict[str, Any] | None:
+    """Where something is missing; None where it is not local, or nothing is."""
+    if found.steps:
+        return place_of(found.steps[0].candidate)
+    if found.decision.verdict != "unexplained":
+        return None
+    first, last = found.location.stretch_m
+    return {"s_from_m": first, "s_to_m": last, "s_from_interval_m": None, "s_to_interval_m": None}
 
 
-def _strength(steps: Sequence[Step], number: int) -> dict[str, Any]:
-    added = augmented_of(steps[-1].calibration).added[number]
-    mean, sd = strength_of(steps, number)
-    return {"parameter": added.name, "unit": added.mechanism.strength.unit, "mean": mean, "sd": sd}
-
-
-def _mechanism(found: Diagnosis, number: int) -> dict[str, Any]:
-    """One mechanism added, its strength as the last calibration has it."""
-    step = found.steps[number]
-    candidate = step.candidate
-    stretch = candidate.stretch()
-    shape = candidate.best.shape
-    return {
-        "id": candidate.mechanism.id,
-        "strength": _strength(found.steps, number),
-        "location": None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]},
-        "equation": equation_of(candidate.mechanism, shape),
-        "covariate": shape.covariate,
-        "standard": _standard(found, shape.covariate),
-        "sensor": shape.sensor,
-        "constants": dict(shape.constants),
-        "tied_with": list(step.tied),
-        "log_bayes_factor": step.comparison.log_factors[candidate.mechanism.id],
-    }
-
-
-def _standard(found: Diagnosis, covariate: str | None) -> dict[str, Any] | None:
-    """By what a covariate is standardised before its strength multiplies it."""
-    standard = None if covariate is None else standard_of(found.problem.campaign.events, covariate)
-    return None if standard is None else standard.as_dict()
-
-
-def _evidence(found: Diagnosis, after: HeldOut | None) -> dict[str, float | None]:
+def _evidence(found: Diagnosis) -> dict[str, float | None]:
     factor = found.comparison.log_odds
     if found.steps:
         factor = found.comparison.log_factors[found.steps[0].candidate.mechanism.id]
-    difference, se = (None, None) if after is None else paired(after, found.before)
+    difference, se = (None, None) if found.after is None else paired(found.after, found.before)
     return {
         "elpd_diff": difference,
         "elpd_se": se,
@@ -191,27 +161,6 @@ def _diagnostics(
     }
 
 
-def _candidate(comparison: Comparison, name: str) -> dict[str, Any]:
-    """One mechanism in the comparison, where and how strong it is if it is there."""
-    candidate = comparison.leading(name).candidates[name]
-    mean, sd = candidate.strength()
-    stretch, shape = candidate.stretch(), candidate.best.shape
-    return {
-        "id": name,
-        "log_bayes_factor": comparison.log_factors[name],
-        "strength": {
-            "parameter": candidate.mechanism.strength.name,
-            "unit": candidate.mechanism.strength.unit,
-            "mean": mean,
-            "sd": sd,
-        },
-        "location": None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]},
-        "covariate": shape.covariate,
-        "sensor": shape.sensor,
-        "estimators_differ_by": candidate.disagreement,
-    }
-
-
 def _left(left: Left | None) -> dict[str, Any] | None:
     """What a comparison of the augmented law leaned to and was not added; None where there was none."""
     if left is None:
@@ -244,24 +193,29 @@ def _profile(law: ProfileLaw) -> dict[str, Any]:
 
 def _more(found: Outcome) -> dict[str, Any]:
     """Keys beyond the format's."""
-    more: dict[str, Any] = {"reason": found.reason or None, "seconds": found.seconds}
+    more: dict[str, Any] = {
+        "reason": found.reason or None,
+        "converged": found.converged,
+        "refits_not_converged": list(found.refits_not_converged),
+        "seconds": found.seconds,
+    }
     if isinstance(found, NotDiagnosed):
-        return more
+        return more | {"alarm_by": None}
     return (
         more
         | {
             "alarm": found.alarm_by is not None,
+            "alarm_by": found.alarm_by,
             "log_bayes_factors": found.comparison.log_factors,
             "calibration": {"version": CALIBRATION_VERSION, "power": POWER},
             "error_models": [under_errors.error_model for under_errors in found.comparison.under_each],
-            "candidates": [
-                _candidate(found.comparison, name) for name in found.comparison.under_each[0].candidates
-            ],
+            "candidates": candidate_documents(found, found.comparison),
         }
         | _of_finding(found.finding)
         | {
             "identifiability": [_detectability(row) for row in found.table.rows],
             "power": found.table.power,
+            "detection_sensor": detection_sensor(found.table),
         }
         | (_missing_work(found.location) if found.alarm_by is not None else {})
     )

@@ -17,7 +17,8 @@ from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.evidence.coefficient import Curve
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, NothingAdded, Outcome
-from skred.diagnosis.verdict.report_facts import FORMAT, candidates_of, checks_of, comparisons_of
+from skred.diagnosis.verdict.mechanisms import candidates_of
+from skred.diagnosis.verdict.report_facts import FORMAT, checks_of, comparisons_of
 from skred.inference.recorded_data import recorded_groups
 from skred.physics.mechanisms.stretches import is_opposed
 

@@ -2,38 +2,49 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.detect.detectability import with_sensors
+from skred.diagnosis.detect.detectability import Identifiability, with_sensors
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.outcome import Diagnosis
 
 _PLACES = 16
+"""Places tried: close enough to each other for what a reading there says to change little between them."""
 
 
 def next_sensor(found: Diagnosis) -> dict[str, Any] | None:
-    """A velocity sensor in the words of the campaign format; None where nothing is to be split or seen."""
+    """One more velocity sensor to set up, in the words of the campaign format; None where none would help.
+
+    The one that splits a tie best, where one can; else the one that raises the power most.
+    """
     if found.steps and (rival := _rival(found.steps[0])) is not None:
         named = found.steps[0].candidate
         return _sensor(_splitting(found, named, rival), [named.mechanism.id, rival.mechanism.id])
-    if found.decision.verdict == "cannot_tell" and found.table.sensor_m is not None:
-        return _sensor(found.table.sensor_m, [])
-    return None
+    return detection_sensor(found.table)
+
+
+def detection_sensor(table: Identifiability) -> dict[str, Any] | None:
+    """The one that raises the power over the listed mechanisms most; None where none does."""
+    if table.sensor_m is None or table.power_with <= table.power:
+        return None
+    return _sensor(table.sensor_m, [], table.power_with)
 
 
 def _rival(step: Step) -> Candidate | None:
     """The first of those tied that a speed could split off: listed, and another term."""
-    raced = {name for under_errors in step.comparison.under_each for name in under_errors.candidates}
-    rivals = [step.comparison.leading(name).candidates[name] for name in step.tied if name in raced]
+    known = {name for under_errors in step.comparison.under_each for name in under_errors.candidates}
+    rivals = [step.comparison.leading(name).candidates[name] for name in step.tied if name in known]
     return next((one for one in rivals if not one.mechanism.is_same_term(step.candidate.mechanism)), None)
 
 
-def _sensor(place: float, splits: list[str]) -> dict[str, Any]:
-    return {"quantity": "front_velocity", "s_from_m": place, "s_to_m": place, "splits": splits}
+def _sensor(place: float, splits: list[str], power_with: float | None = None) -> dict[str, Any]:
+    at = {"quantity": "front_velocity", "s_from_m": place, "s_to_m": place}
+    return at | {"splits": splits, "power_with": power_with}
 
 
 def _splitting(found: Diagnosis, first: Candidate, second: Candidate) -> float:
@@ -53,7 +64,7 @@ def _splitting(found: Diagnosis, first: Candidate, second: Candidate) -> float:
         direction = curve.direction
         if direction.log_readings is not None:
             padded = np.concatenate([direction.log_readings, np.zeros(_PLACES)])
-            direction = type(direction)(log_readings=padded)
+            direction = replace(direction, log_readings=padded)
         extension = extended(problem, found.law, [direction])
         points = curve.fits[at].points
         events = np.arange(len(points))

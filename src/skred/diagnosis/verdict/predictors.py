@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from skred.diagnosis.evidence.prior_odds import UNLISTED
-from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, NothingAdded, Outcome, ProfileAdded
+from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
 from skred.diagnosis.predict.predictor_document import as_dict
 from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.predict.unseen import Predictor, ProfileTerm, predictor_of
@@ -53,6 +53,6 @@ def predictors(found: Outcome) -> dict[str, Any] | None:
 
 def promised_gain(found: Outcome) -> float | None:
     """Gain of the log score for each avalanche, by those left out; None if nothing was added."""
-    if isinstance(found, NotDiagnosed) or isinstance(found.finding, NothingAdded):
+    if isinstance(found, NotDiagnosed) or found.after is None:
         return None
-    return float(np.mean(found.finding.after.pointwise - found.before.pointwise))
+    return float(np.mean(found.after.pointwise - found.before.pointwise))

@@ -29,6 +29,7 @@ from skred.diagnosis.outcome import (
     ProfileAdded,
 )
 from skred.diagnosis.predict.held_out import K_LIMIT, HeldOut
+from skred.diagnosis.verdict.mechanisms import candidate_documents
 from skred.inference.calibrate import Calibration
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
@@ -314,25 +315,16 @@ def _comparison(comparison: Comparison, found: Diagnosis, number: int) -> dict[s
             }
             for under_errors in comparison.under_each
         ],
-        "candidates": {name: _candidate(comparison, name) for name in candidates_of(comparison)},
+        "candidates": {
+            row["id"]: _candidate(comparison, row) for row in candidate_documents(found, comparison)
+        },
     }
 
 
-def candidates_of(comparison: Comparison) -> list[str]:
-    """Ids of the mechanisms in a comparison, under any error model."""
-    return list(dict.fromkeys(name for one in comparison.under_each for name in one.candidates))
-
-
-def _candidate(comparison: Comparison, name: str) -> dict[str, Any]:
-    """One mechanism where it has most of its evidence."""
-    candidate = comparison.leading(name).candidates[name]
-    mean, sd = candidate.strength()
-    stretch = candidate.stretch()
-    return {
-        "strength": {"mean": mean, "sd": sd},
-        "location": None if stretch is None else {"s_from_m": stretch[0], "s_to_m": stretch[1]},
-        "shape": _shape(candidate.best.shape),
-    }
+def _candidate(comparison: Comparison, row: dict[str, Any]) -> dict[str, Any]:
+    """One mechanism where it has most of its evidence; its strength and place are those of the verdict."""
+    best = comparison.leading(row["id"]).candidates[row["id"]].best
+    return {"strength": row["strength"], "location": row["location"], "shape": _shape(best.shape)}
 
 
 def _shape(shape: Shape) -> dict[str, Any]:

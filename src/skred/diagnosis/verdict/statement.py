@@ -10,12 +10,14 @@ from skred.diagnosis.compare.decision import NOTHING_AT_MOST, Decision
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
-from skred.inference.intervals import PRACTICAL_DIFFERENCE
+from skred.diagnosis.verdict.improvement import improvement
+from skred.diagnosis.words import enumerated, percent, plus_minus
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.stretches import U_1, U_2
 
-_RIVAL = 0.05
-"""Probability from which another candidate than those named is told of."""
+_TOLD_FROM = 0.05
+"""Probability from which another candidate than those named is told of: below it, its name misleads more
+than it informs."""
 
 
 def statement(found: Outcome, document: dict[str, Any]) -> str:
@@ -29,7 +31,18 @@ def statement(found: Outcome, document: dict[str, Any]) -> str:
         "nothing_missing": _nothing,
         "cannot_tell": _cannot,
     }[found.decision.verdict](found, document)
-    return " ".join(part for part in parts if part)
+    return " ".join(part for part in (_not_converged(found), *parts) if part)
+
+
+def _not_converged(found: Diagnosis) -> str:
+    """Which refits did not converge; the first thing to know where any did not."""
+    events = found.refits_not_converged
+    if not events:
+        return ""
+    refits = f"the refit without avalanche {events[0]}"
+    if len(events) > 1:
+        refits = f"the refits without avalanches {enumerated(events)}"
+    return f"Not all of this can be trusted: {refits} did not converge, and the held-out scores rest on that."
 
 
 def _title(name: str) -> str:
@@ -41,21 +54,10 @@ def _short(name: str) -> str:
     return _title(name).partition(":")[0]
 
 
-def _share(probability: float) -> str:
-    """A probability that is never rounded to certainty."""
-    if probability > 0.995:
-        return "more than 99 %"
-    return "less than 1 %" if probability < 0.005 else f"{100.0 * probability:.0f} %"
-
-
 def _where(location: dict[str, float] | None) -> str:
     if location is None:
         return ""
-    return f" between s = {location['s_from_m']:.0f} m and {location['s_to_m']:.0f} m"
-
-
-def _unit(unit: str) -> str:
-    return "" if unit == "1" else f" {unit}"
+    return f" between s = {location['s_from_m']:.0f} and {location['s_to_m']:.0f} m"
 
 
 def _what(decision: Decision) -> str:
@@ -74,58 +76,58 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     about = f" ({subject}{by_logarithm})" if subject else ""
     sentences = [
         f"{_what(found.decision)}: {_title(name)}{about}{_where(document['location'])}, with a probability of"
-        f" {_share(probability[name])} (nothing: {_share(probability[NOTHING])}; a force not in the list:"
-        f" {_share(probability[UNLISTED])}).",
-        f"Its {strength['parameter'].replace('_', ' ')} is {strength['mean']:.3g} +- {strength['sd']:.2g}"
-        f"{_unit(strength['unit'])}.",
+        f" {percent(probability[name])} (nothing: {percent(probability[NOTHING])}; a force not in the list:"
+        f" {percent(probability[UNLISTED])}).",
+        f"Its {strength['parameter'].replace('_', ' ')} is"
+        f" {plus_minus(strength['mean'], strength['sd'], strength['unit'])}.",
+        _compensated(document["mechanisms"][0]["constants"]),
     ]
-    sentences.append(_opposed(document["mechanisms"][0]["constants"]))
     if document["covariate"]:
         sentences.append("Associated with, not necessarily caused by.")
     if ties:
-        others = ", ".join(f"{_short(other)} ({_share(probability[other])})" for other in ties)
+        others = ", ".join(f"{_short(other)} ({percent(probability[other])})" for other in ties)
         sentences.append(f"These recordings cannot tell it from: {others}.")
         sentences.append(_split(found.steps[0], document))
-    sentences.append(_rival(document))
+    sentences.append(_not_excluded(document))
     if len(document["mechanisms"]) > 1:
         second = document["mechanisms"][1]
         sentences.append(
             f"Given that, a second one earned its place: {_title(second['id'])}{_where(second['location'])}."
         )
-        sentences.append(_opposed(second["constants"]))
-    sentences.append(_improvement(document))
+        sentences.append(_compensated(second["constants"]))
+    sentences.append(improvement(document))
     sentences.append(_still_fired(found.steps[-1].check))
     return [*sentences, _left(document)]
 
 
-def _rival(document: dict[str, Any]) -> str:
+def _not_excluded(document: dict[str, Any]) -> str:
     """The most probable listed candidate that is neither named nor tied, where it is not improbable."""
     told = {NOTHING, UNLISTED, document["mechanism"], *document["indistinguishable"]}
     others = {name: share for name, share in document["probability"].items() if name not in told}
     name = max(others, key=lambda one: others[one], default="")
-    if not name or others[name] < _RIVAL:
+    if not name or others[name] < _TOLD_FROM:
         return ""
-    return f"Not excluded: {_title(name)} ({_share(others[name])})."
+    return f"Not excluded: {_title(name)} ({percent(others[name])})."
 
 
 def _still_fired(check: BootstrapTest) -> str:
-    """That the law fails the check also with what was let in, where it does."""
+    """That the law fails the check also with what was added, where it does."""
     if not check.fired:
         return ""
     return (
-        f"The augmented law still fails the check (p = {check.p_value:.2g}): something more, or another"
-        " shape of the same, is left; do not take this for the whole story."
+        f"The augmented law still fails the check (p = {check.p_value:.2g}): something more is missing, or"
+        " the same in another form. Do not take this for the whole story."
     )
 
 
-def _opposed(constants: dict[str, float]) -> str:
-    """That a relief opposes a mechanism, where one does."""
+def _compensated(constants: dict[str, float]) -> str:
+    """That a mechanism is compensated at the typical speed, where it is."""
     if U_1 not in constants:
         return ""
     return (
-        "On the same stretch a relief equals it at about the typical speed"
-        f" ({constants[U_1]:.0f} to {constants[U_2]:.0f} m/s), so that it shows in fronts that are faster or"
-        " slower than most, not on average."
+        "On the same stretch it is compensated at about the typical speed"
+        f" ({constants[U_1]:.0f} to {constants[U_2]:.0f} m/s): the mean front is unaffected, and only slower"
+        " and faster fronts show it."
     )
 
 
@@ -137,14 +139,15 @@ def _left(document: dict[str, Any]) -> str:
     name = left["most_probable"]
     why = f" ({left['reason']})" if left["reason"] else ""
     return (
-        f"Another comparison, of the augmented law, leans to {_title(name)} ({_share(left['probability'])};"
-        f" nothing more: {_share(left['nothing'])}); it was not let in{why}."
+        f"Another comparison, of the augmented law, leans to {_title(name)} ({percent(left['probability'])};"
+        f" nothing more: {percent(left['nothing'])}); it was not added{why}."
     )
 
 
 def _split(step: Step, document: dict[str, Any]) -> str:
+    """Which reading would split a tie, or that none would."""
     sensor = document["next_sensor"]
-    if sensor is not None:
+    if sensor is not None and sensor["splits"]:
         first, second = sensor["splits"]
         at = f"A speed at s = {sensor['s_from_m']:.0f} m"
         return f"{at} would split {_short(first)} and {_short(second)} best."
@@ -152,62 +155,39 @@ def _split(step: Step, document: dict[str, Any]) -> str:
     return f"No further speed would split off {same}: the term is the same." if same else ""
 
 
-def _improvement(document: dict[str, Any]) -> str:
-    evidence, held = document["evidence"], document["held_out"]
-    difference, se = evidence["elpd_diff"], evidence["elpd_se"]
-    if difference is None:
-        return ""
-    much = "" if abs(difference) >= PRACTICAL_DIFFERENCE else ", no practical difference"
-    text = (
-        f"For avalanches left out the log score changes by {difference:+.1f} (standard error, doubled,"
-        f" {2.0 * se:.1f}){much}"
-    )
-    if held["rmse_velocity_before"] is not None and held["rmse_velocity_after"] is not None:
-        text += (
-            f"; the error of speeds from {held['rmse_velocity_before']:.1f} to"
-            f" {held['rmse_velocity_after']:.1f} m/s"
-        )
-    if held["rmse_runout_before"] is not None and held["rmse_runout_after"] is not None:
-        text += f", of runout from {held['rmse_runout_before']:.0f} to {held['rmse_runout_after']:.0f} m"
-    return text + "."
-
-
 def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     probability = document["probability"]
-    doubt = 1.0 - probability[NOTHING] - probability[UNLISTED] >= _RIVAL
+    doubt = 1.0 - probability[NOTHING] - probability[UNLISTED] >= _TOLD_FROM
     return [
         f"Something is missing{_where(document['location'])} that {'most probably ' if doubt else ''}no"
-        f" listed mechanism accounts for (a force not in the list: {_share(probability[UNLISTED])}; nothing:"
-        f" {_share(probability[NOTHING])}; check: p = {found.check.p_value:.2g}).",
-        _unlisted_way(found.location),
+        f" listed mechanism accounts for (a force not in the list: {percent(probability[UNLISTED])}; nothing:"
+        f" {percent(probability[NOTHING])}; check: p = {found.check.p_value:.2g}).",
+        _by_speed(found.location),
         _closest(found, document),
-        "The force profile is the answer: see where it stands out and how much work it does.",
-        _improvement(document),
+        "The force profile is the answer: it says where the force acts and how much work it does.",
+        improvement(document),
         _still_fired(found.finding.law.check) if isinstance(found.finding, ProfileAdded) else "",
     ]
 
 
-def _unlisted_way(location: Location) -> str:
-    """Whom an unlisted force brakes where it stands out, if it is nil at the typical speed."""
+def _by_speed(location: Location) -> str:
+    """Which fronts a force decelerates where it stands out, if it is nil at the typical speed."""
     if not location.opposed:
         return ""
     first, last = location.stretch_m
     there = location.mean[(location.s_m >= first) & (location.s_m <= last)]
-    faster, slower = ("brakes", "relieves") if there.mean() > 0.0 else ("relieves", "brakes")
-    return (
-        f"On average there is nothing to see: it {slower} fronts that are slower there than the typical one,"
-        f" and {faster} faster ones."
-    )
+    slower, faster = ("accelerated", "decelerated") if there.mean() > 0.0 else ("decelerated", "accelerated")
+    return f"The mean front is unaffected: slower fronts are {slower} there, faster ones {faster}."
 
 
 def _closest(found: Diagnosis, document: dict[str, Any]) -> str:
-    """The listed candidate of the highest evidence, beside the unlisted force."""
+    """The listed candidate of the highest evidence, beside the force that is not in the list."""
     factors = found.comparison.log_factors
     listed = {name: value for name, value in factors.items() if name not in (NOTHING, UNLISTED)}
     name = max(listed, key=lambda one: listed[one])
     return (
-        f"Of what is listed, {_title(name)} comes closest ({_share(document['probability'][name])}): log"
-        f" Bayes factor {listed[name]:.1f} against nothing, where a force not in the list has"
+        f"Of the listed mechanisms, {_title(name)} comes closest ({percent(document['probability'][name])}):"
+        f" its log Bayes factor against nothing is {listed[name]:.1f} nats, that of a force not in the list"
         f" {factors[UNLISTED]:.1f}."
     )
 
@@ -220,7 +200,7 @@ def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
     first = max((name for name in probability if name != NOTHING), key=lambda name: probability[name])
     return (
         f"Of what could be missing, {_title(first)} would be the most probable"
-        f" ({_share(probability[first])}); but to the check"
+        f" ({percent(probability[first])}). But by the check"
         f" {100.0 * found.check.p_value:.0f} % of clean campaigns look as odd, so none is claimed."
     )
 
@@ -230,42 +210,38 @@ def _odd(found: Diagnosis) -> str:
     if not found.check.fired:
         return ""
     return (
-        "But to the check they are odder than clean campaigns are, all but 1 % of them: by chance, or by"
-        " something that no candidate and no force along the track describes."
+        "But by the check they are odder than all but 1 % of clean campaigns: by chance, or by something that"
+        " no candidate and no force along the track describes."
     )
 
 
 def _nothing(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     return [
-        f"The recordings do not bear out that anything is missing (p = {found.check.p_value:.2g}; probability"
-        f" of nothing {_share(document['probability'][NOTHING])}).",
-        f"A relevant strength of what is listed would have been found in {100.0 * found.table.power:.0f} % of"
-        " cases on average; the table of detection limits says from where on each would have been seen.",
+        f"The recordings give no reason to add anything (p = {found.check.p_value:.2g}; probability of"
+        f" nothing {percent(document['probability'][NOTHING])}).",
+        f"A relevant strength of a listed mechanism would have been found in {percent(found.table.power)} of"
+        " cases on average; the detection limits say from which strength on each would have been seen.",
     ]
 
 
 def _cannot(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     alarm = (
         f"No alarm (p = {found.check.p_value:.2g}; probability of nothing"
-        f" {_share(document['probability'][NOTHING])}), but"
+        f" {percent(document['probability'][NOTHING])}), but"
     )
-    power = f"{100.0 * found.table.power:.0f} % of cases on average"
+    power = f"{percent(found.table.power)} of cases on average"
     silence = (
         f"{alarm} no silence either: these recordings cannot tell whether anything is missing. A relevant"
-        f" strength of what is listed would have been found in {power}."
+        f" strength of a listed mechanism would have been found in {power}."
         if found.table.can_tell
-        else f"{alarm} these recordings cannot tell: a relevant strength of what is listed would have been"
-        f" found in only {power}, so silence means little."
+        else f"{alarm} these recordings cannot tell: a relevant strength of a listed mechanism would have"
+        f" been found in only {power}, so silence means little."
     )
-    sentences = [
-        silence,
-        _odd(found),
-        _hint(found, document),
-    ]
+    sentences = [silence, _odd(found), _hint(found, document)]
     sensor = document["next_sensor"]
     if sensor is not None:
         sentences.append(
             f"One more speed at s = {sensor['s_from_m']:.0f} m would raise that to"
-            f" {100.0 * found.table.power_with:.0f} %."
+            f" {percent(sensor['power_with'])}."
         )
     return sentences

@@ -1,4 +1,4 @@
-"""Bisection of an event's box of strengths until its likelihood is resolved; see `surface`."""
+"""Bisection of the range of an event's coefficients until its likelihood is resolved; see `surface`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from skred.inference.error_model import Errors, EventReadings
-from skred.inference.hierarchical.reading_density import assess, log_likelihoods
+from skred.inference.reading_density import assess, log_likelihoods
 from skred.physics.kernel.fronts import simulate
 from skred.physics.kernel.inputs import Contributions, Path
 
@@ -73,7 +73,7 @@ class Resolution:
 
 
 COARSE = Resolution(change=6.0, depth=14.0, share=1e-2, narrow=4e-2)
-"""Enough to find out where the population is."""
+"""Fine enough to find the approximate population."""
 
 
 class Envelope(NamedTuple):
@@ -100,7 +100,7 @@ class Releases(NamedTuple):
 
 
 class Fronts(NamedTuple):
-    """All that decides how likely an event's readings are for given strengths.
+    """Everything that the likelihood of an event's readings depends on, for given coefficients.
 
     Attributes
     ----------
@@ -261,13 +261,10 @@ class Bisection:
         settled = np.full(len(best), -np.inf)
         found, bounds = [], []
         while len(boxes.event):
-            n_boxes, n_axes = boxes.low.shape
-            change, (bound, top, mean) = np.empty((n_boxes, n_axes)), np.empty((3, n_boxes))
-            envelope, fronts = self.envelope_of(boxes), self.fronts
-            assess(
-                boxes.event, boxes.predictions, fronts.readings, fronts.errors, envelope,
-                change, bound, top, mean,
-            )  # fmt: skip
+            n_axes, envelope, fronts = boxes.low.shape[1], self.envelope_of(boxes), self.fronts
+            change, bound, top, mean = assess(
+                boxes.event, boxes.predictions, fronts.readings, fronts.errors, envelope
+            )
             np.maximum.at(best, boxes.event, top)
             narrow = (boxes.width <= self.narrowest(n_axes)).any(axis=1)
             bound = np.where(narrow, top, bound)
@@ -278,7 +275,7 @@ class Bisection:
             depth = best[boxes.event] - bound
             kept = depth < resolution.depth
             boxes, bound, change, depth = boxes.take(kept), bound[kept], change[kept], depth[kept]
-            # Coarser far below the best, where a larger relative error does no harm.
+            # Coarser far below the maximum, where a larger relative error does not matter.
             allowed = resolution.change * (1.0 + np.maximum(depth, 0.0) / 8.0)
             if n_axes > self.n_strengths:
                 allowed *= resolution.release_change

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from skred.inference.compiled import compiled
+from skred.parallel.compile_cache import compiled, inner
 
 _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 _NEGLIGIBLE = -60.0
 
 
-@compiled()
+@inner()
 def inverse_factor(factor):  # type: ignore[no-untyped-def]
     """Inverse of a lower triangular matrix, and the log of its determinant."""
     n = factor.shape[0]
@@ -27,7 +27,7 @@ def inverse_factor(factor):  # type: ignore[no-untyped-def]
     return inverse, log_determinant
 
 
-@compiled(fastmath={"contract", "reassoc", "nsz", "arcp"})
+@inner(fastmath={"contract", "reassoc", "nsz", "arcp"})
 def _of_one(at, shift, scale, log_weights, result):  # type: ignore[no-untyped-def]
     """`_exponents` of one strength; nodes as slices, or the compiler makes no vectors of them."""
     for k in range(result.size):
@@ -35,7 +35,7 @@ def _of_one(at, shift, scale, log_weights, result):  # type: ignore[no-untyped-d
         result[k] = log_weights[k] - 0.5 * z * z
 
 
-@compiled(fastmath={"contract", "reassoc", "nsz", "arcp"})
+@inner(fastmath={"contract", "reassoc", "nsz", "arcp"})
 def _of_two(at_0, at_1, mean, whiten, log_weights, result):  # type: ignore[no-untyped-def]
     """`_exponents` of two strengths."""
     shift_0, shift_1, a, b, c = mean[0], mean[1], whiten[0, 0], whiten[1, 0], whiten[1, 1]
@@ -45,7 +45,7 @@ def _of_two(at_0, at_1, mean, whiten, log_weights, result):  # type: ignore[no-u
         result[k] = log_weights[k] - 0.5 * z_0 * z_0 - 0.5 * z_1 * z_1
 
 
-@compiled()
+@inner()
 def _largest(values):  # type: ignore[no-untyped-def]
     """The largest value; in four runs, because each comparison waits for the one before."""
     a = b = c = d = -np.inf
@@ -58,7 +58,7 @@ def _largest(values):  # type: ignore[no-untyped-def]
     return max(max(a, b), max(c, d))
 
 
-@compiled()
+@inner()
 def _exponents(first, last, mean, whiten, points, log_weights, room):  # type: ignore[no-untyped-def]
     """Log weight times normal density, but for its constant, at nodes first to last; returns the largest."""
     n_strengths, result = mean.size, room[: last - first]
@@ -77,7 +77,7 @@ def _exponents(first, last, mean, whiten, points, log_weights, room):  # type: i
     return _largest(result)
 
 
-@compiled(fastmath={"contract", "reassoc", "nsz", "arcp"})
+@inner(fastmath={"contract", "reassoc", "nsz", "arcp"})
 def _sum_of_exponentials(exponents, size, largest):  # type: ignore[no-untyped-def]
     """Sum of exp(exponent - largest): exp(x / 1024) by its series, squared ten times, which vectorises.
 

@@ -9,16 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from skred.inference.error_model import ErrorModel
 from skred.inference.hierarchical.event_density import draw_nodes
 from skred.inference.hierarchical.population import population_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
-from skred.inference.hierarchical.reading_density import OUTLIER_FACTOR
 from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
 _FARTHEST = 230.0
-"""Largest logarithm of a strength, either way: its powers are numbers too."""
+"""Largest absolute logarithm of a coefficient; powers of it stay finite."""
 
 
 class Avalanches(NamedTuple):
@@ -62,7 +60,7 @@ def new_avalanches(
     wide = np.maximum(sd, 1e-9)  # cut off where the track ends, as in the likelihood
     low, high = ndtr(-mean / wide), ndtr((length - mean) / wide)
     deviation = ndtri(low + (high - low) * rng.random((len(means), n_events)))
-    # Where spreads are absurdly wide a strength can be beyond any number.
+    # Where spreads are extremely wide a coefficient can exceed the largest number.
     return Avalanches(np.exp(np.clip(logs, -_FARTHEST, _FARTHEST)), _on_track(problem, deviation))
 
 
@@ -83,7 +81,7 @@ def fronts_of(problem: HierarchicalProblem, law: Law, avalanches: Avalanches) ->
 def read_with_errors(
     problem: HierarchicalProblem, fronts: FloatArray, rng: np.random.Generator
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """What instruments would record of fronts.
+    """Readings that the instruments would record of fronts.
 
     Parameters
     ----------
@@ -101,28 +99,8 @@ def read_with_errors(
     """
     sensors, data = problem.sensors[:-1], problem.readings
     predicted, stop = fronts[..., :-1], fronts[..., -1:]
-    sd = np.hypot(data.relative_sd * predicted, data.absolute_sd)
-    readings = predicted + sd * _standard_errors(problem.error_model, data.is_velocity, predicted.shape, rng)
+    readings = problem.error_model.draw(predicted, data.sensor_sd(predicted), data.is_velocity, rng)
     seen_stop = stop + problem.place_sd_m * rng.standard_normal(stop.shape)
     reached = np.where(data.is_velocity, sensors[:, 2] < seen_stop, True)
     readings = np.where(data.is_velocity, np.where(reached, np.maximum(readings, 0.0), 0.0), readings)
     return readings, reached
-
-
-def _standard_errors(
-    model: ErrorModel, is_velocity: NDArray[np.bool_], shape: tuple[int, ...], rng: np.random.Generator
-) -> FloatArray:
-    """Errors in standard deviations, (..., n_sensors): the same case of the mixture for all of a front's."""
-    errors = model.errors
-    case = rng.choice(len(errors.weights), size=shape[:-1], p=errors.weights / errors.weights.sum())[
-        ..., None
-    ]
-    noise = rng.standard_normal(shape)
-    if errors.degrees > 0.0:
-        noise = rng.standard_t(errors.degrees, shape)
-    if errors.common > 0.0:
-        shared = np.sqrt(errors.common) * rng.standard_normal((*shape[:-1], 1))
-        noise = np.where(is_velocity, shared + np.sqrt(1.0 - errors.common) * noise, noise)
-    outlying = rng.random(shape) < errors.shares[case]
-    result: FloatArray = noise * errors.scales[case] * np.where(outlying, OUTLIER_FACTOR, 1.0)
-    return result

@@ -10,11 +10,11 @@ from pytensor.graph.basic import Variable
 from pytensor.link.numba.dispatch.basic import numba_njit, register_funcify_default_op_cache_key
 
 from skred.inference.array_op import ArrayOp
-from skred.inference.compiled import INFERENCE_CACHE_KEY
 from skred.inference.hierarchical.event_density import (
     integrated_log_density,
     integrated_log_density_pullback,
 )
+from skred.parallel.compile_cache import cache_key
 
 _NODES = (("first", 1, "int64"), ("points", 2, "float64"), ("log_weights", 1, "float64"))
 
@@ -67,7 +67,7 @@ def _funcify_density(op: IntegratedLogDensity, node: Any = None, **kwargs: Any) 
     def integrated_density(means, factor, first, points, log_weights):  # type: ignore[no-untyped-def]
         return integrated_log_density(means, factor, first, points, log_weights)
 
-    return integrated_density, INFERENCE_CACHE_KEY
+    return integrated_density, cache_key(integrated_log_density)
 
 
 @register_funcify_default_op_cache_key(IntegratedLogDensityPullback)
@@ -78,4 +78,4 @@ def _funcify_pullback(op: IntegratedLogDensityPullback, node: Any = None, **kwar
     ):
         return integrated_log_density_pullback(cotangent, means, factor, first, points, log_weights)
 
-    return integrated_density_pullback, INFERENCE_CACHE_KEY
+    return integrated_density_pullback, cache_key(integrated_log_density_pullback)

@@ -1,4 +1,4 @@
-"""What a hierarchical posterior says of avalanches: of each recorded one, and of the next one."""
+"""Results of a hierarchical posterior: the recorded avalanches themselves, and new ones."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from skred.inference.fit import fit_entries
 from skred.inference.hierarchical.event_draws import (
     fronts_of,
     new_avalanches,
@@ -16,14 +17,17 @@ from skred.inference.hierarchical.event_draws import (
 )
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import interval
+from skred.inference.results import predictive, summary
 from skred.physics.law import Law
 
+FloatArray = NDArray[np.float64]
 MOST_AVALANCHES = 200_000
-"""Draws times events kept of single avalanches; beyond that draws are thinned."""
+"""Most avalanches kept, draws times events; with more, draws are thinned."""
 _READING = {"units": "m s-1; m for the runout"}
 
 
-def predictive_groups(
+@predictive.register
+def hierarchical_predictive(
     problem: HierarchicalProblem, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
 ) -> dict[str, xr.Dataset]:
     """Predictive groups of a result; draws are thinned where there are many events.
@@ -50,7 +54,7 @@ def predictive_groups(
 
 
 def thinned(draws: xr.Dataset, n_events: int) -> xr.Dataset:
-    """Every so many draws, so that there are no more avalanches than are kept."""
+    """Draws, thinned evenly if there are more avalanches than are kept."""
     n = draws.sizes["chain"] * draws.sizes["draw"]
     return draws.isel(draw=slice(None, None, max(1, -(-n * n_events // MOST_AVALANCHES))))
 
@@ -99,6 +103,35 @@ def avalanche_dataset(
     return xr.Dataset(variables, coords=coords)
 
 
+@summary.register
+def hierarchical_summary(problem: HierarchicalProblem, law: Law, tree: xr.DataTree) -> dict[str, Any]:
+    """The error model, the check of fit, a new avalanche at each sensor, each event's own strengths."""
+    return {
+        "error_model": {"id": problem.error_model.id, "title": problem.error_model.title},
+        "place_sd_m": problem.place_sd_m,
+        "integration": problem.integration(law),
+        **fit_entries(problem, predicted_readings(problem, tree)),
+        "new_avalanche": new_avalanche_rows(problem, tree),
+        "events": event_rows(problem, law, tree),
+    }
+
+
+def predicted_readings(problem: HierarchicalProblem, tree: xr.DataTree) -> FloatArray:
+    """Recordings that the model predicts, (n, n_events, n_sensors), for the check of fit.
+
+    Of the new avalanches of the result, each read with the errors that the recorded avalanche of the same
+    release states; 0 where the front does not come.
+    """
+    groups, data = tree["posterior_predictive"].to_dataset(), problem.readings
+    shape = (-1, problem.campaign.n_events, problem.campaign.n_sensors)
+    fronts, reached = (groups[name].values.reshape(shape) for name in ("front", "reached"))
+    rng = np.random.default_rng([int(tree.attrs["seed"]), 3])
+    sd = data.sd(np.arange(problem.campaign.n_events), fronts)
+    readings = problem.error_model.draw(fronts, sd, data.is_velocity, rng)
+    came = np.where(reached, np.maximum(readings, 0.0), 0.0)
+    return np.where(data.is_velocity, came, readings)
+
+
 def new_avalanche_rows(problem: HierarchicalProblem, tree: xr.DataTree) -> list[dict[str, Any]]:
     """A new avalanche's reading at each sensor, where it comes there, beside the recorded ones."""
     predicted = tree["posterior_predictive"].to_dataset()
@@ -112,7 +145,7 @@ def new_avalanche_rows(problem: HierarchicalProblem, tree: xr.DataTree) -> list[
             "sensor": sensor.id,
             "unit": "m" if sensor.is_runout else "m/s",
             "reached": float(reached.mean()),
-            # A velocity of 0 is no sign that the front came, here as in the likelihood.
+            # As in the likelihood, a velocity of 0 does not show that the front came.
             "recorded_reached": _share(recorded > 0.0, known) if not sensor.is_runout else 1.0,
             "n_recorded": len(recorded),
         }
@@ -126,7 +159,7 @@ def new_avalanche_rows(problem: HierarchicalProblem, tree: xr.DataTree) -> list[
 
 
 def _share(came: NDArray[np.bool_], known: NDArray[np.bool_]) -> float | None:
-    """How many of the events of which it is known came."""
+    """Share of events that came, of those for which it is known."""
     return float(came.sum() / known.sum()) if known.any() else None
 
 

@@ -1,4 +1,4 @@
-"""Where the population is, roughly: expectation-maximisation on coarse surfaces.
+"""Approximate population: expectation-maximisation on coarse likelihood surfaces.
 
 It only decides where and how finely surfaces are resolved; nothing is inferred from it.
 """
@@ -21,7 +21,7 @@ _SEARCH, _ITERATIONS, _ENOUGH = 30, 300, 1e-4
 _STARTING_SPREAD = 0.3
 _PRIOR_EVENTS = 2.0
 _REACH = 2.5
-"""How many posterior standard deviations away a population may be."""
+"""Distance, in posterior standard deviations, up to which populations are expected."""
 _AROUND = 2.0
 """How much wider, in variance, than the mean over some populations an envelope of them is."""
 _CELL_IN_SPREADS, _LEAST_CELL, _LARGEST_CELL = 1.0, 0.02, 0.25

@@ -1,4 +1,4 @@
-"""The pooled log density in numba: one value per event, missing readings out, stops as information.
+"""The pooled log density in numba: one value for each event; missing readings drop out, stops are censored.
 
 For every event the observed readings are whitened by the Cholesky factor of their own block of
 Sigma. Sensors it did not reach add the probability that their latent readings, given the observed
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import roots_legendre
 
-from skred.inference.compiled import compiled
+from skred.parallel.compile_cache import compiled, inner
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -27,7 +27,7 @@ _INV_SQRT_2PI = 1.0 / math.sqrt(2.0 * math.pi)
 
 
 class PooledArrays(NamedTuple):
-    """What the density needs to know of the recordings, made by `pooled_arrays`.
+    """The recordings as the density reads them, made by `pooled_arrays`.
 
     Attributes
     ----------
@@ -110,12 +110,12 @@ def pooled_arrays(
     )
 
 
-@compiled()
+@inner()
 def _normal_cdf(x):  # type: ignore[no-untyped-def]
     return 0.5 * math.erfc(-x * _SQRT_HALF)
 
 
-@compiled()
+@inner()
 def _bound(level, mean, factor, z):  # type: ignore[no-untyped-def]
     """Largest z_level with x_level <= 0, given the z above it."""
     bound = -mean[level]
@@ -124,14 +124,14 @@ def _bound(level, mean, factor, z):  # type: ignore[no-untyped-def]
     return bound / factor[level, level]
 
 
-@compiled()
+@inner()
 def _stretch(bound):  # type: ignore[no-untyped-def]
     """Upper end and width of the stretch below a bound that holds its probability to e^-36."""
     upper = min(bound, 8.5)
     return upper, (upper + 8.5 if upper > 0.0 else upper + math.sqrt(upper * upper + 72.0))
 
 
-@compiled()
+@inner()
 def _tightest_first(size, mean, covariance):  # type: ignore[no-untyped-def]
     """Mean and Cholesky factor with the largest mean in standard deviations first.
 
@@ -156,7 +156,7 @@ def _tightest_first(size, mean, covariance):  # type: ignore[no-untyped-def]
     return ordered, factor
 
 
-@compiled()
+@inner()
 def _orthant(size, unordered, covariance):  # type: ignore[no-untyped-def]
     """P(x_1 <= 0, ..., x_size <= 0) for x ~ N(unordered, covariance).
 
@@ -187,7 +187,7 @@ def _orthant(size, unordered, covariance):  # type: ignore[no-untyped-def]
         node[level] += 1
 
 
-@compiled()
+@inner()
 def _latent_mean(event, response, data, mean):  # type: ignore[no-untyped-def]
     """Mean of the latent readings at the sensors not reached, given the observed ones."""
     row = response[data.release_of_event[event]]
@@ -227,7 +227,7 @@ def pooled_log_density(response, data):  # type: ignore[no-untyped-def]
     return density
 
 
-@compiled()
+@inner()
 def _orthant_slopes(size, mean, covariance, slopes):  # type: ignore[no-untyped-def]
     """Derivatives of log P(x <= 0) by the mean: the density at x_j = 0 times the rest given that."""
     probability = _orthant(size, mean, covariance)

@@ -10,12 +10,12 @@ from pytensor.graph.basic import Variable
 from pytensor.link.numba.dispatch.basic import numba_njit, register_funcify_default_op_cache_key
 
 from skred.inference.array_op import ArrayOp
-from skred.inference.compiled import INFERENCE_CACHE_KEY
 from skred.inference.pooled.density import (
     PooledArrays,
     pooled_log_density,
     pooled_log_density_pullback,
 )
+from skred.parallel.compile_cache import cache_key
 
 _DATA = (
     ("release_of_event", 1, "int64"),
@@ -71,12 +71,13 @@ def _funcify_density(op: PooledLogDensity, node: Any = None, **kwargs: Any) -> A
     def pooled_density(  # type: ignore[no-untyped-def]
         response, release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional
     ):
+        # PyTensor passes the inputs of an Op one by one.
         data = PooledArrays(
             release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional
         )
         return pooled_log_density(response, data)
 
-    return pooled_density, INFERENCE_CACHE_KEY
+    return pooled_density, cache_key(pooled_log_density)
 
 
 @register_funcify_default_op_cache_key(PooledLogDensityPullback)
@@ -94,9 +95,10 @@ def _funcify_pullback(op: PooledLogDensityPullback, node: Any = None, **kwargs: 
         regression,
         conditional,
     ):
+        # PyTensor passes the inputs of an Op one by one.
         data = PooledArrays(
             release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional
         )
         return pooled_log_density_pullback(cotangent, response, data)
 
-    return pooled_density_pullback, INFERENCE_CACHE_KEY
+    return pooled_density_pullback, cache_key(pooled_log_density_pullback)

@@ -12,11 +12,9 @@ from pytensor.graph.basic import Variable
 from pytensor.link.numba.dispatch.basic import numba_njit, register_funcify_default_op_cache_key
 
 from skred.inference.array_op import ArrayOp
-from skred.physics.kernel.compiled import KERNEL_FINGERPRINT
-from skred.physics.kernel.fronts import simulate, simulate_with_jacobian
+from skred.parallel.compile_cache import cache_key
+from skred.physics.kernel.fronts import fill_readings, simulate, simulate_with_jacobian
 from skred.physics.kernel.inputs import Contributions, Path
-
-_CACHE_KEY = int(KERNEL_FINGERPRINT[:12], 16)
 
 
 class _ForwardMap(ArrayOp):
@@ -88,11 +86,15 @@ def _funcify_readings(op: FrontReadings, node: Any = None, **kwargs: Any) -> Any
     def front_readings(  # type: ignore[no-untyped-def]
         strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors
     ):
+        # PyTensor passes the inputs of an Op one by one.
         path = Path(edge, ground, barriers, limits)
         law = Contributions(columns, profiles, u_c.item(), terms.item())
-        return simulate(strengths, releases, path, law, sensors)
+        readings, none = np.empty((releases.size, sensors.shape[0])), np.empty((releases.size, 0))
+        jacobian = np.empty((releases.size, sensors.shape[0], 0))
+        fill_readings(strengths, releases, path, law, sensors, readings, jacobian, none)
+        return readings
 
-    return front_readings, _CACHE_KEY
+    return front_readings, cache_key(fill_readings)
 
 
 @register_funcify_default_op_cache_key(FrontReadingsJacobian)
@@ -101,11 +103,15 @@ def _funcify_jacobian(op: FrontReadingsJacobian, node: Any = None, **kwargs: Any
     def front_readings_jacobian(  # type: ignore[no-untyped-def]
         strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors
     ):
+        # PyTensor passes the inputs of an Op one by one.
         path = Path(edge, ground, barriers, limits)
         law = Contributions(columns, profiles, u_c.item(), terms.item())
-        return simulate_with_jacobian(strengths, releases, path, law, sensors)[1]
+        readings, none = np.empty((releases.size, sensors.shape[0])), np.empty((releases.size, 0))
+        jacobian = np.empty((releases.size, sensors.shape[0], strengths.shape[1] + 1))
+        fill_readings(strengths, releases, path, law, sensors, readings, jacobian, none)
+        return jacobian
 
-    return front_readings_jacobian, _CACHE_KEY
+    return front_readings_jacobian, cache_key(fill_readings)
 
 
 def front_readings(

@@ -144,7 +144,7 @@ def _condition(
 
 
 def _checked(values: ArrayLike, not_reached: ArrayLike) -> tuple[FloatArray, BoolArray]:
-    """Arrays of the events that tell something, or what is wrong with them."""
+    """Arrays of the events that have information; raises where they do not suffice."""
     values, not_reached = np.asarray(values, dtype=float), np.asarray(not_reached, dtype=bool)
     if values.ndim != 2 or values.shape != not_reached.shape:
         raise ValueError(f"expected two (event, sensor) arrays, found {values.shape} and {not_reached.shape}")

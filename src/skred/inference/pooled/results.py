@@ -1,4 +1,4 @@
-"""What a pooled posterior says of readings: the response of the path, and a new avalanche's readings."""
+"""Results of a pooled posterior: the mean response of the path, and readings of a new avalanche."""
 
 from __future__ import annotations
 
@@ -6,14 +6,19 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
+from skred.inference.fit import fit_entries
 from skred.inference.intervals import interval
-from skred.inference.problem import PooledProblem
-from skred.inference.results import chain_and_draw
+from skred.inference.pooled.problem import PooledProblem
+from skred.inference.results import chain_and_draw, predictive, summary
 from skred.physics.law import Law
 
+FloatArray = NDArray[np.float64]
 
-def predictive_groups(
+
+@predictive.register
+def pooled_predictive(
     problem: PooledProblem, law: Law, posterior: xr.Dataset, prior: xr.Dataset, seed: int
 ) -> dict[str, xr.Dataset]:
     """Predictive groups of a result.
@@ -57,6 +62,34 @@ def _response(problem: PooledProblem, law: Law, parameters: xr.Dataset) -> xr.Da
         },
         attrs={"units": "m s-1; m for the runout"},
     )
+
+
+@summary.register
+def pooled_summary(problem: PooledProblem, law: Law, tree: xr.DataTree) -> dict[str, Any]:
+    """Mean response at each sensor, and the check of fit."""
+    return {
+        "response": response_rows(problem, tree),
+        **fit_entries(problem, predicted_readings(problem, tree)),
+    }
+
+
+def predicted_readings(problem: PooledProblem, tree: xr.DataTree) -> FloatArray:
+    """Recordings that the model predicts, (n, n_events, n_sensors), for the check of fit.
+
+    At each sensor the covariance was estimated from the recordings, so that recordings of other avalanches
+    scatter about the mean response as Student's t, with one degree of freedom less than there are readings.
+    """
+    groups = tree["posterior_predictive"].to_dataset()
+    shape = (-1, problem.campaign.n_events, problem.campaign.n_sensors)
+    response = groups["mean_response"].isel(release=problem.release_of_event).values.reshape(shape)
+    known = (problem.observed | problem.not_reached).sum(axis=0)
+    degrees = np.maximum(known - 1.0, 1.0)
+    rng = np.random.default_rng([int(tree.attrs["seed"]), 3])
+    widened = np.sqrt(degrees / rng.chisquare(degrees, (len(response), 1, len(degrees))))
+    latent = response + widened * (groups["reading"].values.reshape(shape) - response)
+    # A latent velocity below 0 is that of a front that does not come.
+    is_velocity = np.array([not sensor.is_runout for sensor in problem.campaign.sensors])
+    return np.where(is_velocity, np.maximum(latent, 0.0), latent)
 
 
 def response_rows(problem: PooledProblem, tree: xr.DataTree) -> list[dict[str, Any]]:

@@ -16,8 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from skred.parallel.compile_cache import inner
 from skred.physics.kernel.columns import GRAVITY, Column
-from skred.physics.kernel.compiled import compiled
 
 CONSTANT, LINEAR, QUADRATIC, FRICTION, WEAKENING = (int(column) for column in Column)
 
@@ -45,7 +45,7 @@ _MAX_ITERATIONS = 60
 _ACCURACY = 1e-15
 
 
-@compiled(fastmath={"contract"}, inline="always")
+@inner(fastmath={"contract"}, inline="always")
 def phi1_series(x):  # type: ignore[no-untyped-def]
     """(1 - exp(-x)) / x for |x| <= 0.5."""
     p = 1.0 / 479001600.0
@@ -62,7 +62,7 @@ def phi1_series(x):  # type: ignore[no-untyped-def]
     return 1.0 - x * p
 
 
-@compiled(fastmath={"contract"}, inline="always")
+@inner(fastmath={"contract"}, inline="always")
 def psi_series(x):  # type: ignore[no-untyped-def]
     """Minus the derivative of phi1, for |x| <= 0.5."""
     p = 12.0 / 6227020800.0
@@ -79,7 +79,7 @@ def psi_series(x):  # type: ignore[no-untyped-def]
     return 0.5 - x * p
 
 
-@compiled()
+@inner()
 def phi1(x):  # type: ignore[no-untyped-def]
     """(1 - exp(-x)) / x for any x."""
     if abs(x) <= SERIES_LIMIT:
@@ -87,7 +87,7 @@ def phi1(x):  # type: ignore[no-untyped-def]
     return -np.expm1(-x) / x
 
 
-@compiled()
+@inner()
 def psi(x):  # type: ignore[no-untyped-def]
     """Minus the derivative of phi1, for any x."""
     if abs(x) <= SERIES_LIMIT:
@@ -95,7 +95,7 @@ def psi(x):  # type: ignore[no-untyped-def]
     return (-np.expm1(-x) / x - np.exp(-x)) / x
 
 
-@compiled()
+@inner()
 def distance_to(v, target, a, b):  # type: ignore[no-untyped-def]
     """Distance [m] at which dv/ds = a - b v carries v to `target`; inf where it never does."""
     if v == target:
@@ -107,7 +107,7 @@ def distance_to(v, target, a, b):  # type: ignore[no-untyped-def]
     return -np.log1p(-y) / b if y < 1.0 else np.inf
 
 
-@compiled()
+@inner()
 def mean_speed(u0, u1):  # type: ignore[no-untyped-def]
     """Mean of U over a stretch on which U^2 is linear: exact at start and stop as well."""
     if u0 + u1 <= 0.0:
@@ -115,14 +115,14 @@ def mean_speed(u0, u1):  # type: ignore[no-untyped-def]
     return (u0 * u0 + u0 * u1 + u1 * u1) / (1.5 * (u0 + u1))
 
 
-@compiled()
+@inner()
 def mean_speed_slope(u0, u1):  # type: ignore[no-untyped-def]
     """Derivative of `mean_speed` with respect to its first argument."""
     total = u0 + u1
     return (2.0 * u0 + u1 - (u0 * u0 + u0 * u1 + u1 * u1) / total) / (1.5 * total)
 
 
-@compiled()
+@inner()
 def cell_at(i, ground, table, weakening_speed, speed_terms):  # type: ignore[no-untyped-def]
     """Gather the scalars of cell i."""
     return Cell(
@@ -139,14 +139,14 @@ def cell_at(i, ground, table, weakening_speed, speed_terms):  # type: ignore[no-
     )
 
 
-@compiled()
+@inner()
 def _speed_part(cell, u):  # type: ignore[no-untyped-def]
     """The terms in U of dv/ds, frozen at speed u."""
     weakening = cell.weakening * GRAVITY * cell.cosine / (1.0 + u / cell.weakening_speed)
     return -2.0 * (cell.linear * u + weakening)
 
 
-@compiled()
+@inner()
 def speed_part_slope(cell, u):  # type: ignore[no-untyped-def]
     """Derivative of `_speed_part` by u."""
     relative = 1.0 + u / cell.weakening_speed
@@ -154,7 +154,7 @@ def speed_part_slope(cell, u):  # type: ignore[no-untyped-def]
     return -2.0 * (cell.linear - weakening)
 
 
-@compiled()
+@inner()
 def linear_part(cell, on):  # type: ignore[no-untyped-def]
     """Source a and decay b of dv/ds = a - b v without the terms in U."""
     mu = cell.friction if on else 0.0
@@ -162,13 +162,13 @@ def linear_part(cell, on):  # type: ignore[no-untyped-def]
     return source, 2.0 * (cell.quadratic + mu * cell.kappa)
 
 
-@compiled()
+@inner()
 def step_v(v, length, a, b):  # type: ignore[no-untyped-def]
     """Exact solution of dv/ds = a - b v after `length` metres."""
     return v - (b * v - a) * length * phi1(b * length)
 
 
-@compiled()
+@inner()
 def end_speed(v, length, a, b, cell):  # type: ignore[no-untyped-def]
     """Speed at the end of a stretch that fits the terms in U frozen at the stretch's mean speed.
 
@@ -201,7 +201,7 @@ def end_speed(v, length, a, b, cell):  # type: ignore[no-untyped-def]
     return u1
 
 
-@compiled()
+@inner()
 def coefficients(v, section, cell, on):  # type: ignore[no-untyped-def]
     """Source and decay of one phase, the terms in U frozen over the rest of the section."""
     a, b = linear_part(cell, on)
@@ -211,13 +211,13 @@ def coefficients(v, section, cell, on):  # type: ignore[no-untyped-def]
     return a, b
 
 
-@compiled()
+@inner()
 def switching_threshold(cell):  # type: ignore[no-untyped-def]
     """Squared speed above which a convex cell's normal force vanishes."""
     return -GRAVITY * cell.cosine / cell.kappa if cell.kappa < 0.0 else np.inf
 
 
-@compiled()
+@inner()
 def end_of_phase(v, length, a, b, threshold, on):  # type: ignore[no-untyped-def]
     """Follow dv/ds = a - b v until something ends it: returns (v, distance, how it ended).
 
@@ -232,7 +232,7 @@ def end_of_phase(v, length, a, b, threshold, on):  # type: ignore[no-untyped-def
     return end, length, COVERED
 
 
-@compiled()
+@inner()
 def _duration(v, end, distance, skip, a, b):  # type: ignore[no-untyped-def]
     """Time [s] over a phase from `skip` metres on: length over the mean of the speeds at its ends."""
     length = distance - skip
@@ -241,7 +241,7 @@ def _duration(v, end, distance, skip, a, b):  # type: ignore[no-untyped-def]
     return 2.0 * length / (np.sqrt(max(step_v(v, skip, a, b), 0.0)) + np.sqrt(end))
 
 
-@compiled()
+@inner()
 def cross(v, length, section, clock, cell):  # type: ignore[no-untyped-def]
     """Carry a front over `length` metres of one cell.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from skred.parallel.compile_cache import inner
 from skred.physics.kernel.cell import (
     CONSTANT,
     COVERED,
@@ -30,10 +31,9 @@ from skred.physics.kernel.cell import (
     switching_threshold,
 )
 from skred.physics.kernel.columns import GRAVITY
-from skred.physics.kernel.compiled import compiled
 
 
-@compiled()
+@inner()
 def _source_change(column, profile, cell, u, on):  # type: ignore[no-untyped-def]
     """Change of the part of dv/ds that does not grow with v, per unit of one strength."""
     if column == CONSTANT:
@@ -47,7 +47,7 @@ def _source_change(column, profile, cell, u, on):  # type: ignore[no-untyped-def
     return 0.0
 
 
-@compiled()
+@inner()
 def _decay_change(column, profile, cell, on):  # type: ignore[no-untyped-def]
     """Change of the coefficient of -v in dv/ds per unit of one strength."""
     if column == QUADRATIC:
@@ -57,7 +57,7 @@ def _decay_change(column, profile, cell, on):  # type: ignore[no-untyped-def]
     return 0.0
 
 
-@compiled()
+@inner()
 def _step_tangent(v, length, a, b, dv, da, db):  # type: ignore[no-untyped-def]
     """Tangent of `step_v` at fixed length."""
     x = b * length
@@ -65,7 +65,7 @@ def _step_tangent(v, length, a, b, dv, da, db):  # type: ignore[no-untyped-def]
     return keep * dv + length * (phi1(x) * da - (keep * v + a * length * psi(x)) * db)
 
 
-@compiled()
+@inner()
 def _frozen_change(v, section, cell, on, a, b, u1, dv, da, db, shift):  # type: ignore[no-untyped-def]
     """Tangent of the frozen part of the source: how the mean speed of the section changes."""
     u0 = np.sqrt(v)
@@ -82,14 +82,14 @@ def _frozen_change(v, section, cell, on, a, b, u1, dv, da, db, shift):  # type: 
     return known + by_end * dv1 / (2.0 * u1 - section * phi1(b * section) * by_end)
 
 
-@compiled()
+@inner()
 def _duration_change(u0, u1, length, du0, du1, d_length):  # type: ignore[no-untyped-def]
     """Tangent of the time over a stretch."""
     total = u0 + u1
     return 2.0 * (d_length - length * (du0 + du1) / total) / total
 
 
-@compiled()
+@inner()
 def _phase_tangents(  # type: ignore[no-untyped-def]
     v, end, section, distance, ended, skip, a, b, cell, on, columns, profiles, i, dv, shift, d_time
 ):
@@ -122,7 +122,7 @@ def _phase_tangents(  # type: ignore[no-untyped-def]
         dv[k], shift[k] = at_end, moved
 
 
-@compiled()
+@inner()
 def cross_tangents(  # type: ignore[no-untyped-def]
     v, length, section, clock, cell, columns, profiles, i, dv, shift, d_time
 ):

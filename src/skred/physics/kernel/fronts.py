@@ -7,19 +7,21 @@ strength enters and with which profile along the track (see `columns.py` for the
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from skred.parallel.compile_cache import compiled, inner
 from skred.physics.kernel.columns import Column
-from skred.physics.kernel.compiled import compiled
-from skred.physics.kernel.inputs import cell_of, spans_of
+from skred.physics.kernel.inputs import Contributions, Path, cell_of, spans_of
 from skred.physics.kernel.march import fill_increments, fill_steps, fill_table, march, march_tangents
 from skred.physics.kernel.march_abreast import ABREAST, march_abreast, room
 from skred.physics.kernel.reading import read, read_tangents
 from skred.physics.kernel.scaled_ground import scale_ground
 
+FloatArray = NDArray[np.float64]
 _N_COLUMNS = len(Column)
 
 
-@compiled()
+@inner()
 def _cells_of(sensors, edge):  # type: ignore[no-untyped-def]
     """Cell of each sensor's upper end."""
     cells = np.zeros(sensors.shape[0], dtype=np.int64)
@@ -29,8 +31,14 @@ def _cells_of(sensors, edge):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _simulate(strengths, releases, path, law, sensors, readings, jacobian):  # type: ignore[no-untyped-def]
-    """Fill the readings run by run, and the jacobian unless its last axis is empty."""
+def fill_readings(  # type: ignore[no-untyped-def]
+    strengths, releases, path, law, sensors, readings, jacobian, speeds
+):
+    """Fill the readings of many fronts, run by run; see `simulate`.
+
+    Fill the jacobian (n_runs, n_sensors, n_strengths + 1) and the speeds (n_runs, n_cells + 1) as well,
+    unless their last axis is empty. One function for all three: with two the march would be compiled twice.
+    """
     # Unpacked once: reading an array out of a tuple costs as much as ten cells.
     edge, ground, barriers, limits = path.edge, path.ground, path.barriers, path.limits
     columns, profiles = law.columns, law.profiles
@@ -61,7 +69,8 @@ def _simulate(strengths, releases, path, law, sensors, readings, jacobian):  # t
                     run, strengths, releases, edge, ground, scaled, barriers, limits, columns, profiles, u_c,
                     own, work, rows, runouts, lasts, firsts,
                 )  # fmt: skip
-            v[:] = rows[place]
+            for i in range(n_cells + 1):
+                v[i] = rows[place, i]
             runout, last, first = runouts[place], lasts[place], firsts[place]
         else:
             runout, last, first = march(release, edge, ground, barriers, limits, table, keep, gain, v)
@@ -82,10 +91,14 @@ def _simulate(strengths, releases, path, law, sensors, readings, jacobian):  # t
                 run, sensors, cells, release, runout, first, edge, ground, barriers, limits, columns,
                 profiles, u_c, speed_terms, table, v, dv, step, shift, d_time, d_runout, readings, jacobian,
             )  # fmt: skip
+        if speeds.shape[1] > 0:
+            for i in range(n_cells + 1):
+                speeds[run, i] = np.sqrt(v[i])
 
 
-@compiled()
-def simulate(strengths, releases, path, law, sensors):  # type: ignore[no-untyped-def]
+def simulate(
+    strengths: FloatArray, releases: FloatArray, path: Path, law: Contributions, sensors: FloatArray
+) -> FloatArray:
     """Readings of many fronts.
 
     Parameters
@@ -105,14 +118,12 @@ def simulate(strengths, releases, path, law, sensors):  # type: ignore[no-untype
         0 for a front velocity where the front does not come.
 
     """
-    readings = np.empty((releases.size, sensors.shape[0]))
-    jacobian = np.empty((releases.size, sensors.shape[0], 0))
-    _simulate(strengths, releases, path, law, sensors, readings, jacobian)
-    return readings
+    return _filled(strengths, releases, path, law, sensors)[0]
 
 
-@compiled()
-def simulate_with_jacobian(strengths, releases, path, law, sensors):  # type: ignore[no-untyped-def]
+def simulate_with_jacobian(
+    strengths: FloatArray, releases: FloatArray, path: Path, law: Contributions, sensors: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """As `simulate`, with the derivatives by every strength and, last, by the release place.
 
     Returns
@@ -121,33 +132,28 @@ def simulate_with_jacobian(strengths, releases, path, law, sensors):  # type: ig
     jacobian : (n_runs, n_sensors, n_strengths + 1) array
 
     """
-    readings = np.empty((releases.size, sensors.shape[0]))
-    jacobian = np.empty((releases.size, sensors.shape[0], strengths.shape[1] + 1))
-    _simulate(strengths, releases, path, law, sensors, readings, jacobian)
-    return readings, jacobian
+    return _filled(strengths, releases, path, law, sensors, n_tangents=strengths.shape[1] + 1)[:2]
 
 
-@compiled()
-def front_speeds(strengths, releases, path, law):  # type: ignore[no-untyped-def]
+def front_speeds(strengths: FloatArray, releases: FloatArray, path: Path, law: Contributions) -> FloatArray:
     """Front speed U [m/s] at every cell edge, (n_runs, n_cells + 1); parameters as `simulate`."""
-    edge, ground, barriers, limits = path.edge, path.ground, path.barriers, path.limits
-    columns, profiles, n_cells = law.columns, law.profiles, ground.shape[1]
-    scaled, table = scale_ground(edge, ground), np.zeros((_N_COLUMNS, n_cells))
-    spans = spans_of(profiles)
-    keep, gain = np.empty(n_cells), np.empty(n_cells)
-    own, work, rows, runouts, lasts, firsts = room(columns.size, n_cells if law.speed_terms else 0)
-    v = np.empty((releases.size, n_cells + 1))
-    for run in range(releases.size):
-        if law.speed_terms:
-            place = run % ABREAST
-            if place == 0:
-                march_abreast(
-                    run, strengths, releases, edge, ground, scaled, barriers, limits, columns, profiles,
-                    law.weakening_speed, own, work, rows, runouts, lasts, firsts,
-                )  # fmt: skip
-            v[run] = rows[place]
-        else:
-            fill_table(run, strengths, columns, profiles, spans, table)
-            fill_steps(scaled, table, keep, gain)
-            march(releases[run], edge, ground, barriers, limits, table, keep, gain, v[run])
-    return np.sqrt(v)
+    return _filled(strengths, releases, path, law, np.empty((0, 3)), n_edges=len(path.edge))[2]
+
+
+def _filled(
+    strengths: FloatArray,
+    releases: FloatArray,
+    path: Path,
+    law: Contributions,
+    sensors: FloatArray,
+    n_tangents: int = 0,
+    n_edges: int = 0,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Readings, jacobian and speeds; the latter two empty unless asked for."""
+    readings = np.empty((len(releases), len(sensors)))
+    jacobian = np.empty((*readings.shape, n_tangents))
+    speeds = np.empty((len(releases), n_edges))
+    # In this order in memory: of any other the kernel would be compiled once more.
+    runs = np.ascontiguousarray(strengths), np.ascontiguousarray(releases)
+    fill_readings(*runs, path, law, np.ascontiguousarray(sensors), readings, jacobian, speeds)
+    return readings, jacobian, speeds

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.parallel.compile_cache import compiled, inner
 from skred.physics.kernel.columns import GRAVITY, Column
-from skred.physics.kernel.compiled import compiled
 
 FRONT_VELOCITY, RUNOUT, VELOCITY_TO_STOP = 0.0, 1.0, 2.0
 """Codes of a sensor's quantity in the sensor table.
@@ -64,7 +64,7 @@ class Contributions(NamedTuple):
     speed_terms: bool
 
 
-@compiled()
+@inner()
 def cell_of(edge, s):  # type: ignore[no-untyped-def]
     """Index of the cell that holds the place s (the lower one at an edge)."""
     return min(max(np.searchsorted(edge, s, side="right") - 1, 0), edge.size - 2)
@@ -100,7 +100,7 @@ def make_contributions(columns, profiles, weakening_speed):  # type: ignore[no-u
     return Contributions(columns, profiles, weakening_speed, speed_terms)
 
 
-@compiled()
+@inner()
 def spans_of(profiles):  # type: ignore[no-untyped-def]
     """First cell in which each profile is not 0, and the one after the last, (n_strengths, 2) integers.
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from skred.parallel.compile_cache import inner
 from skred.physics.kernel.cell import (
     CONSTANT,
     FRICTION,
@@ -29,7 +30,6 @@ from skred.physics.kernel.cell import (
 )
 from skred.physics.kernel.cell_tangents import cross_tangents
 from skred.physics.kernel.columns import GRAVITY
-from skred.physics.kernel.compiled import compiled
 from skred.physics.kernel.inputs import cell_of
 from skred.physics.kernel.march_speed import fill_speed_changes
 from skred.physics.kernel.scaled_ground import BEND, DOUBLE, DRIVE, WEIGHT
@@ -39,7 +39,7 @@ _MAX_HALVINGS = 60
 _ONE, _TWO = np.uint64(1), np.uint64(2)
 
 
-@compiled(fastmath=_FAST)
+@inner(fastmath=_FAST)
 def fill_table(run, strengths, columns, profiles, spans, table):  # type: ignore[no-untyped-def]
     """Sum of strength times profile in the columns that are used; the others must be zero."""
     for k in range(columns.size):
@@ -58,7 +58,20 @@ def fill_table(run, strengths, columns, profiles, spans, table):  # type: ignore
                 table[column, i] += strength * profiles[k, i]
 
 
-@compiled(fastmath=_FAST)
+@inner()
+def _halvings(double, bend, quadratic, friction):  # type: ignore[no-untyped-def]
+    """How often to halve the largest exponent until the series holds."""
+    largest = 0.0
+    for i in range(double.size):
+        largest = max(largest, abs(double[i] * quadratic[i] + bend[i] * friction[i]))
+    halvings = 0
+    while largest > SERIES_LIMIT and halvings < _MAX_HALVINGS:
+        largest *= 0.5
+        halvings += 1
+    return halvings
+
+
+@inner(fastmath=_FAST)
 def fill_steps(scaled, table, keep, gain):  # type: ignore[no-untyped-def]
     """First pass: over a whole cell v becomes keep * v + gain, the normal force on.
 
@@ -91,20 +104,7 @@ def fill_steps(scaled, table, keep, gain):  # type: ignore[no-untyped-def]
     return halvings
 
 
-@compiled()
-def _halvings(double, bend, quadratic, friction):  # type: ignore[no-untyped-def]
-    """How often to halve the largest exponent until the series holds."""
-    largest = 0.0
-    for i in range(double.size):
-        largest = max(largest, abs(double[i] * quadratic[i] + bend[i] * friction[i]))
-    halvings = 0
-    while largest > SERIES_LIMIT and halvings < _MAX_HALVINGS:
-        largest *= 0.5
-        halvings += 1
-    return halvings
-
-
-@compiled()
+@inner()
 def travel(v, s_from, s_to, s_end, clock, cell, barriers):  # type: ignore[no-untyped-def]
     """From one place of a cell to another, barriers included: returns (v, s, stopped, time).
 
@@ -133,7 +133,7 @@ def travel(v, s_from, s_to, s_end, clock, cell, barriers):  # type: ignore[no-un
     return v, s_from + distance, stopped, time + more
 
 
-@compiled()
+@inner()
 def travel_tangents(  # type: ignore[no-untyped-def]
     v, s_from, s_to, s_end, clock, cell, barriers, columns, profiles, i, dv, shift, d_time
 ):
@@ -164,7 +164,7 @@ def travel_tangents(  # type: ignore[no-untyped-def]
     return v, s_from + distance, stopped
 
 
-@compiled(fastmath={"contract"})
+@inner(fastmath={"contract"})
 def _recur(first, keep, gain, limits, v):  # type: ignore[no-untyped-def]
     """Second pass from edge `first` for as long as nothing happens; returns the edge reached."""
     speed = v[first]
@@ -189,7 +189,7 @@ def _recur(first, keep, gain, limits, v):  # type: ignore[no-untyped-def]
     return np.int64(i)
 
 
-@compiled()
+@inner()
 def contact_law(i, ground, table):  # type: ignore[no-untyped-def]
     """Source and decay of cell i, the normal force on, no terms in U."""
     mu = table[FRICTION, i]
@@ -197,7 +197,7 @@ def contact_law(i, ground, table):  # type: ignore[no-untyped-def]
     return a, 2.0 * (table[QUADRATIC, i] + mu * ground[2, i])
 
 
-@compiled()
+@inner()
 def march(release, edge, ground, barriers, limits, table, keep, gain, v):  # type: ignore[no-untyped-def]
     """Fill v at every edge; returns (runout [m], last cell entered, cell of the release).
 
@@ -245,7 +245,7 @@ def march(release, edge, ground, barriers, limits, table, keep, gain, v):  # typ
     return (s if stopped else edge[n_cells]), i - 1, first
 
 
-@compiled()
+@inner()
 def is_regular(i, first, limits, v):  # type: ignore[no-untyped-def]
     """Whether nothing happens in cell i: it is crossed whole, in contact."""
     if i <= first:
@@ -253,7 +253,7 @@ def is_regular(i, first, limits, v):  # type: ignore[no-untyped-def]
     return v[i] <= limits[i] and 0.0 < v[i + 1] <= limits[i + 1]
 
 
-@compiled(fastmath=_FAST)
+@inner(fastmath=_FAST)
 def fill_changes(halvings, scaled, table, keep, v, by_source, by_decay):  # type: ignore[no-untyped-def]
     """Change of v over each whole cell per unit of source and of decay, divided by its length.
 
@@ -277,7 +277,7 @@ def fill_changes(halvings, scaled, table, keep, v, by_source, by_decay):  # type
         by_decay[i] = -(keep[i] * v[i] + impulse * by_decay[i])
 
 
-@compiled(fastmath=_FAST)
+@inner(fastmath=_FAST)
 def _fill_increment(column, profile, scaled, u_c, mean, by_source, by_decay, increment):  # type: ignore[no-untyped-def]
     """What each whole cell adds to the tangent of v by one strength."""
     weight, bend, double = scaled[WEIGHT], scaled[BEND], scaled[DOUBLE]
@@ -298,7 +298,7 @@ def _fill_increment(column, profile, scaled, u_c, mean, by_source, by_decay, inc
             increment[i] = (bend[i] * by_decay[i] - weight[i] * by_source[i]) * profile[i]
 
 
-@compiled()
+@inner()
 def regular_until(first, end, limits, v):  # type: ignore[no-untyped-def]
     """First cell from `first` on, or `end`, in which something happens; see `is_regular`."""
     i, stop = np.uint64(first), np.uint64(end)
@@ -307,7 +307,7 @@ def regular_until(first, end, limits, v):  # type: ignore[no-untyped-def]
     return np.int64(i)
 
 
-@compiled(fastmath={"contract"})
+@inner(fastmath={"contract"})
 def _recur_tangent(k, first, last, keep, increment, dv):  # type: ignore[no-untyped-def]
     """Tangent from edge `first` to edge `last`, two cells at a time as in `_recur`."""
     i, end, row = np.uint64(first), np.uint64(last), np.uint64(k)
@@ -323,7 +323,19 @@ def _recur_tangent(k, first, last, keep, increment, dv):  # type: ignore[no-unty
         dv[row, i + _ONE] = keep[i] * tangent + increment[row, i]
 
 
-@compiled()
+@inner()
+def start_tangents(i, first, release, edge, dv, step, shift):  # type: ignore[no-untyped-def]
+    """Tangents of v and of the place at which a front enters cell i; returns that place."""
+    for k in range(step.size):
+        step[k] = 0.0 if i == first else dv[k, i]
+        shift[k] = 0.0
+    if i > first:
+        return edge[i]
+    shift[-1] = 1.0
+    return release
+
+
+@inner()
 def march_tangents(  # type: ignore[no-untyped-def]
     release, last, first, edge, ground, barriers, limits, columns, profiles, u_c, speed_terms,
     table, carry, v, increment, dv, step, shift, d_time, d_runout,
@@ -349,7 +361,8 @@ def march_tangents(  # type: ignore[no-untyped-def]
             v[i], start, end, end, np.inf, cell, barriers, columns, profiles, i, step, shift, d_time
         )
         if stopped:
-            d_runout[:] = shift
+            for k in range(n_tangents):
+                d_runout[k] = shift[k]
             if s <= release:
                 d_runout[:] = 0.0
                 d_runout[-1] = 1.0
@@ -359,19 +372,7 @@ def march_tangents(  # type: ignore[no-untyped-def]
         i += 1
 
 
-@compiled()
-def start_tangents(i, first, release, edge, dv, step, shift):  # type: ignore[no-untyped-def]
-    """Tangents of v and of the place at which a front enters cell i; returns that place."""
-    for k in range(step.size):
-        step[k] = 0.0 if i == first else dv[k, i]
-        shift[k] = 0.0
-    if i > first:
-        return edge[i]
-    shift[-1] = 1.0
-    return release
-
-
-@compiled(fastmath=_FAST)
+@inner(fastmath=_FAST)
 def fill_increments(  # type: ignore[no-untyped-def]
     halvings, scaled, ground, table, keep, v, columns, profiles, u_c, speed_terms,
     by_source, by_decay, mean, soften, carry, increment,
@@ -381,7 +382,8 @@ def fill_increments(  # type: ignore[no-untyped-def]
     if speed_terms:
         fill_speed_changes(scaled, ground, table, u_c, keep, v, by_source, by_decay, mean, soften, carry)
     else:
-        carry[:] = keep
+        for i in range(carry.size):
+            carry[i] = keep[i]
     for k in range(columns.size):
         _fill_increment(columns[k], profiles[k], scaled, u_c, mean, by_source, by_decay, increment[k])
         if speed_terms:

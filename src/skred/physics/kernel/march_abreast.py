@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from skred.parallel.compile_cache import inner
 from skred.physics.kernel.cell import SERIES_LIMIT, WEAKENING, Cell, phi1_series
 from skred.physics.kernel.columns import Column
-from skred.physics.kernel.compiled import compiled
 from skred.physics.kernel.inputs import cell_of
 from skred.physics.kernel.march import travel
 from skred.physics.kernel.scaled_ground import BEND, DOUBLE, DRIVE, WEIGHT
@@ -32,7 +32,7 @@ _LEAST_SHARE = 0.5
 """Share of the speed below which a cell would slow a front so much that the first guess is no guess."""
 
 
-@compiled(fastmath={"contract"})
+@inner(fastmath={"contract"})
 def _fill_coefficients(i, strengths, columns, profiles, work):  # type: ignore[no-untyped-def]
     """Each front's row of the coefficient table at cell i; strengths are (n_strengths, ABREAST)."""
     work[: _N_COLUMNS * ABREAST] = 0.0
@@ -43,7 +43,7 @@ def _fill_coefficients(i, strengths, columns, profiles, work):  # type: ignore[n
                 work[first + j] += strengths[np.uint64(k), j] * profile
 
 
-@compiled(fastmath={"contract"})
+@inner(fastmath={"contract"})
 def _begin(drive, weight, bend, double, limit, work):  # type: ignore[no-untyped-def]
     """What a cell makes of each front without and with terms in U, and a first guess of its speed ahead."""
     for j in range(ABREAST):
@@ -62,7 +62,7 @@ def _begin(drive, weight, bend, double, limit, work):  # type: ignore[no-untyped
         work[_SOLVED + j] = 0.0
 
 
-@compiled(fastmath={"contract"})
+@inner(fastmath={"contract"})
 def _improve(weakens, per_scale, work):  # type: ignore[no-untyped-def]
     """One of Newton's steps; returns how many of the fronts that are going are not solved yet."""
     left_over = 0
@@ -88,7 +88,7 @@ def _improve(weakens, per_scale, work):  # type: ignore[no-untyped-def]
     return left_over
 
 
-@compiled()
+@inner()
 def _cell_of_front(i, j, ground, u_c, work):  # type: ignore[no-untyped-def]
     """Cell i as `cell.cell_at` has it, for the front in place j."""
     return Cell(
@@ -98,7 +98,7 @@ def _cell_of_front(i, j, ground, u_c, work):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@compiled()
+@inner()
 def march_abreast(  # type: ignore[no-untyped-def]
     run, strengths, releases, edge, ground, scaled, barriers, limits, columns, profiles, u_c,
     own, work, v, runout, last, first,
@@ -154,7 +154,7 @@ def march_abreast(  # type: ignore[no-untyped-def]
             break
 
 
-@compiled()
+@inner()
 def room(n_strengths, n_cells):  # type: ignore[no-untyped-def]
     """What `march_abreast` writes in: own, work, v, runout, last, first."""
     return (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from skred.parallel.compile_cache import inner
 from skred.physics.kernel.cell import (
     FRICTION,
     LINEAR,
@@ -14,11 +15,10 @@ from skred.physics.kernel.cell import (
     psi,
 )
 from skred.physics.kernel.columns import GRAVITY
-from skred.physics.kernel.compiled import compiled
 from skred.physics.kernel.scaled_ground import BEND, DOUBLE
 
 
-@compiled()
+@inner()
 def fill_speed_changes(  # type: ignore[no-untyped-def]
     scaled, ground, table, u_c, keep, v, by_source, by_decay, mean, soften, carry
 ):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from skred.parallel.compile_cache import inner
 from skred.physics.kernel.cell import CONSTANT, FRICTION, QUADRATIC, cell_at, phi1, psi
 from skred.physics.kernel.columns import GRAVITY
-from skred.physics.kernel.compiled import compiled
 from skred.physics.kernel.inputs import RUNOUT, VELOCITY_TO_STOP, cell_of
 from skred.physics.kernel.march import (
     contact_law,
@@ -21,7 +21,7 @@ _SUMS = {"contract", "nsz", "reassoc"}
 _ONE = np.uint64(1)
 
 
-@compiled()
+@inner()
 def speed_at(  # type: ignore[no-untyped-def]
     place, i, release, runout, first, edge, ground, barriers, u_c, speed_terms, table, v
 ):
@@ -33,7 +33,7 @@ def speed_at(  # type: ignore[no-untyped-def]
     return np.sqrt(travel(v[i], start, place, edge[i + 1], np.inf, cell, barriers)[0])
 
 
-@compiled()
+@inner()
 def span_end(quantity, s_from, s_to, release, runout):  # type: ignore[no-untyped-def]
     """Where the part of a span ends over which the front is timed; `s_from` if it is not timed at all."""
     if s_from < release or (s_to > runout and quantity != VELOCITY_TO_STOP):
@@ -41,7 +41,7 @@ def span_end(quantity, s_from, s_to, release, runout):  # type: ignore[no-untype
     return max(min(s_to, runout), s_from)
 
 
-@compiled(fastmath=_SUMS)
+@inner(fastmath=_SUMS)
 def _time_over(i, last, edge, v):  # type: ignore[no-untyped-def]
     """Time [s] over whole cells from i to before `last`, in which nothing happens."""
     time = 0.0
@@ -50,13 +50,13 @@ def _time_over(i, last, edge, v):  # type: ignore[no-untyped-def]
     return 2.0 * time
 
 
-@compiled()
+@inner()
 def _whole_until(i, first, s_from, whole_to, limits, edge, v):  # type: ignore[no-untyped-def]
     """Where the cells from i on end that lie wholly within a span and in which nothing happens."""
     return regular_until(i, whole_to, limits, v) if i > first and edge[i] >= s_from else i
 
 
-@compiled()
+@inner()
 def span_speed(  # type: ignore[no-untyped-def]
     s_from, s_to, end, i, release, first, edge, ground, barriers, limits, u_c, speed_terms, table, v
 ):  # fmt: skip
@@ -84,7 +84,7 @@ def span_speed(  # type: ignore[no-untyped-def]
     return (end - s_from) / time
 
 
-@compiled()
+@inner()
 def read(  # type: ignore[no-untyped-def]
     run, sensors, cells, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms,
     table, v, readings,
@@ -119,7 +119,7 @@ def read(  # type: ignore[no-untyped-def]
             )  # fmt: skip
 
 
-@compiled()
+@inner()
 def _regular_speed_tangents(  # type: ignore[no-untyped-def]
     speed, length, i, ground, table, columns, profiles, v, dv, tangents
 ):
@@ -142,7 +142,7 @@ def _regular_speed_tangents(  # type: ignore[no-untyped-def]
         tangents[k] = 0.5 * change / speed
 
 
-@compiled(fastmath=_SUMS)
+@inner(fastmath=_SUMS)
 def _time_tangents(i, last, edge, v, dv, d_time):  # type: ignore[no-untyped-def]
     """Tangents of the time over whole cells from i to before `last`, added to `d_time`."""
     for k in range(d_time.size):
@@ -154,7 +154,7 @@ def _time_tangents(i, last, edge, v, dv, d_time):  # type: ignore[no-untyped-def
         d_time[k] -= change
 
 
-@compiled()
+@inner()
 def _span_tangents(  # type: ignore[no-untyped-def]
     s_from, s_to, i, speed, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms, columns,
     profiles, table, v, dv, step, shift, d_time, d_runout, tangents,
@@ -181,7 +181,7 @@ def _span_tangents(  # type: ignore[no-untyped-def]
         tangents[k] = speed * (d_end - speed * d_time[k]) / (end - s_from)
 
 
-@compiled()
+@inner()
 def read_tangents(  # type: ignore[no-untyped-def]
     run, sensors, cells, release, runout, first, edge, ground, barriers, limits, columns, profiles,
     u_c, speed_terms, table, v, dv, step, shift, d_time, d_runout, readings, jacobian,
@@ -191,7 +191,8 @@ def read_tangents(  # type: ignore[no-untyped-def]
         s_from, s_to, i, tangents = sensors[j, 1], sensors[j, 2], cells[j], jacobian[run, j]
         speed = readings[run, j]
         if sensors[j, 0] == RUNOUT:
-            tangents[:] = d_runout
+            for k in range(tangents.size):
+                tangents[k] = d_runout[k]
         elif not speed > 0.0:
             tangents[:] = 0.0
         elif s_from < s_to:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from skred.parallel.compile_cache import inner
 from skred.physics.kernel.columns import GRAVITY
-from skred.physics.kernel.compiled import compiled
 
 DRIVE, WEIGHT, BEND, DOUBLE = 0, 1, 2, 3
 """Rows of the scaled ground: 2 g sin(phi), 2 g cos(phi), 2 kappa and 2, times the cell's length."""
 
 
-@compiled()
+@inner()
 def scale_ground(edge, ground):  # type: ignore[no-untyped-def]
     """What the equation of motion makes of the ground, times length: the same for all runs."""
     scaled = np.empty((4, ground.shape[1]))

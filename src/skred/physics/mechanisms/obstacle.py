@@ -7,6 +7,7 @@ import numpy as np
 from skred.physics.kernel.columns import GRAVITY, Column
 from skred.physics.mechanisms.spec import (
     Added,
+    BoundTo,
     Direction,
     Mechanism,
     Setting,
@@ -60,13 +61,12 @@ MECHANISM = Mechanism(
     strength=Strength(
         name="obstacle_height",
         symbol="h",
-        paper_symbol="",
         unit="m",
         prior_scale=8.0,
         prior_reason="dams and steps that matter to a front of 20-40 m/s are metres to tens of metres high",
     ),
     equation="-(g h / w) [climb - descent] - (l h / 4 w) U^2 around s_o: v < 2 g h stops",
-    mark="stops pile up in front of it; above a threshold of speed fronts pass and lose a share of v",
+    signature="stops pile up in front of it; above a threshold of speed fronts pass and lose a share of v",
     reference="Faug, Gauer, Lied and Naaim (2008), Journal of Geophysical Research 113, F03009",
     doi="10.1029/2007JF000854",
     added=Added(
@@ -74,6 +74,7 @@ MECHANISM = Mechanism(
         reason="dams and steps that matter to a front of 20-40 m/s are metres to tens of metres high",
         direction=_direction,
         shapes=_shapes,
+        bound_to=BoundTo.PLACE,
         split=_split,
     ),
 )

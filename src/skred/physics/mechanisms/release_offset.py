@@ -22,13 +22,12 @@ MECHANISM = Mechanism(
     strength=Strength(
         name="release_offset",
         symbol="r",
-        paper_symbol="",
         unit="m",
         prior_scale=30.0,
         prior_reason="release points are read from maps and photographs to a few tens of metres",
     ),
     equation="the front starts from rest at the noted place plus r",
-    mark="fast everywhere, or slow everywhere, most of all above; the same energy for every avalanche",
+    signature="fast everywhere, or slow everywhere, most of all above; the same energy for every avalanche",
     reference="Kristensen, Madsen and Jorgensen (2004), Computers and Chemical Engineering 28, 1431-1449",
     doi="10.1016/j.compchemeng.2003.10.001",
     added=Added(

@@ -1,7 +1,7 @@
 """Forest, boulders, roughness: extra drag quadratic in speed on a stretch."""
 
 from skred.physics.kernel.columns import Column
-from skred.physics.mechanisms.spec import Added, Mechanism, Strength
+from skred.physics.mechanisms.spec import Added, BoundTo, Mechanism, Strength
 from skred.physics.mechanisms.stretches import along_a_stretch, split_stretch, stretches_of_drag
 
 MECHANISM = Mechanism(
@@ -10,13 +10,12 @@ MECHANISM = Mechanism(
     strength=Strength(
         name="segment_drag",
         symbol="D_f",
-        paper_symbol="",
         unit="m-1",
         prior_scale=2.5e-3,
         prior_reason="over 200 m the scale takes 63 % of U^2",
     ),
     equation="-D_f U^2 for s_1 < s < s_2",
-    mark="fast fronts lose more on the stretch than slow ones, in proportion to v; few stop there",
+    signature="fast fronts lose more on the stretch than slow ones, in proportion to v; few stop there",
     reference="Perla, Cheng and McClung (1980), Journal of Glaciology 26(94), 197-207: drag by segment",
     doi="10.3189/S002214300001073X",
     added=Added(
@@ -24,6 +23,7 @@ MECHANISM = Mechanism(
         reason="over 200 m the scale takes 63 % of U^2",
         direction=along_a_stretch(Column.QUADRATIC),
         shapes=stretches_of_drag,
+        bound_to=BoundTo.PLACE,
         split=split_stretch,
     ),
 )

@@ -2,7 +2,16 @@
 
 import numpy as np
 
-from skred.physics.mechanisms.spec import Added, Direction, Group, Mechanism, Setting, Shape, Strength
+from skred.physics.mechanisms.spec import (
+    Added,
+    BoundTo,
+    Direction,
+    Group,
+    Mechanism,
+    Setting,
+    Shape,
+    Strength,
+)
 
 
 def _shapes(setting: Setting) -> tuple[Shape, ...]:
@@ -21,13 +30,12 @@ MECHANISM = Mechanism(
     strength=Strength(
         name="log_sensor_factor",
         symbol="a",
-        paper_symbol="",
         unit="1",
         prior_scale=0.15,
         prior_reason="a calibration or a place that is off by 15 % of the reading",
     ),
     equation="reading = exp(a) times the front's speed, at one sensor",
-    mark="equal and opposite work in the two stretches beside the sensor",
+    signature="equal and opposite work in the two stretches beside the sensor",
     reference="Sargsyan, Najm and Ghanem (2015), International Journal of Chemical Kinetics 47, 246-276",
     doi="10.1002/kin.20906",
     added=Added(
@@ -35,6 +43,7 @@ MECHANISM = Mechanism(
         reason="a calibration or a place that is off by 15 % of the reading",
         direction=_direction,
         shapes=_shapes,
+        bound_to=BoundTo.SENSOR,
         either_sign=True,
     ),
     group=Group.INSTRUMENT,

@@ -1,4 +1,4 @@
-"""What a mechanism says of itself: one spec that drives models, diagnosis, command line, reports, docs."""
+"""What a mechanism says of itself: one spec that drives models, diagnosis, verdict, command line, reports."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from skred.physics.terrain import Terrain
 
 FloatArray = NDArray[np.float64]
 Profile = Callable[[Terrain], FloatArray]
-"""Contribution per unit of strength to a column of the coefficient table, (n_cells,)."""
+"""Contribution per unit of a coefficient to a column of the kernel's table, (n_cells,)."""
 
 
 class Group(StrEnum):
-    """What a mechanism blames."""
+    """What a mechanism says is wrong: the physics or the instruments."""
 
     PHYSICS = "physics"
     """A term of the equation of motion."""
@@ -26,18 +26,33 @@ class Group(StrEnum):
     """The recordings."""
 
 
+class BoundTo(StrEnum):
+    """What an added mechanism is bound to; its shapes say to which one. Figures and verdict follow it."""
+
+    TRACK = "track"
+    """Nothing in particular: it acts alike along the whole track and on all avalanches."""
+    PLACE = "place"
+    """A stretch of the track: every shape has `s_from_m` and `s_to_m`."""
+    SENSOR = "sensor"
+    """An instrument: every shape has `sensor`."""
+    COVARIATE = "covariate"
+    """A property of the avalanches: every shape has `covariate`."""
+
+
 @dataclass(frozen=True)
 class Strength:
-    """How strong a mechanism is: one number.
+    """The coefficient of a mechanism: one number that says how strong it is.
 
     Attributes
     ----------
     name : str
-        Name of the parameter in models, tables and files.
-    symbol, paper_symbol : str
-        In equations here, and in the Ryggfonn calibration paper.
+        Name of the parameter in models, tables and files; no other mechanism's.
+    symbol : str
+        In equations here; no other mechanism's.
+    paper_symbol : str
+        In the Ryggfonn calibration paper; empty where it has none.
     unit : str
-        SI, ``1`` where there is none.
+        SI, as ``m s-2``; ``1`` where there is none.
     prior_scale : float
         Scale of its half-normal prior as a part of a base law, in `unit`.
     prior_reason : str
@@ -46,15 +61,15 @@ class Strength:
 
     name: str
     symbol: str
-    paper_symbol: str
     unit: str
     prior_scale: float
     prior_reason: str
+    paper_symbol: str = ""
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What an added mechanism can refer to: a base law on a terrain, and what was recorded there.
+    """What an added mechanism can refer to: a base law on a terrain, and the recordings made there.
 
     Attributes
     ----------
@@ -62,7 +77,7 @@ class Setting:
     base : tuple of str
         Ids of the base law's mechanisms, in order.
     recorded_m : (float, float)
-        Between which places something was recorded [m].
+        First and last place of the track where something was recorded [m].
     sensors : tuple of str
         Ids of the sensors, in order.
     velocities : tuple of bool
@@ -87,25 +102,27 @@ class Setting:
 
     @property
     def front_square(self) -> FloatArray:
-        """Typical U^2 in each cell [m2/s2], (n_cells,)."""
+        """Typical U^2 in each cell [m²/s²], (n_cells,)."""
         squares: FloatArray = 0.5 * (self.front_speed[1:] ** 2 + self.front_speed[:-1] ** 2)
         return squares
 
 
 @dataclass(frozen=True)
 class Shape:
-    """Where and how an added mechanism acts; integrated over, with equal weights.
+    """One place and way in which an added mechanism may act. All its shapes are integrated over.
 
     Attributes
     ----------
     s_from_m, s_to_m : float, optional
-        The stretch, where it is local.
-    covariate, sensor : str, optional
-        What it depends on, which instrument it blames.
-    constants : mapping
-        Other constants by symbol with unit, as ``U_c [m s-1]``.
+        The stretch of one that is bound to a place [m].
+    covariate : str, optional
+        The property of the avalanches that one bound to a covariate depends on.
+    sensor : str, optional
+        The instrument of one that is bound to a sensor.
+    constants : tuple of (str, float)
+        Other constants by symbol with unit, as ``U_c [m s-1]``; positive numbers.
     prior_scales : float
-        How many times its mechanism's prior scale the prior of its strength has.
+        The prior scale of the coefficient of this shape, in that of its mechanism.
     """
 
     s_from_m: float | None = None
@@ -125,16 +142,16 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class Direction:
-    """What one unit of an added mechanism's strength changes: every part is linear in the strength.
+    """What one unit of an added mechanism's coefficient changes. Every part is linear in the coefficient.
 
     Attributes
     ----------
     columns : tuple of Column
-        Columns of the coefficient table that it enters.
+        Columns of the kernel's table that it enters: its form in U.
     profiles : (n_columns, n_cells) array
-        With which profile.
+        What it adds to each of these columns in each cell of the track.
     log_strengths : (n_events,) array or None
-        Change of the logarithm of the base law's first strength, event by event.
+        Change of the logarithm of the base law's first coefficient, event by event.
     release : float
         Shift of all release places [m], downhill positive.
     log_readings : (n_sensors,) array or None
@@ -158,37 +175,45 @@ class Added:
     Attributes
     ----------
     scale : float
-        Scale of the normal prior of its strength, in the strength's unit: half-normal unless `either_sign`.
+        Scale of the normal prior of its coefficient, in the coefficient's unit: half-normal unless
+        `either_sign`.
     reason : str
         Why that scale.
     direction : callable
         Setting and shape to Direction.
     shapes : callable
-        Setting to the shapes to integrate over; none where it cannot be told from these recordings' columns.
+        Setting to the shapes to integrate over; none where the recordings have nothing to refer to.
+    bound_to : BoundTo
+        What these shapes name: a place, a sensor, a covariate, or nothing.
+    needs : tuple of str
+        Covariates that it refers to by name: columns of `events.csv`. It is not looked for in recordings that
+        lack one of them.
     either_sign : bool
-        Whether the strength may be negative.
+        Whether the coefficient may be negative.
     joins : callable
         Ids of the base law's mechanisms to whether it can be missing there.
     split : callable
-        Setting, shape and steps to finer shapes around it, which share its weight; steps are 1 about a shape
-        of the first look, and less about its parts.
+        Setting, shape and steps to finer shapes around it, which share its weight. Steps are 1 around a shape
+        of the linearised screening, and less around its parts.
     """
 
     scale: float
     reason: str
     direction: Callable[[Setting, Shape], Direction]
     shapes: Callable[[Setting], tuple[Shape, ...]]
+    bound_to: BoundTo = BoundTo.TRACK
+    needs: tuple[str, ...] = ()
     either_sign: bool = False
     joins: Callable[[tuple[str, ...]], bool] = lambda base: True
     split: Callable[[Setting, Shape, float], tuple[Shape, ...]] = lambda setting, shape, steps: ()
 
     def scale_of(self, shape: Shape) -> float:
-        """Scale of the prior of the strength of a shape."""
+        """Scale of the prior of the coefficient of a shape."""
         return self.scale * shape.prior_scales
 
     @property
     def relevant(self) -> float:
-        """Median of the prior of its size: a strength that matters."""
+        """Median of the prior of its size: a coefficient that matters."""
         return 0.6745 * self.scale
 
 
@@ -199,35 +224,36 @@ class Mechanism:
     Attributes
     ----------
     id : str
-        As in the campaign format.
+        Small letters, digits and ``_``; no other mechanism's.
     title : str
         In plain words.
     strength : Strength
     equation : str
         The term as it enters dU^2/(2 ds) = g sin(phi) + a_ret; what is read instead, for a fault.
-    mark : str
-        What its presence looks like in recordings.
+    signature : str
+        Its diagnostic signature: what its presence looks like in recordings.
     reference, doi : str
-        Where it comes from.
+        Where it comes from; no doi where there is none.
     column : Column, optional
-        The column of the coefficient table that its strength enters as a part of a base law; None where it
-        can only be added to one.
+        The column of the kernel's table that it enters as a part of a base law; None where it can only be
+        added to one.
     profile : callable, optional
-        Terrain to (n_cells,) contribution per unit of strength.
+        Terrain to (n_cells,) contribution per unit of the coefficient.
     added : Added, optional
         How it joins a law that leaves it out.
     group : Group
     same_term_as : str
-        Id of a mechanism that is the same term on a stretch: never to be told from it.
+        Id of a mechanism that is the same term by another name, so that no recording tells them apart. It is
+        computed once, under that id.
     """
 
     id: str
     title: str
     strength: Strength
     equation: str
-    mark: str
+    signature: str
     reference: str
-    doi: str
+    doi: str = ""
     column: Column | None = None
     profile: Profile | None = None
     added: Added | None = None
@@ -247,12 +273,12 @@ class Mechanism:
         return self.column, self.profile(terrain)
 
     def is_same_term(self, other: Mechanism) -> bool:
-        """Whether this and another one are the same term on a stretch, so that no speed tells them apart."""
+        """Whether this and another one are the same term, so that no reading tells them apart."""
         return self.same_term_as == other.id or other.same_term_as == self.id
 
 
 def everywhere(terrain: Terrain) -> FloatArray:
-    """Profile of a strength that acts alike along the whole track."""
+    """Profile of a coefficient that acts alike along the whole track."""
     return np.ones(terrain.n_cells)
 
 

@@ -24,7 +24,7 @@ MECHANISM = Mechanism(
         "0.02 1/m, which on 30 degrees without friction allows no more than 16 m/s",
     ),
     equation="-D U^2",
-    mark="fast fronts retard more than slow ones at the same place; speed tends to a limit",
+    signature="fast fronts retard more than slow ones at the same place; speed tends to a limit",
     reference="Voellmy (1955); Perla, Cheng and McClung (1980), Journal of Glaciology 26(94), 197-207",
     doi="10.3189/S002214300001073X",
     column=Column.QUADRATIC,

@@ -23,7 +23,7 @@ MECHANISM = Mechanism(
         prior_reason="at 30 m/s the scale retards by 3 m/s2, as much as dry friction of 0.35",
     ),
     equation="-c U",
-    mark="between constant and quadratic: hard to tell from turbulent drag",
+    signature="between constant and quadratic: hard to tell from turbulent drag",
     reference="among the flow laws compared by Bartelt, Salm and Gruber (1999), J. Glaciology 45(150)",
     doi="10.3189/S002214300000174X",
     column=Column.LINEAR,

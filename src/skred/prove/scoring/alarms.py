@@ -25,21 +25,21 @@ _FITS = 400
 
 
 def false_alarms(pairs: Sequence[Pair]) -> dict[str, Any]:
-    """Alarms where nothing is hidden: plain, nasty, both, and by kind of nastiness.
+    """Alarms where nothing is hidden: plain, contaminated, both, and by kind of contamination.
 
     An alarm is the verdict missing_physics, instrument or unexplained. A crash or time-out is no alarm but
     a wrong answer: it counts in what is named ``with_failures``.
     """
     nulls = [pair for pair in pairs if pair.is_null]
-    nasty = [pair for pair in nulls if pair.hidden == "nasty"]
-    habits = sorted({str(pair.truth.get("nasty")) for pair in nasty})
+    contaminated = [pair for pair in nulls if pair.hidden == "nasty"]
+    kinds = sorted({str(pair.truth.get("nasty")) for pair in contaminated})
     return {
         "plain": _alarms([pair for pair in nulls if pair.hidden == "nothing"]),
-        "nasty": _alarms(nasty),
+        "nasty": _alarms(contaminated),
         "all": _alarms(nulls),
         "by_nastiness": {
-            habit: _alarms([pair for pair in nasty if str(pair.truth.get("nasty")) == habit])
-            for habit in habits
+            kind: _alarms([pair for pair in contaminated if str(pair.truth.get("nasty")) == kind])
+            for kind in kinds
         },
     }
 

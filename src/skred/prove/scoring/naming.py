@@ -78,7 +78,7 @@ def _both(pairs: Sequence[Pair]) -> dict[str, Any]:
     return {"both_found": share(leading), "both_in_sets": share(tied)}
 
 
-def honesty(pairs: Sequence[Pair]) -> dict[str, Any]:
+def selectivity(pairs: Sequence[Pair]) -> dict[str, Any]:
     """How often what is said is so: single names, tie sets; and whether names are given often enough.
 
     Names in trials where nothing, or nothing listed, is hidden are wrong.

@@ -1,7 +1,7 @@
 """Whether stated probabilities mean what they say: reliability, ECE, log score, Brier score.
 
-What is to be probable is the hidden id; `nothing` where nothing is hidden, nasty or not; `unlisted` for what
-no list has; of two mechanisms either, their probabilities added. One against the rest, trials with two are
+The hidden id is to be probable: `nothing` where nothing is hidden, contaminated or not; `unlisted` for what
+no list has; of two mechanisms either, their probabilities added. One id against the rest: trials with two are
 left out of the reliability of all ids, because two statements cannot both be right there.
 """
 

@@ -9,7 +9,7 @@ from skred.prove.scoring.alarms import detection, false_alarms
 from skred.prove.scoring.answers import Pair
 from skred.prove.scoring.confusion import confusion
 from skred.prove.scoring.gain import failures, gains, held_out, times
-from skred.prove.scoring.naming import honesty, naming, unlisted
+from skred.prove.scoring.naming import naming, selectivity, unlisted
 from skred.prove.scoring.places import places, strengths
 from skred.prove.scoring.probability import probabilities
 
@@ -23,7 +23,7 @@ def scores(pairs: Sequence[Pair]) -> dict[str, Any]:
         "false_alarms": false_alarms(pairs),
         "detection": detection(pairs),
         "naming": naming(pairs),
-        "honesty": honesty(pairs),
+        "honesty": selectivity(pairs),
         "unlisted": unlisted(pairs),
         "place": places(pairs),
         "strength": strengths(pairs),

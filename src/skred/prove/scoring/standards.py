@@ -1,4 +1,4 @@
-"""What is expected of a diagnosis: ceilings, classes that cannot be told apart, bars.
+"""What is expected of a diagnosis: ceilings, classes that cannot be told apart, acceptance criteria.
 
 Ceilings come from linearised design calculations with one true mechanism among 18 and perfect knowledge of
 the models; classes are pairs and triples that no estimator separates by more than 2 nats. Both are stated
@@ -22,20 +22,20 @@ NAMED_CEILING = {"sparse": (0.15, 0.30, 0.49, 0.71), "dense": (0.32, 0.57, 0.82,
 DETECTION_LIMIT = 2.85
 """Score that one of 18 candidates passes in 1 % of clean campaigns: detection is at most Phi(snr - this)."""
 
-FALSE_ALARM_BARS = {"all": 0.05, "plain": 0.05, "nasty": 0.10}
+FALSE_ALARM_CRITERIA = {"all": 0.05, "plain": 0.05, "nasty": 0.10}
 """Highest one-sided upper limits of false alarms."""
-DETECTION_BARS = {"5.5": 0.85, "7": 0.95}
+DETECTION_CRITERIA = {"5.5": 0.85, "7": 0.95}
 """Least detection by signal-to-noise."""
-NAMING_BARS = {"dense": (0.80, 0.95), "sparse": (0.65, 0.90)}
+NAMING_CRITERIA = {"dense": (0.80, 0.95), "sparse": (0.65, 0.90)}
 """Least shares of right first names and of right tie sets at a signal-to-noise of 7."""
-PLACE_BAR_M = 50.0
+PLACE_CRITERION_M = 50.0
 """Highest median place error on dense trials."""
 
 SNR_BINS = ((2.0, 4.0), (4.0, 5.5), (5.5, 7.0), (7.0, 9.0), (9.0, 13.0))
 AROUND_7 = (6.0, 8.5)
-"""Signal-to-noise that counts as 7 in the bars."""
+"""Signal-to-noise that counts as 7 in the acceptance criteria."""
 AROUND_10 = (8.5, 13.0)
-"""Signal-to-noise that counts as 10 in the bars."""
+"""Signal-to-noise that counts as 10 in the acceptance criteria."""
 SHORT_M = 100.0
 """Longest stretch of drag [m] that cannot be told from an obstacle."""
 LIMIT_S = {"sparse": 60.0, "dense": 120.0}
@@ -139,10 +139,10 @@ def as_plain() -> dict[str, Any]:
             for tie in TIES
         ],
         "detection_limit_score": DETECTION_LIMIT,
-        "bars_false_alarms": FALSE_ALARM_BARS,
-        "bars_detection": DETECTION_BARS,
-        "bars_naming": NAMING_BARS,
-        "bar_place_m": PLACE_BAR_M,
+        "bars_false_alarms": FALSE_ALARM_CRITERIA,
+        "bars_detection": DETECTION_CRITERIA,
+        "bars_naming": NAMING_CRITERIA,
+        "bar_place_m": PLACE_CRITERION_M,
         "wall_limit_seconds": LIMIT_S,
         "cpu_limit_seconds": CPU_LIMIT_S,
         "log_score_floor_probability": LOG_SCORE_FLOOR,

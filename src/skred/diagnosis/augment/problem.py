@@ -1,0 +1,278 @@
+"""A base law with mechanisms added to it, calibrated anew: all strengths, spreads and correlations together.
+
+The events' own strengths are integrated out as in any hierarchical calibration. What is added is the same
+for all events; at each of its strengths events look different, so their likelihoods are tabulated on a
+grid of strengths that covers the posterior, and interpolated between.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from skred.diagnosis.augment.added_strength import AddedStrength
+from skred.diagnosis.augment.coefficient_grid import finer
+from skred.diagnosis.augment.tables import Tables, build_tables, exact_nodes
+from skred.diagnosis.augment.tabulated_op import tabulated_log_densities
+from skred.diagnosis.augment.truncated_normal import truncated_normal
+from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows, take_rows
+from skred.diagnosis.evidence.event_quadrature import Budget
+from skred.diagnosis.evidence.extension import Extension
+from skred.inference.hierarchical.event_density import integrated_log_density
+from skred.inference.hierarchical.population import population_of, population_samples, population_variables
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.hierarchical.rough_population import moments_of
+from skred.inference.hierarchical.surface import Surfaces
+from skred.physics.kernel.fronts import front_speeds
+from skred.physics.law import Law, Parameter
+from skred.physics.mechanisms.spec import Mechanism
+
+FloatArray = NDArray[np.float64]
+CLAIM_LIMIT = 0.0455
+"""Largest error of the log likelihood per event in a diagnosis, in nats, at the worst of some draws: one nat
+for 22 events.
+
+A claim of a mechanism rests on several nats; where fronts stop on a stretch that is added, an event's
+likelihood bends sharply with the strength, and more quadrature points do not help.
+"""
+_EXACT = Budget(512, 256, 1024, 1.5, 1.8)
+"""Quadrature points of what the tables are compared with: so many that their own error counts for little."""
+_EXACT_RUNS = 352
+"""Events times draws up to which there are so many points; where there are fewer, more."""
+_EXACT_DRAWS = 16
+"""Draws compared, evenly over the posterior."""
+CHECKED_EVENTS = 24
+"""Events of larger campaigns that integration errors are looked for in, drawn at random."""
+_START_WIDER = 1.5
+"""How much wider than the posterior chains start, as r-hat asks for."""
+_INSIDE = 0.02
+"""How far inside the range of a strength chains start, as a share of it: at its end steps shrink."""
+
+
+def extension_with(base: Base, added: Sequence[AddedStrength]) -> Extension:
+    """A base law with some mechanisms added."""
+    return Extension(base.problem, base.law, (*base.directions, *(one.direction for one in added)))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AugmentedProblem(HierarchicalProblem):
+    """A campaign, and a base law with mechanisms added; calibrate the base law with it.
+
+    Attributes
+    ----------
+    base : Base
+    added : tuple of AddedStrength
+        One or two.
+    tables : Tables
+    visited : Population, optional
+        Populations that chains went to with rougher tables, and that these cover.
+    refined : bool
+        Whether there are tables at half the steps between strengths, because those were too rough.
+    """
+
+    integration_limit: float = CLAIM_LIMIT
+    base: Base
+    added: tuple[AddedStrength, ...]
+    tables: Tables = field(repr=False)
+    visited: Population | None = None
+    refined: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse recordings that the tables are not of."""
+        if self.campaign is not self.base.problem.campaign:
+            raise ValueError("the tables are of another campaign: make a new base and augmented_problem")
+
+    @property
+    def extension(self) -> Extension:
+        """The base law with what is added."""
+        return extension_with(self.base, self.added)
+
+    @property
+    def range(self) -> tuple[FloatArray, FloatArray]:
+        """Between which values each added strength is sampled, (n_added,) each: all that counts."""
+        grid = self.tables.grid
+        either = [one.mechanism.added is not None and one.mechanism.added.either_sign for one in self.added]
+        return np.where(either, grid.least, np.maximum(grid.least, 0.0)), grid.most
+
+    def parameters(self, law: Law) -> tuple[Parameter, ...]:
+        """The base law's and its population's parameters, then the added strengths."""
+        return (*super().parameters(law), *(one.parameter for one in self.added))
+
+    def observe(self, mechanisms: Sequence[Mechanism], strengths: Sequence[Any]) -> Any:
+        """Added strengths, and the observed variable ``recordings``: one log density per event."""
+        import pymc as pm
+        import pytensor.tensor as pt
+
+        from skred.diagnosis.augment.tabulated_op import TabulatedLogDensity
+
+        self._check(mechanisms)
+        tables, n_events = self.tables, self.campaign.n_events
+        # As data, so that one compiled model serves many campaigns of as many events.
+        data = tables.arrays
+        held = {name: pm.Data(f"table_{name}", value) for name, value in data.items()}
+        for name in ("size", "first"):
+            held[name] = pt.cast(held[name], "int64")  # PyMC makes integers int32
+        scales = pm.Data("added_scale", np.array([one.scale for one in self.added]))
+        low, high = pm.Data("added_low", self.range[0]), pm.Data("added_high", self.range[1])
+        added = [truncated_normal(one.name, scales[k], low[k], high[k]) for k, one in enumerate(self.added)]
+        factor = population_variables(mechanisms)
+        means = pt.alloc(pt.log(pt.stack(list(strengths))), n_events, len(mechanisms))
+
+        def logp(event_number: Any, event_means: Any, event_factors: Any, event_added: Any) -> Any:
+            # The distribution's batch is the event; factor and added strengths are the same for all.
+            return TabulatedLogDensity()(event_means, event_factors[0], event_added[0], *held.values())
+
+        return pm.CustomDist(
+            "recordings",
+            means,
+            factor,
+            pt.stack(added),
+            logp=logp,
+            signature="(n),(n,m),(k)->()",
+            observed=np.arange(n_events, dtype=float),
+            dims="event",
+        )
+
+    def log_likelihood(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
+        """Log density of each event for many parameter vectors: arrays by name to (n, n_events)."""
+        self._check(law.mechanisms)
+        return self._tabulated(*population_of(law, samples), self.added_rows(samples))
+
+    def _tabulated(self, means: FloatArray, factors: FloatArray, added: FloatArray) -> FloatArray:
+        n_events, tables = self.campaign.n_events, self.tables
+        densities: FloatArray = tabulated_log_densities(
+            means, factors, added, n_events, *tables.arrays.values()
+        )
+        return densities
+
+    def added_rows(self, samples: Mapping[str, Any]) -> FloatArray:
+        """Added strengths of many parameter vectors: arrays by name to (n, n_added)."""
+        return np.column_stack([np.asarray(samples[one.name], dtype=float).ravel() for one in self.added])
+
+    def to_start_from(self, law: Law, prior: dict[str, FloatArray], seed: int) -> dict[str, FloatArray]:
+        """Parameter vectors from around the posterior, wider.
+
+        From the prior, where spreads are of any size, a chain can get to an end of a strength's range, learn
+        steps as small as it needs there, and stay.
+        """
+        rng, n = np.random.default_rng([seed, 6]), len(next(iter(prior.values())))
+        located, (low, high) = self.tables.located, self.range
+        margin = _INSIDE * (high - low)
+        reach = _START_WIDER * rng.standard_normal((n, len(self.added))) @ located.factor.T
+        added = np.clip(located.mean + reach, low + margin, high - margin)
+        psi = located.populations_near(added, rng, _START_WIDER)
+        own = law.parameter_rows(np.exp(psi[:, : len(law.mechanisms)]))
+        rest = population_samples(law, psi[:, len(law.mechanisms) :])
+        return {**own, **rest, **{one.name: added[:, k] for k, one in enumerate(self.added)}}
+
+    def constants(self) -> dict[str, Any]:
+        """How well the releases are known, and between which strengths there are tables."""
+        low, high = self.range
+        return {
+            **super().constants(),
+            "added_strength": ("added", [one.name for one in self.added]),
+            "added_scale": ("added", [one.scale for one in self.added]),
+            "added_from": ("added", low),
+            "added_to": ("added", high),
+        }
+
+    def integration_errors(self, law: Law, samples: Mapping[str, Any], seed: int = 0) -> FloatArray:
+        """Differences of event log densities to exact ones, (n, n_checked_events), of at most 16 draws.
+
+        Exact: nodes at the very strengths of the draw, 1792 or more, around its own population.
+        Of at most 24 events, drawn at random from larger campaigns; positive where the tables are larger.
+        """
+        n = len(next(iter(samples.values())))
+        draws = np.linspace(0, n - 1, min(n, _EXACT_DRAWS)).astype(int)
+        samples = {name: np.ravel(values)[draws] for name, values in samples.items()}
+        rng = np.random.default_rng([seed, 5])
+        chosen = np.sort(rng.permutation(self.campaign.n_events)[:CHECKED_EVENTS])
+        return self.errors_at(*population_of(law, samples), self.added_rows(samples), chosen)
+
+    def errors_at(
+        self,
+        means: FloatArray,
+        factors: FloatArray,
+        added: FloatArray,
+        chosen: NDArray[np.int64],
+        runs: int = _EXACT_RUNS,
+    ) -> FloatArray:
+        """As `integration_errors`, of chosen events at some populations and added strengths.
+
+        Where there are fewer of them than `runs`, with more nodes each.
+        """
+        base = self.base
+        population = Population(means, np.einsum("nij,nkj->nik", factors, factors))
+        rows = Rows(chosen, np.zeros_like(chosen), take_rows(base.rows.readings, chosen), base.rows.errors)
+        start = self.tables.modes[self.tables.grid.nearest(added)][:, chosen]
+        given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
+        more = 2 ** int(np.clip(np.log2(runs / (len(added) * len(chosen))), 0, 3))
+        budget = _EXACT.times(more)
+        likelihood = EventLikelihood(self.extension, rows, base.strengths).in_groups(given)
+        nodes = exact_nodes(likelihood, population, start, budget, base.population)
+        errors = self._tabulated(means, factors, added)[:, chosen]
+        for k in range(len(means)):
+            first = nodes.first[k * len(chosen) : (k + 1) * len(chosen) + 1]
+            of_event = np.tile(means[k], (len(chosen), 1))
+            errors[k] -= integrated_log_density(of_event, factors[k], first, nodes.points, nodes.log_weights)
+        return errors
+
+    def speeds(
+        self, mechanisms: Sequence[Mechanism], strengths: FloatArray, release_s_m: float | FloatArray
+    ) -> FloatArray:
+        """Front speed [m/s] at the cell edges, what is added as strong as its posterior mean."""
+        extension = self.extension
+        added = np.concatenate([self.base.strengths, self.tables.mean])
+        columns = np.repeat(added, [len(d.columns) for d in extension.directions])
+        rows = np.column_stack([np.asarray(strengths, float), np.tile(columns, (len(strengths), 1))])
+        releases = np.full(len(rows), release_s_m, dtype=float)  # where fronts start, an offset included
+        speeds: FloatArray = front_speeds(rows, releases, self.path, extension.contributions)
+        return speeds
+
+    def finer(self, law: Law, posterior: xr.Dataset) -> AugmentedProblem | None:
+        """The same with finer tables; None where there are such already.
+
+        First those that also cover the populations that chains went to: far from all that the tables cover a
+        few nodes stand for all, and may promise a mode that is none. What is wrong then is wrong between the
+        tables' strengths.
+        """
+        old = self.tables
+        if self.refined:
+            return None
+        if self.visited is not None:
+            located = finer(self.base, self.extension, old.located)
+            tables = build_tables(self.base, self.extension, located, old.budget, self.visited)
+            return replace(self, tables=tables, refined=True)
+        samples = {
+            str(name): posterior[name].transpose("chain", "draw").values for name in posterior.data_vars
+        }
+        n_chains = posterior.sizes["chain"]
+        chains = [{name: values[k] for name, values in samples.items()} for k in range(n_chains)]
+        moments = [moments_of(*population_of(law, chain)) for chain in chains]
+        visited = Population(*(np.array(values) for values in zip(*moments, strict=True)))
+        wide = old.budget.over_population * 2 ** math.ceil(math.log2(2 + n_chains))
+        budget = old.budget._replace(over_population=wide, adapted=2 * old.budget.adapted)
+        tables = build_tables(self.base, self.extension, old.located, budget, visited)
+        return replace(self, tables=tables, visited=visited)
+
+    def surfaces(self, mechanisms: Sequence[Mechanism]) -> Surfaces:
+        """Not there: surfaces would be those of the base law alone.
+
+        Raises
+        ------
+        TypeError
+            Always.
+        """
+        raise TypeError("a law with mechanisms added has tables, not surfaces")
+
+    def _check(self, mechanisms: Sequence[Mechanism]) -> None:
+        ids = [mechanism.id for mechanism in self.base.law.mechanisms]
+        if [mechanism.id for mechanism in mechanisms] != ids:
+            raise ValueError(f"mechanisms were added to {self.base.law.id}: calibrate that law")

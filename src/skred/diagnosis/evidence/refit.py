@@ -1,0 +1,132 @@
+"""Population and events fitted at fixed strengths of what is added, with the evidence there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows, event_modes
+from skred.diagnosis.evidence.event_quadrature import USUAL, Budget, event_nodes
+from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.evidence.linear_mixed_model import mean_prior
+from skred.diagnosis.evidence.marginal import Evidence, coordinates, evidence, prior_log_scale
+from skred.inference.hierarchical.surface import Nodes
+
+FloatArray = NDArray[np.float64]
+_MOST_ROUNDS = 6
+"""Rounds of a refit at most: a population could go to and fro."""
+_FAR_MEAN, _FAR_SPREAD = 0.7, 0.35
+"""Change of a population after which quadrature points are made anew: of its mean in spreads, of a log
+spread."""
+
+
+class Fit(NamedTuple):
+    """A law, perhaps extended, fitted at fixed strengths of what is added.
+
+    Attributes
+    ----------
+    found : Evidence
+    points : (n_events, n_base + 1) array
+        The events' modes.
+    """
+
+    found: Evidence
+    points: FloatArray
+
+
+class Rounds(NamedTuple):
+    """How a refit goes on.
+
+    Attributes
+    ----------
+    budget : Budget
+        Quadrature points of the last round.
+    first : Budget or None
+        Of the rounds before, which only move the population there; None for the same.
+    least : int
+        Rounds that there are in any case; more where the population has moved far.
+    """
+
+    budget: Budget = USUAL
+    first: Budget | None = None
+    least: int = 2
+
+
+USUAL_ROUNDS = Rounds()
+
+
+def refit(
+    extension: Extension,
+    rows: Rows,
+    strengths: FloatArray,
+    start: tuple[Population, FloatArray],
+    rounds: Rounds = USUAL_ROUNDS,
+    fits: Sequence[Fit] | None = None,
+) -> list[Fit]:
+    """Refit population and events at some strengths, one group of rows each.
+
+    Parameters
+    ----------
+    rows : Rows
+        The campaign's rows.
+    strengths : (n_groups, n_directions) array
+    start : (Population, (n_events, n_base + 1) array)
+        Of one group: where to begin, and a population that quadrature points cover in any case.
+    fits : sequence of Fit, optional
+        Where to begin instead, one for each group.
+    """
+    n_groups, n_events, n = len(strengths), len(rows.event), start[0].mean.shape[1]
+    log_scale = prior_log_scale(mean_prior(extension.law))
+    state = list(fits) if fits is not None else [Fit(_unfitted(start[0]), start[1])] * n_groups
+    active = list(range(n_groups))
+    for number in range(_MOST_ROUNDS):
+        likelihood = EventLikelihood(extension, rows, np.empty(0)).in_groups(strengths[active])
+        parts = [state[k].found.population(n) for k in active]
+        population = Population(*(np.concatenate([part[a] for part in parts]) for a in range(2)))
+        points = np.concatenate([state[k].points for k in active])
+        modes = event_modes(likelihood, points, population, n_steps=6)
+        spent = rounds.budget if number > 0 or rounds.first is None else rounds.first
+        nodes = event_nodes(likelihood, population, modes, spent, start[0]).nodes
+        moved = []
+        for k, part, own in zip(
+            active,
+            _split(nodes, len(active), n_events),
+            modes.points.reshape(len(active), n_events, -1),
+            strict=True,
+        ):
+            before = state[k].found.psi
+            found = evidence(part, log_scale, before)
+            state[k] = Fit(found, own)
+            if number + 1 < rounds.least or _moved(before, found.psi, n):
+                moved.append(k)
+        active = moved
+        if not active:
+            break
+    return state
+
+
+def _unfitted(population: Population) -> Evidence:
+    """A population to begin with."""
+    psi = coordinates(population)
+    return Evidence(-np.inf, psi, np.eye(len(psi)))
+
+
+def _moved(before: FloatArray, after: FloatArray, n: int) -> bool:
+    """Whether a population is far from the one that its nodes were made for."""
+    mean = np.abs(after[:n] - before[:n]) / np.exp(before[n : 2 * n])
+    spread = np.abs(after[n : 2 * n] - before[n : 2 * n])
+    return bool(mean.max() > _FAR_MEAN or spread.max() > _FAR_SPREAD)
+
+
+def _split(nodes: Nodes, n_groups: int, n_events: int) -> list[Nodes]:
+    """Nodes of each group."""
+    parts = []
+    for k in range(n_groups):
+        first = nodes.first[k * n_events : (k + 1) * n_events + 1]
+        inside = slice(first[0], first[-1])
+        points = np.ascontiguousarray(nodes.points[:, inside])
+        parts.append(Nodes(first - first[0], points, nodes.log_weights[inside]))
+    return parts

@@ -1,0 +1,111 @@
+"""Mechanisms in the verdict: what each is, where it acts and how strong it is.
+
+Of an added mechanism there is one place and one interval of its strength, both over all places it may act at;
+headline, table of candidates and draws all hold these.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from skred.diagnosis.augment.coefficient import augmented_of, strength_of
+from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.comparison import Comparison
+from skred.diagnosis.evidence.covariates import standard_of
+from skred.diagnosis.outcome import Diagnosis
+from skred.physics.mechanisms.spec import Mechanism
+from skred.physics.mechanisms.stretches import equation_of
+
+INTERVAL = (0.05, 0.95)
+"""Quantiles that are the ends of a stated interval: 90 %, as everywhere."""
+
+
+def place_of(candidate: Candidate) -> dict[str, Any] | None:
+    """Medians of both ends of a mechanism's stretch, and their 90 % intervals; None where it is not local."""
+    middle = candidate.stretch()
+    low, high = (candidate.ends(share) for share in INTERVAL)
+    if middle is None or low is None or high is None:
+        return None
+    return {
+        "s_from_m": middle[0],
+        "s_to_m": middle[1],
+        "s_from_interval_m": [low[0], high[0]],
+        "s_to_interval_m": [low[1], high[1]],
+    }
+
+
+def strength_document(found: Diagnosis, number: int) -> dict[str, Any]:
+    """The strength of an added mechanism, as the last calibration has it, over all places."""
+    added = augmented_of(found.steps[-1].calibration).added[number]
+    strength = strength_of(found.steps, number)
+    return {"parameter": added.name, "unit": added.mechanism.strength.unit, **strength._asdict()}
+
+
+def added_document(found: Diagnosis, number: int) -> dict[str, Any]:
+    """One mechanism that was added."""
+    step = found.steps[number]
+    mechanism, shape = step.candidate.mechanism, step.candidate.best.shape
+    return {
+        "id": mechanism.id,
+        **kind_of(mechanism),
+        "strength": strength_document(found, number),
+        "location": place_of(step.candidate),
+        "equation": equation_of(mechanism, shape),
+        "covariate": shape.covariate,
+        "standard": _standard(found, shape.covariate),
+        "sensor": shape.sensor,
+        "constants": dict(shape.constants),
+        "tied_with": list(step.tied),
+        "log_bayes_factor": step.comparison.log_factors[mechanism.id],
+    }
+
+
+def kind_of(mechanism: Mechanism) -> dict[str, str]:
+    """What a mechanism says is wrong and what it is bound to: a reader need not know its id."""
+    assert mechanism.added is not None
+    return {"group": str(mechanism.group), "bound_to": str(mechanism.added.bound_to)}
+
+
+def _standard(found: Diagnosis, covariate: str | None) -> dict[str, Any] | None:
+    """By what a covariate is standardised before its strength multiplies it."""
+    standard = None if covariate is None else standard_of(found.problem.campaign.events, covariate)
+    return None if standard is None else standard.as_dict()
+
+
+def candidates_of(comparison: Comparison) -> list[str]:
+    """Ids of the mechanisms in a comparison, under any error model."""
+    return list(dict.fromkeys(name for one in comparison.under_each for name in one.candidates))
+
+
+def candidate_documents(found: Diagnosis, comparison: Comparison) -> list[dict[str, Any]]:
+    """Every mechanism of a comparison; what was added from it with its strength as it was calibrated."""
+    added = {
+        step.candidate.mechanism.id: number
+        for number, step in enumerate(found.steps)
+        if step.comparison is comparison
+    }
+    rows = [_candidate(comparison, name) for name in candidates_of(comparison)]
+    for row in rows:
+        if row["id"] in added:
+            row["strength"] = strength_document(found, added[row["id"]])
+    return rows
+
+
+def _candidate(comparison: Comparison, name: str) -> dict[str, Any]:
+    """One mechanism in a comparison, where and how strong it is if it is there."""
+    candidate = comparison.leading(name).candidates[name]
+    strength, shape = candidate.mechanism.strength, candidate.best.shape
+    return {
+        "id": name,
+        **kind_of(candidate.mechanism),
+        "log_bayes_factor": comparison.log_factors[name],
+        "strength": {
+            "parameter": strength.name,
+            "unit": strength.unit,
+            **candidate.strength()._asdict(),
+        },
+        "location": place_of(candidate),
+        "covariate": shape.covariate,
+        "sensor": shape.sensor,
+        "estimators_differ_by": candidate.disagreement,
+    }

@@ -1,0 +1,193 @@
+"""One number for one thing: verdict, table, sentences, page and draws say the same of what was added."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_report_cases import diagnosis, with_finding
+from test_report_html import Page
+
+from skred.diagnosis.compare.decision import alarm_by, alarmed
+from skred.diagnosis.detect.detectability import Identifiability
+from skred.diagnosis.outcome import NotDiagnosed
+from skred.diagnosis.verdict.document import verdict
+from skred.diagnosis.verdict.draws import augmented_draws
+from skred.diagnosis.verdict.improvement import improvement
+from skred.report.diagnosis.report import render_diagnosis
+
+
+def uncertain_place():
+    """Drag on one of several stretches, weaker on those that begin further down; the first leads."""
+    found = diagnosis("tie")
+    step = found.steps[0]
+    curves = sorted(
+        (one for one in step.candidate.curves if one.shape.place_m is not None),
+        key=lambda one: one.shape.s_from_m,
+    )
+    tops = [one.log_evidence.max() for one in curves]
+    curves = [
+        replace(
+            one,
+            strengths=(1.0 - 0.1 * k) * one.strengths,
+            log_evidence=one.log_evidence + (one.strengths > 0.0) * (30.0 - 0.1 * k - top),
+        )
+        for k, (one, top) in enumerate(zip(curves, tops, strict=True))
+    ]
+    weights = np.full(len(curves), -np.log(len(curves)))
+    candidate = replace(step.candidate, curves=tuple(curves), log_weights=weights)
+    under = replace(
+        step.comparison.under_each[0],
+        candidates=step.comparison.under_each[0].candidates | {candidate.mechanism.id: candidate},
+    )
+    comparison = replace(step.comparison, under_each=(under,))
+    found = replace(found, comparison=comparison)
+    return with_finding(found, steps=(replace(step, candidate=candidate, comparison=comparison),))
+
+
+def test_one_place_and_one_interval():
+    found = uncertain_place()
+    best = found.steps[0].candidate.best.shape
+    document = verdict(found)
+    place, strength = document["location"], document["strength"]
+    assert (place["s_from_m"], place["s_to_m"]) != (best.s_from_m, best.s_to_m)
+    low, high = place["s_from_interval_m"]
+    assert low <= place["s_from_m"] <= high and low < high
+    (row,) = [one for one in document["candidates"] if one["id"] == document["mechanism"]]
+    for one in (document["mechanisms"][0], row):
+        assert one["location"] == place
+        assert {key: one["strength"][key] for key in ("mean", "sd")} == {
+            key: strength[key] for key in ("mean", "sd")
+        }
+    ends = f"{place['s_from_m']:.0f} and {place['s_to_m']:.0f}"
+    assert f"between s = {ends} m" in document["statement"]
+    text = Page(render_diagnosis(found, document | {"settings": {}}, {})).text
+    assert re.findall(r"where the stretch begins and ends, here (\d+ and \d+)", text) == [ends]
+
+
+def test_draws_hold_the_interval_of_the_verdict():
+    """Beside those of the chains, which hold the place at the best one and are narrower."""
+    found = uncertain_place()
+    document, tree = verdict(found), augmented_draws(found)
+    group, strength, place = tree["added"], document["strength"], document["location"]
+    assert float(group["strength_mean"][0]) == strength["mean"]
+    assert float(group["strength_sd"][0]) == strength["sd"]
+    low, middle, high = group["s_from"].values[0]
+    assert [low, high] == place["s_from_interval_m"] and middle == place["s_from_m"]
+    draws = tree["posterior"][strength["parameter"]]
+    assert float(draws.std()) < strength["sd"]
+    assert np.isnan(augmented_draws(diagnosis("sensor"))["added"]["s_from"].values).all()
+
+
+def test_refits_that_did_not_converge_are_told_first():
+    found = diagnosis("tie")
+    assert verdict(found)["converged"] is True and verdict(found)["refits_not_converged"] == []
+    one, two, *_ = found.problem.campaign.event_ids
+    before = replace(found.before, not_converged=(two,))
+    document = verdict(replace(found, before=before))
+    assert document["converged"] is False and document["refits_not_converged"] == [two]
+    assert document["statement"].startswith(
+        f"Not all of this can be trusted: the refit without avalanche {two} did not converge"
+    )
+    after = replace(found.finding.after, not_converged=(one,))
+    document = verdict(with_finding(replace(found, before=before), after=after))
+    assert document["refits_not_converged"] == [one, two]
+    first = document["statement"].partition(". ")[0]
+    assert f"the refits without avalanches {one} and {two} did not converge" in first
+
+
+def test_what_ended_a_diagnosis_is_no_lack_of_convergence_unless_it_is():
+    problem, law = diagnosis("nothing").problem, diagnosis("nothing").law
+    assert verdict(NotDiagnosed(problem, law, "too few", converged=True))["converged"] is True
+    assert verdict(diagnosis("gate"))["converged"] is False
+
+
+@pytest.mark.parametrize("kind", ["nothing", "silent", "sensor", "tie", "unexplained"])
+def test_the_next_sensor_is_the_one_that_the_page_names(kind):
+    found = diagnosis(kind)
+    document = verdict(found)
+    sensor = document["detection_sensor"]
+    assert sensor["s_from_m"] == found.table.sensor_m and sensor["power_with"] == found.table.power_with
+    assert document["next_sensor"] == sensor or document["next_sensor"]["splits"]
+    text = Page(render_diagnosis(found, document | {"settings": {}}, {})).text
+    assert f"A speed read at s = {sensor['s_from_m']:.0f} m would help most" in text
+
+
+def test_a_sensor_that_raises_nothing_is_not_named():
+    found = diagnosis("silent")
+    table = Identifiability(found.table.rows, 1750.0, 0.3, 0.3)
+    document = verdict(replace(found, table=table))
+    assert document["next_sensor"] is None and document["detection_sensor"] is None
+    text = Page(render_diagnosis(replace(found, table=table), document | {"settings": {}}, {})).text
+    assert "One more sensor" not in text and "One more speed" not in document["statement"]
+
+
+@pytest.mark.parametrize(
+    ("p_value", "nothing", "by"),
+    [
+        (0.005, 0.1, "both"),
+        (0.005, 0.3, "check"),
+        (0.3, 0.1, "evidence"),
+        (0.3, 0.3, None),
+        (0.005, 0.6, None),
+    ],
+)
+def test_what_raised_the_alarm(p_value, nothing, by):
+    probability = {"nothing": nothing, "unlisted": 1.0 - nothing}
+    assert alarm_by(probability, p_value) == by
+    assert alarmed(probability, p_value) is (by is not None)
+
+
+def test_the_verdict_says_what_raised_the_alarm():
+    assert verdict(diagnosis("tie"))["alarm_by"] == "both"
+    assert verdict(diagnosis("silent"))["alarm_by"] is None
+
+
+def held(**values):
+    keys = ("rmse_velocity_before", "rmse_velocity_after", "rmse_runout_before", "rmse_runout_after")
+    return dict.fromkeys(keys) | values
+
+
+RISES = "For avalanches left out the log score rises by 51.0 (twice its standard error: 16.0)"
+FALLS = "the log score falls by 20.0 (twice its standard error: 16.0)"
+STAYS = "the log score changes by +9.0 (twice its standard error: 16.0), no practical difference"
+FASTER = "the error of speeds falls from 5.6 to 4.3 m/s"
+FARTHER = "But the error of runouts grows from 205 to 212 m."
+
+
+@pytest.mark.parametrize(
+    ("difference", "after", "said"),
+    [
+        (51.0, 212.3, f"{RISES}; {FASTER}. {FARTHER}"),
+        (51.0, 180.0, f"{RISES}; {FASTER}; the error of runouts falls from 205 to 180 m."),
+        (
+            -20.0,
+            204.8,
+            f"For avalanches left out {FASTER}; the error of runouts stays at 205 m. But {FALLS}.",
+        ),
+        (9.0, 212.3, f"For avalanches left out {STAYS}; {FASTER}. {FARTHER}"),
+    ],
+)
+def test_what_got_worse_is_told_as_worse(difference, after, said):
+    errors = held(
+        rmse_velocity_before=5.56, rmse_velocity_after=4.31, rmse_runout_before=204.6, rmse_runout_after=after
+    )
+    assert improvement({"evidence": {"elpd_diff": difference, "elpd_se": 8.0}, "held_out": errors}) == said
+
+
+def test_where_all_is_worse_nothing_is_called_better():
+    errors = held(rmse_velocity_before=4.0, rmse_velocity_after=5.0)
+    told = improvement({"evidence": {"elpd_diff": -20.0, "elpd_se": 8.0}, "held_out": errors})
+    assert told == (
+        f"Avalanches left out are predicted worse: {FALLS}; the error of speeds grows from 4.0 to 5.0 m/s."
+    )
+
+
+@pytest.mark.parametrize("kind", ["nothing", "silent", "sensor", "tie", "two", "unexplained"])
+def test_numbers_in_sentences_are_written_one_way(kind):
+    statement = verdict(diagnosis(kind))["statement"]
+    assert "+-" not in statement and not re.search(
+        r"\bm s-\d|\bm-1\b|\b1 times\b|\b1 avalanches\b", statement
+    )
+    if kind in ("sensor", "tie", "two"):
+        assert re.search(r"is \d[\d.e-]* ± \d", statement)
