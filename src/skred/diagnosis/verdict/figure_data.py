@@ -25,6 +25,8 @@ from skred.physics.mechanisms.stretches import is_opposed
 FloatArray = NDArray[np.float64]
 PRIOR_SCALES = np.geomspace(0.1, 10.0, 13)
 """Scales of a strength's prior, relative to the one used, at which the Bayes factor is given."""
+_RELEVANT = 0.01
+"""Probability below which no figure shows a candidate's Bayes factor by the prior's scale."""
 _READING = {"units": "m s-1; m for the runout"}
 _NATS = {"units": "nat"}
 _OF_CANDIDATE = {"units": "see the variable unit"}
@@ -40,7 +42,7 @@ def figure_data(found: Outcome) -> xr.DataTree:
         by the base law and by each law with something added
     force : the missing retardation along the track: ``mean``, ``low``, ``high``, ``covered`` (s)
     comparison, comparison_2 : evidence along the strength of each candidate's most probable shape, and its
-        log Bayes factor by the prior's scale
+        log Bayes factor by the prior's scale (of those above 1 % of probability, and of the first)
     shapes, shapes_2 : log Bayes factor of each candidate at each place, sensor or covariate
     held_out : each avalanche as predicted from the others, ``before`` and ``after`` something was added
     added : draws of the strengths that were added
@@ -119,7 +121,9 @@ def _curves(comparison: Comparison) -> xr.Dataset:
     best = [candidate.best for candidate in candidates]
     fine = [_fine(curve) for curve in best]
     at, on = ("candidate", "strength_point"), ("candidate", "fine_point")
-    scaled = [[_factor_at(candidate, float(scale)) for scale in PRIOR_SCALES] for candidate in candidates]
+    scaled = np.full((len(names), len(PRIOR_SCALES)), np.nan)
+    for row in _looked_at(comparison, names):
+        scaled[row] = [_factor_at(candidates[row], float(scale)) for scale in PRIOR_SCALES]
     return xr.Dataset(
         {
             "unit": ("candidate", [candidate.mechanism.strength.unit for candidate in candidates]),
@@ -128,15 +132,18 @@ def _curves(comparison: Comparison) -> xr.Dataset:
             "fine_strength": (on, _padded([part[0] for part in fine]), _OF_CANDIDATE),
             "fine_log_evidence": (on, _padded([part[1] for part in fine]), _NATS),
             "fine_log_prior": (on, _padded([part[2] for part in fine])),
-            "log_bayes_factor": (
-                ("candidate", "prior_scale"),
-                np.array(scaled).reshape(len(names), -1),
-                _NATS,
-            ),
+            "log_bayes_factor": (("candidate", "prior_scale"), scaled, _NATS),
         },
         coords={"candidate": names, "prior_scale": ("prior_scale", PRIOR_SCALES, {"units": "1"})},
         attrs={"log_evidence": "relative to strength 0, everything else refitted"},
     )
+
+
+def _looked_at(comparison: Comparison, names: Sequence[str]) -> list[int]:
+    """Rows of the candidates whose Bayes factor is given by the prior's scale: those that figures show."""
+    shares = [comparison.probability[name] for name in names]
+    least = min(_RELEVANT, max(shares, default=0.0))
+    return [row for row, share in enumerate(shares) if share >= least]
 
 
 def _fine(curve: Curve) -> tuple[FloatArray, FloatArray, FloatArray]:
