@@ -147,7 +147,7 @@ def run_study(seed: int, *, quick: bool = False, tell: Tell = lambda line: None)
     quick : bool
         Coarser grids and fewer draws, to try things out.
     tell : callable
-        Detectability one line for each stage.
+        Told one line for each stage.
     """
     base = baseline_case()
     cells = 101 if quick else None

@@ -97,7 +97,7 @@ def _told(answer: dict[str, Any]) -> dict[str, str]:
 
 
 def _sureness(answer: dict[str, Any], names: list[str | None]) -> str:
-    """Probabilities of what was named, and of nothing and of an unlisted force."""
+    """Probabilities of what was named, and of nothing and of a force not in the list."""
     probability = answer.get("probability") or {}
     shown = [name for name in (*names, "nothing", "unlisted") if name and name in probability]
     lines = [f"{name} {probability[name]:.2f}" for name in dict.fromkeys(shown)]

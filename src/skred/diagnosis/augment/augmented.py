@@ -22,7 +22,7 @@ from skred.diagnosis.evidence.marginal import population_at
 MOST_ADDED = 2
 """Mechanisms added at most: tables grow with the power of their number."""
 _ROUGH_DRAWS = 8
-"""Draws of the first look at the tables' error, before anything is sampled."""
+"""Draws at which a first check looks at the tables' error, before anything is sampled."""
 _ROUGH_RUNS = 176
 """Events times draws up to which that look has as many quadrature points as the check after sampling."""
 _ENOUGH = 0.2

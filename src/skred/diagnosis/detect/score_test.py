@@ -90,7 +90,7 @@ class ScoreTest:
 
     @cached_property
     def knots_m(self) -> FloatArray:
-        """Places of the knots of the unlisted force [m]."""
+        """Places of the knots of the force not in the list [m]."""
         return knots(self.setting)
 
     @cached_property
@@ -175,7 +175,7 @@ class ScoreTest:
         return found
 
     def log_factor_of_unlisted(self, scores: Scores) -> FloatArray:
-        """Log Bayes factor of the unlisted force in the linear model, (n_groups,)."""
+        """Log Bayes factor of the force not in the list in the linear model, (n_groups,)."""
         first = sum(not candidate.with_speed for candidate in self.placed_mechanisms)
         n = len(self.knots_m)
         factors = []

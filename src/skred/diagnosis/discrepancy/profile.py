@@ -207,7 +207,7 @@ def entering(setting: Setting, kind: Kind, profile: FloatArray) -> Direction:
 
 
 def alike(kind: Kind, curve: Curve) -> bool:
-    """Whether a listed mechanism goes with speed as a kind of the unlisted force does."""
+    """Whether a listed mechanism goes with speed as a kind of the force not in the list does."""
     return kind.column in curve.direction.columns and kind.opposed == is_opposed(curve.shape)
 
 
@@ -217,7 +217,7 @@ def most_probable(profiles: Sequence[Profile]) -> Profile:
 
 
 def log_evidence_of(profiles: Sequence[Profile]) -> float:
-    """Log Bayes factor of the unlisted force over its kinds."""
+    """Log Bayes factor of the force not in the list over its kinds."""
     factors = [profile.log_bayes_factor for profile in profiles]
     shares = np.array([profile.kind.share for profile in profiles])
     return float(np.logaddexp.reduce(np.array(factors) + np.log(shares / shares.sum())))

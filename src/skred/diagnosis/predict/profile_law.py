@@ -62,7 +62,7 @@ class ProfileLaw:
     error_model : str
         Id of the one under which.
     check : BootstrapTest
-        The omnibus check of the law with it; simulated campaigns are not given another profile, the
+        The bootstrap test of the law with it; simulated campaigns are not given another profile, the
         recordings have had theirs fitted to them, so that its p-value is rather too high.
     before, after : HeldOut
         Of avalanches left out, without the profile and with it.
@@ -107,7 +107,7 @@ def profile_law(under_errors: ComparisonUnderErrors, most: int, seed: int) -> Pr
 
 
 def _check(base: Base, profile: Profile, most: int, seed: int) -> BootstrapTest:
-    """The omnibus check of the law with the profile in."""
+    """The bootstrap test of the law with the profile in."""
     directions, strengths = _added_terms(base, profile)
     score_test = ScoreTest(base.problem, base.law, base.setting, directions, strengths)
     rng = np.random.default_rng([seed, 51])

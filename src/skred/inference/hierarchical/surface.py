@@ -123,7 +123,7 @@ def build_surfaces(
     envelope : Envelope, optional
         What a population could be at most; without it all of the box counts.
     tell : callable, optional
-        Detectability the number of events done and of all.
+        Told the number of events done and of all.
     """
     uncertain = fronts.releases.sd > 0.0
     n_events = len(uncertain)

@@ -46,7 +46,7 @@ IDENTIFY_LIMIT_S = 10.0
 LOG_SCORE_FLOOR = 1e-3
 """Least probability that a log score charges for: one trial costs 6.9 nats at most."""
 NEAR_M = 100.0
-"""How far from the true place an unlisted force may be put."""
+"""How far from the true place a force not in the list may be put."""
 CREDIBLE = 1.6449
 """Half of a 90 % interval in standard deviations."""
 
