@@ -62,6 +62,7 @@ def test_draws_are_in_their_files(
     monkeypatch.setattr(module, "diagnose", lambda *_: found)
     monkeypatch.setattr(module, "verdict", lambda _: {})
     monkeypatch.setattr(module, "report_facts", lambda _: {})
+    monkeypatch.setattr(module, "augmented_draws", lambda _: made["augmented"].tree)
     monkeypatch.setattr(module, "figure_data", lambda _: made["curves"].tree)
     with helpers() if with_helpers else nullcontext():
         diagnose_to(few, law, SamplerSettings(), Effort(), tmp_path)
