@@ -15,7 +15,15 @@ from skred.diagnosis.compare.comparison import ComparisonUnderErrors
 from skred.diagnosis.compare.location import _band, _resolution, _stretch, _work, locate
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.detect.score_test import _of_profile
-from skred.diagnosis.discrepancy.fit import _climb, _fit_at, _peak, _promise, _Seen, as_profile, fit_profile
+from skred.diagnosis.discrepancy.fit import (
+    _around,
+    _climb,
+    _Explored,
+    _fit_at,
+    _laplace,
+    as_profile,
+    fit_profile,
+)
 from skred.diagnosis.discrepancy.profile import (
     KINDS,
     Prior,
@@ -211,11 +219,11 @@ def test_evidence_under_a_prior_from_the_peak_under_another(base: Base) -> None:
     at = knots(changed.setting)
     start = (changed.population, changed.fit.points)
     nothing = _fit_at(changed, kind, at, np.zeros(len(at)), start)
-    flat = _peak(changed, kind, at, np.zeros(len(at)), nothing)
+    flat = _around(changed, kind, at, np.zeros(len(at)), nothing)
     height = nothing.found.log_evidence
     usual, other = Prior(0.8, 120.0), Prior(1.6, 120.0, 800.0)
     peak, own = (_climb(changed, kind, at, flat, one.cover(at)) for one in (usual, other))
-    found, exact = (_promise(one, height, other.cover(at)).log_factor() for one in (peak, own))
+    found, exact = (_laplace(one, height, other.cover(at)).log_factor() for one in (peak, own))
     assert exact > 20.0
     assert found == pytest.approx(exact, abs=0.5)
     precision = np.linalg.inv(other.cover(at))
@@ -260,9 +268,9 @@ def test_evidence_over_priors_against_climbing_under_each(base: Base, kind: int,
     own, at = KINDS[kind], knots(base.setting)
     start = (changed.population, changed.fit.points)
     nothing = _fit_at(changed, own, at, np.zeros(len(at)), start)
-    flat = _peak(changed, own, at, np.zeros(len(at)), nothing)
+    flat = _around(changed, own, at, np.zeros(len(at)), nothing)
     factors = [
-        _promise(_climb(changed, own, at, flat, cover), nothing.found.log_evidence, cover).log_factor()
+        _laplace(_climb(changed, own, at, flat, cover), nothing.found.log_evidence, cover).log_factor()
         + share
         for prior, share in priors_of(own, at).items()
         for cover in [prior.cover(at)]
@@ -277,9 +285,9 @@ def test_what_is_only_promised_counts_no_more_than_what_was_computed(base: Base)
     own, at = KINDS[0], knots(base.setting)
     none = np.zeros(len(at))
     fit = _fit_at(base, own, at, none, (base.population, base.fit.points))
-    flat = _peak(base, own, at, none, fit)
+    flat = _around(base, own, at, none, fit)
     priors = priors_of(own, at)
-    seen = _Seen(fit.found.log_evidence, at, priors)
+    seen = _Explored(fit.found.log_evidence, at, priors)
     climbed = next(one for one in priors if one.centre_m is not None)
     # Settled under its own prior, which holds its rough values down: to others that is a steep slope.
     values = 0.05 * own.amplitude * np.sin(2.0 * np.arange(len(at)))

@@ -11,6 +11,7 @@ from diagnosis_cases import base_of, first_events, score_test_of, trial, with_se
 from skred.campaign.parts import of_events
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
 from skred.diagnosis.detect.detectability import LIMIT_Z, Detectability, extra_sensors, mean_power, told
+from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.detect.score_test import PlacedMechanism, ScoreTest, placed_mechanisms
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, campaign_rows, look_around
@@ -87,7 +88,7 @@ def test_more_events_tell_more(base: Base, table: dict[str, Detectability]) -> N
     four = of_events(campaign, list(range(campaign.n_events)) * 4)
     events = tuple(replace(event, id=f"{event.id} {k}") for k, event in enumerate(four.events))
     problem = replace(base.problem, campaign=replace(four, events=events))
-    score_test = ScoreTest(problem, base.law, replace(base.setting, n_events=4 * campaign.n_events))
+    score_test = ScoreTest(problem, base.law, setting_of(problem, base.law))
     kept = [c for c in score_test.placed_mechanisms if c.direction.log_strengths is None]
     score_test.__dict__["candidates"] = kept
     rows = campaign_rows(score_test.extension)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from importlib.metadata import entry_points
-from types import SimpleNamespace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -116,11 +116,13 @@ def test_an_inverse_that_is_none_is_refused() -> None:
     assert_allclose(found["xi_h"], [GRAVITY / 0.005, GRAVITY / 0.01])
 
 
-def test_a_packs_law_that_is_none_is_an_input_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    def load() -> Any:
-        raise ValueError("mine: inverse does not give back the parameters of strengths")
-
-    entry = SimpleNamespace(name="mine", value="pack:LAW", load=load)
-    monkeypatch.setattr("skred.laws.entry_points", lambda group: [entry])
-    with pytest.raises(InputError, match="'mine' of pack:LAW cannot be used: mine: inverse"):
+def test_a_packs_law_that_is_none_is_an_input_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A package that breaks as it is imported is named, and its error told in one line."""
+    (tmp_path / "broken_pack.py").write_text("raise ValueError('inverse does not undo strengths')\n")
+    about = tmp_path / "broken_pack-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: broken-pack\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text("[skred.laws]\nmine = broken_pack:LAW\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(InputError, match="broken_pack:LAW cannot be loaded.*inverse does not undo"):
         load_law("mine")

@@ -172,7 +172,7 @@ def comparison() -> dict:
         "settings": {"sampler": "metropolis", "draws": 1000, "tune": 500, "chains": 4, "seed": 0},
         "versions": {"skred": "0.1.0", "pymc": "6.4.0"},
         "interval": {"kind": "equal-tailed", "probability": 0.9},
-        "limits": {"practical_difference": 4.0, "r_hat": 1.01, "ess": 400.0, "integration": 0.2},
+        "limits": {"practical_difference": 4.0, "r_hat": 1.01, "ess": 400.0, "integration": 0.0091},
         "models": [
             entry("pcm", best, best),
             entry("constant", [-15.0, -15.1, -17.0, -17.5], best),

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_report_cases import diagnosis, with_finding
+from diagnosis_report_cases import diagnosis, document_of, with_finding
 from test_report_html import Page
 
 from skred.diagnosis.compare.decision import alarm_by, alarmed
@@ -13,6 +13,7 @@ from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.outcome import NotDiagnosed
 from skred.diagnosis.verdict.document import verdict
 from skred.diagnosis.verdict.draws import augmented_draws
+from skred.diagnosis.verdict.figure_data import figure_data
 from skred.diagnosis.verdict.improvement import improvement
 from skred.report.diagnosis.report import render_diagnosis
 
@@ -61,7 +62,7 @@ def test_one_place_and_one_interval():
         }
     ends = f"{place['s_from_m']:.0f} and {place['s_to_m']:.0f}"
     assert f"between s = {ends} m" in document["statement"]
-    text = Page(render_diagnosis(found, document | {"settings": {}}, {})).text
+    text = Page(render_diagnosis(document_of(found), figure_data(found), {})).text
     assert re.findall(r"where the stretch begins and ends, here (\d+ and \d+)", text) == [ends]
 
 
@@ -109,16 +110,16 @@ def test_the_next_sensor_is_the_one_that_the_page_names(kind):
     sensor = document["detection_sensor"]
     assert sensor["s_from_m"] == found.table.sensor_m and sensor["power_with"] == found.table.power_with
     assert document["next_sensor"] == sensor or document["next_sensor"]["splits"]
-    text = Page(render_diagnosis(found, document | {"settings": {}}, {})).text
-    assert f"A speed read at s = {sensor['s_from_m']:.0f} m would help most" in text
+    text = Page(render_diagnosis(document_of(found), figure_data(found), {})).text
+    assert f"A speed read at s = {sensor['s_from_m']:.0f} m helps most" in text
 
 
 def test_a_sensor_that_raises_nothing_is_not_named():
-    found = diagnosis("silent")
-    table = Identifiability(found.table.rows, 1750.0, 0.3, 0.3)
-    document = verdict(replace(found, table=table))
+    table = Identifiability(diagnosis("silent").table.rows, 1750.0, 0.3, 0.3)
+    found = replace(diagnosis("silent"), table=table)
+    document = verdict(found)
     assert document["next_sensor"] is None and document["detection_sensor"] is None
-    text = Page(render_diagnosis(replace(found, table=table), document | {"settings": {}}, {})).text
+    text = Page(render_diagnosis(document_of(found), figure_data(found), {})).text
     assert "One more sensor" not in text and "One more speed" not in document["statement"]
 
 

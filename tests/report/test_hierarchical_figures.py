@@ -156,7 +156,7 @@ def test_labels_of_a_population(problem):
     parameters = problem.parameters(load_law("voellmy"))
     assert [population_label(p) for p in parameters] == [
         "median dry friction\nμ [-]",
-        "median\nξ h [m² s⁻²]",
+        "median\nξ h [m²/s²]",
         "spread\nsd(log μ) [-]",
         "spread\nsd(log D) [-]",
         "correlation\ncorr(log μ, log D) [-]",

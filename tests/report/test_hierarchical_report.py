@@ -53,11 +53,11 @@ def test_pooled_reports_have_none_of_it(figures):
 
 def test_the_population_has_units_and_no_false_decimals(figures):
     text = Page(render_comparison(hierarchical_comparison(), figures)).text
-    assert "median turbulent drag D m⁻¹ 0.00311 0.00091 0.00166 to 0.00466" in text
+    assert "median turbulent drag D 1/m 0.00311 0.00091 0.00166 to 0.00466" in text
     assert "spread sd(log μ) - 0.210 0.053 0.125 to 0.301 1.41" in text
     assert "correlation corr(log μ, log D) - -0.19 0.22" in text
     assert "coulomb (failed) median dry friction" in text
-    assert "constant 0.0026 0.0057 4" in text and "limit is 0.2 nats" in text
+    assert "constant 0.0026 0.0003 4" in text and "limit is 0.0091 nats per avalanche" in text
 
 
 def test_new_avalanches_stand_beside_the_recorded(figures):

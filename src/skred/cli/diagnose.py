@@ -3,6 +3,9 @@
 Everything heavy is imported inside the functions, so that ``--help`` is instant.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
 from skred.cli.exit_codes import DONE, NOT_CONVERGED
 from skred.cli.inputs import campaign_of, hierarchical_of
 from skred.cli.options import (
@@ -49,4 +52,12 @@ def diagnose(
             output.tell("writing the report")
             write_reports(results.unfinished)
     output.show(document, diagnosis_table, [], results.path)  # the statement is in the table
-    return DONE if document["reason"] is None or document["converged"] else NOT_CONVERGED
+    return DONE if is_answer(document) else NOT_CONVERGED
+
+
+def is_answer(document: Mapping[str, Any]) -> bool:
+    """Whether a verdict answers the question; that it cannot tell, or that one refit failed, is an answer.
+
+    It does not where chains that did not converge stood in the way of an answer.
+    """
+    return document["reason"] is None or bool(document["converged"])

@@ -113,7 +113,7 @@ def observe(rng: np.random.Generator, truth: Truth, nasty: str | None) -> tuple[
     campaign = Campaign(
         name=f"path-{letters}",
         description=f"Simulated avalanches on one path: {n_speeds} front speeds and the runout.",
-        source="skred.simulator",
+        source="skred.trials",  # sealed as this: it stays where the room moves
         origin="simulated",
         reference_s_m=None,
         track=Track(ground.track_x_m, ground.track_z_m),
