@@ -58,6 +58,7 @@ def ryggfonn() -> dict[str, Any]:
     return document_of(RYGGFONN)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law_id", ["pcm", "constant", "coulomb", "voellmy"])
 def test_a_row_for_whatever_can_be_missing(law_id: str) -> None:
     problem, law = hierarchical_problem(RYGGFONN), load_law(law_id)
@@ -197,6 +198,7 @@ def test_too_few_recordings_are_an_answer_before_anything_is_sampled(
     assert json.loads((folder / "identified" / "identify.json").read_text())["reason"] == document["reason"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("error", "code", "said"),
     [

@@ -113,6 +113,7 @@ def test_quiet(capsys: pytest.CaptureFixture[str]) -> None:
     assert capsys.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["mechanisms", "identify", "diagnose"])
 def test_help_needs_no_heavy_imports(command: str) -> None:
     code = (

@@ -81,6 +81,7 @@ def test_bad_options_are_told(options: list[str], tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "word"),
     [
@@ -108,6 +109,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess
     return out, done
 
 
+@pytest.mark.slow
 def test_a_run_writes_everything(finished: tuple[Path, subprocess.CompletedProcess[str]]) -> None:
     out, done = finished
     assert done.returncode in (0, 1), done.stderr

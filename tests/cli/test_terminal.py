@@ -47,6 +47,7 @@ def test_what_a_terminal_can_write_stays() -> None:
     assert written("a\udcff", "utf-8") == "a?"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("environment", ASCII, ids=lambda environment: " ".join(environment.values()))
 @pytest.mark.parametrize(
     "arguments",

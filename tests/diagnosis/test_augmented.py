@@ -113,6 +113,7 @@ def event_likelihoods(problem: AugmentedProblem, logs: np.ndarray, strengths: np
     return np.array(found).reshape(len(strengths), n_events, n)
 
 
+@pytest.mark.slow
 def test_densities_are_those_of_a_dense_sum(problem: AugmentedProblem) -> None:
     """Of each event's own friction, at strengths between the tables."""
     low, high = problem.range
@@ -188,6 +189,7 @@ def test_finest_tables_are_at_half_the_steps_between_strengths(problem: Augmente
     assert before > 0.2 and after < 0.1 * before
 
 
+@pytest.mark.slow
 def test_posterior_is_that_of_a_dense_grid(problem: AugmentedProblem, calibration: Any) -> None:
     """Median friction, spread and added drag of three events, all on a grid, against the draws."""
     assert calibration.gate.passed, calibration.gate.problems

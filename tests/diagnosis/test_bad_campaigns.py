@@ -81,6 +81,7 @@ def test_no_reading_at_all() -> None:
         hierarchical_problem(replace(campaign, values=values, status=status, stated_sd=values))
 
 
+@pytest.mark.slow
 def test_a_gate_that_fails_gives_no_name() -> None:
     """Twenty draws are not enough, nor sixteen times as many: a verdict all the same, which says why."""
     settings = SamplerSettings("metropolis", 10, 10, 2, 0)
@@ -99,6 +100,7 @@ def test_numerics_that_break_down_give_no_name(monkeypatch: pytest.MonkeyPatch) 
     assert_refused(document, "the numerics broke down in 'base': Matrix is not positive definite")
 
 
+@pytest.mark.slow
 def test_all_runouts_censored() -> None:
     campaign = small()
     status, values = np.array(campaign.status), np.array(campaign.values)
@@ -135,6 +137,7 @@ def test_a_volume_of_another_order_of_magnitude_does_not_decide_alone() -> None:
     assert_allclose(setting.covariates["snow_degC"], (raw - raw.mean()) / raw.std(), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_two_sensors_at_the_same_place() -> None:
     campaign = small()
     sensors = list(campaign.sensors)
@@ -182,6 +185,7 @@ def flat(campaign: Campaign) -> Campaign:
     )
 
 
+@pytest.mark.slow
 def test_an_event_that_never_starts() -> None:
     kind, names = outcome(base_of(flat(small()), "constant"))
     assert kind in ("cannot_tell", "nothing_missing") and names == ()
@@ -197,11 +201,13 @@ def two_runouts() -> Campaign:
     return replace(made, values=values)
 
 
+@pytest.mark.slow
 def test_two_runouts_and_no_speed() -> None:
     kind, names = outcome(base_of(two_runouts(), "constant"))
     assert kind in ("cannot_tell", "nothing_missing") and names == ()
 
 
+@pytest.mark.slow
 def test_absurd_speeds() -> None:
     """Half of the readings a hundred times too fast: no finite sense, no traceback, no piece of physics."""
     campaign = small()

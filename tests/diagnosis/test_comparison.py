@@ -33,6 +33,7 @@ def base() -> Base:
     return base_of(trial(1013, "sparse", "turbulent_drag", "coulomb", 7.0).campaign, "coulomb")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["turbulent_drag", "viscous_drag", "sensor_bias"])
 def test_second_look_against_many_nodes_on_a_dense_grid(base: Base, name: str) -> None:
     job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == name)
@@ -53,6 +54,7 @@ def test_rough_look_finds_what_is_missing(base: Base) -> None:
             assert curve(base, job.mechanism, job.shape, ROUGH).log_bayes_factor > 5.0
 
 
+@pytest.mark.slow
 def test_what_tangents_promise_counts_by_what_fronts_say() -> None:
     """In a clean campaign friction on many a stretch reads five nats along tangents; none has two."""
     base = base_of(trial(990001, "sparse", "nothing", "pcm").campaign, "pcm")
@@ -226,6 +228,7 @@ def peaked(shape: Shape, width_m: float) -> float:
     return float(40.0 - 0.5 * np.sum((apart / width_m) ** 2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("width_m", "most_looks", "off", "error"),
     [(10.0, 140, 5.0, 2.5), (30.0, 100, 20.0, 1.5), (1e3, 21, 100.0, 0.1)],
@@ -323,6 +326,7 @@ def test_errors_in_common_are_integrated_as_closely_as_others() -> None:
     assert max(found) - min(found) < 1.0
 
 
+@pytest.mark.slow
 def test_a_first_look_leaves_out_only_strengths_that_are_hopeless() -> None:
     """The same evidence as on the whole grid, without those that have none and have the more the weaker."""
     base, spared = sparse_base(), 0

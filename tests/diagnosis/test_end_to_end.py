@@ -150,6 +150,7 @@ def test_predictions_are_of_the_readings(clean: Diagnosis) -> None:
     assert found.elpd == pytest.approx(found.pointwise.sum())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["robust", "scaled"])
 def test_before_and_after_stand_under_one_error_model(biased: Diagnosis, name: str) -> None:
     """Else a left-out gain is the error model's as well as the mechanism's."""

@@ -49,6 +49,7 @@ def added(hidden: Base) -> ProfileLaw:
     return law_of(hidden)
 
 
+@pytest.mark.slow
 def test_a_force_that_is_there_predicts_avalanches_left_out(added: ProfileLaw) -> None:
     difference = added.after.pointwise - added.before.pointwise
     assert difference.sum() > 10.0
@@ -56,6 +57,7 @@ def test_a_force_that_is_there_predicts_avalanches_left_out(added: ProfileLaw) -
     assert added.check.p_value > 0.01
 
 
+@pytest.mark.slow
 def test_a_force_that_is_not_there_does_not() -> None:
     clean = law_of(thinned("nothing", None))
     assert (clean.after.pointwise - clean.before.pointwise).sum() < 1.0
@@ -139,6 +141,7 @@ def test_an_avalanche_has_no_say_in_what_is_predicted_of_it(hidden: Base, added:
         assert abs(a.log_score - b.log_score) > 1.0
 
 
+@pytest.mark.slow
 def test_before_is_what_sampling_and_refits_say(hidden: Base, added: ProfileLaw) -> None:
     """Populations by importance sampling against Metropolis, avalanche by avalanche."""
     calibration = calibrate(hidden.problem, hidden.law, SamplerSettings("metropolis", 800, 1500, 4, 0))

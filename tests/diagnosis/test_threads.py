@@ -58,6 +58,7 @@ def test_the_check_is_the_same_in_threads(monkeypatch: pytest.MonkeyPatch) -> No
     np.testing.assert_array_equal(one.simulated, two.simulated)
 
 
+@pytest.mark.slow
 def test_tables_are_the_same_in_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     base = sparse_base()
     mechanism = mechanisms()["viscous_drag"]

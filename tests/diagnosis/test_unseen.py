@@ -83,6 +83,7 @@ def by_hand(n_draws: int = 3, *terms: Term, strengths: Any = None) -> Predictor:
     return Predictor("constant", "robust", 8.0, 10.0, means, factors, terms, drawn)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("which", ["base", "augmented"])
 def test_agrees_with_the_calibration_of_its_own_events(which: str, request: pytest.FixtureRequest) -> None:
     """By its own pointwise log likelihood, which comes from surfaces, or tables, instead of these nodes."""

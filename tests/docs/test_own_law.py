@@ -69,6 +69,7 @@ def test_its_front_runs(law: Law, problem: Any) -> None:
     assert (weak > usual).all()
 
 
+@pytest.mark.slow
 def test_its_prior_and_its_density(law: Law, problem: Any) -> None:
     model = law.build(problem)
     assert [variable.name for variable in model.free_RVs] == law.parameter_names

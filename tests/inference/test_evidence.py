@@ -13,6 +13,7 @@ from skred.inference.evidence import Evidence, _log_evidence, evidence
 TOLERANCE = {"pcm": 0.15, "constant": 0.15, "coulomb": 0.2}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law_id", list(TOLERANCE))
 def test_evidence_is_that_of_the_grid(
     law_id: str, model_of: Callable[[str], Any], quadrature_of: Callable[[str], Any]

@@ -59,6 +59,7 @@ def test_the_likelihood_belongs_to_the_simulation(benchmark: Any, calibrator: An
             assert entry["coverage_90"] >= 0.7, (name, entry)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [velocities_too_high, runouts_off])
 def test_a_planted_error_is_found(
     benchmark: Any, calibrator: Any, error: Callable[[HierarchicalProblem], Any]

@@ -82,6 +82,7 @@ def z_scores(
     return np.asarray((one - two) / np.hypot(one_error, two_error))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law_id", ["constant", "coulomb"])
 def test_laws_of_one_strength(gibbs: Any, law_id: str) -> None:
     scores = z_scores(gibbs, problem_of(SIX), law_id, chains=32, sweeps=600, draws=1000)

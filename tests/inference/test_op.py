@@ -59,6 +59,7 @@ def test_value_and_gradient_agree_with_the_reference(mode: str) -> None:
             assert_allclose(found, derivative @ [1.0, 2.0, 3.0], rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", [0, 2])
 def test_verify_grad(run: int) -> None:
     def scaled(strengths: pt.TensorVariable, releases: pt.TensorVariable) -> pt.TensorVariable:
@@ -87,6 +88,7 @@ def evaluate(pickled: bytes) -> np.ndarray:
     return pickle.loads(pickled).eval()
 
 
+@pytest.mark.slow
 def test_a_node_travels_to_another_process() -> None:
     node = front_readings(STRENGTHS, RELEASES, PATH, PCM, SENSORS)
     with multiprocessing.get_context("spawn").Pool(1) as pool:
@@ -94,6 +96,7 @@ def test_a_node_travels_to_another_process() -> None:
     np.testing.assert_array_equal(there, node.eval())
 
 
+@pytest.mark.slow
 def test_shapes_are_known_without_evaluating() -> None:
     strengths, releases = pt.dmatrix("strengths"), pt.dvector("releases")
     node = front_readings(strengths, releases, PATH, PCM, SENSORS)

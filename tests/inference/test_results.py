@@ -182,6 +182,7 @@ def test_a_full_disk_is_an_error_and_leaves_nothing_half_written(tmp_path: Path)
     assert list(tmp_path.iterdir()) == [file]
 
 
+@pytest.mark.slow
 def test_statistics_of_smc_can_be_stored(
     smc: Any, tmp_path: Path, quadrature_of: Callable[[str], Any]
 ) -> None:

@@ -36,6 +36,7 @@ def z_scores(tree: Any, name: str, mean: float, sd: float, quantiles: list[float
     return (np.array(found) - [mean, sd, *quantiles]) / [float(error[name]) for error in errors]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["metropolis", "nuts"])
 @pytest.mark.parametrize("parameter", [0, 1])
 def test_posterior_is_that_of_the_grid(

@@ -188,6 +188,7 @@ def test_laws_of_one_strength(law_id: str, errors: str) -> None:
     assert np.abs(differences(problem, law_id, AROUND[law_id], 40_000)).max() < TOLERANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law_id, errors", [("pcm", "robust"), ("pcm", "student"), ("voellmy", "robust")])
 def test_laws_of_two_strengths(law_id: str, errors: str) -> None:
     problem = hierarchical_problem(pick(FOUR), error_model=errors)

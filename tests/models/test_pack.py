@@ -53,6 +53,7 @@ def test_dims(law: Any, model_of: Callable[[str], Any], problem: Any) -> None:
     assert not set(model.coords) & set(model.named_vars)
 
 
+@pytest.mark.slow
 def test_density_is_finite_at_the_initial_point_and_is_the_problems(
     law: Any, model_of: Callable[[str], Any], problem: Any
 ) -> None:

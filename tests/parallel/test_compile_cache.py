@@ -74,6 +74,7 @@ def test_a_change_in_another_file_is_compiled(folder: Path, before: str, after: 
     assert run(folder, "caller.py") == [value, "1", "1"]
 
 
+@pytest.mark.slow
 def test_an_option_is_part_of_the_stamp(folder: Path) -> None:
     (folder / "callee.py").write_text(CALLEE.replace("@inner()", '@inner(fastmath={"contract"})'))
     assert run(folder, "caller.py") == ["7.0", "1", "1"]
@@ -90,6 +91,7 @@ def test_a_changed_sentence_compiles_nothing(folder: Path) -> None:
     assert run(folder, "caller.py") == ["7.0", "0", "0"]
 
 
+@pytest.mark.slow
 def test_other_functions_are_cached_as_numba_does(folder: Path) -> None:
     """The setting that leads numba to our stamps holds for our functions alone."""
     (folder / "other.py").write_text(

@@ -111,6 +111,7 @@ def compared(folder: Path) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.slow
 def test_the_list_has_them_and_tells_of_those_that_it_leaves_out(folder: Path) -> None:
     done = skred(folder, "mechanisms", "--json")
     assert done.returncode == 0, done.stderr
@@ -130,6 +131,7 @@ def test_the_list_has_them_and_tells_of_those_that_it_leaves_out(folder: Path) -
     assert "rival-snow" in ledge and "other-snow" in ledge
 
 
+@pytest.mark.slow
 def test_tables_for_people_hold_them_too(folder: Path) -> None:
     done = skred(folder, "mechanisms")
     assert done.returncode == 0 and "wet " in done.stdout and "beta_w [1]" in done.stdout
@@ -137,6 +139,7 @@ def test_tables_for_people_hold_them_too(folder: Path) -> None:
     assert done.returncode == 2 and "broken-snow" in done.stderr and "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_the_comparison_holds_all_three(compared: dict[str, Any]) -> None:
     probability = compared["probability"]
     assert {"ledge", "wet", "clock"} < set(probability)
@@ -171,6 +174,7 @@ def test_a_verdict_that_names_one_fits_the_schema(
     assert f"the title of {name}" in document["statement"]
 
 
+@pytest.mark.slow
 def test_a_law_of_another_package_is_calibrated_and_compared(folder: Path, tmp_path: Path) -> None:
     words = ("slush", "ryggfonn", "--quiet", "--seed", "1", "--out", str(tmp_path / "one"))
     done = skred(folder, "calibrate", *words)
@@ -183,6 +187,7 @@ def test_a_law_of_another_package_is_calibrated_and_compared(folder: Path, tmp_p
     assert {model["id"] for model in compared["models"]} == {"coulomb", "slush"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["calibrate", "identify --base-model", "diagnose --base-model"])
 def test_a_law_that_cannot_be_used_is_told_with_its_packages(command: str, folder: Path) -> None:
     done = skred(folder, *command.split(), "pcm")
@@ -193,6 +198,7 @@ def test_a_law_that_cannot_be_used_is_told_with_its_packages(command: str, folde
     assert "slush" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_law_with_the_symbol_of_a_mechanism_is_not_diagnosed(folder: Path) -> None:
     done = skred(folder, "identify", "--base-model", "ledges", "--quiet")
     assert done.returncode == 2 and "Traceback" not in done.stderr

@@ -138,6 +138,7 @@ def test_no_scheduler(proof: ProofFolder) -> None:
         distributed.default_client()
 
 
+@pytest.mark.slow
 def test_a_dying_worker_is_replaced_and_its_trial_tried_once_more(proof: ProofFolder) -> None:
     proof.request("trial-0002").write_text('{"base_model": "murderous"}')
     done = subprocess.run(command(proof, "murderous"), capture_output=True, text=True, timeout=500)
@@ -152,6 +153,7 @@ def test_a_dying_worker_is_replaced_and_its_trial_tried_once_more(proof: ProofFo
     assert "1 crashed" in done.stderr and "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 def test_kill_and_go_on(proof: ProofFolder) -> None:
     """Kill -9 between the first answer and the last: nothing is lost, and nothing done twice."""
     process = started(proof, "slow", "--workers", "1")
@@ -171,6 +173,7 @@ def test_kill_and_go_on(proof: ProofFolder) -> None:
     assert not list(proof.path.rglob(".*.json*")), "something is half written"
 
 
+@pytest.mark.slow
 def test_interruption(proof: ProofFolder) -> None:
     process = started(proof, "endless", "--workers", "1")
     wait_until(lambda: (proof.path / "attempts").is_dir())

@@ -52,6 +52,7 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
             process.wait()
 
 
+@pytest.mark.slow
 def test_trials_run_on_a_scheduler_that_is_there(proof: ProofFolder, cluster: Cluster) -> None:
     limits = Limits(60.0, fake("quick"))
     found = run(proof, WorkerPool(1, cluster.address), silent, silent, limits)
@@ -61,6 +62,7 @@ def test_trials_run_on_a_scheduler_that_is_there(proof: ProofFolder, cluster: Cl
     assert [worker.poll() for worker in cluster.workers] == [None, None]  # it is not ours to end
 
 
+@pytest.mark.slow
 def test_a_worker_elsewhere_that_dies_is_its_trials_answer(proof: ProofFolder, cluster: Cluster) -> None:
     """Its own nanny starts it again; the other trials are answered."""
     first, *others = trial_names(read_ledger(proof))

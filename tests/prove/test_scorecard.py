@@ -121,6 +121,7 @@ HOSTILE: dict[str, tuple[list[dict[str, Any]], list[dict[str, Any] | None]]] = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", HOSTILE)
 def test_few_trials_and_bad_answers_do_not_fail(case: str, tmp_path: Path) -> None:
     truths, given = HOSTILE[case]

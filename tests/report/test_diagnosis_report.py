@@ -124,6 +124,7 @@ def attacked(value):
     return f"{value}{HOSTILE}" if isinstance(value, str) else value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["gate", "two", "sensor", "unexplained"])
 def test_every_text_of_a_document_is_escaped(kind, tmp_path):
     document, tree = attacked(documents(kind)[0]), documents(kind)[1]
@@ -141,6 +142,7 @@ def test_anything_may_be_null_on_the_page(kind):
         assert "None" not in page.text and "nan" not in page.text.split()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["gate", "two", "unexplained"])
 def test_anything_may_be_null_in_figures(kind, tmp_path):
     document, tree = documents(kind)

@@ -55,6 +55,7 @@ def test_a_diagnosis_is_reported_the_same_again(kind, tmp_path, capsys):
     assert [line for line in capsys.readouterr().out.splitlines() if line] == [str(one) for one in written]
 
 
+@pytest.mark.slow
 def test_a_comparison_is_reported_the_same_again(tmp_path):
     write_comparison(tmp_path, comparison(), calibration, ryggfonn())
     write_reports(tmp_path)
@@ -67,6 +68,7 @@ def test_a_comparison_is_reported_the_same_again(tmp_path):
     assert contents(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_a_hierarchical_comparison_has_figures_of_both(tmp_path):
     document = hierarchical_comparison()
     write_comparison(tmp_path, document, hierarchical_calibration, hierarchical_ryggfonn())
@@ -128,6 +130,7 @@ def test_what_this_version_cannot_read_is_told_and_left_alone(broken, tmp_path, 
     assert contents(tmp_path) == before
 
 
+@pytest.mark.slow
 def test_a_figure_that_fails_leaves_everything_as_it_was(tmp_path):
     write_documents("tie", tmp_path)
     write_reports(tmp_path)

@@ -33,6 +33,7 @@ def with_sensors(problem, sensors, **changes):
     return replace(problem, campaign=replace(campaign, sensors=tuple(sensors), **taken, **changes))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law_id", ["coulomb", "voellmy"])
 def test_every_law_has_its_figures(problem, law_id, tmp_path):
     law = load_law(law_id)
@@ -43,6 +44,7 @@ def test_every_law_has_its_figures(problem, law_id, tmp_path):
     assert_pictures(files)
 
 
+@pytest.mark.slow
 def test_a_law_of_three_strengths(problem, tmp_path):
     pcm, constant = load_law("pcm"), load_law("constant")
     law = replace(
@@ -55,6 +57,7 @@ def test_a_law_of_three_strengths(problem, tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_spans_many_sensors_events_releases_no_reference_and_hostile_names(problem, tmp_path):
     places = np.linspace(300.0, 1900.0, 13)
     spans = [Sensor(f"{k}{HOSTILE}", "front_velocity", s, s + 60.0, 0.1, 1.0) for k, s in enumerate(places)]
@@ -72,6 +75,7 @@ def test_spans_many_sensors_events_releases_no_reference_and_hostile_names(probl
     assert_pictures(save_model_figures(as_saved(tree, law, changed), tmp_path))
 
 
+@pytest.mark.slow
 def test_nothing_recorded_nothing_reached_and_draws_all_alike(problem, tmp_path):
     status = problem.campaign.status.copy()
     status[:, 0] = Status.MISSING

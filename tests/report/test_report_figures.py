@@ -31,6 +31,7 @@ def assert_pictures(files, at_least=12_000):
     assert sorted(folder.iterdir()) == sorted(files), "nothing but the figures, no partial files"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law_id", ["coulomb", "voellmy"])
 def test_every_law_of_the_pack_has_its_figures(problem, law_id, tmp_path):
     law = load_law(law_id)
@@ -42,6 +43,7 @@ def test_every_law_of_the_pack_has_its_figures(problem, law_id, tmp_path):
     assert_pictures(files)
 
 
+@pytest.mark.slow
 def test_spans_many_sensors_no_reference_and_hostile_names(problem, tmp_path):
     places = np.linspace(300.0, 1900.0, 13)
     spans = [Sensor(f"{k}{HOSTILE}", "front_velocity", s, s + 60.0, 0.1, 1.0) for k, s in enumerate(places)]
@@ -79,6 +81,7 @@ def test_comparison_figures(tmp_path):
     assert_pictures(list(files.values()))
 
 
+@pytest.mark.slow
 def test_comparison_figures_of_many_sensors_events_and_laws(tmp_path):
     best = [-15.0 - 0.01 * k for k in range(60)]
     laws = [entry(f"{k}{HOSTILE}", [b - 0.1 * k for b in best], best, n_sensors=14) for k in range(8)]

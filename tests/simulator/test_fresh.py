@@ -79,6 +79,7 @@ def test_a_covariate_acts_on_them_as_on_the_trial() -> None:
     assert isinstance(effect.weigh, Response) and further.hidden.friction.std() > 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["sensor_bias", "release_offset", "obstacle", "deposit_history"])
 def test_what_is_hidden_acts_on_them_too(name: str) -> None:
     truth = trial(305, "dense", name).source.truth

@@ -25,6 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 HIDEABLE = [*LISTED, *UNLISTED]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", HIDEABLE)
 def test_everything_can_be_hidden(name: str, tmp_path: Path) -> None:
     kind = "dense" if HIDEABLE.index(name) % 2 else "sparse"
@@ -76,6 +77,7 @@ def test_two_at_once() -> None:
     assert len(truth["snr_alone"]) == 2 and 3.0 < truth["snr"] < 9.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["sparse", "dense"])
 def test_masked_effects_leave_no_mean_residual(kind: str) -> None:
     truth = draw_trial(21, kind=kind, hidden="masked", snr=5.0).truth  # type: ignore[arg-type]
@@ -134,6 +136,7 @@ def test_integration_over_events_against_a_grid() -> None:
     assert fit(setting, target, None, theta, FINAL_NODES).deviance == pytest.approx(best, abs=0.3)
 
 
+@pytest.mark.slow
 def test_each_mechanism_in_turn_sparse_and_dense(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "benchmarks.development_set", "--each", "--n", "4"]
     subprocess.run(
@@ -145,6 +148,7 @@ def test_each_mechanism_in_turn_sparse_and_dense(tmp_path: Path) -> None:
     assert ids == [name for name in list(LISTED)[:2] for _ in range(2)]
 
 
+@pytest.mark.slow
 def test_the_development_set_resumes(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "benchmarks.development_set", "--seed", "1000"]
     command += ["--hidden", "nothing", "--out", str(tmp_path)]
