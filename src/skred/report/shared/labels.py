@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from typing import Any
 
-_SUPERSCRIPT = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
-_FACTOR = re.compile(r"([A-Za-z]+)(-?)(\d*)")
+from skred import units
+
 _GREEK = {"mu": "μ", "xi": "ξ", "kappa": "κ", "phi": "φ", "alpha": "α", "beta": "β", "sigma": "σ", "tau": "τ"}
 
 
@@ -34,22 +34,7 @@ def figure_text(text: Any, length: int = 40) -> str:
 def unit_text(unit: Any) -> str:
     """A unit for people: ``m s-1`` as m/s, ``m s-2`` as m/s², ``m-1`` as 1/m, ``1`` as -."""
     shown = " ".join(printable(unit).split())
-    if shown == "1":
-        return "-"
-    parts = [_FACTOR.fullmatch(part) for part in shown.split(" ")]
-    factors = [part.groups() for part in parts if part is not None]
-    if len(factors) != len(parts):
-        return shown  # words, or written for people already
-    above = [_power(name, digits) for name, sign, digits in factors if not sign]
-    below = [_power(name, digits) for name, sign, digits in factors if sign]
-    if not below:
-        return " ".join(above)
-    under = below[0] if len(below) == 1 else f"({' '.join(below)})"
-    return f"{' '.join(above) or '1'}/{under}"
-
-
-def _power(name: str, digits: str) -> str:
-    return name + ("" if digits in ("", "1") else digits.translate(_SUPERSCRIPT))
+    return "-" if shown == "1" else units.unit_text(shown)
 
 
 def symbol_text(symbol: Any) -> str:
