@@ -24,7 +24,7 @@ from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import refine
 from skred.diagnosis.compare.restarts import better_modes
 from skred.diagnosis.compare.screening import curve, screening_budget
-from skred.diagnosis.detect.score_test import ScoreTest, placed_mechanisms
+from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, alike, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
@@ -38,7 +38,6 @@ from skred.parallel.processes import worker_pool
 from skred.parallel.threads import side_by_side
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import can_join
-from skred.physics.mechanisms.spec import Shape
 
 FloatArray = NDArray[np.float64]
 Tell = Callable[[int, int], None]
@@ -222,11 +221,10 @@ def _screened(
     """A rough curve for each candidate; those `before`, by another error model, where they cannot count."""
     todo = [(one.mechanism, one.shape) for one in before or placed_mechanisms(base.setting, ties=False)]
     curves, looked = dict(enumerate(before)), set[int]()
-    linear = _linear_strengths(base)
 
     def look(number: int) -> Curve:
         mechanism, shape = todo[number]
-        return curve(base, mechanism, shape, budget, linear.get((mechanism.id, shape)))
+        return curve(base, mechanism, shape, budget)
 
     while jobs := sorted(set(_that_count(curves) if curves else range(len(todo))) - looked):
         looked |= set(jobs)
@@ -243,12 +241,6 @@ def _that_may_count(before: Sequence[Curve], behind: float) -> list[Curve]:
     best = max(float(heights.max()), 0.0)
     names = {one.mechanism.id for one, most in zip(before, may_have, strict=True) if most > best}
     return [one for one in before if one.mechanism.id in names]
-
-
-def _linear_strengths(base: Base) -> dict[tuple[str, Shape], float]:
-    """Roughly how strong the candidates are that stand out."""
-    score_test = ScoreTest(base.problem, base.law, base.setting, base.directions, base.strengths)
-    return score_test.strengths_found(score_test.scores(base.rows, base.fit.points, base.population))
 
 
 def _that_count(curves: Mapping[int, Curve]) -> list[int]:
