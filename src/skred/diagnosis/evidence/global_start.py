@@ -3,8 +3,8 @@
 Around the events' modes readings are linear in the population's median, in the events' own strengths and in
 the coefficient, all at once. A step therefore moves all of them together. A drag that the base law's friction
 has absorbed comes in while friction falls to a third; neither a derivative at nil nor a refit at a fixed
-coefficient gets there. Each event's point follows the step in the linear model, so that fronts stay with their
-readings. This is Gauss and Newton's method for a nonlinear mixed model (Lindstrom and Bates, 1990, doi
+coefficient gets there. Each event's point follows the step in the linear model, so that fronts stay with
+their readings. This is Gauss and Newton's method for a nonlinear mixed model (Lindstrom and Bates, 1990, doi
 10.2307/2532087), with spreads by expectation-maximisation. It begins at nil and at the prior's scale.
 """
 
