@@ -44,6 +44,11 @@ class Decision:
     names: tuple[str, ...]
 
     @property
+    def answer(self) -> str | None:
+        """Id of what the verdict names first, or of a force in no list; None where nothing is claimed."""
+        return UNLISTED if self.verdict == "unexplained" else next(iter(self.names), None)
+
+    @property
     def disputed(self) -> bool:
         """Whether physics, in the list or not, and instruments are tied: either may be off."""
         faults = [name != UNLISTED and mechanisms()[name].group == Group.INSTRUMENT for name in self.names]

@@ -75,6 +75,8 @@ class Influence:
         there are none. They are looked for in the order of what each one takes by itself.
     without_them : float or None
         Log Bayes factor without those.
+    without_a_third : float or None
+        Without the third of the avalanches that take most of it, where it has what it needs then too.
     readings : tuple of ReadingsLeftOut
     """
 
@@ -85,6 +87,7 @@ class Influence:
     without_each: FloatArray
     carried_by: tuple[str, ...]
     without_them: float | None
+    without_a_third: float | None
     readings: tuple[ReadingsLeftOut, ...]
 
 
@@ -113,7 +116,7 @@ def influence(comparison: Comparison, answer: str) -> Influence:
     factors = stated + np.array(found) - whole
     needed = _needed(comparison, answer)
     order = np.argsort(factors[:n])
-    carried, without = _carried(lambda part: stated + again(base, part) - whole, order, needed)
+    carried, left = _carried(lambda part: stated + again(base, part) - whole, order, needed)
     ids = base.problem.campaign.event_ids
     return Influence(
         answer,
@@ -122,7 +125,8 @@ def influence(comparison: Comparison, answer: str) -> Influence:
         tuple(ids),
         factors[:n],
         tuple(ids[k] for k in sorted(carried)),
-        without,
+        left if carried else None,
+        None if carried else left,
         tuple(
             ReadingsLeftOut(kind, sensor, int(chosen.sum()), float(factor))
             for (kind, sensor, chosen), factor in zip(kinds, factors[n:], strict=True)
@@ -202,19 +206,22 @@ def _needed(comparison: Comparison, answer: str) -> float:
 def _carried(
     factor: Callable[[_Part], float], order: Sequence[int] | NDArray[np.int64], needed: float
 ) -> tuple[list[int], float | None]:
-    """The first avalanches of an order without which an answer has too little, and what it has then."""
-    n = len(order)
+    """The first avalanches of an order without which an answer has too little, and what it has then.
+
+    None, and what it has without a third of them, where that is still enough.
+    """
+    n, left = len(order), None
     for many in range(1, int(MOST * n) + 1):
         kept = np.ones(n, dtype=bool)
         kept[order[:many]] = False
         left = factor(_Part(kept))
         if left < needed:
             return [int(k) for k in order[:many]], left
-    return [], None
+    return [], left
 
 
 def _kinds(base: Base) -> list[tuple[str, str | None, BoolArray]]:
-    """Kinds of readings that may mean something else than they say, and each sensor's; (n_events, n_sensors)."""
+    """Readings that may mean something else than they say, and each sensor's, as (n_events, n_sensors)."""
     readings, campaign = base.rows.readings, base.problem.campaign
     observed = readings.observed
     speeds = observed & readings.is_velocity

@@ -12,6 +12,7 @@ from skred.diagnosis.augment.step import Left
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Detectability, Identifiability
 from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER
+from skred.diagnosis.influence.influence import Influence
 from skred.diagnosis.outcome import (
     Diagnosis,
     Finding,
@@ -42,8 +43,8 @@ _NO_LIMIT = 20.0
 def verdict(found: Outcome) -> dict[str, Any]:
     """The verdict of a diagnosis, as `verdict.json` holds it."""
     document = _told_nothing(found) if isinstance(found, NotDiagnosed) else _told(found)
-    document["statement"] = statement(found, document)
-    return document | _more(found)
+    document |= _more(found)
+    return document | {"statement": statement(found, document)}
 
 
 def _told_nothing(found: NotDiagnosed) -> dict[str, Any]:
@@ -200,7 +201,7 @@ def _more(found: Outcome) -> dict[str, Any]:
         "seconds": found.seconds,
     }
     if isinstance(found, NotDiagnosed):
-        return more | {"alarm_by": None}
+        return more | {"alarm_by": None, "influence": None}
     return (
         more
         | {
@@ -210,6 +211,7 @@ def _more(found: Outcome) -> dict[str, Any]:
             "calibration": {"version": CALIBRATION_VERSION, "power": POWER},
             "error_models": [under_errors.error_model for under_errors in found.comparison.under_each],
             "candidates": candidate_documents(found, found.comparison),
+            "influence": _influence(found.influence),
         }
         | _of_finding(found.finding)
         | {
@@ -239,6 +241,25 @@ def _of_finding(finding: Finding) -> dict[str, Any]:
             }
         case NothingAdded():
             return {}
+
+
+def _influence(found: Influence | None) -> dict[str, Any] | None:
+    """What the answer hangs on; None where none is given."""
+    if found is None:
+        return None
+    return {
+        "answer": found.answer,
+        "log_bayes_factor": found.log_bayes_factor,
+        "needed": found.needed,
+        "events": dict(zip(found.events, found.without_each.tolist(), strict=True)),
+        "carried_by": list(found.carried_by),
+        "without_them": found.without_them,
+        "without_a_third": found.without_a_third,
+        "readings": [
+            {"kind": one.kind, "sensor": one.sensor, "n": one.n, "log_bayes_factor": one.log_bayes_factor}
+            for one in found.readings
+        ],
+    }
 
 
 def _detectability(row: Detectability) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from skred.diagnosis.augment.step import Step
@@ -10,6 +11,7 @@ from skred.diagnosis.compare.decision import NOTHING_AT_MOST, Decision
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
+from skred.diagnosis.verdict.hangs_on import carried, hangs_on
 from skred.diagnosis.verdict.improvement import improvement
 from skred.diagnosis.words import enumerated, percent, plus_minus
 from skred.physics.mechanisms import mechanisms
@@ -31,18 +33,23 @@ def statement(found: Outcome, document: dict[str, Any]) -> str:
         "nothing_missing": _nothing,
         "cannot_tell": _cannot,
     }[found.decision.verdict](found, document)
-    return " ".join(part for part in (_not_converged(found), *parts) if part)
+    return " ".join(part for part in (_caution(found), *parts, *hangs_on(document)) if part)
 
 
-def _not_converged(found: Diagnosis) -> str:
-    """Which refits did not converge; the first thing to know where any did not."""
-    events = found.refits_not_converged
+def _caution(found: Diagnosis) -> str:
+    """The first thing to know: that few avalanches carry the answer, that a refit did not converge."""
+    reasons = [one for one in (carried(found.influence), _not_converged(found.refits_not_converged)) if one]
+    return f"Take this with care: {'; '.join(reasons)}." if reasons else ""
+
+
+def _not_converged(events: Sequence[str]) -> str:
+    """Which refits did not converge."""
     if not events:
         return ""
     refits = f"the refit without avalanche {events[0]}"
     if len(events) > 1:
         refits = f"the refits without avalanches {enumerated(events)}"
-    return f"Not all of this can be trusted: {refits} did not converge, and the held-out scores rest on that."
+    return f"{refits} did not converge, and the held-out scores rest on that"
 
 
 def _title(name: str) -> str:

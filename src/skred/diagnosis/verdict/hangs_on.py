@@ -1,0 +1,47 @@
+"""What the answer hangs on, in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from skred.diagnosis.influence.influence import Influence
+from skred.diagnosis.words import enumerated
+
+_KINDS = {"zeros": "readings of zero", "near a stop": "speeds beside the same avalanche's stop"}
+
+
+def carried(found: Influence | None) -> str:
+    """That few avalanches carry the answer, where they do; begins with a small letter."""
+    if found is None or not found.carried_by:
+        return ""
+    one, many = len(found.carried_by) == 1, f"{len(found.carried_by)} of {len(found.events)} avalanches"
+    evidence = f"{found.log_bayes_factor:.1f} nats with all, {found.without_them:.1f} without"
+    return (
+        f"{many} {'carries' if one else 'carry'} this answer ({enumerated(found.carried_by)}), and without"
+        f" {'it' if one else 'them'} it would not be given (log Bayes factor {evidence}, {found.needed:.1f}"
+        " needed)"
+    )
+
+
+def hangs_on(document: dict[str, Any]) -> list[str]:
+    """That no few avalanches carry the answer; and which kinds of readings it would not be given without."""
+    found = document.get("influence")
+    if found is None:
+        return []
+    sentences = []
+    if not found["carried_by"] and found["without_a_third"] is not None:
+        evidence = f"{found['without_a_third']:.1f} nats ({found['log_bayes_factor']:.1f} with all)"
+        sentences.append(
+            "It does not hang on a few avalanches: without the third that carry most of it, its log Bayes"
+            f" factor is still {evidence}."
+        )
+    lost = [_words(one) for one in found["readings"] if one["log_bayes_factor"] < found["needed"]]
+    if lost:
+        sentences.append(f"It would not be given without {' or without '.join(lost)}.")
+    return sentences
+
+
+def _words(readings: dict[str, Any]) -> str:
+    """Some of the readings."""
+    what = _KINDS.get(readings["kind"], f"the readings of {readings['sensor']}")
+    return f"{what} ({readings['n']})"
