@@ -81,7 +81,7 @@ def _told(found: Diagnosis) -> dict[str, Any]:
         "mechanism": names[0] if names else None,
         "mechanisms": [added_document(found, number) for number in range(len(found.steps))],
         "probability": found.comparison.probability,
-        "indistinguishable": list(names[1:]),
+        "indistinguishable": list(found.decision.tied),
         "location": _location(found),
         "strength": strength_document(found, 0) if found.steps else None,
         "covariate": shape.covariate if shape is not None else None,

@@ -92,8 +92,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     if document["covariate"]:
         sentences.append("Associated with, not necessarily caused by.")
     if ties:
-        others = ", ".join(f"{_short(other)} ({percent(probability[other])})" for other in ties)
-        sentences.append(f"These recordings cannot tell it from: {others}.")
+        sentences.append(_tied(document))
         sentences.append(_split(found.steps[0], document))
     sentences.append(_not_excluded(document))
     if len(document["mechanisms"]) > 1:
@@ -105,6 +104,13 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     sentences.append(improvement(document))
     sentences.append(_still_fired(found.steps[-1].check))
     return [*sentences, _left(document)]
+
+
+def _tied(document: dict[str, Any]) -> str:
+    """What the recordings cannot tell from the answer."""
+    probability = document["probability"]
+    ties = [f"{_short(other)} ({percent(probability[other])})" for other in document["indistinguishable"]]
+    return f"These recordings cannot tell it from: {', '.join(ties)}." if ties else ""
 
 
 def _not_excluded(document: dict[str, Any]) -> str:
@@ -169,6 +175,7 @@ def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         f"Something is missing{_where(document['location'])} that {'most probably ' if doubt else ''}no"
         f" listed mechanism accounts for (a force not in the list: {percent(probability[UNLISTED])}; nothing:"
         f" {percent(probability[NOTHING])}; check: p = {found.check.p_value:.2g}).",
+        _tied(document),
         _by_speed(found.location),
         _closest(found, document),
         "The force profile is the answer: it says where the force acts and how much work it does.",
