@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from skred.diagnosis.augment.add import add_mechanisms
+from skred.diagnosis.augment.add import Adding, add_mechanisms
 from skred.diagnosis.augment.problem import CLAIM_LIMIT
 from skred.diagnosis.augment.reference import Reference
 from skred.diagnosis.augment.step import Augmented, NotAugmented
@@ -99,7 +99,8 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
 
     added: Augmented | NotAugmented | None = None
     if decision.names:
-        added = add_mechanisms(base, comparison, decision.names, Reference(calibration), run)
+        adding = Adding(Reference(calibration), run)
+        added = add_mechanisms(base, comparison, decision.names, adding)
     if isinstance(added, NotAugmented):
         decision = Decision("cannot_tell", ())
     if decision.verdict == "unexplained":

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 
+from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
 from skred.diagnosis.evidence.event_quadrature import FRONTS, ROUGH, Budget
 from skred.diagnosis.evidence.extension import extended
@@ -13,6 +17,7 @@ from skred.diagnosis.evidence.global_start import Start, global_starts
 from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Mechanism, Shape
 
+Tell = Callable[[int, int], None]
 _GRID = (0.2, 0.6, 1.2)
 """Strengths at first, in scales of the prior: 45 % of a half-normal prior is below the second."""
 _STRONGER = (2.2, 3.5)
@@ -27,6 +32,9 @@ _FAR_OFF = 4.0
 """Standard deviations beyond which a reading is far off: one in sixteen thousand is by chance."""
 _FAR_SHARE = 0.02
 """Share of such readings that is many: that of the robust error model's larger outlier share."""
+_FAR_BEHIND = 10.0
+"""Nats behind its mechanism's best at which a place is not screened under another error model: it counts for
+nothing."""
 
 
 def screening_budget(base: Base) -> Budget:
@@ -102,3 +110,51 @@ def _by_fronts(base: Base, rough: Curve) -> Curve:
     there = max(float(near.log_evidence[near.strengths == strengths[0]][0]), 0.0)
     heights = np.where(rough.log_evidence > 0.0, rough.log_evidence * (there / promised), rough.log_evidence)
     return replace(rough, log_evidence=heights)
+
+
+def screened(
+    base: Base,
+    budget: Budget,
+    pool: ThreadPoolExecutor,
+    tell: Tell = lambda done, of: None,
+    before: Sequence[Curve] = (),
+) -> list[Curve]:
+    """A rough curve for each candidate.
+
+    Under another error model only places are looked at that may count: each mechanism's best ones, and
+    others once these have fallen behind.
+
+    Parameters
+    ----------
+    budget : Budget
+        Quadrature points, of `screening_budget`.
+    tell : callable
+        Is told how many candidates are screened, and of how many.
+    before : sequence of Curve, optional
+        Screened under another error model: the candidates. Those that cannot count are returned as they are.
+    """
+    todo = [(one.mechanism, one.shape) for one in before or placed_mechanisms(base.setting, ties=False)]
+    curves, looked = dict(enumerate(before)), set[int]()
+
+    def look(number: int) -> Curve:
+        mechanism, shape = todo[number]
+        return curve(base, mechanism, shape, budget)
+
+    while jobs := sorted(set(_that_count(curves) if curves else range(len(todo))) - looked):
+        looked |= set(jobs)
+        for done, (number, one) in enumerate(zip(jobs, pool.map(look, jobs), strict=True), start=1):
+            curves[number] = one
+            tell(len(todo) - len(jobs) + done, len(todo))
+    return [curves[number] for number in range(len(todo))]
+
+
+def _that_count(curves: Mapping[int, Curve]) -> list[int]:
+    """Numbers of the curves that are not far behind their mechanism's best."""
+    best: dict[str, float] = {}
+    for one in curves.values():
+        best[one.mechanism.id] = max(one.log_bayes_factor, best.get(one.mechanism.id, -math.inf))
+    return [
+        number
+        for number, one in curves.items()
+        if one.log_bayes_factor > best[one.mechanism.id] - _FAR_BEHIND
+    ]
