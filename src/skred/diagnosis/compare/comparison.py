@@ -36,6 +36,7 @@ from skred.parallel.processes import worker_pool
 from skred.parallel.threads import side_by_side
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import can_join
+from skred.physics.mechanisms.spec import Shape
 
 FloatArray = NDArray[np.float64]
 ERROR_SHARES = {"robust": 0.55, "student": 0.15, "correlated": 0.15, "scaled": 0.15}
