@@ -10,6 +10,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from benchmarks.reference.coefficient import At, Curve, Reference, curve
+from benchmarks.reference.lattice import population_envelope
+from skred.diagnosis.evidence.extension import extended, setting_of, typical_speed
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.law import Law
 from skred.physics.mechanisms.placed import direction_of
@@ -62,13 +64,21 @@ class ReferenceFactor:
         return asdict(self)
 
 
+def nothing_added(problem: HierarchicalProblem, law: Law, seed: int) -> tuple[Reference, Setting]:
+    """The base law alone, and what candidates can refer to: its typical front, found without the diagnosis."""
+    plain = Reference(problem, law, None, seed)
+    at = plain.at(0.0)
+    envelope = population_envelope(at.found.draws, len(law.mechanisms))
+    best = [cloud.points[int(np.argmax(cloud.heights(envelope)))] for cloud in at.resolved.clouds]
+    speeds = extended(problem, law).speeds(np.array(best), np.empty(0))
+    return plain, setting_of(problem, law, typical_speed(speeds))
+
+
 def reference_factor(
-    problem: HierarchicalProblem,
-    law: Law,
+    plain: Reference,
     setting: Setting,
     mechanism: Mechanism,
     shapes: Sequence[Shape],
-    seed: int,
     *,
     n_live: int = 150,
 ) -> ReferenceFactor:
@@ -76,18 +86,19 @@ def reference_factor(
 
     Parameters
     ----------
+    plain : Reference
+        With nothing added.
     n_live : int
         Live points of the nested sampling that checks it; 0 for none.
     """
     started = time.process_time()
     added = mechanism.added
     assert added is not None
-    plain = Reference(problem, law, None, seed)
     nothing = plain.at(0.0)
     found: list[tuple[Reference, Curve]] = []
     for number, shape in enumerate(shapes):
         direction = direction_of(mechanism, setting, shape)
-        one = Reference(problem, law, direction, seed + 1000 * (number + 1))
+        one = Reference(plain.problem, plain.law, direction, plain.seed + 1000 * (number + 1))
         found.append((one, curve(one, nothing, added.scale_of(shape), added.either_sign)))
     factors = np.array([one.log_bayes_factor for _, one in found]) + np.log(shares(list(shapes)))
     total = float(np.logaddexp.reduce(factors))

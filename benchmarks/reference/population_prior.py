@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import betaln, ndtri
-from scipy.stats import beta
+from scipy.special import betaincinv, betaln, ndtri
 
 from skred.inference.hierarchical.population import LKJ_SHAPE
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
@@ -39,7 +38,7 @@ def from_cube(cube: FloatArray, log_scale: FloatArray) -> FloatArray:
     psi[..., n : 2 * n] = np.log(SPREAD_MEDIAN) + SPREAD_LOG_SD * ndtri(u[..., n : 2 * n])
     if n > 1:
         shapes = _shapes(n)
-        psi[..., 2 * n :] = np.arctanh(2.0 * beta.ppf(u[..., 2 * n :], shapes, shapes) - 1.0)
+        psi[..., 2 * n :] = np.arctanh(2.0 * betaincinv(shapes, shapes, u[..., 2 * n :]) - 1.0)
     return psi
 
 
