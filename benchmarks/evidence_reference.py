@@ -2,14 +2,14 @@
 
 ``python -m benchmarks.evidence_reference --n 150 --seed 1 --seconds 3000 [--also DIR]`` draws pairs of a
 campaign and a candidate, computes both numbers for each, and writes a table and
-``results/evidence_reference.json``. Each pair has a file of its own in ``--out``, and the same command goes on
-with a run that was ended. ``--pair K`` computes one pair. ``--engine-again`` keeps what the reference found
-and asks the diagnosis anew. Recordings of ``--also`` are named in the results and are not copied.
+``results/evidence_reference.json``. Each pair has a file of its own in ``--out``, and the same command goes
+on with a run that was ended. ``--pair K`` computes one pair. ``--engine-again`` keeps what the reference
+found and asks the diagnosis anew. Recordings of ``--also`` are named in the results and are not copied.
 
-The reference (`benchmarks.reference`): sums over lattices for each avalanche at each coefficient, laid where a
-search of a wide box finds its likelihood; the population by tempered population Monte Carlo; the coefficient on
-a grid to five prior scales that refines itself. It is computed a second time with finer lattices at the best
-coefficient, and every fourth time by nested sampling (dynesty) as well.
+The reference is `benchmarks.reference`. Each avalanche is a sum over a lattice at each coefficient, laid
+where a search of a wide box finds its likelihood. The population is integrated by tempered population Monte
+Carlo, the coefficient on a grid to five prior scales that refines itself. At the best coefficient all is
+computed a second time on finer lattices, and for every fourth pair by nested sampling (dynesty) too.
 """
 
 from __future__ import annotations
@@ -100,7 +100,9 @@ def main(
     also: Annotated[
         list[Path] | None, cyclopts.Parameter(help="Another campaign, or a folder of them.")
     ] = None,
-    engine_again: Annotated[bool, cyclopts.Parameter(help="Keep the reference's numbers.", negative="")] = False,
+    engine_again: Annotated[
+        bool, cyclopts.Parameter(help="Keep the reference's numbers.", negative="")
+    ] = False,
     only_table: Annotated[bool, cyclopts.Parameter(help="Compute nothing.", negative="")] = False,
     out: Path = ROOT / "skred-out" / "evidence_reference",
     result: Annotated[Path, cyclopts.Parameter(name="--json")] = RESULT,

@@ -18,8 +18,8 @@ from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Mechanism, Setting, Shape
 from skred.physics.mechanisms.stretches import shares
 
-_AGAIN_STEP = 0.6
-"""Step of the lattices of the second computation: more than twice the points on a plane."""
+_FINER = 0.65
+"""Factor on the steps of the lattices of the second computation: more than twice the points on a plane."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class ReferenceFactor:
 
 
 def nothing_added(problem: HierarchicalProblem, law: Law, seed: int) -> tuple[Reference, Setting]:
-    """The base law alone, and what candidates can refer to: its typical front, found without the diagnosis."""
+    """The base law alone, and what candidates can refer to; its typical front is the reference's own."""
     plain = Reference(problem, law, None, seed)
     at = plain.at(0.0)
     envelope = population_envelope(at.found.draws, len(law.mechanisms))
@@ -131,7 +131,7 @@ def reference_factor(
 def _again(plain: Reference, added: Reference, top: float, nothing: At, at_top: At) -> float:
     """Change of the evidence at the top, relative to nothing, when computed anew and finer."""
     parts = [
-        Reference(one.problem, one.law, one.direction, one.seed + 7, _AGAIN_STEP).at(at)
+        Reference(one.problem, one.law, one.direction, one.seed + 7, _FINER).at(at)
         for one, at in ((plain, 0.0), (added, top))
     ]
     second = parts[1].found.log_evidence - parts[0].found.log_evidence

@@ -27,8 +27,12 @@ _APART = 1.3
 """Largest difference between neighbours that count [nats]."""
 _MOST = 46
 _BETWEEN = 40
-_ROUGH_STEP, _ROUGH_DRAWS, _DRAWS = 1.3, 300.0, 1500.0
-"""Step of the lattices that are laid for any population; effective draws before, and at last."""
+_ROUGH_LATTICE = 1.3, 9.0
+"""Step and depth of the lattices that are laid while no population is known."""
+_STEPS = {1: 0.2, 2: 0.6, 3: 0.8, 4: 0.9}
+"""Steps of the lattices by their number of axes: on a line points cost nothing, and stops make kinks."""
+_ROUGH_DRAWS, _DRAWS = 300.0, 1500.0
+"""Effective draws of the population before, and at last."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,15 +54,15 @@ class Reference:
     law : Law
     direction : Direction or None
     seed : int
-    step : float
-        Of the lattices.
+    finer : float
+        Factor on the steps of the lattices.
     """
 
     problem: HierarchicalProblem
     law: Law
     direction: Direction | None
     seed: int
-    step: float = 0.9
+    finer: float = 1.0
     known: dict[float, At] = field(default_factory=dict)
 
     @property
@@ -76,8 +80,7 @@ class Reference:
     def at(self, coefficient: float, hopeless_below: float = -math.inf) -> At:
         """At one coefficient; not finely if that is hopeless."""
         if coefficient not in self.known or (
-            not self.known[coefficient].fine
-            and self.known[coefficient].found.log_evidence > hopeless_below
+            not self.known[coefficient].fine and self.known[coefficient].found.log_evidence > hopeless_below
         ):
             self.known[coefficient] = self._computed(coefficient, hopeless_below)
         return self.known[coefficient]
@@ -88,14 +91,15 @@ class Reference:
         envelope = wide_envelope(log_scale)
         points, likelihoods = search(recorded, log_scale, envelope, rng)
         clouds = [Cloud(own, height) for own, height in zip(points, likelihoods, strict=True)]
-        resolved = resolve(recorded, clouds, envelope, narrow_precision(None, n), rng, _ROUGH_STEP)
+        resolved = resolve(recorded, clouds, envelope, narrow_precision(None, n), rng, *_ROUGH_LATTICE)
         found = integrate_population(resolved.nodes, log_scale, rng, wanted=_ROUGH_DRAWS)
         if found.log_evidence < hopeless_below:
             return At(found, resolved, False)
+        step = self.finer * _STEPS[n + int(recorded.loose.any())]
         for wanted in (_ROUGH_DRAWS, _DRAWS):
             # Twice: the first lattice was laid for any population, the second may have moved it.
             envelope, narrow = population_envelope(found.draws, n), narrow_precision(found.draws, n)
-            resolved = resolve(recorded, resolved.clouds, envelope, narrow, rng, self.step)
+            resolved = resolve(recorded, resolved.clouds, envelope, narrow, rng, step)
             found = integrate_population(resolved.nodes, log_scale, rng, found.draws, wanted)
         return At(found, resolved, True)
 

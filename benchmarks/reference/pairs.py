@@ -109,7 +109,9 @@ def _trial(rng: np.random.Generator, base: str) -> Trial:
         seed, kind = int(rng.integers(10_000_000, 20_000_000)), ("sparse", "dense")[int(rng.integers(2))]
         hidden, snr = str(rng.choice(list(HIDDEN), p=list(HIDDEN.values()))), float(rng.uniform(*SNR))
         try:
-            return draw_trial(seed, kind="dense" if kind == "dense" else "sparse", hidden=hidden, snr=snr, base=base)
+            return draw_trial(
+                seed, kind="dense" if kind == "dense" else "sparse", hidden=hidden, snr=snr, base=base
+            )
         except RuntimeError:
             continue
 
@@ -189,5 +191,3 @@ def campaigns_in(folders: Sequence[Path]) -> list[Path]:
         own = [folder] if (folder / "campaign.toml").is_file() else sorted(folder.iterdir())
         found += [one for one in own if (one / "campaign.toml").is_file()]
     return found
-
-
