@@ -9,7 +9,6 @@ from skred.diagnosis.compare.comparison import with_errors
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import Place, candidates_of, leading
 from skred.diagnosis.compare.screening import curve, screening_budget
-from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.diagnose import as_diagnosed
 from skred.diagnosis.evidence.coefficient import Base, curve_near, fit_base
 from skred.diagnosis.evidence.conditional_map import Population
@@ -39,9 +38,7 @@ def engine_log_bayes_factor(base: Base, mechanism: Mechanism, shapes: Sequence[S
     comparison does; no shape is split into others.
     """
     budget = screening_budget(base)
-    score_test = ScoreTest(base.problem, base.law, base.setting)
-    linear = score_test.strengths_found(score_test.scores(base.rows, base.fit.points, base.population))
-    screened = [curve(base, mechanism, one, budget, linear.get((mechanism.id, one))) for one in shapes]
+    screened = [curve(base, mechanism, one, budget) for one in shapes]
     places: dict[int, Place] = {}
     while todo := [k for k in leading(screened, places) if k not in places]:
         for k in todo:
