@@ -251,7 +251,10 @@ def _influence(found: Influence | None) -> dict[str, Any] | None:
         "answer": found.answer,
         "log_bayes_factor": found.log_bayes_factor,
         "needed": found.needed,
-        "events": dict(zip(found.events, found.without_each.tolist(), strict=True)),
+        "events": [
+            {"event": event, "log_bayes_factor": factor}
+            for event, factor in zip(found.events, found.without_each.tolist(), strict=True)
+        ],
         "carried_by": list(found.carried_by),
         "without_them": found.without_them,
         "without_a_third": found.without_a_third,

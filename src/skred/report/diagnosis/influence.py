@@ -33,8 +33,9 @@ def influence_figure(document: doc.Document) -> Figure:
     readings = doc.listed(found, "readings")
     panels = figure.subplots(1, 2, sharey=True, width_ratios=[3, 1.2]).ravel()
     carried = set(found["carried_by"])
-    events = sorted(found["events"], key=lambda event: float(found["events"][event]))
-    _points(panels[0], found, events, [float(found["events"][event]) for event in events], carried)
+    without = {one["event"]: float(one["log_bayes_factor"]) for one in found["events"]}
+    events = sorted(without, key=lambda event: without[event])
+    _points(panels[0], found, events, [without[event] for event in events], carried)
     panels[0].set_xlabel(
         "without avalanche" if len(events) <= _MOST_NAMED else f"without each of {len(events)}"
     )
