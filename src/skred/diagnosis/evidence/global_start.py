@@ -102,13 +102,14 @@ class _Climb:
         """Log posterior density, each event's integral by the Laplace approximation."""
         precision = population.precision[likelihood.rows.group]
         integrals = log_joint(likelihood, modes.points, population)
-        integrals -= 0.5 * np.linalg.slogdet(modes.information + precision)[1]
-        integrals += 0.5 * np.linalg.slogdet(precision)[1]
+        with np.errstate(invalid="ignore"):  # a climb that has left what numbers can hold is not taken
+            integrals -= 0.5 * np.linalg.slogdet(modes.information + precision)[1]
+            integrals += 0.5 * np.linalg.slogdet(precision)[1]
         spreads = 0.5 * np.log(np.einsum("gii->gi", population.covariance))
         height = integrals.reshape(len(strengths), -1).sum(axis=1)
         height -= 0.5 * (((spreads - math.log(SPREAD_MEDIAN)) / SPREAD_LOG_SD) ** 2).sum(axis=1)
         height -= 0.5 * (((population.mean - self.prior.mean) / self.prior.sd) ** 2).sum(axis=1)
-        found: FloatArray = height - 0.5 * self.precision * strengths**2
+        found: FloatArray = np.nan_to_num(height - 0.5 * self.precision * strengths**2, nan=-np.inf)
         return found
 
     def moved(self, state: _State) -> _State:
@@ -184,7 +185,7 @@ def global_starts(
     nil = float(state.height[starts == 0.0][0])
     for _ in range(_ROUNDS):
         before, state = state, climb.moved(state)
-        if (state.height - before.height < _SETTLED).all():
+        if (state.height <= before.height + _SETTLED).all():
             break
     all_rows = rows.repeated(n_groups)
     sd = joint_step(state.modes, all_rows, state.population, climb.prior, state.strengths, climb.precision).sd
