@@ -23,7 +23,7 @@ from benchmarks.reference.population_prior import (
 )
 from benchmarks.reference.search import search, wide_envelope
 from benchmarks.reference.table import summary, table
-from skred.diagnosis.evidence import marginal
+from skred.diagnosis.evidence import marginal, population_target
 
 LOG_SCALE = np.log([0.5, 0.01, 3.0])
 
@@ -42,8 +42,8 @@ def test_the_prior_transform_has_the_density(n: int) -> None:
 def test_the_prior_is_that_of_the_diagnosis(n: int) -> None:
     cube = np.random.default_rng(n).uniform(0.02, 0.98, (20, n_coordinates(n)))
     psi = from_cube(cube, LOG_SCALE[:n])
-    theirs = [marginal._log_prior(one, n, LOG_SCALE[:n]) for one in psi]
-    constant = marginal._log_correlation_constant(n)
+    theirs = [population_target.log_prior(one, n, LOG_SCALE[:n]) for one in psi]
+    constant = population_target.log_correlation_constant(n)
     np.testing.assert_allclose(log_prior(psi, LOG_SCALE[:n]), np.array(theirs) + constant, rtol=1e-9)
     np.testing.assert_allclose(covariance_of(psi, n), marginal.population_at(psi, n).covariance, rtol=1e-9)
 
