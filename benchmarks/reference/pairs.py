@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -168,14 +168,7 @@ def _apart(shape: Shape, truth: dict[str, Any]) -> float:
 
 def shape_as_dict(shape: Shape) -> dict[str, Any]:
     """A shape as plain data."""
-    return {
-        "s_from_m": shape.s_from_m,
-        "s_to_m": shape.s_to_m,
-        "covariate": shape.covariate,
-        "sensor": shape.sensor,
-        "constants": [list(one) for one in shape.constants],
-        "prior_scales": shape.prior_scales,
-    }
+    return asdict(shape)
 
 
 def shape_from_dict(content: dict[str, Any]) -> Shape:

@@ -28,6 +28,7 @@ from skred.diagnosis.evidence.conditional_map import (
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.linear_mixed_model import (
     MeanPrior,
+    deviations,
     joint_step,
     mean_prior,
     most_probable_covariance,
@@ -116,7 +117,7 @@ class _Climb:
         """One step of each climb, or a part of it, as far as it gains."""
         n_groups = len(state.strengths)
         rows = self.rows.repeated(n_groups)
-        population = most_probable_covariance(state.modes, rows, state.population)
+        population = self._with_spreads(state, rows)
         step = joint_step(state.modes, rows, population, self.prior, state.strengths, self.precision)
         if not self.either_sign:
             step = step.held(np.flatnonzero(state.strengths + step.strength < 0.0), -state.strengths)
@@ -135,6 +136,13 @@ class _Climb:
             if not open_.any():
                 break
         return state
+
+    def _with_spreads(self, state: _State, rows: Rows) -> Population:
+        """The populations with the covariances that the events ask for."""
+        mean, n = state.population.mean, state.population.mean.shape[1]
+        cover = np.linalg.inv(state.modes.information + state.population.precision[rows.group])
+        deviation = deviations(state.modes.points, rows, state.population)
+        return Population(mean, most_probable_covariance(rows, deviation[:, :n], cover[:, :n, :n]))
 
 
 def _chosen(one: _State, other: _State, taken: NDArray[np.bool_]) -> _State:

@@ -277,7 +277,7 @@ def fit_population(
         lost = np.einsum("gij,gjk,gkl->gil", precision, _by_group(rows, cover[:, :n, :n]), precision)
         total = per_group * precision - lost + np.diag(prior.sd**-2.0)
         step = np.clip(np.linalg.solve(total, score[:, :, None])[:, :, 0], -0.5, 0.5)
-        covariance = most_probable_covariance(modes, rows, population).covariance
+        covariance = most_probable_covariance(rows, deviation, cover[:, :n, :n])
         change = max(
             float(np.abs(step / np.sqrt(_diagonal(covariance))).max()),
             float(np.abs(np.log(_diagonal(covariance) / _diagonal(population.covariance))).max()),
@@ -288,13 +288,18 @@ def fit_population(
     return population, event_modes(likelihood, points, population).points
 
 
-def most_probable_covariance(modes: Modes, rows: Rows, population: Population) -> Population:
-    """The population with the covariance that the events' modes and what is left open of them ask for."""
-    n, n_events = population.mean.shape[1], len(rows.event) // rows.n_groups
-    cover = np.linalg.inv(modes.information + population.precision[rows.group])
-    deviation = deviations(modes.points, rows, population)[:, :n]
-    moment = _by_group(rows, np.einsum("ri,rj->rij", deviation, deviation) + cover[:, :n, :n])
-    return Population(population.mean, _most_probable_covariance(moment, n_events))
+def most_probable_covariance(rows: Rows, deviation: FloatArray, cover: FloatArray) -> FloatArray:
+    """Covariance of each group's population, (n_groups, n, n), that its events ask for.
+
+    Parameters
+    ----------
+    deviation : (n_rows, n) array
+        Of the events' modes from the population's mean.
+    cover : (n_rows, n, n) array
+        What is left open of them.
+    """
+    moment = _by_group(rows, np.einsum("ri,rj->rij", deviation, deviation) + cover)
+    return _most_probable_covariance(moment, len(rows.event) // rows.n_groups)
 
 
 def _most_probable_covariance(moment: FloatArray, n_events: int) -> FloatArray:

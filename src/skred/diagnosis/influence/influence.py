@@ -2,7 +2,7 @@
 
 The population and every avalanche are refitted to what is left, at all strengths of the named mechanism's
 leading shapes, or with the whole profile. Nothing is chosen again: the question is whether what was answered
-would still stand.
+would still stand. Of a speed that is left out it stays known that the front came there.
 """
 
 from __future__ import annotations

@@ -43,8 +43,8 @@ _NO_LIMIT = 20.0
 def verdict(found: Outcome) -> dict[str, Any]:
     """The verdict of a diagnosis, as `verdict.json` holds it."""
     document = _told_nothing(found) if isinstance(found, NotDiagnosed) else _told(found)
-    document |= _more(found)
-    return document | {"statement": statement(found, document)}
+    document["statement"] = statement(found, document)
+    return document | _more(found)
 
 
 def _told_nothing(found: NotDiagnosed) -> dict[str, Any]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from skred.diagnosis.influence.influence import Influence
+from skred.diagnosis.influence.influence import Influence, ReadingsLeftOut
 from skred.diagnosis.words import enumerated
 
 _KINDS = {"zeros": "readings of zero", "near a stop": "speeds beside the same avalanche's stop"}
@@ -23,25 +21,23 @@ def carried(found: Influence | None) -> str:
     )
 
 
-def hangs_on(document: dict[str, Any]) -> list[str]:
+def hangs_on(found: Influence | None) -> list[str]:
     """That no few avalanches carry the answer; and which kinds of readings it would not be given without."""
-    found = document.get("influence")
     if found is None:
         return []
     sentences = []
-    if not found["carried_by"] and found["without_a_third"] is not None:
-        evidence = f"{found['without_a_third']:.1f} nats ({found['log_bayes_factor']:.1f} with all)"
+    if found.without_a_third is not None:
+        evidence = f"{found.without_a_third:.1f} nats ({found.log_bayes_factor:.1f} with all)"
         sentences.append(
             "It does not hang on a few avalanches: without the third that carry most of it, its log Bayes"
             f" factor is still {evidence}."
         )
-    lost = [_words(one) for one in found["readings"] if one["log_bayes_factor"] < found["needed"]]
+    lost = [_words(one) for one in found.readings if one.log_bayes_factor < found.needed]
     if lost:
         sentences.append(f"It would not be given without {' or without '.join(lost)}.")
     return sentences
 
 
-def _words(readings: dict[str, Any]) -> str:
-    """Some of the readings."""
-    what = _KINDS.get(readings["kind"], f"the readings of {readings['sensor']}")
-    return f"{what} ({readings['n']})"
+def _words(readings: ReadingsLeftOut) -> str:
+    """Some of the readings, and how many they are."""
+    return f"{_KINDS.get(readings.kind, f'the readings of {readings.sensor}')} ({readings.n})"

@@ -33,7 +33,7 @@ def statement(found: Outcome, document: dict[str, Any]) -> str:
         "nothing_missing": _nothing,
         "cannot_tell": _cannot,
     }[found.decision.verdict](found, document)
-    return " ".join(part for part in (_caution(found), *parts, *hangs_on(document)) if part)
+    return " ".join(part for part in (_caution(found), *parts, *hangs_on(found.influence)) if part)
 
 
 def _caution(found: Diagnosis) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from skred.report.diagnosis.words import AFTER, MISMATCH
+from skred.report.diagnosis.words import AFTER, MISMATCH, in_words
 from skred.report.shared import document as doc
-from skred.report.shared.labels import figure_text, name_text
+from skred.report.shared.labels import figure_text
 from skred.report.shared.style import GREY, legend_below, new_figure, styled
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ def has_influence(document: doc.Document) -> bool:
 def influence_figure(document: doc.Document) -> Figure:
     """Log Bayes factor of the answer without each avalanche, and without kinds of readings."""
     found = doc.get(document, "influence")
-    name = figure_text(name_text(found["answer"]), 40)
+    name = figure_text(in_words([found["answer"]])[0], 40)
     figure = new_figure(3.6, f"What the answer hangs on: {name}, again without some of the recordings")
     readings = doc.listed(found, "readings")
     panels = figure.subplots(1, 2, sharey=True, width_ratios=[3, 1.2]).ravel()
@@ -56,7 +57,7 @@ def _points(
     found: dict[str, Any],
     names: list[str],
     values: list[float],
-    carried: frozenset[str] | set[str] = frozenset(),
+    carried: Set[str] = frozenset(),
 ) -> None:
     """One point for each part that is left out, with the evidence of all and what is needed as lines."""
     at = np.arange(len(names))
