@@ -9,7 +9,7 @@ log score.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from skred.campaign import Campaign
 from skred.diagnosis.compare.decision import blamed
-from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds, probabilities
+from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds, probabilities, same_term
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group, Mechanism
@@ -28,8 +28,6 @@ Stretch = tuple[float, float]
 Verdict = Literal["missing_physics", "nothing_missing", "instrument", "unexplained"]
 VERDICT_OF: dict[str, Verdict] = {Group.PHYSICS: "missing_physics", Group.INSTRUMENT: "instrument"}
 _MOST_SPARSE_SENSORS = 10
-_FIRST_OF_A_TIE = "segment_drag"
-"""Named before `entrainment`, which is the same term."""
 
 
 @dataclass(frozen=True)
@@ -95,22 +93,14 @@ def is_dense(campaign: Campaign) -> bool:
 def possible(base_law: str) -> dict[str, Mechanism]:
     """What the base law does not have already, by id."""
     base = tuple(mechanism.id for mechanism in load_law(base_law).mechanisms)
-    found = {
+    return {
         name: one for name, one in mechanisms().items() if one.added is not None and one.added.joins(base)
     }
-    return dict(sorted(found.items(), key=lambda item: item[0] != _FIRST_OF_A_TIE))
 
 
 def group_of(name: str) -> str:
     """What an id blames; `nothing` and `unlisted` are groups of their own."""
     return name if name in (NOTHING, UNLISTED) else str(mechanisms()[name].group)
-
-
-def with_ties(factors: Mapping[str, float], ids: Iterable[str]) -> dict[str, float]:
-    """Evidence of all ids: what is the same term as another has the other's."""
-    listed = mechanisms()
-    found = {name: factors.get(name, factors.get(listed[name].same_term_as, -np.inf)) for name in ids}
-    return {name: value for name, value in found.items() if np.isfinite(value)}
 
 
 def weighed(
@@ -134,7 +124,7 @@ def weighed(
     stretches : mapping
         Where each local id has most of its evidence.
     """
-    compared = with_ties(factors, possible(base_law))
+    compared = {name: value for name, value in factors.items() if name in possible(base_law)}
     odds = prior_odds([mechanisms()[name] for name in compared])
     if UNLISTED in factors:
         compared[UNLISTED] = factors[UNLISTED]
@@ -170,14 +160,14 @@ def nearest(
     Parameters
     ----------
     similarity : mapping
-        Of each id; the largest wins, ids that are the same term are tied.
+        Of each id; the largest wins, and what is the same term by another name is tied.
     stretch : (float, float) or None
         Where.
     """
-    compared = with_ties(similarity, possible(base_law))
+    compared = {name: value for name, value in similarity.items() if name in possible(base_law)}
     if score <= limit or not compared:
         leading = max(compared, key=lambda name: compared[name], default=None)
         return Answer("nothing_missing", None, (), None, None, score, leading)
     name = max(compared, key=lambda one: compared[one])
-    tied = tuple(one for one in compared if one != name and compared[one] == compared[name])
+    tied = tuple(one.id for one in same_term(name))
     return Answer(VERDICT_OF[group_of(name)], name, tied, None, stretch, score, name)

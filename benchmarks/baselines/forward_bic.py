@@ -112,6 +112,5 @@ class ForwardBic:
                 value = gain(fit, one) - 0.5 * free_numbers(one) * np.log(n_readings)
                 if value > factors.get(name, -np.inf):
                     factors[name], stretches[name] = float(value), stretch_of(one.shape)
-        stretches["entrainment"] = stretches.get("segment_drag")
         limit = LIMITS["dense" if is_dense(campaign) else "sparse"]
         return weighed(factors, base_law, limit, TEMPERATURE, stretches)

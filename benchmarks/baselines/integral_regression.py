@@ -212,7 +212,7 @@ def _without_outliers(made: Regression, fits: Fits) -> Regression:
 
 def log_factors(made: Regression) -> tuple[list[PlacedMechanism], FloatArray]:
     """Log Bayes factor of every candidate of every shape."""
-    todo = placed_mechanisms(made.setting, ties=False)
+    todo = placed_mechanisms(made.setting)
     n_base = made.x.shape[2] - 1
     of = products(made.x, made.y, made.columns([one.direction for one in todo]))
     scales = np.array([one.mechanism.added.scale for one in todo])  # type: ignore[union-attr]
@@ -240,6 +240,5 @@ class IntegralRegression:
             factors[name] = float(logsumexp(found[own]) - np.log(len(own)))
             shape = todo[own[np.argmax(found[own])]].shape
             stretches[name] = stretch_of(shape)
-        stretches["entrainment"] = stretches.get("segment_drag")
         kind = "dense" if is_dense(campaign) else "sparse"
         return weighed(factors, base_law, LIMITS[kind], TEMPERATURES[kind], stretches)

@@ -29,7 +29,7 @@ from skred.physics.law import Law
 from skred.physics.laws import load_law
 from skred.physics.mechanisms.spec import Direction
 
-from .common import Answer, Stretch, decided, is_dense, possible, with_ties
+from .common import Answer, Stretch, decided, is_dense, possible
 from .profiles import Balance, cell_of, energy_balance, responses, starting_coefficients
 from .quick_fit import stretch_of
 
@@ -182,7 +182,7 @@ class EnsembleSindy:
         problem, law = hierarchical_problem(campaign), load_law(base_law)
         balance = energy_balance(problem, None, law, starting_coefficients(problem, law))
         rows = Rows(problem, balance)
-        todo = placed_mechanisms(setting_of(problem, law), ties=False)
+        todo = placed_mechanisms(setting_of(problem, law))
         base, added = columns(rows, problem, law, [one.direction for one in todo])
         weight = rows.weight[:, None]
         left = taken_out(rows, base * weight, np.column_stack([rows.slope[:, None], added]) * weight)
@@ -206,9 +206,8 @@ class EnsembleSindy:
             mean[name] = float(size[:, own].mean(axis=0).max())
             share[name] = float(np.mean((size[:, own] > 0.0).any(axis=1))) * mean[name]
             stretches[name] = stretch_of(terms[own[np.argmax(size[:, own].mean(axis=0))]].shape)
-        stretches["entrainment"] = stretches.get("segment_drag")
         limit = LIMITS["dense" if is_dense(campaign) else "sparse"]
-        listed = with_ties(share, possible(base_law))
+        listed = {name: value for name, value in share.items() if name in possible(base_law)}
         odds = prior_odds(possible(base_law).values())
         # At the limit, anything is as likely as nothing.
         anything = score**2 / (score**2 + max(limit, 1e-6) ** 2)

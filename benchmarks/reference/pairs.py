@@ -137,7 +137,7 @@ def draw_candidate(drawn: Drawn, setting: Setting) -> tuple[Mechanism, list[Shap
     rng = drawn.rng
     shapes: dict[str, list[Shape]] = {}
     mechanisms: dict[str, Mechanism] = {}
-    for placed in placed_mechanisms(setting, ties=False):
+    for placed in placed_mechanisms(setting):
         shapes.setdefault(placed.mechanism.id, []).append(placed.shape)
         mechanisms[placed.mechanism.id] = placed.mechanism
     truth = next((one for one in drawn.hidden if one["id"] in shapes), None)

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.commit import commit
-from skred.diagnosis.compare.decision import NOTHING_ALONE
+from skred.diagnosis.check.bootstrap_test import LIMIT
 from skred.diagnosis.detect.score_test import PlacedMechanism, ScoreTest
 from skred.diagnosis.evidence.linear_mixed_model import Scores
 from skred.physics.mechanisms.spec import Group
@@ -81,7 +81,7 @@ def _alarms(
     values, axes = np.linalg.eigh(information)
     root = axes * np.sqrt(np.maximum(values, 0.0))
     scores = rng.standard_normal((DRAWS, len(information))) @ root.T
-    reached = np.zeros(DRAWS, dtype=bool)
+    clean, reached = scores.copy(), np.zeros(DRAWS, dtype=bool)
     for k, snr in enumerate(_evenly()):
         direction = _one_of(score_test, information, allowed, float(snr), rng)
         if direction is None:
@@ -90,8 +90,8 @@ def _alarms(
         scores[k] += information[:, direction] * snr / math.sqrt(information[direction, direction])
     every = np.broadcast_to(information, (DRAWS, *information.shape))
     raw = np.broadcast_to(np.diag(information), (DRAWS, len(information)))
-    log_odds = score_test.statistic(Scores(scores, every, raw))
-    alarm = (log_odds > math.log(1.0 / NOTHING_ALONE - 1.0)).tolist()
+    log_odds, without = (score_test.statistic(Scores(one, every, raw)) for one in (scores, clean))
+    alarm = (log_odds > np.quantile(without, 1.0 - LIMIT)).tolist()
     return [one if there else None for one, there in zip(alarm, reached, strict=True)]
 
 

@@ -33,11 +33,12 @@ from skred.diagnosis.check.bootstrap_test import bootstrap_test
 from skred.diagnosis.compare.comparison import compare
 from skred.diagnosis.compare.decision import alarmed
 from skred.diagnosis.detect.score_test import ScoreTest
+from skred.diagnosis.effort import REPLICAS
 from skred.diagnosis.evidence.prior_odds import NOTHING
 from skred.simulator.detectability import over_noise
 from skred.simulator.draw import Trial, draw_trial
 from studies.files import RESULTS, read, write
-from studies.thresholds.compared_again import REPLICAS, base_and_draws
+from studies.thresholds.compared_again import base_and_draws
 
 app = cyclopts.App(help=__doc__)
 RESULT = RESULTS / "masked_open.json"
@@ -130,11 +131,17 @@ def alarm_of(campaign: Campaign, law_id: str) -> dict[str, Any]:
             ScoreTest(base.problem, base.law, base.setting),
             (base.population, base.fit.points),
         )
-        p_value = bootstrap_test(score_test, base.rows, start, draws, 0, REPLICAS).p_value
-        probability = compare(base).probability
+        comparison = compare(base)
+        log_odds, probability = comparison.log_odds, comparison.probability
+        check = bootstrap_test(score_test, base.rows, start, draws, 0, REPLICAS, log_odds)
     except np.linalg.LinAlgError as error:
         return {"alarm": False, "failed": repr(error)}
-    return {"alarm": alarmed(probability, p_value), "p_value": p_value, "nothing": probability[NOTHING]}
+    return {
+        "alarm": alarmed(probability, check.p_value),
+        "p_value": check.p_value,
+        "linear_p_value": check.p_value_in_linear_model,
+        "nothing": probability[NOTHING],
+    }
 
 
 def share_less(found: list[dict[str, Any]], which: str, edges: tuple[float, ...]) -> str:

@@ -30,7 +30,7 @@ from skred.diagnosis.compare.comparison import Comparison, compare
 from skred.diagnosis.diagnose import as_diagnosed
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS
-from skred.diagnosis.effort import SAMPLING
+from skred.diagnosis.effort import REPLICAS, SAMPLING
 from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.population_draws import population_draws, typical
 from skred.diagnosis.evidence.prior_odds import NOTHING, POWER, UNLISTED, prior_odds, stated
@@ -44,7 +44,6 @@ from studies.files import RESULTS, read, write
 from studies.proof.record import diagnosed, opened_batches, sealed_of
 
 FloatArray = NDArray[np.float64]
-REPLICAS = 120
 CLASSES = ("listed", "masked", "two", "instrument", "unlisted")
 app = cyclopts.App(help=__doc__)
 

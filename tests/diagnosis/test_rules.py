@@ -23,18 +23,31 @@ def test_prior_odds_of_the_whole_library() -> None:
     odds = prior_odds(ALL)
     assert INSTRUMENT == ["release_offset", "sensor_bias"] and len(PHYSICS) >= 8
     assert odds["nothing"] == pytest.approx(0.5) and odds["unlisted"] == pytest.approx(0.05)
-    for name in PHYSICS:
-        assert odds[name] == pytest.approx(0.35 / len(PHYSICS))
+    shares = dict.fromkeys(PHYSICS, 1.0) | {"segment_drag": 1.5, "entrainment": 0.5}  # one term, two names
+    for name, share in shares.items():
+        assert odds[name] == pytest.approx(0.35 * share / len(PHYSICS))
     assert odds["sensor_bias"] == odds["release_offset"] == pytest.approx(0.05)
     assert sum(odds.values()) == pytest.approx(1.0)
 
 
 def test_prior_odds_of_groups_without_members() -> None:
-    odds = prior_odds([mechanisms()["obstacle"], mechanisms()["segment_drag"]])
+    odds = prior_odds([mechanisms()["obstacle"], mechanisms()["viscous_drag"]])
     assert odds == pytest.approx(
-        {"nothing": 0.5 / 0.9, "unlisted": 0.05 / 0.9, "obstacle": 0.175 / 0.9, "segment_drag": 0.175 / 0.9}
+        {"nothing": 0.5 / 0.9, "unlisted": 0.05 / 0.9, "obstacle": 0.175 / 0.9, "viscous_drag": 0.175 / 0.9}
     )
     assert prior_odds([]) == pytest.approx({"nothing": 10.0 / 11.0, "unlisted": 1.0 / 11.0})
+
+
+def test_two_names_of_one_term_are_one_candidate_with_both_priors() -> None:
+    alone = prior_odds([mechanisms()["obstacle"], mechanisms()["segment_drag"]])
+    assert alone["segment_drag"] == pytest.approx(2.0 * alone["obstacle"])  # entrainment's share is its own
+    assert "entrainment" not in alone
+    names = decide({"nothing": 0.01, "unlisted": 0.01, "segment_drag": 0.95, "obstacle": 0.03}, 0.001, True)
+    assert names == Decision("missing_physics", ("segment_drag", "entrainment"))
+    both = {"nothing": 0.01, "unlisted": 0.01, "segment_drag": 0.5, "obstacle": 0.3, "entrainment": 0.18}
+    assert decide(both, 0.001, True).names == ("segment_drag", "obstacle", "entrainment")
+    own = {"nothing": 0.01, "unlisted": 0.01, "segment_drag": 0.01, "obstacle": 0.01, "entrainment": 0.96}
+    assert decide(own, 0.001, True).names == ("entrainment",)  # in its own form it is another term
 
 
 def test_probabilities_by_hand() -> None:
@@ -78,7 +91,7 @@ def test_silence() -> None:
 
 
 def test_short_of_an_alarm_nothing_is_not_claimed() -> None:
-    """A comparison at three to one is no alarm, and no reason to claim nothing; nor is a check."""
+    """Odds of three to one that clean campaigns have too are no alarm, and no reason to claim nothing."""
     loud = shares(0.25, 0.05, obstacle=0.65, sensor_bias=0.05)
     assert decide(loud, p_value=0.3, can_tell=True) == Decision("cannot_tell", ())
     even = shares(0.5, 0.0, obstacle=0.5)
@@ -145,17 +158,17 @@ def test_ties_across_groups() -> None:
     assert not decide(shares(0.2, 0.3, sensor_bias=0.5), 0.9, True).disputed
 
 
-def test_no_instrument_in_the_race() -> None:
+def test_no_instrument_compared() -> None:
     assert decide(shares(0.1, 0.05, obstacle=0.85), 0.005, True).names == ("obstacle",)
     assert decide(shares(0.1, 0.2, obstacle=0.7), 0.005, True).names == ("obstacle", "unlisted")
     assert decide(shares(0.1, 0.9), 0.005, True).verdict == "unexplained"
 
 
-def test_the_race_alone_and_the_check_alone() -> None:
-    """A comparison that leaves nothing less than 15 % is an alarm; a check that fires against it is none."""
-    sure = shares(0.14, 0.01, obstacle=0.85)
-    assert decide(sure, p_value=0.9, can_tell=True).names == ("obstacle",)
-    assert decide(shares(0.16, 0.0, obstacle=0.84), 0.011, True).verdict == "cannot_tell"
+def test_the_alarm_is_one_limit() -> None:
+    """What one in a hundred clean campaigns has is an alarm, unless nothing is at least as probable."""
+    sure = shares(0.01, 0.01, obstacle=0.98)
+    assert decide(sure, p_value=0.011, can_tell=True).verdict == "cannot_tell"
+    assert decide(sure, p_value=0.01, can_tell=True).names == ("obstacle",)
     assert decide(shares(0.51, 0.0, obstacle=0.49), 0.005, True).verdict == "cannot_tell"
     assert decide(shares(0.49, 0.0, obstacle=0.51), 0.005, True).names == ("obstacle",)
 

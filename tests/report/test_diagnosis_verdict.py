@@ -8,7 +8,7 @@ import pytest
 from diagnosis_report_cases import diagnosis, document_of, with_finding
 from test_report_html import Page
 
-from skred.diagnosis.compare.decision import alarm_by, alarmed
+from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.outcome import NotDiagnosed
 from skred.diagnosis.verdict.document import verdict
@@ -124,19 +124,14 @@ def test_a_sensor_that_raises_nothing_is_not_named():
 
 
 @pytest.mark.parametrize(
-    ("p_value", "nothing", "by"),
-    [
-        (0.005, 0.1, "both"),
-        (0.005, 0.3, "check"),
-        (0.3, 0.1, "evidence"),
-        (0.3, 0.3, None),
-        (0.005, 0.6, None),
-    ],
+    ("log_odds", "linear", "by"),
+    [(30.0, 30.0, "both"), (30.0, -2.0, "evidence"), (-2.0, 30.0, None), (-2.0, -2.0, None)],
 )
-def test_what_raised_the_alarm(p_value, nothing, by):
-    probability = {"nothing": nothing, "unlisted": 1.0 - nothing}
-    assert alarm_by(probability, p_value) == by
-    assert alarmed(probability, p_value) is (by is not None)
+def test_what_raised_the_alarm(log_odds, linear, by):
+    """The odds of the comparison do, or nothing does; it is told whether the linear model would have."""
+    found = diagnosis("tie")
+    check = BootstrapTest(log_odds, np.linspace(-1.0, 2.0, 400), linear)
+    assert replace(found, check=check).alarm_by == by
 
 
 def test_the_verdict_says_what_raised_the_alarm():

@@ -88,12 +88,12 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
     clock.stage("identify", "what these recordings can tell")
     table = identify(score_test, base.rows, base.fit.points, base.population)
 
-    clock.stage("check", "is anything wrong: clean campaigns simulated and refitted")
-    start = (base.population, base.fit.points)
-    check = bootstrap_test(score_test, base.rows, start, draws, run.seed, effort.replicas)
-
-    clock.stage("comparison", "what is missing: every candidate refitted")
+    clock.stage("comparison", "what could be missing: every candidate refitted")
     comparison = compare(base)
+
+    clock.stage("check", "is anything wrong: clean campaigns simulated and refitted")
+    start, odds = (base.population, base.fit.points), comparison.log_odds
+    check = bootstrap_test(score_test, base.rows, start, draws, run.seed, effort.replicas, odds)
     decision = decide(comparison.probability, check.p_value, table.can_tell)
     location = location_of(comparison, decision)
 
@@ -110,7 +110,7 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
     hangs_on = None
     if decision.answer is not None:
         clock.stage("influence", "what the answer hangs on: without each avalanche, each kind of reading")
-        hangs_on = influence(comparison, decision.answer)
+        hangs_on = influence(comparison, decision.answer, max(check.critical, 0.0))
     clock.end()
     return Diagnosis(
         problem, law, calibration, score_test, table, check, comparison, decision, location, finding, before,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from skred.diagnosis.augment.step import Left, Step
-from skred.diagnosis.check.bootstrap_test import BootstrapTest
+from skred.diagnosis.check.bootstrap_test import LIMIT, BootstrapTest
 from skred.diagnosis.compare.comparison import Comparison
-from skred.diagnosis.compare.decision import Decision, alarm_by
+from skred.diagnosis.compare.decision import Decision, alarmed
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.detect.score_test import ScoreTest
@@ -161,8 +161,13 @@ class Diagnosis:
 
     @property
     def alarm_by(self) -> str | None:
-        """What raised the alarm: ``check``, ``evidence``, ``both``, or None where there is no alarm."""
-        return alarm_by(self.comparison.probability, self.check.p_value)
+        """What raised the alarm; None where there is none.
+
+        ``both`` where the linear model would have raised it too, ``evidence`` where it took the comparison.
+        """
+        if not alarmed(self.comparison.probability, self.check.p_value):
+            return None
+        return "both" if self.check.p_value_in_linear_model <= LIMIT else "evidence"
 
     @property
     def reason(self) -> str:

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from skred.diagnosis.augment.augmented import augmented_problem
-from skred.diagnosis.augment.check_again import check_again
+from skred.diagnosis.augment.check_again import Again, check_again
 from skred.diagnosis.augment.reference import Reference
 from skred.diagnosis.augment.step import Augmented, Left, NotAugmented, Step
-from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.compare.comparison import Comparison, compare
 from skred.diagnosis.compare.decision import decide
 from skred.diagnosis.effort import Run
@@ -19,7 +18,7 @@ from skred.inference.calibrate import Calibration, calibrate_surely
 COMPARE_AGAIN = 0.2
 """P-value of the augmented law's check below which a second mechanism is looked for.
 
-The check sees little of a second one beside the first; the alarm is raised by the same rule as for the first.
+The linear model sees little of a second one beside the first. The alarm has the limit of the first.
 """
 
 
@@ -43,9 +42,7 @@ class Adding:
         # Its chains start around the posterior: half the tuning does.
         return calibrate_surely(problem, base.law, replace(settings, tune=settings.tune // 2))
 
-    def checked(
-        self, base: Base, calibration: Calibration, chosen: Sequence[Curve]
-    ) -> tuple[BootstrapTest, Base]:
+    def checked(self, base: Base, calibration: Calibration, chosen: Sequence[Curve]) -> Again:
         """Whether anything is wrong with that law, and the law as a base for another comparison."""
         return check_again(base, calibration, chosen, self.run)
 
@@ -88,15 +85,15 @@ def add_mechanisms(
             left = replace(left, reason=reason)
             break
         run.clock.stage("check again", "is anything wrong with the augmented law")
-        check, next_base = adding.checked(under_errors.base, calibration, chosen)
-        steps.append(Step(candidate, tuple(names[1:]), comparison, calibration, check))
+        again = adding.checked(under_errors.base, calibration, chosen)
+        steps.append(Step(candidate, tuple(names[1:]), comparison, calibration, again.check))
         left, problem = None, under_errors.base.problem
-        if check.p_value > COMPARE_AGAIN or number + 1 == run.effort.max_mechanisms:
+        if again.check.p_value > COMPARE_AGAIN or number + 1 == run.effort.max_mechanisms:
             break
         run.clock.stage("second comparison", "something may be left: every candidate refitted again")
-        comparison = adding.compared(next_base)
+        comparison = adding.compared(again.base)
         left = Left(comparison)
-        second = decide(comparison.probability, check.p_value, True)
+        second = decide(comparison.probability, again.at(comparison.log_odds).p_value, True)
         if not second.names:
             break
         names = second.names

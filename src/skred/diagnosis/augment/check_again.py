@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 from skred.diagnosis.augment.coefficient import added_draws
 from skred.diagnosis.check.bootstrap_test import BootstrapTest, bootstrap_test
@@ -14,10 +15,27 @@ from skred.diagnosis.evidence.population_draws import population_draws, typical
 from skred.inference.calibrate import Calibration
 
 
-def check_again(
-    base: Base, calibration: Calibration, chosen: Sequence[Curve], run: Run
-) -> tuple[BootstrapTest, Base]:
-    """The bootstrap test of the augmented law, and that law with its strengths held at their means.
+@dataclass(frozen=True, eq=False)
+class Again:
+    """A law with mechanisms added, asked once more.
+
+    Attributes
+    ----------
+    check : BootstrapTest
+        Whether anything is wrong with it, by the linear model.
+    base : Base
+        That law, its added strengths held at their means: for another comparison.
+    at : callable
+        The log odds of that comparison to the bootstrap test of them.
+    """
+
+    check: BootstrapTest
+    base: Base
+    at: Callable[[float], BootstrapTest]
+
+
+def check_again(base: Base, calibration: Calibration, chosen: Sequence[Curve], run: Run) -> Again:
+    """The bootstrap test of the augmented law.
 
     Parameters
     ----------
@@ -37,8 +55,8 @@ def check_again(
     again = replace(again, setting=setting)
     score_test = ScoreTest(base.problem, base.law, setting, directions, strengths)
     start = (again.population, again.fit.points)
-    check = bootstrap_test(score_test, again.rows, start, draws, run.seed + 1, run.effort.replicas)
-    return check, again
+    test = partial(bootstrap_test, score_test, again.rows, start, draws, run.seed + 1, run.effort.replicas)
+    return Again(test(), again, test)
 
 
 def _global_ids(chosen: Sequence[Curve]) -> list[str]:

@@ -1,12 +1,15 @@
 """Is anything wrong? A parametric bootstrap test of the evidence for anything at all.
 
-Whole campaigns are simulated from the base law's posterior and everything is refitted to each, so that
-looking at many mechanisms and places is accounted for. Sampling stops as soon as the answer is clear (Besag
-and Clifford, 1991, doi 10.1093/biomet/78.2.301).
+The statistic is the log odds of anything against nothing. Whole campaigns are simulated from the base law's
+posterior and everything is refitted to each, so that looking at many mechanisms and places is accounted for.
+Of simulated campaigns the odds are those of the linear model: nothing is hidden there, and close to nothing
+it is exact. Sampling stops as soon as the answer is clear (Besag and Clifford, 1991, doi
+10.1093/biomet/78.2.301).
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import batched
 
@@ -21,7 +24,7 @@ from skred.parallel.threads import side_by_side, threads
 
 FloatArray = NDArray[np.float64]
 LIMIT = 0.01
-"""Share of clean campaigns that may be called wrong."""
+"""Share of clean campaigns that may be called wrong: the one limit of an alarm."""
 _ENOUGH_ABOVE = 8
 """Clean campaigns at least as odd after which sampling stops: the p-value is then known to a third of it."""
 _BATCH = 25
@@ -35,26 +38,45 @@ class BootstrapTest:
     Attributes
     ----------
     statistic : float
-        Log odds of anything against nothing, in the linear model.
+        Log odds of anything against nothing: by the whole comparison, or in the linear model.
     simulated : (n,) array
-        The same of clean campaigns.
+        The same of clean campaigns, in the linear model.
+    linear : float or None
+        Of the recordings in the linear model, where the statistic is not that.
     """
 
     statistic: float
     simulated: FloatArray
+    linear: float | None = None
 
     @property
     def p_value(self) -> float:
         """Share of clean campaigns at least as odd, by Besag and Clifford's rule where it stopped early."""
-        above = int(np.sum(self.simulated >= self.statistic))
-        if above >= _ENOUGH_ABOVE:
-            return above / len(self.simulated)
-        return (above + 1) / (len(self.simulated) + 1)
+        return self._share(self.statistic)
 
     @property
     def fired(self) -> bool:
         """Whether the calibrated limit is passed."""
         return self.p_value <= LIMIT
+
+    @property
+    def p_value_in_linear_model(self) -> float:
+        """The same of the recordings in the linear model."""
+        return self._share(self.statistic if self.linear is None else self.linear)
+
+    @property
+    def critical(self) -> float:
+        """The log odds from which on the limit is passed; infinite where too few were simulated for it."""
+        may_be_above = math.floor(LIMIT * (len(self.simulated) + 1) - 1.0 + 1e-9)
+        if may_be_above < 0:
+            return math.inf
+        return float(np.sort(self.simulated)[::-1][may_be_above])
+
+    def _share(self, statistic: float) -> float:
+        above = int(np.sum(self.simulated >= statistic))
+        if above >= _ENOUGH_ABOVE:
+            return above / len(self.simulated)
+        return (above + 1) / (len(self.simulated) + 1)
 
 
 def bootstrap_test(
@@ -64,6 +86,7 @@ def bootstrap_test(
     draws: tuple[FloatArray, FloatArray],
     seed: int,
     most: int = 300,
+    log_odds: float | None = None,
 ) -> BootstrapTest:
     """Check the base law.
 
@@ -73,8 +96,11 @@ def bootstrap_test(
         Of the real recordings.
     draws : (n, n_base) and (n, n_base, n_base) arrays
         Means and factors of populations from the base law's posterior, at least `most` of them.
+    log_odds : float, optional
+        Of anything against nothing, as a comparison has them; in the linear model unless given.
     """
-    statistic = float(_refitted(score_test, rows, start)[0])
+    linear = float(_refitted(score_test, rows, start)[0])
+    statistic = linear if log_odds is None else log_odds
     rng = np.random.default_rng([seed, 21])
     simulated: list[FloatArray] = []
     for some in batched(range(0, most, _BATCH), threads()):
@@ -83,8 +109,8 @@ def bootstrap_test(
         for refitted in side_by_side(lambda clean: _refitted(score_test, *clean), made):
             simulated.append(refitted)
             if np.sum(np.concatenate(simulated) >= statistic) >= _ENOUGH_ABOVE:
-                return BootstrapTest(statistic, np.concatenate(simulated))
-    return BootstrapTest(statistic, np.concatenate(simulated))
+                return BootstrapTest(statistic, np.concatenate(simulated), linear)
+    return BootstrapTest(statistic, np.concatenate(simulated), linear)
 
 
 def _simulated(

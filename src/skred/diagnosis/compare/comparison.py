@@ -34,8 +34,6 @@ from skred.diagnosis.evidence.refit import Rounds, refit
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
 from skred.parallel.processes import worker_pool
 from skred.parallel.threads import side_by_side
-from skred.physics.mechanisms import mechanisms
-from skred.physics.mechanisms.placed import can_join
 from skred.physics.mechanisms.spec import Shape
 
 FloatArray = NDArray[np.float64]
@@ -206,11 +204,6 @@ def _under_errors(
         candidates = refine(base.setting, curves, near, pool)
         profiles = list(pool.map(partial(free_force, base, candidates=candidates), KINDS))
         candidates, profiles = recomputed(base, candidates, profiles, pool, best)
-    for mechanism in mechanisms().values():
-        other = candidates.get(mechanism.same_term_as)
-        if other is not None and can_join(mechanism, base.setting.base):
-            same = tuple(replace(one, mechanism=mechanism) for one in other.curves)
-            candidates[mechanism.id] = replace(other, mechanism=mechanism, curves=same)
     return ComparisonUnderErrors(error_model, base, candidates, profiles, curves)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from skred.diagnosis.check.bootstrap_test import LIMIT
-from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
+from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, same_term
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group
 
@@ -17,14 +17,8 @@ TIED_NATS = 2.0
 """An id of another group is tied with the named one where its log probability is at most so far below. Some
 such ties no recordings split: a low dam and a bias of the sensor beside it. Which group leads decides the
 verdict, not whether its name stands alone."""
-NOTHING_AT_MOST, NOTHING_ALONE = 0.5, 0.15
-"""Probability of nothing below which the check raises an alarm, its prior; and below which the comparison
-alone does."""
-ALARMS = ((LIMIT, NOTHING_AT_MOST), (1.0, NOTHING_ALONE))
-"""The alarm is raised where, for any of these, the check's p-value is at most the first and the probability
-of nothing below the second. That is: by the check, unless the comparison denies it; or by the comparison
-alone. By the evidence alone a clean campaign falls below the latter with at most a sixth of probability
-(Markov's inequality for a Bayes factor); it is far rarer (``studies/thresholds/alarm_limit.py``)."""
+NOTHING_AT_MOST = 0.5
+"""Probability of nothing, its prior, from which on nothing is claimed whatever clean campaigns look like."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +31,8 @@ class Decision:
         As in the campaign format.
     names : tuple of str
         One is named, several are tied, none where nothing is. Those of the leading group come first, each
-        group's most probable first; `unlisted` may be among the tied ones, and never comes first.
+        group's most probable first; `unlisted` may be among the tied ones, and never comes first. What is the
+        same term by another name follows each.
     beside : tuple of str
         Listed ids that are tied with a force in no list, where that is the answer.
     """
@@ -64,21 +59,8 @@ class Decision:
 
 
 def alarmed(probability: Mapping[str, float], p_value: float) -> bool:
-    """Whether something is wrong, by the check and the comparison together."""
-    return any(p_value <= most and probability[NOTHING] < below for most, below in ALARMS)
-
-
-def alarm_by(probability: Mapping[str, float], p_value: float) -> str | None:
-    """Which of the rules of the alarm hold: ``check``, ``evidence``, ``both``; None where none does."""
-    check, evidence = (p_value <= most and probability[NOTHING] < below for most, below in ALARMS)
-    if check and evidence:
-        return "both"
-    return "check" if check else "evidence" if evidence else None
-
-
-def _silent(probability: Mapping[str, float], p_value: float) -> bool:
-    """Whether neither check nor comparison gives a reason to add anything; it takes less than an alarm."""
-    return p_value > LIMIT and probability[NOTHING] >= NOTHING_AT_MOST
+    """Whether something is wrong: hardly any clean campaign has such odds, and nothing is not probable."""
+    return p_value <= LIMIT and probability[NOTHING] < NOTHING_AT_MOST
 
 
 def decide(probability: Mapping[str, float], p_value: float, can_tell: bool) -> Decision:
@@ -89,18 +71,18 @@ def decide(probability: Mapping[str, float], p_value: float, can_tell: bool) -> 
     probability : mapping
         Of each id.
     p_value : float
-        Of the check.
+        Of the odds that the probabilities are.
     can_tell : bool
         Whether relevant strengths would mostly have been found.
 
     Returns
     -------
     Decision
-        Without an alarm `nothing_missing`, if relevant strengths would have been found, the check does not
-        fire and nothing is not less probable than it was beforehand; else `cannot_tell`.
+        Without an alarm `nothing_missing`, if relevant strengths would have been found, clean campaigns look
+        alike and nothing is not less probable than it was beforehand; else `cannot_tell`.
     """
     if not alarmed(probability, p_value):
-        nothing = can_tell and _silent(probability, p_value)
+        nothing = can_tell and p_value > LIMIT and probability[NOTHING] >= NOTHING_AT_MOST
         return Decision("nothing_missing" if nothing else "cannot_tell", ())
     return blamed(probability)
 
@@ -114,16 +96,24 @@ def blamed(probability: Mapping[str, float]) -> Decision:
     leading = max(groups, key=lambda group: sum(groups[group].values()))
     others = {name: share for group in groups if group != leading for name, share in groups[group].items()}
     if leading == UNLISTED:
-        return Decision("unexplained", (), _within(others, probability[UNLISTED]))
+        return Decision("unexplained", (), _with_other_names(_within(others, probability[UNLISTED])))
     verdict = "missing_physics" if leading == Group.PHYSICS else "instrument"
     names = smallest_set(groups[leading])
-    return Decision(verdict, (*names, *_within(others, probability[names[0]])))
+    return Decision(verdict, _with_other_names((*names, *_within(others, probability[names[0]]))))
 
 
 def _within(shares: Mapping[str, float], leading: float) -> tuple[str, ...]:
     """Ids whose probability is close to that of the named one, most probable first."""
     close = [name for name, share in shares.items() if share >= math.exp(-TIED_NATS) * leading]
     return tuple(sorted(close, key=lambda name: -shares[name]))
+
+
+def _with_other_names(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Each id, and after it those that are the same term by another name and are not told already."""
+    found: list[str] = []
+    for name in names:
+        found += [name, *(one.id for one in same_term(name) if one.id not in names)]
+    return tuple(found)
 
 
 def smallest_set(shares: Mapping[str, float]) -> tuple[str, ...]:

@@ -133,7 +133,7 @@ def screened(
     before : sequence of Curve, optional
         Screened under another error model: the candidates. Those that cannot count are returned as they are.
     """
-    todo = [(one.mechanism, one.shape) for one in before or placed_mechanisms(base.setting, ties=False)]
+    todo = [(one.mechanism, one.shape) for one in before or placed_mechanisms(base.setting)]
     curves, looked = dict(enumerate(before)), set[int]()
 
     def look(number: int) -> Curve:

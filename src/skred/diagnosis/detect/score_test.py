@@ -51,15 +51,15 @@ class PlacedMechanism:
         return bool({Column.LINEAR, Column.WEAKENING} & set(self.direction.columns))
 
 
-def placed_mechanisms(setting: Setting, *, ties: bool = True) -> list[PlacedMechanism]:
-    """All that could be missing from a base law; without `ties`, one of each two that are the same term."""
+def placed_mechanisms(setting: Setting) -> list[PlacedMechanism]:
+    """All that could be missing from a base law; of two that are the same term in a shape, one."""
     could = [one for one in mechanisms().values() if can_join(one, setting.base)]
     shapes = {one.id: shapes_of(one, setting) for one in could}
     return [
         PlacedMechanism(one, shape, direction_of(one, setting, shape))
         for one in could
-        if ties or not shapes.get(one.same_term_as)
         for shape in shapes[one.id]
+        if shape not in shapes.get(one.same_term_as, ())
     ]
 
 

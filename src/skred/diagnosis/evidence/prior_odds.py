@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group, Mechanism
 
 NOTHING, UNLISTED = "nothing", "unlisted"
@@ -24,15 +25,29 @@ exponents, and evidence says more for the less wrong one than trials bear out. F
 def prior_odds(compared: Iterable[Mechanism]) -> dict[str, float]:
     """Prior probability of each id, `nothing` and `unlisted` included.
 
-    A group without members gives its share to none: the rest is what it is relative to each other.
+    A group without members gives its share to none: the rest is what it is relative to each other. What is
+    the same term as another by another name gives its share to that one; half of it if it is also compared
+    itself, in shapes of its own.
     """
-    compared = list(compared)
-    odds = {NOTHING: SHARES[NOTHING], UNLISTED: SHARES[UNLISTED]}
+    own = {mechanism.id: mechanism for mechanism in compared}
+    named = own | {one.id: one for name in own for one in same_term(name)}
+    odds = {NOTHING: SHARES[NOTHING], UNLISTED: SHARES[UNLISTED]} | dict.fromkeys(own, 0.0)
     for group in Group:
-        members = [mechanism.id for mechanism in compared if mechanism.group is group]
-        odds |= {name: SHARES[group] / len(members) for name in members}
+        members = [mechanism for mechanism in named.values() if mechanism.group is group]
+        for one in members:
+            share = SHARES[group] / len(members)
+            given = 0.0 if one.same_term_as not in own else 0.5 if one.id in own else 1.0
+            if given:
+                odds[one.same_term_as] += given * share
+            if one.id in own:
+                odds[one.id] += (1.0 - given) * share
     total = sum(odds.values())
     return {name: share / total for name, share in odds.items()}
+
+
+def same_term(name: str) -> list[Mechanism]:
+    """Mechanisms that are the same term as one, by another name."""
+    return [one for one in mechanisms().values() if one.same_term_as == name]
 
 
 def probabilities(log_factors: Mapping[str, float], odds: Mapping[str, float]) -> dict[str, float]:

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison
-from skred.diagnosis.compare.decision import NOTHING_ALONE
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, most_probable
 from skred.diagnosis.evidence.coefficient import Base, curve_at
@@ -91,13 +90,15 @@ class Influence:
     readings: tuple[ReadingsLeftOut, ...]
 
 
-def influence(comparison: Comparison, answer: str) -> Influence:
+def influence(comparison: Comparison, answer: str, critical: float) -> Influence:
     """What an answer of a comparison hangs on, under the error model that it has most evidence under.
 
     Parameters
     ----------
     answer : str
         Id of a mechanism that was compared, or ``unlisted``.
+    critical : float
+        The log odds of anything against nothing from which on there is an alarm.
     """
     under_errors = comparison.leading(answer)
     base = under_errors.base
@@ -114,7 +115,8 @@ def influence(comparison: Comparison, answer: str) -> Influence:
     # By the same, quicker method on both sides; only the difference is taken from it.
     stated = under_errors.log_factors[answer]
     factors = stated + np.array(found) - whole
-    needed = _needed(comparison, answer)
+    # An answer that alone is worth so much raises the alarm, if all else has no evidence.
+    needed = critical + math.log(comparison.odds[NOTHING] / comparison.odds[answer])
     order = np.argsort(factors[:n])
     carried, left = _carried(lambda part: stated + again(base, part) - whole, order, needed)
     ids = base.problem.campaign.event_ids
@@ -195,12 +197,6 @@ def _of_profile(profile: Profile) -> Again:
         return fit_profile(part.base(base), profile.kind, near, profile.prior).log_bayes_factor
 
     return again
-
-
-def _needed(comparison: Comparison, answer: str) -> float:
-    """The log Bayes factor that makes nothing improbable enough for an alarm, if all else has none."""
-    odds = comparison.odds
-    return math.log((1.0 - NOTHING_ALONE) / NOTHING_ALONE * odds[NOTHING] / odds[answer])
 
 
 def _carried(

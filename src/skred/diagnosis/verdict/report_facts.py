@@ -15,7 +15,7 @@ from skred.campaign import Campaign, Status
 from skred.diagnosis.augment.coefficient import augmented_of
 from skred.diagnosis.check.bootstrap_test import LIMIT, BootstrapTest
 from skred.diagnosis.compare.comparison import ERROR_SHARES, Comparison
-from skred.diagnosis.compare.decision import NOTHING_ALONE, TIED_NATS, decide
+from skred.diagnosis.compare.decision import NOTHING_AT_MOST, TIED_NATS, decide
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.discrepancy.profile import AMPLITUDES, KINDS, LENGTHS_M, NEAR_M
 from skred.diagnosis.evidence.covariates import standard_of
@@ -174,7 +174,7 @@ def _limits() -> dict[str, float]:
     """What the page measures by."""
     return {
         "p_value": LIMIT,
-        "nothing_alone": NOTHING_ALONE,
+        "nothing_at_most": NOTHING_AT_MOST,
         "tied": math.exp(TIED_NATS),
         "pareto_k": K_LIMIT,
         "r_hat": R_HAT_LIMIT,

@@ -108,9 +108,16 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
 
 def _tied(document: dict[str, Any]) -> str:
     """What the recordings cannot tell from the answer."""
-    probability = document["probability"]
-    ties = [f"{_short(other)} ({percent(probability[other])})" for other in document["indistinguishable"]]
-    return f"These recordings cannot tell it from: {', '.join(ties)}." if ties else ""
+    probability, ties = document["probability"], document["indistinguishable"]
+    told = {document["mechanism"], *ties}
+    how = {
+        other: "the same term"
+        if other != UNLISTED and mechanisms()[other].same_term_as in told
+        else percent(probability[other])
+        for other in ties
+    }
+    listed = ", ".join(f"{_short(other)} ({sure})" for other, sure in how.items())
+    return f"These recordings cannot tell it from: {listed}." if ties else ""
 
 
 def _not_excluded(document: dict[str, Any]) -> str:
@@ -214,8 +221,8 @@ def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
     first = max((name for name in probability if name != NOTHING), key=lambda name: probability[name])
     return (
         f"Of what could be missing, {_title(first)} would be the most probable"
-        f" ({percent(probability[first])}). But by the check"
-        f" {100.0 * found.check.p_value:.0f} % of clean campaigns look as odd, so none is claimed."
+        f" ({percent(probability[first])}). But {100.0 * found.check.p_value:.0f} % of clean campaigns have"
+        " such odds, so none is claimed."
     )
 
 

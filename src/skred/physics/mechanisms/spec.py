@@ -246,8 +246,9 @@ class Mechanism:
         How it joins a law that leaves it out.
     group : Group
     same_term_as : str
-        Id of a mechanism that is the same term by another name, so that no recording tells them apart. It is
-        computed once, under that id.
+        Id of a mechanism that is the same term by another name, so that no recording tells them apart, in the
+        shapes that both have. These are computed once, under that id. It is compared itself only in shapes
+        of its own, if it has such.
     """
 
     id: str

@@ -156,7 +156,8 @@ def split_stretch(setting: Setting, shape: Shape, steps: float) -> tuple[Shape, 
     length, end = steps * (last - first), setting.terrain.length_m
     changes = ((-0.2, -0.2), (0.2, 0.2), (0.15, -0.15), (-0.25, 0.25), (-0.4, 0.0), (0.0, 0.4))
     moved = [
-        Shape(max(first + before * length, 0.0), min(last + after * length, end)) for before, after in changes
+        replace(shape, s_from_m=max(first + before * length, 0.0), s_to_m=min(last + after * length, end))
+        for before, after in changes
     ]
     if not is_opposed(shape):
         return tuple(moved)
