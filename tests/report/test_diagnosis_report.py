@@ -56,7 +56,7 @@ def test_every_kind_has_a_page_that_needs_nothing_else(kind, picture):
         ("silent", {"check", "where", "probabilities", "strength", "places", "left_out"}),
         (
             "two",
-            {"check", "where", "probabilities", "strength", "places", "left_out", "scores"}
+            {"check", "where", "probabilities", "strength", "places", "left_out", "scores", "influence"}
             | {"probabilities_2", "strength_2", "places_2"},
         ),
     ],

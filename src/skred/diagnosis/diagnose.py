@@ -24,6 +24,7 @@ from skred.diagnosis.evidence.coefficient import fit_base
 from skred.diagnosis.evidence.compile_ahead import compile_ahead
 from skred.diagnosis.evidence.population_draws import population_draws, typical
 from skred.diagnosis.evidence.prior_odds import UNLISTED
+from skred.diagnosis.influence.influence import influence
 from skred.diagnosis.outcome import (
     Diagnosis,
     Finding,
@@ -106,10 +107,14 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
         finding, before = _with_profile(comparison, run)
     else:
         finding, before = _predicted(added, calibration, run)
+    hangs_on = None
+    if decision.answer is not None:
+        clock.stage("influence", "what the answer hangs on: without each avalanche, each kind of reading")
+        hangs_on = influence(comparison, decision.answer)
     clock.end()
     return Diagnosis(
         problem, law, calibration, score_test, table, check, comparison, decision, location, finding, before,
-        clock.seconds,
+        hangs_on, clock.seconds,
     )  # fmt: skip
 
 

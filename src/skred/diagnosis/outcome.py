@@ -11,6 +11,7 @@ from skred.diagnosis.compare.decision import Decision, alarm_by
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.detect.score_test import ScoreTest
+from skred.diagnosis.influence.influence import Influence
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.inference.calibrate import Calibration
@@ -138,6 +139,8 @@ class Diagnosis:
     finding : NothingAdded, MechanismsAdded or ProfileAdded
     before : HeldOut
         Avalanches left out, as the base law predicts them, under the error model of what was added.
+    influence : Influence or None
+        What the answer hangs on; None where none is given.
     seconds : dict
         Of each stage.
     """
@@ -153,6 +156,7 @@ class Diagnosis:
     location: Location
     finding: Finding
     before: HeldOut
+    influence: Influence | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 
     @property

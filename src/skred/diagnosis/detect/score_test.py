@@ -162,18 +162,6 @@ class ScoreTest:
                 result[:, k] += math.log(2.0) + log_ndtr(score[:, k] / np.sqrt(precision))
         return result
 
-    def strengths_found(self, scores: Scores) -> dict[tuple[str, Shape], float]:
-        """Most probable strength in the linear model of each candidate that stands out, by id and shape."""
-        score, information, _ = self.of_candidates(scores)
-        found = {}
-        for k, candidate in enumerate(self.placed_mechanisms):
-            added = candidate.mechanism.added
-            assert added is not None
-            precision = float(information[0, k]) + added.scale_of(candidate.shape) ** -2.0
-            if abs(score[0, k]) > math.sqrt(precision):
-                found[candidate.mechanism.id, candidate.shape] = float(score[0, k]) / precision
-        return found
-
     def log_factor_of_unlisted(self, scores: Scores) -> FloatArray:
         """Log Bayes factor of the force not in the list in the linear model, (n_groups,)."""
         first = sum(not candidate.with_speed for candidate in self.placed_mechanisms)
