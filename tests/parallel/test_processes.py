@@ -24,7 +24,7 @@ def where(number: int, base: list[int]) -> tuple[int, int, int, int]:
     return number, number + base[0], os.getpid(), threads()
 
 
-def test_a_crew_shares_jobs_between_this_process_and_a_helper(two_cores: None) -> None:
+def test_a_worker_pool_shares_jobs_between_this_process_and_a_helper(two_cores: None) -> None:
     base = [100]
     with helpers("skred.physics.kernel.fronts"), worker_pool() as pool:
         found = list(pool.map(lambda number: where(number, base), range(60)))  # closures go there too
