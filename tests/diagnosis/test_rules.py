@@ -158,7 +158,7 @@ def test_ties_across_groups() -> None:
     assert not decide(shares(0.2, 0.3, sensor_bias=0.5), 0.9, True).disputed
 
 
-def test_no_instrument_compared() -> None:
+def test_no_instrument_in_the_comparison() -> None:
     assert decide(shares(0.1, 0.05, obstacle=0.85), 0.005, True).names == ("obstacle",)
     assert decide(shares(0.1, 0.2, obstacle=0.7), 0.005, True).names == ("obstacle", "unlisted")
     assert decide(shares(0.1, 0.9), 0.005, True).verdict == "unexplained"
