@@ -42,14 +42,14 @@ def without_one(campaign: Campaign, event: int) -> float:
 def test_without_an_avalanche_as_in_a_campaign_that_never_had_it() -> None:
     campaign = rolling(2.4e-4, n_events=10)
     comparison, found = drag_in(campaign)
-    said = influence(comparison, DRAG.id)
+    said = influence(comparison, DRAG.id, 1.73)
     assert said.log_bayes_factor == pytest.approx(found.log_bayes_factor)
     for event in (0, 7):
         assert said.without_each[event] == pytest.approx(without_one(campaign, event), abs=0.5)
 
 
 def test_a_strong_effect_in_all_avalanches_hangs_on_no_few() -> None:
-    said = influence(drag_in(rolling(2.4e-4, n_events=12))[0], DRAG.id)
+    said = influence(drag_in(rolling(2.4e-4, n_events=12))[0], DRAG.id, 1.73)
     assert said.carried_by == () and said.without_them is None
     assert said.without_a_third is not None and said.needed < said.without_a_third < said.log_bayes_factor
 
@@ -59,7 +59,7 @@ def test_avalanches_that_carry_an_answer_are_found() -> None:
     campaign = rolling(2.4e-4, n_events=9)
     coarse = np.full(campaign.values.shape, 3.0)
     coarse[[2, 5]] = 0.1
-    said = influence(drag_in(replace(campaign, stated_sd=coarse))[0], DRAG.id)
+    said = influence(drag_in(replace(campaign, stated_sd=coarse))[0], DRAG.id, 1.73)
     assert set(said.carried_by) <= {"run02", "run05"} and said.carried_by
     assert len(said.carried_by) <= MOST * campaign.n_events
     assert said.without_them is not None and said.without_them < said.needed < said.log_bayes_factor
@@ -71,6 +71,6 @@ def test_readings_are_left_out_by_sensor_and_kind() -> None:
     campaign = rolling(2.4e-4, n_events=8)
     values = np.array(campaign.values)
     values[3, -1] = 0.0
-    said = influence(drag_in(replace(campaign, values=values))[0], DRAG.id)
+    said = influence(drag_in(replace(campaign, values=values))[0], DRAG.id, 1.73)
     kinds = [(one.kind, one.sensor, one.n) for one in said.readings]
     assert kinds == [("zeros", None, 1), *(("sensor", f"s{k}", 8) for k in range(6))]

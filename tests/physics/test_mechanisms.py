@@ -24,6 +24,7 @@ from skred.physics.law import Law
 from skred.physics.laws import check_library, law_ids, load_law
 from skred.physics.mechanisms import Mechanism, mechanisms
 from skred.physics.mechanisms.coulomb_friction import WITHOUT_CURVATURE
+from skred.physics.mechanisms.entrainment import GROWTH
 from skred.physics.mechanisms.library import NOT_MECHANISMS
 from skred.physics.mechanisms.placed import shapes_of
 from skred.physics.mechanisms.spec import Added, BoundTo, Direction, Group, Setting, Shape
@@ -228,6 +229,26 @@ def with_added(setting: Setting, direction: Direction, b: np.ndarray, sizes: np.
     return front_speeds(strengths, np.zeros(len(b)), path_of(setting.terrain), contributions)
 
 
+def test_entrainment_of_a_limited_supply(settings: list[Setting]) -> None:
+    """Every metre adds as much mass: momentum is kept, so U falls as 1 over the mass, to a half."""
+    setting, added = settings[1], added_to(ALL["entrainment"])
+    own = [one for one in added.shapes(setting) if GROWTH in dict(one.constants)]
+    twin = added_to(ALL["segment_drag"]).shapes(setting)
+    assert own and not set(own) & set(twin)  # the other shapes are computed under that id
+    for shape in some(own, 6):
+        first, last = ends_of(shape)
+        direction = added.direction(setting, shape)
+        edge = setting.terrain.edge_s_m
+        # dU/ds = -(1/m)(dm/ds) U, and all that is lost on a stretch is the integral of (dm/ds)/m.
+        mass = 1.0 + np.clip((edge - first) / (last - first), 0.0, 1.0)
+        lost = np.cumsum(direction.profiles[0] * np.diff(edge)) / (last - first)
+        np.testing.assert_allclose(
+            lost, np.log(mass[1:]), atol=2e-3 + (np.diff(edge).max() / (last - first)) ** 2
+        )
+        parts = added.split(setting, shape, 1.0)
+        assert parts and all(part.constants == shape.constants for part in parts)
+
+
 @pytest.mark.parametrize("name", ["segment_drag", "entrainment"])
 def test_what_is_opposed_does_not_show_in_a_typical_front(name: str, settings: list[Setting]) -> None:
     """Below the stretch a typical front is as fast as without it; drag brings others closer."""
@@ -267,7 +288,7 @@ def test_every_stretch_ends_in_the_recorded_part_and_each_length_is_as_probable(
     setting = replace(settings[1], recorded_m=(600.0, 1100.0))
     shapes = added_to(ALL[name]).shapes(setting)
     assert len(set(shapes)) == len(shapes)
-    plain = [one for one in shapes if not is_opposed(one)]
+    plain = [one for one in shapes if not is_opposed(one) and GROWTH not in dict(one.constants)]
     ends = np.array([ends_of(one) for one in plain])
     assert (ends[:, 1] > 600.0).all() and (ends[:, 1] <= 1100.0).all() and ends[:, 0].min() < 400.0
     lengths = np.round(ends[:, 1] - ends[:, 0])

@@ -168,14 +168,14 @@ def diagnosis(kind: str, text: str = "") -> Outcome:
         why = "the gate of the base law's calibration failed"
         return NotDiagnosed(problem, LAW, why, calibration(problem, gate=failed), seconds={"base": 3.0})
     tops = {
-        "tie": {"entrainment": 40.0, "segment_drag": 39.6},
+        "tie": {"segment_drag": 40.0},
         "two": {"covariate_friction": 40.0},
         "sensor": {"sensor_bias": 40.0},
         "unexplained": {"unlisted": 30.0},
     }.get(kind, {kind: 40.0})
     comparison = comparison_of(problem, tops, 2 if kind in ("tie", "sensor") else 1)
     names = {
-        "tie": ("entrainment", "segment_drag"), "two": ("covariate_friction",), "sensor": ("sensor_bias",),
+        "tie": ("segment_drag", "entrainment"), "two": ("covariate_friction",), "sensor": ("sensor_bias",),
     }.get(kind, (kind,) if kind in mechanisms() else ())  # fmt: skip
     verdicts = {
         "tie": "missing_physics", "two": "missing_physics", "sensor": "instrument",

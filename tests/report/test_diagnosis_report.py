@@ -83,9 +83,9 @@ def test_how_many_readings_are_not_there(n, said):
 
 def test_a_tie_says_that_it_is_one():
     text = Page(rendered("tie")).text
-    assert "cannot tell entrainment from segment drag" in text
-    assert "Segment drag is the same term on a stretch" in text
-    assert "e for s 1 < s < s 2" in text and "here" in text
+    assert "cannot tell segment drag from entrainment" in text
+    assert "Entrainment is the same term on a stretch" in text
+    assert "D f U 2 for s 1 < s < s 2" in text and "here" in text
     assert "doi 10." in text
     assert "predicted better" in text and "difference below 4 nats is no practical difference" in text
     assert "student errors" in text and "61 12 5.1" in text

@@ -45,7 +45,8 @@ def test_a_lean_that_the_check_does_not_bear_out_is_told_and_not_claimed(kind: s
     assert ("so silence means little" in leaning) == (kind == "silent")
     assert "an obstacle: a dam, a wall, a step would be the most probable (50 %)" in leaning
     assert (
-        f"{100.0 * found.check.p_value:.0f} % of clean campaigns look as odd, so none is claimed" in leaning
+        f"{100.0 * found.check.p_value:.0f} % of clean campaigns have such odds, so none is claimed"
+        in leaning
     )
     other = statement(found, document({"nothing": 0.2, "obstacle": 0.3, "unlisted": 0.5}))
     assert "a force not in the list would be" in other
@@ -158,15 +159,15 @@ def test_the_next_speed_is_where_a_dam_slows_fronts() -> None:
     assert dam.s_from_m is not None and verdict(found)["next_sensor"]["s_from_m"] > dam.s_from_m > 1600.0
 
 
-@pytest.mark.parametrize("tied", [("segment_drag",), ("segment_drag", UNLISTED), (UNLISTED,)])
+@pytest.mark.parametrize("tied", [("entrainment",), ("entrainment", UNLISTED), (UNLISTED,)])
 def test_what_no_further_speed_splits(tied: tuple[str, ...]) -> None:
     found = diagnosis("tie")
     step = replace(found.steps[0], tied=tied)
     decision = Decision("missing_physics", (found.decision.names[0], *tied))
     document = verdict(with_finding(replace(found, decision=decision), steps=(step,)))
     assert document["next_sensor"]["splits"] == [] and "cannot tell it from" in document["statement"]
-    same = "No further speed would split off extra drag on a stretch: the term is the same."
-    assert (same in document["statement"]) == ("segment_drag" in tied)
+    same = "No further speed would split off snow at rest picked up on a stretch: the term is the same."
+    assert (same in document["statement"]) == ("entrainment" in tied)
 
 
 def test_a_candidate_that_is_not_excluded_is_told() -> None:

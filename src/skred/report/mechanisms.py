@@ -101,9 +101,13 @@ def looked_for(mechanism: Mechanism) -> str:
         )
         where += f" the prior of its coefficient {OPPOSED_SCALES:g} times as wide"
     plain = [shape for shape in shapes if not is_opposed(shape)]
-    names = dict.fromkeys(name for shape in plain for name, _ in shape.constants)
-    values = {name: sorted({dict(shape.constants)[name] for shape in plain}) for name in names}
-    return "; ".join([where, *(f"{name} of {_either(found)}" for name, found in values.items())])
+    constants = [dict(shape.constants) for shape in plain]
+    values = {
+        name: sorted({of_shape[name] for of_shape in constants if name in of_shape})
+        for name in dict.fromkeys(name for of_shape in constants for name in of_shape)
+    }
+    also = {name: "" if all(name in of_shape for of_shape in constants) else "also with " for name in values}
+    return "; ".join([where, *(f"{also[name]}{name} of {_either(found)}" for name, found in values.items())])
 
 
 def _where(mechanism: Mechanism, setting: Setting, shapes: Sequence[Shape]) -> str:

@@ -39,7 +39,8 @@ def _rival(step: Step) -> Candidate | None:
     """The first of those tied that a speed could split off: listed, and another term."""
     known = {name for under_errors in step.comparison.under_each for name in under_errors.candidates}
     rivals = [step.comparison.leading(name).candidates[name] for name in step.tied if name in known]
-    return next((one for one in rivals if not one.mechanism.is_same_term(step.candidate.mechanism)), None)
+    named = step.candidate.mechanism.id
+    return next((one for one in rivals if one.mechanism.same_term_as != named), None)
 
 
 def _sensor(place: float, splits: list[str], power_with: float | None = None) -> dict[str, Any]:

@@ -300,7 +300,7 @@ def _comparison(comparison: Comparison, found: Diagnosis, number: int) -> dict[s
         "same_term": [
             name
             for name in (step.tied if step is not None else ())
-            if name != UNLISTED and named is not None and listed[name].is_same_term(named)
+            if name != UNLISTED and named is not None and listed[name].same_term_as == named.id
         ],
         "probability": comparison.probability,
         "prior": comparison.odds,

@@ -276,10 +276,6 @@ class Mechanism:
             raise ValueError(f"{self.id} can be added to a law, not be a part of a base law")
         return self.column, self.profile(terrain)
 
-    def is_same_term(self, other: Mechanism) -> bool:
-        """Whether this and another one are the same term, so that no reading tells them apart."""
-        return self.same_term_as == other.id or other.same_term_as == self.id
-
 
 def everywhere(terrain: Terrain) -> FloatArray:
     """Profile of a coefficient that acts alike along the whole track."""
