@@ -33,6 +33,7 @@ from skred.diagnosis.outcome import (
     Outcome,
     ProfileAdded,
 )
+from skred.diagnosis.predict.conditional import BeforeAfter
 from skred.diagnosis.predict.held_out import HeldOut, held_out
 from skred.diagnosis.predict.profile_law import profile_law
 from skred.inference.calibrate import Calibration, calibrate_surely
@@ -105,10 +106,14 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
         finding, before = _with_profile(comparison, run)
     else:
         finding, before = _predicted(added, calibration, run)
+    given = None
+    if not isinstance(finding, NothingAdded):
+        clock.stage("conditional", "predicting each reading from those above it")
+        given = BeforeAfter.of(before, finding.after, run.seed)
     clock.end()
     return Diagnosis(
         problem, law, calibration, score_test, table, check, comparison, decision, location, finding, before,
-        clock.seconds,
+        clock.seconds, given,
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from skred.diagnosis.compare.decision import Decision, alarm_by
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.detect.score_test import ScoreTest
+from skred.diagnosis.predict.conditional import BeforeAfter
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.inference.calibrate import Calibration
@@ -140,6 +141,8 @@ class Diagnosis:
         Avalanches left out, as the base law predicts them, under the error model of what was added.
     seconds : dict
         Of each stage.
+    conditional : BeforeAfter or None
+        Each reading as predicted by those of the same avalanche above it; None where nothing was added.
     """
 
     problem: HierarchicalProblem
@@ -154,6 +157,7 @@ class Diagnosis:
     finding: Finding
     before: HeldOut
     seconds: dict[str, float] = field(default_factory=dict)
+    conditional: BeforeAfter | None = None
 
     @property
     def alarm_by(self) -> str | None:

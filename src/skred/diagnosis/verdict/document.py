@@ -23,6 +23,7 @@ from skred.diagnosis.outcome import (
 )
 from skred.diagnosis.predict.held_out import HeldOut, errors, paired
 from skred.diagnosis.predict.profile_law import ProfileLaw
+from skred.diagnosis.verdict.conditional import conditional_document
 from skred.diagnosis.verdict.mechanisms import (
     added_document,
     candidate_documents,
@@ -42,8 +43,15 @@ _NO_LIMIT = 20.0
 def verdict(found: Outcome) -> dict[str, Any]:
     """The verdict of a diagnosis, as `verdict.json` holds it."""
     document = _told_nothing(found) if isinstance(found, NotDiagnosed) else _told(found)
+    document["conditional"] = conditional_document(found, _carried_by(document))
     document["statement"] = statement(found, document)
     return document | _more(found)
+
+
+def _carried_by(document: dict[str, Any]) -> Sequence[str] | None:
+    """Avalanches that carry the answer; None where that was not looked into."""
+    influence = document.get("influence")
+    return None if influence is None else influence["carried_by"]
 
 
 def _told_nothing(found: NotDiagnosed) -> dict[str, Any]:
