@@ -35,7 +35,7 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 ENOUGH = 100.0
 """Effective draws below which an avalanche is drawn again around what was missed, and it is told."""
-_USUAL, _MORE = Sizes(2, 1, (1.3,)), Sizes(16, 8, (1.3, 5.0))
+_USUAL, _MORE = Sizes(4, 2, (1.3,)), Sizes(16, 8, (1.3, 5.0))
 """Points for each draw of the population: as usual, and where those were too few. Beside a stop the linear
 model is far too narrow: nothing is read of how far above a sensor a front stopped."""
 _AGAIN = 2
@@ -125,8 +125,9 @@ def conditional(others: Sequence[LeftOut], seed: int) -> Conditional:
         return _event(extension, event, draws, seed)
 
     parts = np.array(side_by_side(of_event, range(len(others))))
-    numbers = parts.transpose(1, 0, 2)
-    return Conditional(*numbers[:5], np.nan_to_num(numbers[5]).astype(np.int64), numbers[6])
+    mean, low, high, log_score, crps, n_above, effective = parts.transpose(1, 0, 2)
+    n_above = np.nan_to_num(n_above).astype(np.int64)
+    return Conditional(mean, low, high, log_score, crps, n_above, effective)
 
 
 def above(problem: HierarchicalProblem) -> BoolArray:

@@ -24,8 +24,10 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 _MOST_STYLES = 6
 """Sensors of speed that have a style of their own; more are put together by where they are."""
-_WHEN = {"before": "base law", "after": "with what was missing"}
-_SETS = {"all": "", "carrying": "those that carry the answer", "others": "the others"}
+_FARTHEST = 0.5
+"""How far beyond the recordings a prediction is shown where it is, in their range."""
+_WHEN = ("before", "after")
+_PARTS = {"carrying": "those that carry the answer", "others": "the others"}
 
 
 @dataclass(frozen=True)
@@ -68,32 +70,38 @@ def _panels(
     zero = (recordings.reference_s_m or 0.0) if runout else 0.0
     what, unit = ("runout", "m") if runout else ("speed", unit_text("m s-1"))
     recorded = recordings.values - zero
-    ends = [recorded[shown]]
-    for axes, when in zip(panels, _WHEN, strict=True):
-        mean, low, high = (_values(tree, when, name) - zero for name in ("mean", "low", "high"))
-        ends += [low[shown], high[shown]]
-        for style in styles:
-            at = shown & style.columns
-            axes.vlines(
-                recorded[at], low[at], high[at], color=tint(style.colour, 0.4), linewidth=0.8, zorder=1
-            )
-            axes.plot(
-                recorded[at], mean[at], linestyle="none", marker=style.marker, markersize=4.0, zorder=2,
-                color=style.colour, markeredgewidth=0.0, label=style.label,
-            )  # fmt: skip
-        axes.set_title(f"{what}s, {_WHEN[when]}", fontsize=8)
-        axes.set_xlabel(f"recorded [{unit}]")
-    values = np.concatenate(ends)
-    margin = 0.05 * float(np.ptp(values)) or 1.0
-    line = [float(values.min() - margin), float(values.max() + margin)]
-    beside = 0.08 * float(np.ptp(recorded[shown])) or margin
-    for axes in panels:
+    x = recorded[shown]
+    size = float(np.ptp(x)) or 1.0
+    bands = {when: [_values(tree, when, name) - zero for name in ("mean", "low", "high")] for when in _WHEN}
+    every = np.concatenate([x, *(values[shown] for band in bands.values() for values in band)])
+    # One prediction that is far off must not press all others into a line: it stands at the edge, open.
+    least, most = max(every.min(), x.min() - _FARTHEST * size), min(every.max(), x.max() + _FARTHEST * size)
+    line = least - 0.05 * (most - least), most + 0.05 * (most - least)
+    for axes, (when, (mean, low, high)) in zip(panels, bands.items(), strict=True):
         axes.plot(
             line, line, color=GREY, linewidth=0.8, linestyle="--", zorder=0, label="predicted = recorded"
         )
-        axes.set_xlim(recorded[shown].min() - beside, recorded[shown].max() + beside)
+        for style in styles:
+            at = shown & style.columns
+            ends = np.clip(low[at], *line), np.clip(high[at], *line)
+            axes.vlines(recorded[at], *ends, color=tint(style.colour, 0.4), linewidth=0.8, zorder=1)
+            inside = (mean[at] >= least) & (mean[at] <= most)
+            points: dict[str, Any] = {
+                "linestyle": "none",
+                "marker": style.marker,
+                "color": style.colour,
+                "markersize": 4.0,
+            }
+            axes.plot(
+                recorded[at][inside], mean[at][inside], label=style.label, markeredgewidth=0.0, **points
+            )
+            outside = recorded[at][~inside], np.clip(mean[at][~inside], least, most)
+            axes.plot(*outside, markerfacecolor="none", markeredgewidth=0.8, **points)
+        axes.set_title(f"{what}s, {when}", fontsize=8.5)
+        axes.set_xlabel(f"recorded {what} [{unit}]")
+        axes.set_xlim(x.min() - 0.08 * size, x.max() + 0.08 * size)
         axes.set_ylim(*line)
-    panels[0].set_ylabel(f"predicted {what}{' from the reference' if zero else ''} [{unit}]")
+    panels[0].set_ylabel(f"predicted {what} [{unit}]")
     panels[1].set_yticklabels([])
 
 
@@ -126,31 +134,34 @@ def conditional_rows(document: doc.Document) -> list[dict[str, str]]:
     """For each sensor, over all avalanches and over parts of them: errors and scores before and after."""
     rows = []
     for entry in doc.listed(document, "conditional", "sensors"):
-        decimals = 0 if doc.get(entry, "unit") == "m" else 1
-        for key, of in _SETS.items():
+        unit = unit_text(doc.get(entry, "unit"))
+        decimals = 0 if unit == "m" else 1
+        words = {"all": f"{printable(doc.get(entry, 'sensor'))} [{unit}]", **_PARTS}
+        gains = {"all": name_text(doc.get(entry, "gain") or "")}
+        for key, name in words.items():
             scores = doc.get(entry, key)
             if scores:
-                name = printable(doc.get(entry, "sensor")) if key == "all" else ""
-                rows.append({"sensor": name, "of": of, **_row(scores, decimals), **_gain(entry, key)})
-                rows[-1]["unit"] = unit_text(doc.get(entry, "unit"))
+                rows.append({"name": name, "gain": gains.get(key, ""), **_row(scores, decimals)})
     return rows
 
 
-def _gain(entry: doc.Document, key: str) -> dict[str, str]:
-    return {"gain": name_text(doc.get(entry, "gain") or "") if key == "all" else ""}
-
-
 def _row(scores: doc.Document, decimals: int) -> dict[str, str]:
-    row = {"n": fixed(doc.get(scores, "n"), 0)}
-    for name, places in (("rmse", decimals), ("crps", decimals), ("log_score", 2), ("coverage_90", 0)):
-        factor = 100.0 if name == "coverage_90" else 1.0
-        for when in _WHEN:
-            row[f"{name}_{when}"] = fixed(_times(doc.get(scores, f"{name}_{when}"), factor), places)
-    for name, places in (("rmse", decimals), ("crps", decimals), ("log_score", 2)):
-        change, doubled = (doc.get(scores, f"{name}_{key}") for key in ("diff", "diff_2se"))
-        row[f"{name}_change"] = f"{fixed(change, places, signed=True)} ± {fixed(doubled, places)}"
-    return row
+    return {
+        "n": fixed(doc.get(scores, "n"), 0),
+        "error": _pair(scores, "rmse", decimals),
+        "error_change": _change(scores, "rmse", decimals),
+        "crps": _pair(scores, "crps", decimals),
+        "log_score": _pair(scores, "log_score", 2),
+        "log_score_change": _change(scores, "log_score", 2),
+        "inside": _pair(scores, "coverage_90", 0, 100.0),
+    }
 
 
-def _times(value: Any, factor: float) -> float | None:
-    return factor * value if is_number(value) else None
+def _pair(scores: doc.Document, name: str, decimals: int, factor: float = 1.0) -> str:
+    values = [doc.get(scores, f"{name}_{when}") for when in _WHEN]
+    return " → ".join(fixed(factor * one if is_number(one) else None, decimals) for one in values)
+
+
+def _change(scores: doc.Document, name: str, decimals: int) -> str:
+    change, doubled = (doc.get(scores, f"{name}_{key}") for key in ("diff", "diff_2se"))
+    return f"{fixed(change, decimals, signed=True)} ± {fixed(doubled, decimals)}"
