@@ -97,7 +97,10 @@ def diagnose_case(case: Case, replicas: int, *, figures: bool = True) -> dict[st
     found = diagnose(problem, law, settings, effort, print)
     document = verdict(found) | {"case": case._asdict()}
     if case.folds:
-        document["outer_folds"] = outer_folds(problem, law, settings, effort, case.folds, print)
+        without = replace(effort, exact_loo=False)
+        document["outer_folds"] = outer_folds(
+            problem, case.folds, settings.seed, lambda rest: diagnose(rest, law, settings, without), print
+        )
     if isinstance(found, Diagnosis):
         document["prior_scales"] = {
             name: {str(factor): _best_factor(found.comparison, name, factor) for factor in PRIOR_FACTORS}

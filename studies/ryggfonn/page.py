@@ -89,15 +89,27 @@ def _answers(one: Found) -> dict[str, str]:
     )
     said["probability of `nothing`"] = _share(shares["nothing"])
     said["error models compared"] = f"{', '.join(one.get('error_models', []))}{_under(one)}"
-    if one["next_sensor"]:
+    if one["next_sensor"] and one["next_sensor"]["splits"]:
         place, splits = one["next_sensor"]["s_from_m"], one["next_sensor"]["splits"]
         said["speed that would split the tie best"] = f"at s = {place:.0f} m ({' from '.join(splits)})"
+    said["carried by"] = _carried(one["influence"])
     said["held-out log score"] = (
         f"{evidence['elpd_diff']:+.1f} (doubled standard error {2.0 * evidence['elpd_se']:.1f})"
     )
     said["held-out error of runout"] = _before_after(held, "rmse_runout", "m", 0)
     said["held-out error of speeds"] = _before_after(held, "rmse_velocity", "m/s", 1)
     return said
+
+
+def _carried(found: Found) -> str:
+    """The few avalanches without which the answer would not be given, or that there are none."""
+    if not found["carried_by"]:
+        left = f"{found['without_a_third']:.1f} nats are left"
+        return f"no few avalanches: {left} without the third that carry most"
+    few = ", ".join(found["carried_by"])
+    return (
+        f"{few}: without them {found['without_them']:.1f} nats are left, and {found['needed']:.1f} are needed"
+    )
 
 
 def _added(row: Found) -> str:

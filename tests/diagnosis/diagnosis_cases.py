@@ -11,12 +11,16 @@ import numpy as np
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.campaign.parts import of_events
 from skred.diagnosis.detect.score_test import ScoreTest
+from skred.diagnosis.diagnose import diagnose
+from skred.diagnosis.effort import Effort
 from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
+from skred.diagnosis.outcome import Diagnosis
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical.problem import hierarchical_problem
+from skred.inference.sampling import SamplerSettings
 from skred.physics.laws import load_law
 from skred.physics.mechanisms.spec import Direction
 from skred.simulator.draw import draw_trial
@@ -57,6 +61,29 @@ def base_of(campaign: Campaign, law_id: str, error_model: str = "robust") -> Bas
         EventLikelihood(extension, rows, np.zeros(0)), mean_prior(law), (population, points)
     )
     return fit_base(problem, law, found, points)
+
+
+BIASED_GATE, BIAS = 2, 1.45
+"""The gate of `gates_campaign` that may read too high, and how many times."""
+
+
+def gates_campaign(events: range, *, biased: bool) -> Campaign:
+    """Some of 17 avalanches past five gates, a runout each; no physics hidden."""
+    campaign = of_events(trial(1003, "dense", "nothing", "constant").campaign, events)
+    campaign = with_sensors(campaign, [12, 15, 18, 21, 24, campaign.n_sensors - 1])
+    values = np.array(campaign.values)
+    values[:, BIASED_GATE] *= BIAS if biased else 1.0
+    return replace(campaign, values=values)
+
+
+@cache
+def gates_diagnosis(*, biased: bool) -> Diagnosis:
+    """The whole diagnosis of eight avalanches, one mechanism added at most."""
+    settings, effort = SamplerSettings("metropolis", 500, 500, 4, 0), Effort(replicas=40, max_mechanisms=1)
+    problem = hierarchical_problem(gates_campaign(range(8), biased=biased))
+    found = diagnose(problem, load_law("constant"), settings, effort)
+    assert isinstance(found, Diagnosis)
+    return found
 
 
 def score_test_of(base: Base) -> ScoreTest:

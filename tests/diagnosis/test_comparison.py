@@ -4,21 +4,17 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
 
-from skred.diagnosis.compare import comparison
-from skred.diagnosis.compare import refinement as looking
 from skred.diagnosis.compare.candidate import FORM, Candidate
-from skred.diagnosis.compare.comparison import _screened, _that_count, _that_may_count, with_errors
+from skred.diagnosis.compare.comparison import with_errors, worth_comparing
 from skred.diagnosis.compare.recomputed import recomputed
-from skred.diagnosis.compare.refinement import Place, candidates_of, leading
-from skred.diagnosis.compare.screening import curve, screening_budget
-from skred.diagnosis.detect.score_test import ScoreTest, placed_mechanisms
+from skred.diagnosis.compare.refinement import Place, candidates_of, leading, refine
+from skred.diagnosis.compare.screening import curve, screened, screening_budget
+from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at, curve_near
 from skred.diagnosis.evidence.event_quadrature import FINE, FIRST, FRONTS, ROUGH, USUAL
 from skred.diagnosis.evidence.extension import extended
@@ -129,7 +125,6 @@ def test_those_that_lead_after_a_second_look_are_looked_at_too() -> None:
 def test_what_is_far_behind_is_not_looked_at_again() -> None:
     heights = {"segment_drag": [30.0, 19.0, 21.0], "obstacle": [12.0, 9.0], "sensor_bias": [14.0, 3.0]}
     curves = [made(name, 100.0 * k, one) for name, row in heights.items() for k, one in enumerate(row)]
-    assert _that_count(dict(enumerate(curves))) == [0, 2, 3, 4, 5]
     # A second look at what is hopeless against the best of all would change nothing that is said.
     assert leading(curves, {}) == [0, 3, 5]
     assert leading(curves, {0: Place((made("segment_drag", 0.0, 33.0),))}) == [0, 5]
@@ -139,7 +134,7 @@ def test_what_is_far_behind_is_not_looked_at_again() -> None:
     assert leading(strong, {}) == [0, 1]
 
 
-def test_the_leader_is_parted_before_others_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_leader_is_parted_before_others_are_looked_at(base: Base) -> None:
     """What falls hopelessly behind the leader's parts is left as it is; what keeps up is not."""
     at_first = [
         made("segment_drag", 0.0, 20.0),
@@ -148,16 +143,16 @@ def test_the_leader_is_parted_before_others_are_looked_at(monkeypatch: pytest.Mo
     ]
     looked: list[str] = []
 
-    def curve_near(base: Any, mechanism: Any, shape: Any, near: Curve, first: Any) -> Curve:
-        looked.append(mechanism.id)
-        return made(mechanism.id, shape.s_from_m, 31.0 if mechanism.id == "segment_drag" else 13.0)
+    def near(known: Curve, shape: Shape) -> Curve:
+        looked.append(known.mechanism.id)
+        place = shape.s_from_m or 0.0
+        return made(known.mechanism.id, place, 31.0 if known.mechanism.id == "segment_drag" else 13.0)
 
-    monkeypatch.setattr(looking, "curve_near", curve_near)
-    monkeypatch.setattr(looking, "_parts", lambda *of: [])
     with ThreadPoolExecutor(1) as pool:
-        base: Any = SimpleNamespace()
-        found = looking.refine(base, at_first, ROUGH, pool)
-    assert looked == ["segment_drag", "sensor_bias"]
+        found = refine(base.setting, at_first, near, pool)
+    assert list(dict.fromkeys(looked)) == ["segment_drag", "sensor_bias"]
+    assert looked.count("segment_drag") == len(found["segment_drag"].curves) > 1
+    assert looked.index("sensor_bias") >= looked.count("segment_drag")
     assert found["obstacle"].curves == (at_first[1],)
 
 
@@ -166,36 +161,41 @@ def test_mechanisms_that_an_error_model_far_behind_cannot_bring_back() -> None:
     curves = [made("segment_drag", 0.0, 12.0), made("obstacle", 0.0, 4.0), made("sensor_bias", 0.0, -1.0)]
     curves.append(made("obstacle", 100.0, -3.0))
     best, low, none, worst = (one.log_bayes_factor for one in curves)
-    assert _that_may_count(curves, 0.0) == [curves[0], curves[1], curves[3]]
+    assert worth_comparing(curves, 0.0) == [curves[0], curves[1], curves[3]]
     assert 2.0 * low + 5.0 > best and none + 5.0 < best
-    assert _that_may_count(curves, 2.0 * low + 5.0 - best + 0.01) == [curves[0]]
-    assert _that_may_count(curves, best + 5.01) == []
+    assert worth_comparing(curves, 2.0 * low + 5.0 - best + 0.01) == [curves[0]]
+    assert worth_comparing(curves, best + 5.01) == []
     # With nothing that leads they have to keep up with nothing.
-    assert _that_may_count(curves[2:3], none + 4.99) == curves[2:3]
-    assert _that_may_count(curves[2:3], none + 5.01) == []
+    assert worth_comparing(curves[2:3], none + 4.99) == curves[2:3]
+    assert worth_comparing(curves[2:3], none + 5.01) == []
 
 
 def test_under_another_error_model_each_mechanism_is_looked_at_until_the_rest_is_far_behind(
-    monkeypatch: pytest.MonkeyPatch,
+    base: Base,
 ) -> None:
     """A place that was far behind is looked at once the leading one falls; one that stays behind is not."""
-    before = [made("obstacle", 100.0 * k, one) for k, one in enumerate([30.0, 19.0, 5.0])]
-    now = [made("obstacle", 100.0 * k, one) for k, one in enumerate([12.0, 25.0, 40.0])]
-    looked: list[int] = []
+    friction = [one for one in placed_mechanisms(base.setting) if one.mechanism.id == "segment_friction"]
+    bias = [one for one in placed_mechanisms(base.setting) if one.mechanism.id == "sensor_bias"]
+    places = [*friction[:3], bias[0]]
 
-    def curve(base: Any, mechanism: Any, shape: Any, budget: Any, linear: Any) -> Curve:
-        looked.append(int(shape.s_from_m / 100.0))
-        return now[looked[-1]]
+    def before(*heights: float) -> list[Curve]:
+        return [
+            replace(made(one.mechanism.id, 0.0, height), shape=one.shape)
+            for one, height in zip(places, heights, strict=True)
+        ]
 
-    todo = [SimpleNamespace(mechanism=one.mechanism, shape=one.shape) for one in now]
-    monkeypatch.setattr(comparison, "curve", curve)
-    monkeypatch.setattr(comparison, "_linear_strengths", lambda base: {})
-    monkeypatch.setattr(comparison, "placed_mechanisms", lambda setting, ties: todo)
     with ThreadPoolExecutor(1) as pool:
+        now = screened(base, ROUGH, pool, before=before(0.0, 0.0, 0.0, 0.0))
+        heights = [one.log_bayes_factor for one in now]
+        most = max(heights[:2])
+        known = before(most + 90.0, most + 45.0, most - 12.0, -50.0)
         told: list[tuple[int, int]] = []
-        base: Any = SimpleNamespace(setting=None)
-        found = _screened(base, ROUGH, pool, lambda *of: told.append(of), before)
-    assert looked == [0, 1] and found == [now[0], now[1], before[2]] and told[-1] == (3, 3)
+        found = screened(base, ROUGH, pool, lambda *of: told.append(of), known)
+    assert all(one.rough for one in now)
+    assert [one.log_bayes_factor for one in found[:2]] == heights[:2]
+    assert found[2] is known[2]
+    assert found[3].log_bayes_factor == heights[3]  # the best of its own mechanism
+    assert told == [(3, 4), (4, 4), (4, 4)]
 
 
 def test_strengths_of_other_sensors_are_other_strengths() -> None:
@@ -234,26 +234,24 @@ def peaked(shape: Shape, width_m: float) -> float:
     [(10.0, 140, 5.0, 2.5), (30.0, 100, 20.0, 1.5), (1e3, 21, 100.0, 0.1)],
 )
 def test_a_place_is_parted_where_one_part_holds_most(
-    monkeypatch: pytest.MonkeyPatch, base: Base, width_m: float, most_looks: int, off: float, error: float
+    base: Base, width_m: float, most_looks: int, off: float, error: float
 ) -> None:
     """The peak is found, and the mean over all stretches is that of very many of them."""
     setting = replace(base.setting, recorded_m=(100.0, 900.0))
-    base = replace(base, setting=setting)
     looked: list[Shape] = []
 
     def as_high(shape: Shape) -> Curve:
         return replace(made("segment_friction", 0.0, peaked(shape, width_m)), shape=shape)
 
-    def curve_near(base: Any, mechanism: Any, shape: Shape, near: Curve, budget: Any) -> Curve:
+    def near(known: Curve, shape: Shape) -> Curve:
         looked.append(shape)
         return as_high(shape)
 
-    monkeypatch.setattr(looking, "curve_near", curve_near)
     added = mechanisms()["segment_friction"].added
     assert added is not None
     shapes = added.shapes(setting)
     with ThreadPoolExecutor(1) as pool:
-        found = looking.refine(base, [as_high(one) for one in shapes], FRONTS, pool)
+        found = refine(setting, [as_high(one) for one in shapes], near, pool)
     candidate = found["segment_friction"]
     assert np.exp(candidate.log_weights).sum() == pytest.approx(1.0)
     assert len(looked) <= most_looks and len(set(looked)) == len(looked)
@@ -361,21 +359,16 @@ def test_nothing_is_the_same_whatever_is_not_added() -> None:
     assert replace(base).with_nothing(ROUGH) is not base.with_nothing(ROUGH)
 
 
-def test_a_first_look_sees_strengths_far_below_the_grid() -> None:
+def test_screening_sees_strengths_far_below_the_grid() -> None:
     """Many recordings tell a drag of a tenth of its prior's scale; the grid begins at a fifth."""
     base = base_of(trial(1031, "dense", "turbulent_drag", "constant", 9.5).campaign, "constant")
     job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == "turbulent_drag")
-    score_test = ScoreTest(base.problem, base.law, base.setting)
-    found = score_test.strengths_found(score_test.scores(base.rows, base.fit.points, base.population))
-    linear = found[job.mechanism.id, job.shape]
-    assert job.mechanism.added is not None and 0.0 < linear < 0.2 * job.mechanism.added.scale
-    rough = curve(base, job.mechanism, job.shape, ROUGH, linear)
+    rough = curve(base, job.mechanism, job.shape, ROUGH)
     settled = curve_near(base, job.mechanism, job.shape, rough, ROUGH)
+    assert job.mechanism.added is not None
+    assert 0.0 < settled.moments[0] < 0.2 * job.mechanism.added.scale
     assert settled.log_bayes_factor > 20.0
     assert rough.log_bayes_factor == pytest.approx(settled.log_bayes_factor, abs=5.0)
-    blind = curve(base, job.mechanism, job.shape, ROUGH)
-    assert blind.log_bayes_factor < settled.log_bayes_factor - 5.0
-    assert settled.moments[0] == pytest.approx(linear, abs=6.0 * settled.moments[1])
 
 
 def test_moments_of_a_curve_on_uneven_strengths(base: Base) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from scipy.stats import norm
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.diagnosis.evidence.conditional_map import campaign_rows
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of
+from skred.diagnosis.influence.influence import Influence
 from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.predict.conditional import BeforeAfter, Conditional, above, conditional
 from skred.diagnosis.predict.draws import Draws, LeftOut
@@ -170,16 +172,16 @@ def test_seeds_are_fixed_and_few_draws_are_told(ryggfonn: HierarchicalProblem) -
     assert np.nanmin(first.effective) > 5.0
 
 
-def found_of(pair: BeforeAfter, problem: HierarchicalProblem) -> Diagnosis:
-    none = None
-    return Diagnosis(
-        problem, load_law("pcm"), none, none, none, none, none, none, none, none, none, {}, pair
-    )  # type: ignore[arg-type]  # fmt: skip
+def found_of(pair: BeforeAfter, problem: HierarchicalProblem, *carried_by: str) -> Diagnosis:
+    nothing: Any = (None,) * 9
+    events = tuple(problem.campaign.event_ids)
+    hangs_on = Influence("drag", 9.0, 4.0, events, np.full(len(events), 8.0), carried_by, None, None, ())
+    return Diagnosis(problem, load_law("pcm"), *nothing, hangs_on, pair)
 
 
 def test_nothing_is_gained_where_before_is_after(ryggfonn: HierarchicalProblem) -> None:
     one = predicted(pcm(ryggfonn), draws(200))
-    document = conditional_document(found_of(BeforeAfter(one, one), ryggfonn), ["19880315", "19890217"])
+    document = conditional_document(found_of(BeforeAfter(one, one), ryggfonn, "19880315", "19890217"))
     assert document is not None
     assert [row["sensor"] for row in document["sensors"]] == ["CD", "b", "runout"]
     for row in document["sensors"]:
@@ -201,7 +203,7 @@ def test_a_gain_counts_beyond_twice_its_standard_error(ryggfonn: HierarchicalPro
     document = conditional_document(found_of(BeforeAfter(before, better), ryggfonn))
     assert document is not None
     row = document["sensors"][0]
-    assert row["carrying"] is None and row["gain"] == "better"
+    assert row["carrying"] is None and row["others"] == row["all"] and row["gain"] == "better"
     assert row["all"]["rmse_after"] == pytest.approx(0.5 * row["all"]["rmse_before"])
     assert row["all"]["log_score_diff"] == pytest.approx(0.5)
     assert row["all"]["log_score_diff_2se"] == pytest.approx(0.0, abs=1e-12)

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 import xarray as xr
+from diagnosis_cases import gates_diagnosis
 
-import skred.diagnosis.run as module
 from skred.campaign.parts import of_events
 from skred.diagnosis.effort import Effort
-from skred.diagnosis.outcome import Diagnosis, MechanismsAdded
-from skred.diagnosis.run import diagnose_to
+from skred.diagnosis.outcome import MechanismsAdded
+from skred.diagnosis.run import diagnose_to, write_trees
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
 from skred.inference.sampling import SamplerSettings
 from skred.parallel.processes import helpers
@@ -44,29 +43,31 @@ def test_nothing_of_an_earlier_diagnosis_is_left(few: HierarchicalProblem, tmp_p
 
 @pytest.mark.parametrize("with_helpers", [False, True])
 def test_draws_are_in_their_files(
-    with_helpers: bool, few: HierarchicalProblem, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    with_helpers: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    names = {
-        "base.nc": "base", "base_same_errors.nc": "reference", "augmented.nc": "augmented",
-        "diagnosis.nc": "curves",
-    }  # fmt: skip
-    made: dict[str, Any] = {
-        name: SimpleNamespace(tree=xr.DataTree(xr.Dataset(attrs={"name": name}))) for name in names.values()
-    }
-    step: Any = SimpleNamespace(calibration=made["augmented"])
-    law = load_law("constant")
-    none: Any = None
-    added = MechanismsAdded((step,), made["reference"], none)
-    found = Diagnosis(few, law, made["base"], none, none, none, none, none, none, added, none)
+    """Of a biased sensor that was found, and the base law calibrated once more for comparison."""
+    found = gates_diagnosis(biased=True)
+    assert isinstance(found.finding, MechanismsAdded)
+    other = replace(found.calibration, tree=found.calibration.tree.copy())
+    other.tree.attrs["name"] = "under the same errors"
+    added = replace(found, finding=replace(found.finding, reference=other))
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
-    monkeypatch.setattr(module, "diagnose", lambda *_: found)
-    monkeypatch.setattr(module, "verdict", lambda _: {})
-    monkeypatch.setattr(module, "report_facts", lambda _: {})
-    monkeypatch.setattr(module, "augmented_draws", lambda _: made["augmented"].tree)
-    monkeypatch.setattr(module, "figure_data", lambda _: made["curves"].tree)
     with helpers() if with_helpers else nullcontext():
-        diagnose_to(few, law, SamplerSettings(), Effort(), tmp_path)
-    told = {
-        file.name: xr.open_datatree(file, engine="h5netcdf").attrs["name"] for file in tmp_path.glob("*.nc")
-    }
-    assert told == names
+        write_trees(added, tmp_path)
+    trees = {file.name: xr.open_datatree(file, engine="h5netcdf") for file in tmp_path.iterdir()}
+    assert set(trees) == {"base.nc", "base_same_errors.nc", "augmented.nc", "diagnosis.nc"}
+    assert "name" not in trees["base.nc"].attrs
+    assert trees["base_same_errors.nc"].attrs["name"] == "under the same errors"
+    own = {str(name) for name in trees["base.nc"]["posterior"].data_vars}
+    assert own < {str(name) for name in trees["augmented.nc"]["posterior"].data_vars}
+    assert "added" in trees["augmented.nc"].children and "added" not in trees["base.nc"].children
+    assert "posterior" not in trees["diagnosis.nc"].children
+
+
+def test_files_of_what_is_not_there_are_not_written(tmp_path: Path) -> None:
+    write_trees(gates_diagnosis(biased=True), tmp_path)
+    assert {file.name for file in tmp_path.iterdir()} == {"base.nc", "augmented.nc", "diagnosis.nc"}
+    clean = tmp_path / "clean"
+    clean.mkdir()
+    write_trees(gates_diagnosis(biased=False), clean)
+    assert {file.name for file in clean.iterdir()} == {"base.nc", "diagnosis.nc"}

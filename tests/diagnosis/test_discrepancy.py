@@ -12,20 +12,15 @@ from scipy.stats import multivariate_normal, norm
 
 from skred.campaign import find_campaign, read_campaign
 from skred.diagnosis.compare.comparison import ComparisonUnderErrors
-from skred.diagnosis.compare.location import _band, _resolution, _stretch, _work, locate
+from skred.diagnosis.compare.location import Location, locate
 from skred.diagnosis.compare.screening import curve
-from skred.diagnosis.detect.score_test import _of_profile
-from skred.diagnosis.discrepancy.fit import (
-    _around,
-    _climb,
-    _Explored,
-    _fit_at,
-    _laplace,
-    as_profile,
-    fit_profile,
-)
+from skred.diagnosis.detect.score_test import log_factor_of_process
+from skred.diagnosis.discrepancy.climb import climb, expanded_at
+from skred.diagnosis.discrepancy.explored import Expansion, ExploredPriors, laplace
+from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
 from skred.diagnosis.discrepancy.profile import (
     KINDS,
+    Kind,
     Prior,
     Profile,
     alike,
@@ -84,7 +79,9 @@ def test_linear_evidence_of_a_profile(n_groups: int) -> None:
         informations.append(design.T @ (design / sd[:, None] ** 2))
         there = multivariate_normal(np.zeros(n_data), np.diag(sd**2) + design @ cover @ design.T)
         expected.append(there.logpdf(data) - norm.logpdf(data, scale=sd).sum())
-    assert_allclose(_of_profile(np.array(scores), np.array(informations), cover), expected, rtol=1e-9)
+    assert_allclose(
+        log_factor_of_process(np.array(scores), np.array(informations), cover), expected, rtol=1e-9
+    )
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -99,7 +96,7 @@ def test_a_planted_force_is_found(base: Base, kind: int, sign: float) -> None:
     z = found.mean / np.sqrt(np.diag(found.covariance))
     top = int(np.argmax(np.abs(z)))
     assert abs(found.knots_m[top] - centre) < 120.0 and np.sign(found.mean[top]) == sign
-    first, last = _stretch(found)
+    first, last = location_of(changed, found).stretch_m
     assert first < centre < last
     at = np.linspace(found.knots_m[0], found.knots_m[-1], 2001)
     near = np.abs(at - centre) < 200.0
@@ -121,11 +118,15 @@ def made_profile(base: Base, kind: int) -> Profile:
     return Profile(KINDS[kind], prior, at, mean, cover, 0.0, 0.0, base.fit, ())
 
 
+def location_of(base: Base, profile: Profile) -> Location:
+    """Where, by this profile alone."""
+    return locate(ComparisonUnderErrors("robust", base, {}, [profile], []))
+
+
 def test_work_is_the_integral_of_the_force(base: Base) -> None:
     """Between neighbouring sensors, and from the last to the last knot; its standard deviation by draws."""
-    profile, terrain = made_profile(base, 0), base.setting.terrain
-    edge, basis = terrain.edge_s_m, spline_basis(terrain, profile.knots_m)
-    work = _work(base.problem.sensor_places, profile, basis, np.diff(edge), edge)
+    profile, edge = made_profile(base, 0), base.setting.terrain.edge_s_m
+    work = location_of(base, profile).work
     ends = sorted(float(s.s_from_m) for s in base.problem.campaign.sensors if not s.is_runout)
     if profile.knots_m[-1] > ends[-1] + 1.0:
         ends = [*ends, profile.knots_m[-1]]
@@ -150,8 +151,11 @@ def test_band_holds_the_whole_profile(base: Base) -> None:
     profile = made_profile(base, 0)
     basis = spline_basis(base.setting.terrain, profile.knots_m)
     basis = basis[:, basis.sum(axis=0) > 0.0]
-    mean, sd, factor = _band(profile, basis)
-    assert_allclose(mean, profile.mean @ basis)
+    found = location_of(base, profile)
+    mean, sd = profile.mean @ basis, np.sqrt(np.einsum("kc,kl,lc->c", basis, profile.covariance, basis))
+    assert_allclose(found.mean, mean)
+    factor = ((found.high - mean) / sd).mean()
+    assert_allclose([mean - factor * sd, mean + factor * sd], [found.low, found.high])
     assert norm.ppf(0.95) < factor < norm.ppf(1.0 - 0.05 / basis.shape[1])
     draws = np.random.default_rng(9).multivariate_normal(profile.mean, profile.covariance, 4000) @ basis
     held = np.all(np.abs(draws - mean) <= factor * sd, axis=1).mean()
@@ -182,8 +186,9 @@ def test_resolution(base: Base) -> None:
     at = profile.knots_m
     prior = profile.prior.cover(at)
     length = at[-1] - at[0]
-    assert _resolution(replace(profile, covariance=prior)) == pytest.approx(length)
-    assert _resolution(replace(profile, covariance=0.0 * prior)) == pytest.approx(length / len(at))
+    nothing, everything = (replace(profile, covariance=share * prior) for share in (1.0, 1e-9))
+    assert location_of(base, nothing).resolution_m == pytest.approx(length)
+    assert location_of(base, everything).resolution_m == pytest.approx(length / len(at))
 
 
 def test_evidence_of_all_kinds_is_their_mean(base: Base) -> None:
@@ -213,17 +218,21 @@ def test_profile_is_found_from_a_listed_mechanism_where_nothing_is_too_far(error
     assert from_listed.log_bayes_factor > max(from_nothing.log_bayes_factor, 0.8 * listed.log_bayes_factor)
 
 
+def around_nothing(base: Base, kind: Kind) -> Expansion:
+    """The log likelihood of a profile around no force."""
+    at = knots(base.setting)
+    return expanded_at(base, kind, at, np.zeros(len(at)), (base.population, base.fit.points))
+
+
 def test_evidence_under_a_prior_from_the_peak_under_another(base: Base) -> None:
     """The likelihood's slope and curvature say what climbing under the other prior finds."""
     changed, kind = planted(base, 0, 800.0, 1.0), KINDS[0]
     at = knots(changed.setting)
-    start = (changed.population, changed.fit.points)
-    nothing = _fit_at(changed, kind, at, np.zeros(len(at)), start)
-    flat = _around(changed, kind, at, np.zeros(len(at)), nothing)
-    height = nothing.found.log_evidence
+    flat = around_nothing(changed, kind)
+    height = flat.fit.found.log_evidence
     usual, other = Prior(0.8, 120.0), Prior(1.6, 120.0, 800.0)
-    peak, own = (_climb(changed, kind, at, flat, one.cover(at)) for one in (usual, other))
-    found, exact = (_laplace(one, height, other.cover(at)).log_factor() for one in (peak, own))
+    peak, own = (climb(changed, kind, at, flat, one.cover(at)) for one in (usual, other))
+    found, exact = (laplace(one, height, other.cover(at)).log_factor() for one in (peak, own))
     assert exact > 20.0
     assert found == pytest.approx(exact, abs=0.5)
     precision = np.linalg.inv(other.cover(at))
@@ -266,12 +275,10 @@ def test_evidence_over_priors_against_climbing_under_each(base: Base, kind: int,
     """The few priors that are climbed under stand for all."""
     changed = planted(base, kind, 800.0, size) if size else base
     own, at = KINDS[kind], knots(base.setting)
-    start = (changed.population, changed.fit.points)
-    nothing = _fit_at(changed, own, at, np.zeros(len(at)), start)
-    flat = _around(changed, own, at, np.zeros(len(at)), nothing)
+    flat = around_nothing(changed, own)
+    height = flat.fit.found.log_evidence
     factors = [
-        _laplace(_climb(changed, own, at, flat, cover), nothing.found.log_evidence, cover).log_factor()
-        + share
+        laplace(climb(changed, own, at, flat, cover), height, cover).log_factor() + share
         for prior, share in priors_of(own, at).items()
         for cover in [prior.cover(at)]
     ]
@@ -283,11 +290,8 @@ def test_evidence_over_priors_against_climbing_under_each(base: Base, kind: int,
 def test_what_is_only_promised_counts_no_more_than_what_was_computed(base: Base) -> None:
     """A slope at a kink promises hundreds of nats elsewhere: enough to climb there, not to claim them."""
     own, at = KINDS[0], knots(base.setting)
-    none = np.zeros(len(at))
-    fit = _fit_at(base, own, at, none, (base.population, base.fit.points))
-    flat = _around(base, own, at, none, fit)
-    priors = priors_of(own, at)
-    seen = _Explored(fit.found.log_evidence, at, priors)
+    flat, priors = around_nothing(base, own), priors_of(own, at)
+    seen = ExploredPriors(flat.fit.found.log_evidence, at, priors)
     climbed = next(one for one in priors if one.centre_m is not None)
     # Settled under its own prior, which holds its rough values down: to others that is a steep slope.
     values = 0.05 * own.amplitude * np.sin(2.0 * np.arange(len(at)))

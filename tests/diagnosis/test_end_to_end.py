@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from diagnosis_cases import first_events, trial, with_sensors
+from diagnosis_cases import BIAS, BIASED_GATE, gates_campaign, gates_diagnosis
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skred.campaign import Campaign, Status
+from skred.campaign import Status
 from skred.diagnosis.augment.reference import Reference
-from skred.diagnosis.diagnose import diagnose
-from skred.diagnosis.effort import Effort
 from skred.diagnosis.evidence.predictive import Predicted
 from skred.diagnosis.outcome import Diagnosis, MechanismsAdded, NothingAdded
 from skred.diagnosis.predict.held_out import HeldOut, errors, paired
@@ -22,8 +20,6 @@ from skred.diagnosis.verdict.document import verdict
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.inference.leave_one_out import exact_leave_one_out
-from skred.inference.sampling import SamplerSettings
-from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 
 KEYS = {
@@ -31,36 +27,17 @@ KEYS = {
     "indistinguishable", "location", "strength", "covariate", "sensor", "equation", "evidence", "held_out",
     "detection_limits", "next_sensor", "diagnostics", "statement",
 }  # fmt: skip
-GATE = 2
-FACTOR = 1.45
-
-
-def clean_campaign() -> Campaign:
-    """Eight avalanches past five gates, a runout each; nothing hidden."""
-    campaign = first_events(trial(1003, "dense", "nothing", "constant").campaign, 8)
-    return with_sensors(campaign, [12, 15, 18, 21, 24, campaign.n_sensors - 1])
-
-
-def diagnosed(campaign: Campaign) -> Diagnosis:
-    settings = SamplerSettings("metropolis", 500, 500, 4, 0)
-    effort = Effort(replicas=40, max_mechanisms=1)
-    found = diagnose(hierarchical_problem(campaign), load_law("constant"), settings, effort)
-    assert isinstance(found, Diagnosis)
-    return found
 
 
 @pytest.fixture(scope="module")
 def clean() -> Diagnosis:
-    return diagnosed(clean_campaign())
+    return gates_diagnosis(biased=False)
 
 
 @pytest.fixture(scope="module")
 def biased() -> Diagnosis:
     """The third gate reads 45 % too high."""
-    campaign = clean_campaign()
-    values = np.array(campaign.values)
-    values[:, GATE] *= FACTOR
-    return diagnosed(replace(campaign, values=values))
+    return gates_diagnosis(biased=True)
 
 
 @pytest.mark.parametrize("which", ["clean", "biased"])
@@ -111,9 +88,12 @@ def test_nothing_is_named_where_nothing_is(clean: Diagnosis) -> None:
 def test_a_biased_sensor_is_named(biased: Diagnosis) -> None:
     document = verdict(biased)
     assert document["verdict"] == "instrument" and document["mechanism"] == "sensor_bias"
-    assert document["sensor"] == clean_campaign().sensors[GATE].id and document["indistinguishable"] == []
+    assert (
+        document["sensor"] == biased.problem.campaign.sensors[BIASED_GATE].id
+        and document["indistinguishable"] == []
+    )
     strength = document["strength"]
-    assert abs(strength["mean"] - np.log(FACTOR)) < 4.0 * strength["sd"] + 0.02
+    assert abs(strength["mean"] - np.log(BIAS)) < 4.0 * strength["sd"] + 0.02
     assert strength["parameter"] == "log_sensor_factor" and document["location"] is None
     assert document["mechanisms"][0]["id"] == "sensor_bias"
     assert document["evidence"]["elpd_diff"] > 20.0 and document["evidence"]["log_bayes_factor"] > 20.0
@@ -187,7 +167,7 @@ def test_paired_by_hand() -> None:
 
 
 def test_errors_by_hand() -> None:
-    campaign = clean_campaign()
+    campaign = gates_campaign(range(8), biased=False)
     problem = hierarchical_problem(campaign)
     predicted, covered = np.array(campaign.values), np.full(campaign.values.shape, np.nan)
     seen = np.asarray(campaign.status) == Status.OBSERVED

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from skred.diagnosis.predict.held_out import _smoothed
+from skred.diagnosis.predict.held_out import leave_out_weights
 
 
 @pytest.mark.parametrize("far", [0.0, 2.5])
@@ -20,7 +20,7 @@ def test_smoothed_weights_leave_an_event_out(far: float) -> None:
     n, total = len(values), values.sum()
     draws = total / n + rng.standard_normal(40_000) / np.sqrt(n)
     densities = norm.logpdf(values[None, :], draws[:, None], 1.0)
-    log_weights, k = _smoothed(densities)
+    log_weights, k = leave_out_weights(densities)
     weights = log_weights - logsumexp(log_weights, axis=0)
     found = logsumexp(densities + weights, axis=0)
     others = (total - values) / (n - 1)

@@ -182,3 +182,12 @@ def test_stated_probabilities_of_what_is_all_but_sure() -> None:
 def test_the_power_is_the_one_that_trials_gave() -> None:
     result = Path(__file__).parents[2] / "studies" / "results" / "calibrate_odds.json"
     assert json.loads(result.read_text(encoding="utf-8"))["power"] == POWER
+
+
+def test_a_force_in_no_list_is_tied_by_the_rule_that_names_are() -> None:
+    """Listed ids at most 2 nats behind it; it stays the answer."""
+    close = decide(shares(0.01, 0.79, segment_friction=0.15, sensor_bias=0.05), 0.005, True)
+    assert close.verdict == "unexplained" and close.names == () and close.answer == "unlisted"
+    assert close.tied == close.beside == ("segment_friction",)
+    far = decide(shares(0.01, 0.89, segment_friction=0.1), 0.005, True)
+    assert far.verdict == "unexplained" and far.tied == ()

@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_array_equal
 
-from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior
+from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior, starting_points
 from skred.physics.laws import load_law
 
 LAW = load_law("pcm")
@@ -110,11 +110,9 @@ def test_prior_draws_are_the_priors(calibration: Any) -> None:
 
 def test_each_chain_starts_from_the_likeliest_of_its_own(problem: Any, calibration: Any) -> None:
     """Apart from one another, and not on a plateau."""
-    from skred.inference.sampling import _starts
-
     names = LAW.parameter_names
     prior = sample_prior(calibration.model, LAW, 0, draws=40)
-    starts = _starts(LAW, problem, prior, SamplerSettings(chains=4))
+    starts = starting_points(LAW, problem, prior, SamplerSettings(chains=4))
     assert len({start[names[0]] for start in starts}) == 4
     every = prior[names[0]].values.ravel()
     for chain, start in enumerate(starts):

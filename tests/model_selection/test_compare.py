@@ -6,18 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
-import skred.model_selection.compare as module
-from skred.model_selection.compare import rank
+from skred.inference.leave_one_out import ExactLoo
+from skred.model_selection.compare import leave_one_out_entry, rank
 
 EVENTS = 22
 BASE = -15.0 + np.sin(np.arange(EVENTS))
-
-
-@pytest.fixture(autouse=True)
-def no_stacking(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Weights are ArviZ's; here equal ones."""
-    monkeypatch.setattr(module, "_stacking", lambda ids, trees: {law: 1 / len(ids) for law in ids})
 
 
 def entry(law: str, shift: Any = 0.0, passed: bool = True) -> dict[str, Any]:
@@ -28,6 +23,17 @@ def entry(law: str, shift: Any = 0.0, passed: bool = True) -> dict[str, Any]:
     return made
 
 
+def ranked(entries: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """With draws that scatter little about each event's score, for the weights."""
+    rng, trees = np.random.default_rng(0), {}
+    for made in entries:
+        if made["exact"]:
+            terms = made["exact"]["pointwise"] + 0.01 * rng.standard_normal((2, 200, EVENTS))
+            data = xr.Dataset({"recordings": (("chain", "draw", "event"), terms)})
+            trees[made["id"]] = xr.DataTree.from_dict({"log_likelihood": data, "posterior": data})
+    return rank(entries, trees)
+
+
 def uneven(total: float, scatter: float) -> np.ndarray:
     """Shifts with a given sum and standard deviation over events."""
     z = np.cos(np.arange(EVENTS))
@@ -36,14 +42,14 @@ def uneven(total: float, scatter: float) -> np.ndarray:
 
 
 def test_best_first_whatever_the_order() -> None:
-    ranked = rank([entry("c", 2.0), entry("a"), entry("b", 1.0)], {})
-    assert [e["id"] for e in ranked] == ["a", "b", "c"]
-    assert [e["difference"]["elpd"] for e in ranked] == pytest.approx([0.0, -EVENTS, -2 * EVENTS])
+    found = ranked([entry("c", 2.0), entry("a"), entry("b", 1.0)])
+    assert [e["id"] for e in found] == ["a", "b", "c"]
+    assert [e["difference"]["elpd"] for e in found] == pytest.approx([0.0, -EVENTS, -2 * EVENTS])
 
 
 def test_differences_are_paired() -> None:
     """Their error is that of the differences, not of the scores."""
-    _, second = rank([entry("a"), entry("b", uneven(10.0, 0.5))], {})
+    _, second = ranked([entry("a"), entry("b", uneven(10.0, 0.5))])
     assert second["difference"]["se"] == pytest.approx(np.sqrt(EVENTS) * 0.5)
     assert second["difference"]["se_doubled"] == pytest.approx(np.sqrt(EVENTS))
 
@@ -60,36 +66,46 @@ def test_differences_are_paired() -> None:
 def test_practical_is_at_least_four_and_twice_its_error(
     total: float, scatter: float, practical: bool
 ) -> None:
-    _, second = rank([entry("a"), entry("b", uneven(total, scatter))], {})
+    _, second = ranked([entry("a"), entry("b", uneven(total, scatter))])
     assert second["difference"]["practical"] is practical
 
 
 def test_a_tie() -> None:
-    ranked = rank([entry("a"), entry("b")], {})
-    assert [e["id"] for e in ranked] == ["a", "b"]
-    for e in ranked:
+    found = ranked([entry("a"), entry("b")])
+    assert [e["id"] for e in found] == ["a", "b"]
+    for e in found:
         assert e["difference"] == {"elpd": 0.0, "se": 0.0, "se_doubled": 0.0, "practical": False}
 
 
 def test_a_failed_gate_comes_last_without_difference() -> None:
-    ranked = rank([entry("bad", passed=False), entry("worse", 1.0), entry("best")], {})
-    assert [e["id"] for e in ranked] == ["best", "worse", "bad"]
-    assert "difference" not in ranked[-1] and "weight" not in ranked[-1]
-    assert [e["weight"] for e in ranked[:2]] == [0.5, 0.5]
+    found = ranked([entry("bad", passed=False), entry("worse", 1.0), entry("best")])
+    assert [e["id"] for e in found] == ["best", "worse", "bad"]
+    assert "difference" not in found[-1] and "weight" not in found[-1]
+    assert [e["weight"] for e in found[:2]] == pytest.approx([1.0, 0.0], abs=1e-3)
+
+
+def test_laws_that_predict_different_events_share_the_weight() -> None:
+    """Half of the events each is predicted well by one of them: together they predict best.
+
+    By its total of seven nats more the first would have all of it.
+    """
+    side = np.where(np.arange(EVENTS) % 2, 4.0, -4.0)
+    found = ranked([entry("a", side), entry("b", 0.3 - side), entry("c", 9.0)])
+    assert [e["weight"] for e in found] == pytest.approx([0.5, 0.5, 0.0], abs=0.05)
 
 
 @pytest.mark.parametrize("entries", [[], [entry("bad", passed=False)], [entry("only")]])
 def test_fewer_than_two(entries: list[dict[str, Any]]) -> None:
-    assert [e["id"] for e in rank(entries, {})] == [e["id"] for e in entries]
+    assert [e["id"] for e in ranked(entries)] == [e["id"] for e in entries]
 
 
 def test_events_that_were_refitted_are_exact_and_the_others_are_not() -> None:
     by_importance = np.array([-1.0, -2.0, -3.0, -4.0])
-    refits = module.ExactLoo(np.array([-2.5, -4.5]), 0.03, ("d",))
-    made = module._exact_entry(by_importance, refits, [1, 3], ["a", "b", "c", "d"])
+    refits = ExactLoo(np.array([-2.5, -4.5]), 0.03, ("d",))
+    made = leave_one_out_entry(by_importance, refits, [1, 3], ["a", "b", "c", "d"])
     assert made["pointwise"] == [-1.0, -2.5, -3.0, -4.5] and made["elpd"] == pytest.approx(-11.0)
     assert made["refitted"] == ["b", "d"] and made["failed_refits"] == ["d"] and made["mcse"] == 0.03
     assert made["se"] == pytest.approx(np.sqrt(4 * np.var([-1.0, -2.5, -3.0, -4.5], ddof=1)))
     assert by_importance[1] == -2.0
-    none = module._exact_entry(by_importance, None, [], ["a", "b", "c", "d"])
+    none = leave_one_out_entry(by_importance, None, [], ["a", "b", "c", "d"])
     assert none["elpd"] == pytest.approx(-10.0) and none["refitted"] == [] and none["mcse"] == 0.0

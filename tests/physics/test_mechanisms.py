@@ -247,7 +247,7 @@ def test_what_is_opposed_does_not_show_in_a_typical_front(name: str, settings: l
 
 
 def test_opposed_shapes_have_a_share_of_their_own(settings: list[Setting]) -> None:
-    """As the opposed kinds of the unlisted force do; without any, or with nothing else, all are alike."""
+    """As the opposed kinds of the unlisted force do."""
     shapes = added_to(ALL["segment_drag"]).shapes(settings[1])
     opposed = np.array([is_opposed(shape) for shape in shapes])
     found = shares(shapes)
@@ -255,30 +255,31 @@ def test_opposed_shapes_have_a_share_of_their_own(settings: list[Setting]) -> No
     assert sum(kind.share for kind in KINDS if kind.opposed) == pytest.approx(OPPOSED_SHARE)
     for some_of in (~opposed, opposed):
         chosen = [shape for shape, one in zip(shapes, some_of, strict=True) if one]
-        np.testing.assert_allclose(shares(chosen), 1.0 / len(chosen))
+        assert shares(chosen).sum() == pytest.approx(1.0)
     assert not any(is_opposed(shape) for shape in added_to(ALL["segment_friction"]).shapes(settings[1]))
 
 
-def test_opposed_stretches_begin_above_what_is_recorded_and_plain_ones_do_not(
-    settings: list[Setting],
+@pytest.mark.parametrize("name", ["segment_drag", "segment_friction", "entrainment"])
+def test_every_stretch_ends_in_the_recorded_part_and_each_length_is_as_probable(
+    settings: list[Setting], name: str
 ) -> None:
-    """By up to their length, and where fronts move; every place of the recorded part has both."""
+    """One prior for all mechanisms of a stretch: plain or opposed, they begin above the first sensor too."""
     setting = replace(settings[1], recorded_m=(600.0, 1100.0))
-    shapes = added_to(ALL["segment_drag"]).shapes(setting)
+    shapes = added_to(ALL[name]).shapes(setting)
     assert len(set(shapes)) == len(shapes)
-    for length, above in ((200.0, [400.0, 466.7, 533.3]), (500.0, [100.0, 266.7, 433.3])):
-        own = [one for one in shapes if ends_of(one)[1] - ends_of(one)[0] == pytest.approx(length)]
-        opposed = [ends_of(one)[0] for one in own if is_opposed(one)]
-        plain = [ends_of(one)[0] for one in own if not is_opposed(one)]
-        assert min(plain) == 600.0 and sorted(start for start in opposed if start >= 600.0) == plain
-        np.testing.assert_allclose(sorted(start for start in opposed if start < 600.0), above, atol=0.1)
-    for first in (600.1, 600.2, 600.3):
-        near = added_to(ALL["segment_drag"]).shapes(replace(setting, recorded_m=(first, 1100.0)))
-        assert (
-            len({(is_opposed(one), *np.round(ends_of(one), 3)) for one in near}) == len(near) == len(shapes)
+    plain = [one for one in shapes if not is_opposed(one)]
+    ends = np.array([ends_of(one) for one in plain])
+    assert (ends[:, 1] > 600.0).all() and (ends[:, 1] <= 1100.0).all() and ends[:, 0].min() < 400.0
+    lengths = np.round(ends[:, 1] - ends[:, 0])
+    for length in (75.0, 200.0, 500.0):
+        assert shares(plain)[lengths == length].sum() == pytest.approx(1.0 / 3.0)
+        np.testing.assert_allclose(
+            np.diff(np.sort(ends[lengths == length, 1])), 500.0 / (lengths == length).sum()
         )
+    opposed = {ends_of(one) for one in shapes if is_opposed(one)}
+    assert opposed <= {ends_of(one) for one in plain if np.diff(ends_of(one)) > 150.0}
     shallow = replace(setting, recorded_m=(100.0, 1100.0))
-    assert min(ends_of(one)[0] for one in added_to(ALL["segment_drag"]).shapes(shallow)) >= 0.0
+    assert min(ends_of(one)[0] for one in added_to(ALL[name]).shapes(shallow)) >= 0.0
 
 
 def test_parts_of_an_opposed_stretch_keep_its_relief_or_vary_it(settings: list[Setting]) -> None:

@@ -23,6 +23,7 @@ from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.predictive import Predicted
 from skred.diagnosis.evidence.prior_odds import UNLISTED, prior_odds
 from skred.diagnosis.evidence.refit import Fit
+from skred.diagnosis.influence.influence import Influence, ReadingsLeftOut
 from skred.diagnosis.outcome import (
     Diagnosis,
     MechanismsAdded,
@@ -206,10 +207,28 @@ def diagnosis(kind: str, text: str = "") -> Outcome:
     return Diagnosis(
         problem, LAW, calibration(problem), SimpleNamespace(), table,
         BootstrapTest(30.0 if alarm else 0.3, clean), comparison, Decision(verdict_, names),
-        location(), finding, held(problem, 0.0), {"base": 12.3, "comparison": 45.6},
+        location(), finding, held(problem, 0.0), hangs_on(verdict_, names, problem),
         None if isinstance(finding, NothingAdded) else BeforeAfter(
             given_above(problem, 0.0), given_above(problem, 0.4)
         ),
+        {"base": 12.3, "comparison": 45.6},
+    )  # fmt: skip
+
+
+def hangs_on(verdict_: str, names: tuple[str, ...], problem: HierarchicalProblem) -> Influence | None:
+    """Two avalanches carry an answer in no list; none carry what is named."""
+    if not names and verdict_ != "unexplained":
+        return None
+    ids = tuple(problem.campaign.event_ids)
+    few = () if names else ids[1:3]
+    without = np.where([one in few for one in ids], 12.0, 24.0)
+    readings = (
+        ReadingsLeftOut("zeros", None, 5, 17.0),
+        ReadingsLeftOut("sensor", problem.campaign.sensor_ids[0], 21, 1.5),
+    )
+    return Influence(
+        names[0] if names else "unlisted", 25.0, 4.0, ids, without, few,
+        0.5 if few else None, None if few else 14.0, readings,
     )  # fmt: skip
 
 

@@ -4,12 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnosis_report_cases import diagnosis, document_of, documents
+from diagnosis_report_cases import documents
 from rich.console import Console
 from test_report_html import Page, nulls
 
 from skred.campaign import Sensor
-from skred.diagnosis.verdict.conditional import conditional_document
 from skred.report.diagnosis.conditional import _styles, conditional_rows
 from skred.report.diagnosis.equation import equations, formula
 from skred.report.diagnosis.report import FIGURES, diagnosis_table, render_diagnosis, save_diagnosis_figures
@@ -61,7 +60,7 @@ def test_every_kind_has_a_page_that_needs_nothing_else(kind, picture):
         ("silent", {"check", "where", "probabilities", "strength", "places", "left_out"}),
         (
             "two",
-            {"check", "where", "probabilities", "strength", "places", "left_out", "scores"}
+            {"check", "where", "probabilities", "strength", "places", "left_out", "scores", "influence"}
             | {"probabilities_2", "strength_2", "places_2", "conditional"},
         ),
     ],
@@ -210,8 +209,11 @@ def test_many_sensors_share_a_style():
 
 
 def test_avalanches_that_carry_the_answer_have_rows_of_their_own():
-    found, carrying = diagnosis("tie"), ["19880315", "19890217", "20030406"]
-    document = document_of(found) | {"conditional": conditional_document(found, carrying)}
+    document, _ = documents("unexplained")
     rows = [row["name"] for row in conditional_rows(document)]
     assert rows[:3] == ["CD [m/s]", "those that carry the answer", "the others"]
     assert "avalanches that carry the answer" in document["conditional"]["statement"]
+    # Where no few avalanches carry it, there are no others either.
+    document, _ = documents("tie")
+    assert {row["name"][-1] for row in conditional_rows(document)} == {"]"}
+    assert "that carry the answer" not in document["conditional"]["statement"]

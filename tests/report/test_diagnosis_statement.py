@@ -155,6 +155,21 @@ def test_how_sure_a_force_in_no_list_is() -> None:
     assert "that no listed mechanism accounts for" in said(0.96, 0.04)
 
 
+def test_that_few_avalanches_carry_an_answer_comes_first() -> None:
+    found = diagnosis("unexplained")
+    assert found.influence is not None
+    said = verdict(found)["statement"]
+    first, _, rest = said.partition(". ")
+    few = " and ".join(found.influence.carried_by)
+    assert first.startswith(f"Take this with care: 2 of 22 avalanches carry this answer ({few})")
+    assert "25.0 nats with all, 0.5 without, 4.0 needed" in first
+    assert rest.endswith(
+        f"It would not be given without the readings of {found.influence.readings[1].sensor} (21)."
+    )
+    named = verdict(diagnosis("two"))["statement"]
+    assert "Take this with care" not in named and "It does not hang on a few avalanches" in named
+
+
 def test_the_force_profile_added_is_told() -> None:
     """What avalanches left out gain by it, its equation and its numbers; nothing is named."""
     found = diagnosis("unexplained")

@@ -88,7 +88,7 @@ def test_refits_that_did_not_converge_are_told_first():
     document = verdict(replace(found, before=before))
     assert document["converged"] is False and document["refits_not_converged"] == [two]
     assert document["statement"].startswith(
-        f"Not all of this can be trusted: the refit without avalanche {two} did not converge"
+        f"Take this with care: the refit without avalanche {two} did not converge"
     )
     after = replace(found.finding.after, not_converged=(one,))
     document = verdict(with_finding(replace(found, before=before), after=after))

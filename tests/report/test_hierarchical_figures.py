@@ -10,10 +10,10 @@ from skred.campaign import Event, Sensor, Status
 from skred.physics.laws import load_law
 from skred.report.calibration.figures import save_model_figures
 from skred.report.calibration.new_avalanches import reached_text
-from skred.report.calibration.population import _levels, population_lines, set_limits
+from skred.report.calibration.population import population_lines, set_limits
 from skred.report.comparison.laws import save_comparison_figures
 from skred.report.comparison.likelihoods import likelihoods_figure
-from skred.report.shared.draws import new_avalanche, shaded_density
+from skred.report.shared.draws import new_avalanche, region_levels, shaded_density
 from skred.report.shared.labels import population_label, population_role, symbol_text
 from skred.report.shared.recordings import recordings_of
 from skred.report.shared.style import new_figure, tint
@@ -134,7 +134,7 @@ def test_the_population_in_words(problem):
 
 def test_regions_hold_their_share():
     mass = np.array([[0.4, 0.3], [0.2, 0.1]])
-    assert _levels(mass, (0.85, 0.5)) == [0.2, 0.3]
+    assert region_levels(mass, (0.85, 0.5)) == [0.2, 0.3]
 
 
 def test_wide_ranges_are_logarithmic_with_legible_ticks():

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-import skred.simulator.draw as draw_module
 from skred.campaign import Campaign, Status, read_campaign, write_campaign
 from skred.simulator.draw import Trial, draw_trial
-from skred.simulator.fresh import N_FRESH, _plausible, draw_fresh
+from skred.simulator.fresh import N_FRESH, draw_fresh, draw_further
 from skred.simulator.listed import Response
 
 BEFORE = {
@@ -28,13 +27,9 @@ def trial(seed: int, kind: Any, hidden: str, snr: float | None = 6.0) -> Trial:
 
 
 @pytest.mark.parametrize("key", BEFORE, ids=lambda key: key[2])
-def test_a_seed_gives_the_campaign_that_it_always_gave(
-    key: tuple[int, str, str, float | None], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """And nothing is drawn for further avalanches unless they are asked for."""
-    with monkeypatch.context() as patch:
-        patch.setattr(draw_module, "draw_fresh", lambda source: pytest.fail("drawn though not asked for"))
-        found = trial(*key)
+def test_a_seed_gives_the_campaign_that_it_always_gave(key: tuple[int, str, str, float | None]) -> None:
+    """Whether further avalanches are drawn or not."""
+    found = trial(*key)
     assert found.campaign.fingerprint().startswith(BEFORE[key])
     truth = dict(found.truth)
     check_fresh(found, found.fresh)
@@ -66,7 +61,7 @@ def test_a_covariate_acts_on_them_as_on_the_trial() -> None:
     """By the trial's own scale: its response at their covariates, not one standardised anew."""
     found = trial(303, "sparse", "covariate_friction")
     truth = found.source.truth
-    further = _plausible(np.random.default_rng(5), truth, N_FRESH)
+    further = draw_further(np.random.default_rng(5), truth, N_FRESH)
     (effect,) = truth.effects
     name = effect.details["covariate"]
     own, order = truth.scene.covariates[name], np.argsort(truth.scene.covariates[name])
@@ -83,7 +78,7 @@ def test_a_covariate_acts_on_them_as_on_the_trial() -> None:
 @pytest.mark.parametrize("name", ["sensor_bias", "release_offset", "obstacle", "deposit_history"])
 def test_what_is_hidden_acts_on_them_too(name: str) -> None:
     truth = trial(305, "dense", name).source.truth
-    further = _plausible(np.random.default_rng(5), truth, N_FRESH)
+    further = draw_further(np.random.default_rng(5), truth, N_FRESH)
     assert np.array_equal(further.hidden.factor, truth.hidden.factor)
     assert further.hidden.release_m == truth.hidden.release_m
     assert further.hidden.terms.shape[1:] == truth.hidden.terms.shape[1:]
@@ -97,7 +92,7 @@ def test_what_is_hidden_acts_on_them_too(name: str) -> None:
 
 def test_they_come_from_the_same_population() -> None:
     truth = trial(301, "sparse", "nothing").source.truth
-    theta = np.concatenate([_plausible(np.random.default_rng(k), truth, N_FRESH).theta for k in range(20)])
+    theta = np.concatenate([draw_further(np.random.default_rng(k), truth, N_FRESH).theta for k in range(20)])
     k = len(truth.scene.median)
     np.testing.assert_allclose(
         theta[:, :k].mean(axis=0), np.log(truth.scene.median), atol=4.0 * truth.scene.spread.max() / 240**0.5

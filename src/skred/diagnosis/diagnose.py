@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from skred.diagnosis.augment.add import add_mechanisms
+from skred.diagnosis.augment.add import Adding, add_mechanisms
 from skred.diagnosis.augment.problem import CLAIM_LIMIT
 from skred.diagnosis.augment.reference import Reference
 from skred.diagnosis.augment.step import Augmented, NotAugmented
@@ -24,6 +24,7 @@ from skred.diagnosis.evidence.coefficient import fit_base
 from skred.diagnosis.evidence.compile_ahead import compile_ahead
 from skred.diagnosis.evidence.population_draws import population_draws, typical
 from skred.diagnosis.evidence.prior_odds import UNLISTED
+from skred.diagnosis.influence.influence import influence
 from skred.diagnosis.outcome import (
     Diagnosis,
     Finding,
@@ -76,7 +77,8 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
     clock.stage("base", f"{law.id}: calibrating the base law")
     meanwhile(compile_ahead, asked.readings, asked.error_model)  # where there are workers
     calibration = calibrate_surely(as_diagnosed(asked), law, run.settings)
-    problem = _problem_of(calibration)
+    problem = calibration.problem  # perhaps finer than was asked for
+    assert isinstance(problem, HierarchicalProblem)
     if not calibration.gate.passed:
         clock.end()
         why = "the gate of the base law's calibration failed: " + "; ".join(calibration.gate.problems)
@@ -99,29 +101,26 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
 
     added: Augmented | NotAugmented | None = None
     if decision.names:
-        added = add_mechanisms(base, comparison, decision.names, Reference(calibration), run)
+        adding = Adding(Reference(calibration), run)
+        added = add_mechanisms(base, comparison, decision.names, adding)
     if isinstance(added, NotAugmented):
         decision = Decision("cannot_tell", ())
     if decision.verdict == "unexplained":
         finding, before = _with_profile(comparison, run)
     else:
         finding, before = _predicted(added, calibration, run)
-    given = None
+    hangs_on = given = None
+    if decision.answer is not None:
+        clock.stage("influence", "what the answer hangs on: without each avalanche, each kind of reading")
+        hangs_on = influence(comparison, decision.answer)
     if not isinstance(finding, NothingAdded):
         clock.stage("conditional", "predicting each reading from those above it")
         given = BeforeAfter.of(before, finding.after, run.seed)
     clock.end()
     return Diagnosis(
         problem, law, calibration, score_test, table, check, comparison, decision, location, finding, before,
-        clock.seconds, given,
+        hangs_on, given, clock.seconds,
     )  # fmt: skip
-
-
-def _problem_of(calibration: Calibration) -> HierarchicalProblem:
-    """What a base law was calibrated on: perhaps finer than was asked for."""
-    problem = calibration.problem
-    assert isinstance(problem, HierarchicalProblem)
-    return problem
 
 
 def _with_profile(comparison: Comparison, run: Run) -> tuple[Finding, HeldOut]:

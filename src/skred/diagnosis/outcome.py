@@ -11,6 +11,7 @@ from skred.diagnosis.compare.decision import Decision, alarm_by
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.detect.score_test import ScoreTest
+from skred.diagnosis.influence.influence import Influence
 from skred.diagnosis.predict.conditional import BeforeAfter
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.predict.profile_law import ProfileLaw
@@ -139,10 +140,12 @@ class Diagnosis:
     finding : NothingAdded, MechanismsAdded or ProfileAdded
     before : HeldOut
         Avalanches left out, as the base law predicts them, under the error model of what was added.
-    seconds : dict
-        Of each stage.
+    influence : Influence or None
+        What the answer hangs on; None where none is given.
     conditional : BeforeAfter or None
         Each reading as predicted by those of the same avalanche above it; None where nothing was added.
+    seconds : dict
+        Of each stage.
     """
 
     problem: HierarchicalProblem
@@ -156,8 +159,9 @@ class Diagnosis:
     location: Location
     finding: Finding
     before: HeldOut
-    seconds: dict[str, float] = field(default_factory=dict)
+    influence: Influence | None = None
     conditional: BeforeAfter | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
 
     @property
     def alarm_by(self) -> str | None:

@@ -15,8 +15,6 @@ import numpy as np
 from skred.campaign import Campaign
 from skred.campaign.parts import of_events, without_silent_sensors
 from skred.diagnosis.detect.too_little import too_little
-from skred.diagnosis.diagnose import diagnose
-from skred.diagnosis.effort import Effort
 from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
 from skred.diagnosis.predict.held_out import HeldOut, errors
@@ -25,8 +23,6 @@ from skred.diagnosis.verdict.predictors import predictors_of
 from skred.errors import InputError
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.paired import sum_se
-from skred.inference.sampling import SamplerSettings
-from skred.physics.law import Law
 
 Tell = Callable[[str], None]
 _ERRORS = ("rmse_velocity", "rmse_runout", "coverage_90")
@@ -101,23 +97,33 @@ def folds_of(problem: HierarchicalProblem, k: int, seed: int) -> list[list[int]]
 
 def outer_folds(
     problem: HierarchicalProblem,
-    law: Law,
-    settings: SamplerSettings,
-    effort: Effort,
     k: int,
+    seed: int,
+    diagnose: Callable[[HierarchicalProblem], Outcome],
     tell: Tell = lambda line: None,
 ) -> dict[str, Any]:
     """Repeat the whole diagnosis without each fold, and score the fold before and after what it added.
 
     Where it adds nothing, after is before.
+
+    Parameters
+    ----------
+    problem : HierarchicalProblem
+    k : int
+        Number of folds.
+    seed : int
+        Of how avalanches are dealt out, and of the scores.
+    diagnose : callable
+        Takes the problem of the other avalanches.
+    tell : callable
+        Takes one line for each fold.
     """
-    folds = folds_of(problem, k, settings.seed)
+    folds = folds_of(problem, k, seed)
     entries, pairs = list[dict[str, Any]](), list[float]()
     for number, fold in enumerate(folds):
         tell(f"outer fold {number + 1} of {k}: the diagnosis without {len(fold)} avalanches")
         others = _without(problem, fold, f"--outer-folds {k}")
-        found = diagnose(others, law, settings, replace(effort, exact_loo=False))
-        entry, difference = _fold(found, of_events(problem.campaign, fold), settings.seed)
+        entry, difference = _fold(diagnose(others), of_events(problem.campaign, fold), seed)
         entries.append(entry)
         pairs += difference
     return {"k": k, "folds": entries, **_difference(np.array(pairs))}

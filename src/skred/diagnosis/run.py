@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -71,13 +72,25 @@ def diagnose_to(
         tell(f"opening {lock} locked avalanches")
         document["locked"] = open_locked(found, locked, settings.seed)
     if folds:
-        document["outer_folds"] = outer_folds(problem, law, settings, effort, folds, tell)
+        without = replace(effort, exact_loo=False)
+        document["outer_folds"] = outer_folds(
+            problem, folds, settings.seed, lambda others: diagnose(others, law, settings, without), tell
+        )
     if lock or folds:
         write_json(folder / "verdict.json", document)
-    with ExitStack() as saved:  # written whatever becomes of the others
+    write_trees(found, folder)
+    return document
+
+
+def write_trees(found: Outcome, folder: Path) -> None:
+    """Write draws of every calibration and what the figures show, each whatever becomes of the others.
+
+    ``diagnosis.nc`` is always there, ``base.nc`` where the base law was calibrated, ``augmented.nc`` where
+    mechanisms were added, ``base_same_errors.nc`` where that was under other errors than those of the base.
+    """
+    with ExitStack() as saved:
         for name, tree in (_draws_of(found) | {CURVES: figure_data(found)}).items():
             saved.callback(meanwhile(save, tree, folder / name))
-    return document
 
 
 def _draws_of(found: Outcome) -> dict[str, xr.DataTree]:

@@ -89,7 +89,7 @@ def sample_posterior(
             chains=settings.chains,
             cores=1,  # a chain takes less time than starting a process
             step=step or JointMetropolis(model=model),
-            initvals=_starts(law, problem, prior, settings),
+            initvals=starting_points(law, problem, prior, settings),
             random_seed=settings.seed,
             progressbar=progress,
             compute_convergence_checks=False,
@@ -100,8 +100,20 @@ def sample_posterior(
     return tree
 
 
-def _starts(law: Law, problem: Problem, prior: xr.Dataset, settings: SamplerSettings) -> list[dict[str, Any]]:
-    """One starting point for each chain."""
+def starting_points(
+    law: Law, problem: Problem, prior: xr.Dataset, settings: SamplerSettings
+) -> list[dict[str, Any]]:
+    """One starting point for each chain: the most probable of some draws that are its own.
+
+    Parameters
+    ----------
+    law : Law
+    problem : Problem
+    prior : Dataset
+        Draws of the prior, (chain, draw).
+    settings : SamplerSettings
+        Number of chains, and the seed of what the problem knows already.
+    """
     samples = {str(name): variable.values.ravel() for name, variable in prior.data_vars.items()}
     chains = settings.chains
     n = min(_STARTS_PER_CHAIN, prior.sizes["chain"] * prior.sizes["draw"] // chains)

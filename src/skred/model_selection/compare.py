@@ -148,7 +148,7 @@ def scores(
             "p": float(information.p_waic),
             "n_unreliable": int(information.n_unreliable),
         },
-        "exact": _exact_entry(np.asarray(loo.elpd_i, dtype=float), refits, which, events),
+        "exact": leave_one_out_entry(np.asarray(loo.elpd_i, dtype=float), refits, which, events),
         "evidence": {
             "log_evidence": list(marginal.log_evidence),
             "mean": marginal.mean,
@@ -158,10 +158,22 @@ def scores(
     }
 
 
-def _exact_entry(
+def leave_one_out_entry(
     pointwise: NDArray[np.float64], refits: ExactLoo | None, which: Sequence[int], events: Sequence[str]
 ) -> dict[str, Any]:
-    """Leave-one-event-out: exact where an event was refitted, by importance sampling elsewhere."""
+    """Leave-one-event-out: exact where an event was refitted, by importance sampling elsewhere.
+
+    Parameters
+    ----------
+    pointwise : (n_events,) array
+        Expected log predictive density of each event by importance sampling.
+    refits : ExactLoo or None
+        Of the events that were left out; None if none was.
+    which : sequence of int
+        Numbers of those.
+    events : sequence of str
+        Ids of all.
+    """
     pointwise = pointwise.copy()
     if refits is not None:
         pointwise[list(which)] = refits.pointwise

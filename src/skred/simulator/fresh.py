@@ -71,14 +71,23 @@ def draw_fresh(source: Source, n: int = N_FRESH) -> Campaign:
         Of the same name, track and sensors; events are named ``f01``, ``f02``, ...
     """
     rng = np.random.default_rng([source.seed, _STREAM])
-    truth = _plausible(rng, source.truth, n)
+    truth = draw_further(rng, source.truth, n)
     campaign, _ = observe(rng, truth, source.nasty)
     events = tuple(replace(event, id=f"f{i + 1:02d}") for i, event in enumerate(campaign.events))
     return replace(campaign, name=source.name, events=events)
 
 
-def _plausible(rng: np.random.Generator, truth: Truth, n: int) -> Truth:
-    """Draw until `n` avalanches at once are as plausible as those of the trial had to be."""
+def draw_further(rng: np.random.Generator, truth: Truth, n: int) -> Truth:
+    """The truth of further avalanches of a trial, each as plausible as those of the trial had to be.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    truth : Truth
+        Of the trial.
+    n : int
+        How many.
+    """
     for _ in range(_MOST_DRAWS):
         scene, effects = _draw(rng, truth, _AT_ONCE * n)
         there = _with(truth, scene, effects)

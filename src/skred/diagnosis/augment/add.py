@@ -9,6 +9,7 @@ from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.augment.check_again import check_again
 from skred.diagnosis.augment.reference import Reference
 from skred.diagnosis.augment.step import Augmented, Left, NotAugmented, Step
+from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.compare.comparison import Comparison, compare
 from skred.diagnosis.compare.decision import decide
 from skred.diagnosis.effort import Run
@@ -22,8 +23,39 @@ The check sees little of a second one beside the first; the alarm is raised by t
 """
 
 
+class Adding:
+    """What is computed to add mechanisms to a law: a calibration, a check, another comparison.
+
+    Parameters
+    ----------
+    reference : Reference
+        Asked for the base law under the error model of what is added.
+    run : Run
+    """
+
+    def __init__(self, reference: Reference, run: Run) -> None:
+        self.reference = reference
+        self.run = run
+
+    def calibrated(self, base: Base, chosen: Sequence[Curve]) -> Calibration:
+        """The law with what is chosen added, calibrated."""
+        problem, settings = augmented_problem(base.plain(), chosen), self.run.settings
+        # Its chains start around the posterior: half the tuning does.
+        return calibrate_surely(problem, base.law, replace(settings, tune=settings.tune // 2))
+
+    def checked(
+        self, base: Base, calibration: Calibration, chosen: Sequence[Curve]
+    ) -> tuple[BootstrapTest, Base]:
+        """Whether anything is wrong with that law, and the law as a base for another comparison."""
+        return check_again(base, calibration, chosen, self.run)
+
+    def compared(self, base: Base) -> Comparison:
+        """The comparison of all candidates beside it."""
+        return compare(base)
+
+
 def add_mechanisms(
-    base: Base, comparison: Comparison, names: Sequence[str], reference: Reference, run: Run
+    base: Base, comparison: Comparison, names: Sequence[str], adding: Adding
 ) -> Augmented | NotAugmented:
     """Add the named mechanism, check again, and a second one only if it earns its place given the first.
 
@@ -35,10 +67,9 @@ def add_mechanisms(
         That named something.
     names : sequence of str
         What is named, and what is tied with it.
-    reference : Reference
-        Asked for the base law under the error model of what is added.
-    run : Run
+    adding : Adding
     """
+    run, reference = adding.run, adding.reference
     run.clock.stage("augment", f"{base.law.id} + {names[0]}: calibrating the augmented law")
     steps: list[Step] = []
     left: Left | None = None
@@ -48,7 +79,7 @@ def add_mechanisms(
         candidate = under_errors.candidates[names[0]]
         chosen.append(candidate.best)
         reference.begin(under_errors.base.problem)
-        calibration = _calibrated(under_errors.base, chosen, run)
+        calibration = adding.calibrated(under_errors.base, chosen)
         if not calibration.gate.passed:
             problems = "; ".join(calibration.gate.problems)
             reason = f"the gate of {base.law.id} + {names[0]} failed: {problems}"
@@ -57,13 +88,13 @@ def add_mechanisms(
             left = replace(left, reason=reason)
             break
         run.clock.stage("check again", "is anything wrong with the augmented law")
-        check, next_base = check_again(under_errors.base, calibration, chosen, run)
+        check, next_base = adding.checked(under_errors.base, calibration, chosen)
         steps.append(Step(candidate, tuple(names[1:]), comparison, calibration, check))
         left, problem = None, under_errors.base.problem
         if check.p_value > COMPARE_AGAIN or number + 1 == run.effort.max_mechanisms:
             break
         run.clock.stage("second comparison", "something may be left: every candidate refitted again")
-        comparison = compare(next_base)
+        comparison = adding.compared(next_base)
         left = Left(comparison)
         second = decide(comparison.probability, check.p_value, True)
         if not second.names:
@@ -73,10 +104,3 @@ def add_mechanisms(
     # The base law under the same errors as the last step: before and after then differ by what was added.
     same_errors, reason = reference.on(problem)
     return NotAugmented(reason, left) if reason else Augmented(tuple(steps), same_errors, left)
-
-
-def _calibrated(base: Base, chosen: Sequence[Curve], run: Run) -> Calibration:
-    """The law with what is chosen added, calibrated."""
-    problem = augmented_problem(base.plain(), chosen)
-    # Its chains start around the posterior: half the tuning does.
-    return calibrate_surely(problem, base.law, replace(run.settings, tune=run.settings.tune // 2))

@@ -11,8 +11,7 @@ loads only when asked, and two threads that ask at once find half of it; NumPy's
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -23,13 +22,12 @@ from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import refine
 from skred.diagnosis.compare.restarts import better_modes
-from skred.diagnosis.compare.screening import curve, screening_budget
-from skred.diagnosis.detect.score_test import ScoreTest, placed_mechanisms
+from skred.diagnosis.compare.screening import Tell, screened, screening_budget
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, alike, log_evidence_of
-from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
-from skred.diagnosis.evidence.event_quadrature import FINE, USUAL, Budget
+from skred.diagnosis.evidence.event_quadrature import FINE, USUAL
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds, stated
 from skred.diagnosis.evidence.refit import Rounds, refit
@@ -41,14 +39,10 @@ from skred.physics.mechanisms.placed import can_join
 from skred.physics.mechanisms.spec import Shape
 
 FloatArray = NDArray[np.float64]
-Tell = Callable[[int, int], None]
 ERROR_SHARES = {"robust": 0.55, "student": 0.15, "correlated": 0.15, "scaled": 0.15}
 """Prior probability of each error model in the comparison."""
 _PREFERRED_BY = 1.0
 """Nats by which another error model must be better for the base law alone to be compared under as well."""
-_FAR_BEHIND = 10.0
-"""Nats behind its mechanism's best at which a place is not screened under another error model: it counts for
-nothing."""
 _OTHER_ERRORS = 5.0
 """Nats that a candidate may have more under the less probable of two error models, beside as many again as it
 has under the other. Where a model is farther behind than that, mechanisms to which these are too few are not
@@ -162,7 +156,7 @@ def compare(base: Base, tell: Tell = lambda done, of: None) -> Comparison:
     for name in chosen[1:]:
         before, behind = under_each[0].screened, height[preferred] - height[name]
         if behind > _OTHER_ERRORS:
-            before = _that_may_count(before, behind)
+            before = worth_comparing(before, behind)
         if before:
             best = max(under_each[0].log_factors.values()) + behind
             under_each.append(_under_errors(name, bases[name], tell, before, best))
@@ -203,9 +197,13 @@ def _under_errors(
     """
     budget = screening_budget(base)
     base.with_nothing(budget)  # before anyone else does it once more
+
+    def near(known: Curve, shape: Shape) -> Curve:
+        return curve_near(base, known.mechanism, shape, known, budget)
+
     with worker_pool() as pool:
-        curves = _screened(base, budget, pool, tell, before)
-        candidates = refine(base, curves, budget, pool)
+        curves = screened(base, budget, pool, tell, before)
+        candidates = refine(base.setting, curves, near, pool)
         profiles = list(pool.map(partial(free_force, base, candidates=candidates), KINDS))
         candidates, profiles = recomputed(base, candidates, profiles, pool, best)
     for mechanism in mechanisms().values():
@@ -216,51 +214,21 @@ def _under_errors(
     return ComparisonUnderErrors(error_model, base, candidates, profiles, curves)
 
 
-def _screened(
-    base: Base, budget: Budget, pool: ThreadPoolExecutor, tell: Tell, before: Sequence[Curve]
-) -> list[Curve]:
-    """A rough curve for each candidate; those `before`, by another error model, where they cannot count."""
-    todo = [(one.mechanism, one.shape) for one in before or placed_mechanisms(base.setting, ties=False)]
-    curves, looked = dict(enumerate(before)), set[int]()
-    linear = _linear_strengths(base)
+def worth_comparing(curves: Sequence[Curve], behind: float) -> list[Curve]:
+    """Of what was screened the mechanisms that may count under another error model.
 
-    def look(number: int) -> Curve:
-        mechanism, shape = todo[number]
-        return curve(base, mechanism, shape, budget, linear.get((mechanism.id, shape)))
-
-    while jobs := sorted(set(_that_count(curves) if curves else range(len(todo))) - looked):
-        looked |= set(jobs)
-        for done, (number, one) in enumerate(zip(jobs, pool.map(look, jobs), strict=True), start=1):
-            curves[number] = one
-            tell(len(todo) - len(jobs) + done, len(todo))
-    return [curves[number] for number in range(len(todo))]
-
-
-def _that_may_count(before: Sequence[Curve], behind: float) -> list[Curve]:
-    """Of what was screened the mechanisms that may count under an error model so many nats behind."""
-    heights = np.array([one.log_bayes_factor for one in before])
+    Parameters
+    ----------
+    curves : sequence of Curve
+        Screened under the most probable error model.
+    behind : float
+        Nats that the other one is behind it.
+    """
+    heights = np.array([one.log_bayes_factor for one in curves])
     may_have = heights + np.maximum(heights, 0.0) + _OTHER_ERRORS - behind
     best = max(float(heights.max()), 0.0)
-    names = {one.mechanism.id for one, most in zip(before, may_have, strict=True) if most > best}
-    return [one for one in before if one.mechanism.id in names]
-
-
-def _linear_strengths(base: Base) -> dict[tuple[str, Shape], float]:
-    """Roughly how strong the candidates are that stand out."""
-    score_test = ScoreTest(base.problem, base.law, base.setting, base.directions, base.strengths)
-    return score_test.strengths_found(score_test.scores(base.rows, base.fit.points, base.population))
-
-
-def _that_count(curves: Mapping[int, Curve]) -> list[int]:
-    """Numbers of the curves that are not far behind their mechanism's best."""
-    best: dict[str, float] = {}
-    for one in curves.values():
-        best[one.mechanism.id] = max(one.log_bayes_factor, best.get(one.mechanism.id, -math.inf))
-    return [
-        number
-        for number, one in curves.items()
-        if one.log_bayes_factor > best[one.mechanism.id] - _FAR_BEHIND
-    ]
+    names = {one.mechanism.id for one, most in zip(curves, may_have, strict=True) if most > best}
+    return [one for one in curves if one.mechanism.id in names]
 
 
 def free_force(base: Base, kind: Kind, candidates: Mapping[str, Candidate]) -> Profile:

@@ -38,10 +38,23 @@ class Decision:
     names : tuple of str
         One is named, several are tied, none where nothing is. Those of the leading group come first, each
         group's most probable first; `unlisted` may be among the tied ones, and never comes first.
+    beside : tuple of str
+        Listed ids that are tied with a force in no list, where that is the answer.
     """
 
     verdict: str
     names: tuple[str, ...]
+    beside: tuple[str, ...] = ()
+
+    @property
+    def tied(self) -> tuple[str, ...]:
+        """What these recordings cannot tell from the answer."""
+        return self.names[1:] or self.beside
+
+    @property
+    def answer(self) -> str | None:
+        """Id of what the verdict names first, or of a force in no list; None where nothing is claimed."""
+        return UNLISTED if self.verdict == "unexplained" else next(iter(self.names), None)
 
     @property
     def disputed(self) -> bool:
@@ -99,11 +112,11 @@ def blamed(probability: Mapping[str, float]) -> Decision:
         if name not in (NOTHING, UNLISTED):
             groups.setdefault(mechanisms()[name].group, {})[name] = share
     leading = max(groups, key=lambda group: sum(groups[group].values()))
+    others = {name: share for group in groups if group != leading for name, share in groups[group].items()}
     if leading == UNLISTED:
-        return Decision("unexplained", ())
+        return Decision("unexplained", (), _within(others, probability[UNLISTED]))
     verdict = "missing_physics" if leading == Group.PHYSICS else "instrument"
     names = smallest_set(groups[leading])
-    others = {name: share for group in groups if group != leading for name, share in groups[group].items()}
     return Decision(verdict, (*names, *_within(others, probability[names[0]])))
 
 

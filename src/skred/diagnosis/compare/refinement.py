@@ -9,19 +9,19 @@ and a force of any shape would not.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 
 from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
-from skred.diagnosis.evidence.event_quadrature import Budget
+from skred.diagnosis.evidence.coefficient import Curve
 from skred.physics.mechanisms.placed import parts_of
-from skred.physics.mechanisms.spec import Shape
+from skred.physics.mechanisms.spec import Setting, Shape
 from skred.physics.mechanisms.stretches import shares
 
+Near = Callable[[Curve, Shape], Curve]
 _WITHIN = 3.0
 """Nats behind its mechanism's best within which a place is refined: screening is off by nats where fronts
 stop."""
@@ -84,55 +84,62 @@ class Place:
 
 
 def refine(
-    base: Base, curves: Sequence[Curve], budget: Budget, pool: ThreadPoolExecutor
+    setting: Setting, curves: Sequence[Curve], near: Near, pool: ThreadPoolExecutor
 ) -> dict[str, Candidate]:
     """Candidates whose leading places are computed with fronts and then split; rough curves for the others.
 
     The leading mechanism comes first: others have to keep up with what its parts have. Once a place is looked
     at it may fall behind others that then lead, and are looked at in their turn.
+
+    Parameters
+    ----------
+    setting : Setting
+        In which places are split.
+    curves : sequence of Curve
+        Of all places, screened.
+    near : callable
+        Computes with fronts the curve at a shape near that of another curve.
+    pool : ThreadPoolExecutor
     """
     places: dict[int, Place] = {}
     first = max(curves, key=lambda one: one.log_bayes_factor).mechanism.id
-
-    def look(near: Curve) -> Place:
-        return Place((curve_near(base, near.mechanism, near.shape, near, budget),))
-
     for turn in range(1 + _TURNS):
         todo = [k for k in leading(curves, places) if k not in places]
         todo = [k for k in todo if turn > 0 or curves[k].mechanism.id == first]
         if not todo:
             break
-        places.update(zip(todo, pool.map(look, [curves[k] for k in todo]), strict=True))
+        computed = pool.map(near, [curves[k] for k in todo], [curves[k].shape for k in todo])
+        places.update({k: Place((one,)) for k, one in zip(todo, computed, strict=True)})
         height = {k: max(curves[k].log_bayes_factor, places[k].log_bayes_factor) for k in todo}
-        _split(base, [k for k in todo if height[k] > _SPLIT_FROM], places, budget, pool)
+        _split(setting, [k for k in todo if height[k] > _SPLIT_FROM], places, near, pool)
     return candidates_of(curves, places)
 
 
 def _split(
-    base: Base, numbers: Sequence[int], places: dict[int, Place], budget: Budget, pool: ThreadPoolExecutor
+    setting: Setting,
+    numbers: Sequence[int],
+    places: dict[int, Place],
+    near: Near,
+    pool: ThreadPoolExecutor,
 ) -> None:
     """Places in parts, and in smaller steps the part that holds most of the evidence, if one does."""
-
-    def look(job: tuple[Curve, Shape]) -> Curve:
-        near, shape = job
-        return curve_near(base, near.mechanism, shape, near, budget)
-
     splitting = {k: 0 for k in numbers}
     for level in range(_LEVELS):
         jobs = [
-            (k, (places[k].curves[number], shape))
+            (k, places[k].curves[number], shape)
             for k, number in splitting.items()
-            for shape in _parts(base, places[k], number, _SMALLER**level)
+            for shape in _parts(setting, places[k], number, _SMALLER**level)
         ]
+        computed = pool.map(near, [part for _, part, _ in jobs], [shape for *_, shape in jobs])
         found: dict[int, list[Curve]] = {k: [] for k in splitting}
-        for (k, _), one in zip(jobs, pool.map(look, [job for _, job in jobs]), strict=True):
+        for (k, *_), one in zip(jobs, computed, strict=True):
             found[k].append(one)
         places.update({k: places[k].parted(number, found[k]) for k, number in splitting.items()})
         most = {k: places[k].holds_most for k in splitting}
         splitting = {k: number for k, number in most.items() if number is not None}
 
 
-def _parts(base: Base, place: Place, number: int, steps: float) -> list[Shape]:
+def _parts(setting: Setting, place: Place, number: int, steps: float) -> list[Shape]:
     """The finer shapes that a part stands for beside its own; steps are in those of the whole place."""
     part, whole = place.curves[number], place.curves[0].shape
     mechanism, shape = part.mechanism, part.shape
@@ -140,7 +147,7 @@ def _parts(base: Base, place: Place, number: int, steps: float) -> list[Shape]:
         assert whole.s_from_m is not None and whole.s_to_m is not None
         steps *= (whole.s_to_m - whole.s_from_m) / (shape.s_to_m - shape.s_from_m)
     known = {one.shape for one in place.curves}
-    return [one for one in dict.fromkeys(parts_of(mechanism, base.setting, shape, steps)) if one not in known]
+    return [one for one in dict.fromkeys(parts_of(mechanism, setting, shape, steps)) if one not in known]
 
 
 def leading(curves: Sequence[Curve], places: Mapping[int, Place]) -> list[int]:

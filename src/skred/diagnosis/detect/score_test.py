@@ -162,18 +162,6 @@ class ScoreTest:
                 result[:, k] += math.log(2.0) + log_ndtr(score[:, k] / np.sqrt(precision))
         return result
 
-    def strengths_found(self, scores: Scores) -> dict[tuple[str, Shape], float]:
-        """Most probable strength in the linear model of each candidate that stands out, by id and shape."""
-        score, information, _ = self.of_candidates(scores)
-        found = {}
-        for k, candidate in enumerate(self.placed_mechanisms):
-            added = candidate.mechanism.added
-            assert added is not None
-            precision = float(information[0, k]) + added.scale_of(candidate.shape) ** -2.0
-            if abs(score[0, k]) > math.sqrt(precision):
-                found[candidate.mechanism.id, candidate.shape] = float(score[0, k]) / precision
-        return found
-
     def log_factor_of_unlisted(self, scores: Scores) -> FloatArray:
         """Log Bayes factor of the force not in the list in the linear model, (n_groups,)."""
         first = sum(not candidate.with_speed for candidate in self.placed_mechanisms)
@@ -183,7 +171,7 @@ class ScoreTest:
             part = slice(first + n * number, first + n * (number + 1))
             score, information = scores.score[:, part], scores.information[:, part, part]
             for prior, share in priors_of(kind, self.knots_m).items():
-                found = _of_profile(score, information, prior.cover(self.knots_m))
+                found = log_factor_of_process(score, information, prior.cover(self.knots_m))
                 factors.append(found + share + math.log(kind.share))
         result: FloatArray = np.logaddexp.reduce(np.array(factors), axis=0)
         return result
@@ -203,8 +191,16 @@ class ScoreTest:
         return result
 
 
-def _of_profile(score: FloatArray, information: FloatArray, cover: FloatArray) -> FloatArray:
-    """Log Bayes factor of a normal process in the linear model, (n_groups,)."""
+def log_factor_of_process(score: FloatArray, information: FloatArray, cover: FloatArray) -> FloatArray:
+    """Log Bayes factor of a Gaussian process in the linear model, (n_groups,).
+
+    Parameters
+    ----------
+    score, information : (n_groups, n) and (n_groups, n, n) arrays
+        Of the values of the process, at none.
+    cover : (n, n) array
+        Their prior covariance.
+    """
     inside = np.eye(len(cover)) + cover @ information
     _, log_det = np.linalg.slogdet(inside)
     pulled = np.linalg.solve(inside, np.einsum("ij,gj->gi", cover, score)[:, :, None])[:, :, 0]

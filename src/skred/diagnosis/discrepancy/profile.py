@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import multivariate_normal
 
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.extension import Extension, extended
@@ -171,6 +172,15 @@ def priors_of(kind: Kind, at: FloatArray) -> dict[Prior, float]:
     everywhere = [Prior(*size) for size in sizes]
     local = [Prior(*size, float(centre)) for size in sizes if size[1] <= NEAR_M for centre in centres]
     return {one: -math.log(2.0 * len(group)) for group in (everywhere, local) for one in group}
+
+
+def log_prior_density(kind: Kind, at: FloatArray, values: FloatArray) -> FloatArray:
+    """Of a profile's values at its knots, (n, n_knots) to (n,), over all priors of its kind."""
+    densities = [
+        share + multivariate_normal(cov=prior.cover(at)).logpdf(values).reshape(-1)
+        for prior, share in priors_of(kind, at).items()
+    ]
+    return np.asarray(np.logaddexp.reduce(densities, axis=0))
 
 
 def knots(setting: Setting) -> FloatArray:

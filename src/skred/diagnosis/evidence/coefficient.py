@@ -7,6 +7,7 @@ which shows only where it is added.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -120,7 +121,12 @@ class Curve:
 
     def nearest(self, strength: float) -> Fit:
         """The fit at the strength closest to one."""
-        return self.fits[int(np.abs(self.strengths - strength).argmin())]
+        return _closest(self.known, strength)
+
+    @property
+    def known(self) -> dict[float, Fit]:
+        """The fits by strength."""
+        return dict(zip(self.strengths.tolist(), self.fits, strict=True))
 
     def joined(self, other: Curve) -> Curve:
         """With another curve's strengths, of the same mechanism, shape and budget."""
@@ -186,7 +192,7 @@ def curve_near(base: Base, mechanism: Mechanism, shape: Shape, near: Curve, firs
     for number in range(_PASSES):
         budget = first if number == 0 and first.linear else USUAL
         before = near.moments
-        near = curve_at(base, mechanism, shape, _strengths_near(near), budget, near)
+        near = curve_at(base, mechanism, shape, _strengths_near(near), budget, near.known)
         after = near.moments
         sd = max(before[1], least), max(after[1], least)
         if budget is USUAL and abs(after[0] - before[0]) < sd[0] and 0.5 < sd[1] / sd[0] < 2.0:
@@ -212,14 +218,19 @@ def curve_at(
     shape: Shape,
     strengths: FloatArray,
     budget: Budget = USUAL,
-    near: Curve | None = None,
+    known: Mapping[float, Fit] | None = None,
+    begin: Mapping[float, Fit] | None = None,
 ) -> Curve:
     """Evidence along the strength of a mechanism, at some strengths and at 0.
 
     Parameters
     ----------
-    near : Curve, optional
-        Whose fits are where to begin; else the base's.
+    known : mapping of float to Fit, optional
+        Fits by strength, of the same mechanism and nearly the same shape, 0 among them: the closest is where
+        each refit begins, and one round goes on from it.
+    begin : mapping of float to Fit, optional
+        The same, of other places or of a linear model: where refits begin that go all their rounds; else they
+        begin with the base's.
     """
     added = mechanism.added
     assert added is not None
@@ -228,30 +239,40 @@ def curve_at(
     strengths = np.sort(strengths[np.abs(strengths) > 1e-3 * added.scale_of(shape)])
     place = int(np.searchsorted(strengths, 0.0))
     # Strength 0 like all others, so that what is left of integration errors is the same there.
-    if near is None:
-        found = _refit_from(base, extension, strengths, budget) if len(strengths) else []
+    if known is None:
+        fits = None if begin is None else [_closest(begin, strength) for strength in strengths]
+        found = _refit_from(base, extension, strengths, budget, fits) if len(strengths) else []
         found.insert(place, base.with_nothing(budget))
         strengths = np.insert(strengths, place, 0.0)
     else:
         strengths = np.insert(strengths, place, 0.0)
-        fits = [near.nearest(strength) for strength in strengths]
-        found = _refit_from(base, extension, strengths, budget, fits)
+        fits = [_closest(known, strength) for strength in strengths]
+        found = _refit_from(base, extension, strengths, budget, fits, least=1)
     heights = np.array([fit.found.log_evidence for fit in found])
     heights = np.nan_to_num(heights - heights[strengths == 0.0], nan=-1e3, neginf=-1e3)
     return Curve(mechanism, shape, direction, strengths, heights, tuple(found), budget.linear)
 
 
+def _closest(fits: Mapping[float, Fit], strength: float) -> Fit:
+    """The fit at the strength closest to one."""
+    return fits[min(fits, key=lambda one: abs(one - strength))]
+
+
 def _refit_from(
-    base: Base, extension: Extension, strengths: FloatArray, budget: Budget, fits: list[Fit] | None = None
+    base: Base,
+    extension: Extension,
+    strengths: FloatArray,
+    budget: Budget,
+    fits: list[Fit] | None = None,
+    least: int = 2,
 ) -> list[Fit]:
     """Fits at strengths of the extension's last direction, or without it; begun at fits or at the base's."""
     given = base.strengths[None, :]
     if len(strengths):
         given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
     start = (base.population, base.fit.points)
-    first = None if budget.linear or fits is not None else FIRST
-    rounds = Rounds(budget, first) if fits is None else Rounds(budget, first, 1)
-    return refit(extension, base.rows, given, start, rounds, fits)
+    first = None if budget.linear or least == 1 else FIRST
+    return refit(extension, base.rows, given, start, Rounds(budget, first, least), fits)
 
 
 def fit_base(

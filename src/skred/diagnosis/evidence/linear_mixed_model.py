@@ -33,6 +33,9 @@ _PRIOR_EVENTS = 2.0
 """Events that the prior's spread, without correlation, counts for in a covariance."""
 _STARTING_SPREAD = 0.3
 """Spread of the population that a fit begins with: wider than most."""
+_LARGEST_MOVE = 1.5
+"""Largest change of an event's log strength in one joint step: tangents say nothing of a front five times as
+strong."""
 
 
 class MeanPrior(NamedTuple):
@@ -128,6 +131,100 @@ def efficient_scores(modes: Modes, rows: Rows, population: Population, prior: Me
     return Scores(result, efficient, raw)
 
 
+class JointStep(NamedTuple):
+    """A step of the population's means and of one coefficient, which the events' points follow; by group.
+
+    Attributes
+    ----------
+    mean : (n_groups, n_base) array
+    strength : (n_groups,) array
+    sd : (n_groups,) array
+        Of the coefficient, everything else free.
+    information : (n_groups, n_base + 1, n_base + 1) array
+        About means and coefficient, the points integrated out.
+    score : (n_groups, n_base + 1) array
+    along : (n_rows, n_base + 1) array
+        What each event's point moves by itself.
+    by_both : (n_rows, n_base + 1, n_base + 1) array
+        What it moves with means and coefficient.
+    """
+
+    mean: FloatArray
+    strength: FloatArray
+    sd: FloatArray
+    information: FloatArray
+    score: FloatArray
+    along: FloatArray
+    by_both: FloatArray
+
+    def held(self, groups: IntArray, strength: FloatArray) -> JointStep:
+        """With the coefficient's step given in some groups, the means' as that asks for."""
+        if len(groups) == 0:
+            return self
+        n = self.mean.shape[1]
+        mean, changed = self.mean.copy(), self.strength.copy()
+        left = self.score[groups, :n] - self.information[groups, :n, n] * strength[groups, None]
+        mean[groups] = np.linalg.solve(self.information[groups, :n, :n], left[:, :, None])[:, :, 0]
+        changed[groups] = strength[groups]
+        return self._replace(mean=mean, strength=changed)
+
+    def of_points(self, share: FloatArray, rows: Rows) -> FloatArray:
+        """What the events' points move by, (n_rows, n_base + 1), with a share of the step of each group."""
+        both = np.column_stack([self.mean, self.strength])[rows.group]
+        whole = self.along + np.einsum("rij,rj->ri", self.by_both, both)
+        size = np.maximum(np.abs(whole).max(axis=1, keepdims=True) / _LARGEST_MOVE, 1.0)
+        moved: FloatArray = share[rows.group, None] * whole / size
+        return moved
+
+
+def joint_step(
+    modes: Modes,
+    rows: Rows,
+    population: Population,
+    prior: MeanPrior,
+    strengths: FloatArray,
+    precision: float,
+) -> JointStep:
+    """Newton's step of means and of the last coefficient together, in the linear model around the modes.
+
+    Parameters
+    ----------
+    strengths : (n_groups,) array
+        Of the last coefficient.
+    precision : float
+        Of its normal prior about 0.
+    """
+    n = population.mean.shape[1]
+    of_points = population.precision[rows.group]
+    deviation = deviations(modes.points, rows, population)
+    added = modes.by_strengths[:, :, -1:]
+    weighted = modes.weighed(added)
+    pull = np.einsum("rij,ri->rj", modes.by_points, modes.slope)
+    pull -= np.einsum("rij,rj->ri", of_points, deviation)
+    cover = np.linalg.inv(modes.information + of_points)
+    # Second derivatives by points and by (means, coefficient); the release has no mean.
+    mixed = np.concatenate([-of_points[:, :, :n], modes.by_points.transpose(0, 2, 1) @ weighted], axis=2)
+    own = np.zeros((len(mixed), n + 1, n + 1))
+    own[:, :n, :n] = of_points[:, :n, :n]
+    own[:, n:, n:] = added.transpose(0, 2, 1) @ weighted
+    score = np.concatenate(
+        [
+            np.einsum("rij,rj->ri", of_points[:, :n, :n], deviation[:, :n]),
+            np.einsum("rij,ri->rj", added, modes.slope),
+        ],
+        axis=1,
+    )
+    follow = cover @ mixed
+    information = _by_group(rows, own - mixed.transpose(0, 2, 1) @ follow)
+    total = _by_group(rows, score - np.einsum("rij,ri->rj", follow, pull))
+    information += np.diag(np.append(prior.sd**-2.0, precision))
+    total += np.column_stack([(prior.mean - population.mean) / prior.sd**2, -precision * strengths])
+    step = np.linalg.solve(information, total[:, :, None])[:, :, 0]
+    sd = np.sqrt(np.linalg.inv(information)[:, n, n])
+    along = np.einsum("rij,rj->ri", cover, pull)
+    return JointStep(step[:, :n], step[:, n], sd, information, total, along, -follow)
+
+
 def without(scores: Scores, n_first: int) -> Scores:
     """Scores after the first directions, which are in already and free, have had their share too."""
     if n_first == 0:
@@ -180,8 +277,7 @@ def fit_population(
         lost = np.einsum("gij,gjk,gkl->gil", precision, _by_group(rows, cover[:, :n, :n]), precision)
         total = per_group * precision - lost + np.diag(prior.sd**-2.0)
         step = np.clip(np.linalg.solve(total, score[:, :, None])[:, :, 0], -0.5, 0.5)
-        moment = _by_group(rows, np.einsum("ri,rj->rij", deviation, deviation) + cover[:, :n, :n])
-        covariance = _most_probable_covariance(moment, per_group)
+        covariance = most_probable_covariance(rows, deviation, cover[:, :n, :n])
         change = max(
             float(np.abs(step / np.sqrt(_diagonal(covariance))).max()),
             float(np.abs(np.log(_diagonal(covariance) / _diagonal(population.covariance))).max()),
@@ -190,6 +286,20 @@ def fit_population(
         if change < tolerance:
             break
     return population, event_modes(likelihood, points, population).points
+
+
+def most_probable_covariance(rows: Rows, deviation: FloatArray, cover: FloatArray) -> FloatArray:
+    """Covariance of each group's population, (n_groups, n, n), that its events ask for.
+
+    Parameters
+    ----------
+    deviation : (n_rows, n) array
+        Of the events' modes from the population's mean.
+    cover : (n_rows, n, n) array
+        What is left open of them.
+    """
+    moment = _by_group(rows, np.einsum("ri,rj->rij", deviation, deviation) + cover)
+    return _most_probable_covariance(moment, len(rows.event) // rows.n_groups)
 
 
 def _most_probable_covariance(moment: FloatArray, n_events: int) -> FloatArray:

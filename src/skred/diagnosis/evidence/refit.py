@@ -80,7 +80,7 @@ def refit(
     """
     n_groups, n_events, n = len(strengths), len(rows.event), start[0].mean.shape[1]
     log_scale = prior_log_scale(mean_prior(extension.law))
-    state = list(fits) if fits is not None else [Fit(_unfitted(start[0]), start[1])] * n_groups
+    state = list(fits) if fits is not None else [Fit(unfitted(start[0]), start[1])] * n_groups
     active = list(range(n_groups))
     for number in range(_MOST_ROUNDS):
         likelihood = EventLikelihood(extension, rows, np.empty(0)).in_groups(strengths[active])
@@ -108,7 +108,7 @@ def refit(
     return state
 
 
-def _unfitted(population: Population) -> Evidence:
+def unfitted(population: Population) -> Evidence:
     """A population to begin with."""
     psi = coordinates(population)
     return Evidence(-np.inf, psi, np.eye(len(psi)))

@@ -82,7 +82,7 @@ def held_out(calibration: Calibration, seed: int, *, exact: bool = False) -> Hel
     log_likelihood = tree["log_likelihood"]["recordings"]
     array = log_likelihood.transpose("chain", "draw", "event")
     densities = np.asarray(array.values, dtype=float).reshape(-1, array.sizes["event"])
-    log_weights, k = _smoothed(densities)
+    log_weights, k = leave_out_weights(densities)
     weights = np.exp(log_weights - logsumexp(log_weights, axis=0))
     pointwise = logsumexp(densities + np.log(np.maximum(weights, 1e-300)), axis=0)
     events = list(problem.campaign.event_ids)
@@ -99,11 +99,20 @@ def held_out(calibration: Calibration, seed: int, *, exact: bool = False) -> Hel
     return HeldOut(pointwise, k, tuple(events[e] for e in again), failed, predicted, covered, others)
 
 
-def _smoothed(densities: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Pareto-smoothed log weights of leaving each event out, (n_draws, n_events), and Pareto k.
+def leave_out_weights(densities: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Pareto-smoothed weights of draws that leave each event out.
 
-    ArviZ takes log likelihoods and changes their sign itself.
+    Parameters
+    ----------
+    densities : (n_draws, n_events) array
+        Log density of each event at each draw of the posterior of all.
+
+    Returns
+    -------
+    log_weights : (n_draws, n_events) array
+    pareto_k : (n_events,) array
     """
+    # ArviZ takes log likelihoods and changes their sign itself.
     log_weights, k = array_stats.psislw(densities.T, axis=-1)
     return np.asarray(log_weights, dtype=float).T, np.asarray(k, dtype=float)
 

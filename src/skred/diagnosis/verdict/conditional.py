@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from skred.diagnosis.outcome import Diagnosis, Outcome
+from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.predict.conditional import ENOUGH, BeforeAfter, Conditional
 from skred.diagnosis.verdict.given_above import gain_of, given_above
 from skred.inference.hierarchical.problem import HierarchicalProblem
@@ -19,18 +18,16 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 
-def conditional_document(found: Outcome, carried_by: Sequence[str] | None = None) -> dict[str, Any] | None:
+def conditional_document(found: Diagnosis) -> dict[str, Any] | None:
     """How well each reading is predicted from those above it, by sensor; None where nothing was added.
 
-    Parameters
-    ----------
-    carried_by : sequence of str, optional
-        Ids of the avalanches that carry the answer, if that is known: they and the others also by themselves.
+    Avalanches that carry the answer, and the others, are also told of by themselves.
     """
-    if not isinstance(found, Diagnosis) or found.conditional is None:
+    if found.conditional is None:
         return None
     problem, pair = found.problem, found.conditional
-    carrying = np.isin(problem.campaign.event_ids, list(carried_by)) if carried_by else None
+    carried_by = [] if found.influence is None else list(found.influence.carried_by)
+    carrying = np.isin(problem.campaign.event_ids, carried_by)
     velocity, n_sensors = problem.readings.is_velocity, problem.campaign.n_sensors
     groups = [(np.arange(n_sensors) == k) for k in range(n_sensors)]
     shown = _shown(pair)
@@ -76,13 +73,12 @@ def _shown(pair: BeforeAfter) -> BoolArray:
 
 
 def _sets(
-    pair: BeforeAfter, problem: HierarchicalProblem, columns: BoolArray, carrying: BoolArray | None
+    pair: BeforeAfter, problem: HierarchicalProblem, columns: BoolArray, carrying: BoolArray
 ) -> dict[str, Any]:
     """Scores over all avalanches, over those that carry the answer, and over the others."""
-    every = np.full(problem.campaign.n_events, True)
-    sets = {"all": every, "carrying": carrying, "others": None if carrying is None else ~carrying}
+    sets = {"all": np.full(problem.campaign.n_events, True), "carrying": carrying, "others": ~carrying}
     scores = {
-        name: None if events is None else _scores(pair, problem, _shown(pair) & columns & events[:, None])
+        name: _scores(pair, problem, _shown(pair) & columns & events[:, None])
         for name, events in sets.items()
     }
     return {"gain": gain_of(scores["all"]) if scores["all"] else None, **scores}

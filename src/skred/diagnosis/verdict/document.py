@@ -12,6 +12,7 @@ from skred.diagnosis.augment.step import Left
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Detectability, Identifiability
 from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER
+from skred.diagnosis.influence.influence import Influence
 from skred.diagnosis.outcome import (
     Diagnosis,
     Finding,
@@ -43,15 +44,8 @@ _NO_LIMIT = 20.0
 def verdict(found: Outcome) -> dict[str, Any]:
     """The verdict of a diagnosis, as `verdict.json` holds it."""
     document = _told_nothing(found) if isinstance(found, NotDiagnosed) else _told(found)
-    document["conditional"] = conditional_document(found, _carried_by(document))
     document["statement"] = statement(found, document)
     return document | _more(found)
-
-
-def _carried_by(document: dict[str, Any]) -> Sequence[str] | None:
-    """Avalanches that carry the answer; None where that was not looked into."""
-    influence = document.get("influence")
-    return None if influence is None else influence["carried_by"]
 
 
 def _told_nothing(found: NotDiagnosed) -> dict[str, Any]:
@@ -88,7 +82,7 @@ def _told(found: Diagnosis) -> dict[str, Any]:
         "mechanism": names[0] if names else None,
         "mechanisms": [added_document(found, number) for number in range(len(found.steps))],
         "probability": found.comparison.probability,
-        "indistinguishable": list(names[1:]),
+        "indistinguishable": list(found.decision.tied),
         "location": _location(found),
         "strength": strength_document(found, 0) if found.steps else None,
         "covariate": shape.covariate if shape is not None else None,
@@ -208,7 +202,7 @@ def _more(found: Outcome) -> dict[str, Any]:
         "seconds": found.seconds,
     }
     if isinstance(found, NotDiagnosed):
-        return more | {"alarm_by": None}
+        return more | {"alarm_by": None, "influence": None, "conditional": None}
     return (
         more
         | {
@@ -218,6 +212,8 @@ def _more(found: Outcome) -> dict[str, Any]:
             "calibration": {"version": CALIBRATION_VERSION, "power": POWER},
             "error_models": [under_errors.error_model for under_errors in found.comparison.under_each],
             "candidates": candidate_documents(found, found.comparison),
+            "influence": _influence(found.influence),
+            "conditional": conditional_document(found),
         }
         | _of_finding(found.finding)
         | {
@@ -247,6 +243,28 @@ def _of_finding(finding: Finding) -> dict[str, Any]:
             }
         case NothingAdded():
             return {}
+
+
+def _influence(found: Influence | None) -> dict[str, Any] | None:
+    """What the answer hangs on; None where none is given."""
+    if found is None:
+        return None
+    return {
+        "answer": found.answer,
+        "log_bayes_factor": found.log_bayes_factor,
+        "needed": found.needed,
+        "events": [
+            {"event": event, "log_bayes_factor": factor}
+            for event, factor in zip(found.events, found.without_each.tolist(), strict=True)
+        ],
+        "carried_by": list(found.carried_by),
+        "without_them": found.without_them,
+        "without_a_third": found.without_a_third,
+        "readings": [
+            {"kind": one.kind, "sensor": one.sensor, "n": one.n, "log_bayes_factor": one.log_bayes_factor}
+            for one in found.readings
+        ],
+    }
 
 
 def _detectability(row: Detectability) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from skred.diagnosis.augment.step import Step
@@ -10,6 +11,7 @@ from skred.diagnosis.compare.decision import NOTHING_AT_MOST, Decision
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
+from skred.diagnosis.verdict.hangs_on import carried, hangs_on
 from skred.diagnosis.verdict.improvement import improvement
 from skred.diagnosis.words import enumerated, percent, plus_minus
 from skred.physics.mechanisms import mechanisms
@@ -31,18 +33,23 @@ def statement(found: Outcome, document: dict[str, Any]) -> str:
         "nothing_missing": _nothing,
         "cannot_tell": _cannot,
     }[found.decision.verdict](found, document)
-    return " ".join(part for part in (_not_converged(found), *parts) if part)
+    return " ".join(part for part in (_caution(found), *parts, *hangs_on(found.influence)) if part)
 
 
-def _not_converged(found: Diagnosis) -> str:
-    """Which refits did not converge; the first thing to know where any did not."""
-    events = found.refits_not_converged
+def _caution(found: Diagnosis) -> str:
+    """The first thing to know: that few avalanches carry the answer, that a refit did not converge."""
+    reasons = [one for one in (carried(found.influence), _not_converged(found.refits_not_converged)) if one]
+    return f"Take this with care: {'; '.join(reasons)}." if reasons else ""
+
+
+def _not_converged(events: Sequence[str]) -> str:
+    """Which refits did not converge."""
     if not events:
         return ""
     refits = f"the refit without avalanche {events[0]}"
     if len(events) > 1:
         refits = f"the refits without avalanches {enumerated(events)}"
-    return f"Not all of this can be trusted: {refits} did not converge, and the held-out scores rest on that."
+    return f"{refits} did not converge, and the held-out scores rest on that"
 
 
 def _title(name: str) -> str:
@@ -85,8 +92,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     if document["covariate"]:
         sentences.append("Associated with, not necessarily caused by.")
     if ties:
-        others = ", ".join(f"{_short(other)} ({percent(probability[other])})" for other in ties)
-        sentences.append(f"These recordings cannot tell it from: {others}.")
+        sentences.append(_tied(document))
         sentences.append(_split(found.steps[0], document))
     sentences.append(_not_excluded(document))
     if len(document["mechanisms"]) > 1:
@@ -98,6 +104,13 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     sentences.append(improvement(document))
     sentences.append(_still_fired(found.steps[-1].check))
     return [*sentences, _left(document)]
+
+
+def _tied(document: dict[str, Any]) -> str:
+    """What the recordings cannot tell from the answer."""
+    probability = document["probability"]
+    ties = [f"{_short(other)} ({percent(probability[other])})" for other in document["indistinguishable"]]
+    return f"These recordings cannot tell it from: {', '.join(ties)}." if ties else ""
 
 
 def _not_excluded(document: dict[str, Any]) -> str:
@@ -162,6 +175,7 @@ def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         f"Something is missing{_where(document['location'])} that {'most probably ' if doubt else ''}no"
         f" listed mechanism accounts for (a force not in the list: {percent(probability[UNLISTED])}; nothing:"
         f" {percent(probability[NOTHING])}; check: p = {found.check.p_value:.2g}).",
+        _tied(document),
         _by_speed(found.location),
         _closest(found, document),
         "The force profile is the answer: it says where the force acts and how much work it does.",

@@ -123,6 +123,8 @@ class Shape:
         Other constants by symbol with unit, as ``U_c [m s-1]``; positive numbers.
     prior_scales : float
         The prior scale of the coefficient of this shape, in that of its mechanism.
+    prior_weight : float
+        Prior probability of this shape, relative to the mechanism's others.
     """
 
     s_from_m: float | None = None
@@ -131,6 +133,7 @@ class Shape:
     sensor: str | None = None
     constants: tuple[tuple[str, float], ...] = ()
     prior_scales: float = 1.0
+    prior_weight: float = 1.0
 
     @property
     def place_m(self) -> float | None:

@@ -78,12 +78,16 @@ def equation_of(mechanism: Mechanism, shape: Shape) -> str:
 
 
 def shares(shapes: Sequence[Shape]) -> FloatArray:
-    """Prior probability of each of a mechanism's shapes: equal, but for those that are opposed."""
+    """Prior probability of each of a mechanism's shapes: by weight; opposed ones share theirs."""
+    weights = np.array([shape.prior_weight for shape in shapes])
     opposed = np.array([is_opposed(shape) for shape in shapes])
-    n_opposed = int(opposed.sum())
-    if n_opposed in (0, len(shapes)):
-        return np.full(len(shapes), 1.0 / len(shapes))
-    return np.where(opposed, OPPOSED_SHARE / n_opposed, (1.0 - OPPOSED_SHARE) / (len(shapes) - n_opposed))
+    if opposed.all() or not opposed.any():
+        return weights / weights.sum()
+    return np.where(
+        opposed,
+        OPPOSED_SHARE * weights / weights[opposed].sum(),
+        (1.0 - OPPOSED_SHARE) * weights / weights[~opposed].sum(),
+    )
 
 
 def _relief(setting: Setting, shape: Shape) -> FloatArray:
@@ -97,20 +101,18 @@ def _relief(setting: Setting, shape: Shape) -> FloatArray:
 
 
 def stretches(setting: Setting) -> tuple[Shape, ...]:
-    """Stretches of several lengths, overlapping, over the recorded part of the track."""
-    first, last = setting.recorded_m
-    return tuple(shape for length in _lengths(setting) for shape in _row(setting, length, first, last))
+    """Stretches of several lengths, overlapping, that end in the recorded part of the track.
+
+    They begin above it too, by up to their length: the first sensor reads what a stretch has done to the
+    fronts that come out of it.
+    """
+    return tuple(shape for length in _lengths(setting) for shape in _row(setting, length))
 
 
 def stretches_of_drag(setting: Setting) -> tuple[Shape, ...]:
-    """The stretches, and the longer ones once more, opposed: on a short one that does too little.
-
-    Opposed ones begin above the recorded part too, by up to their length: fronts come out of one with
-    speeds more alike than they had before, the first sensor reads that, and no base strength does the same.
-    """
+    """The stretches, and the longer ones once more, opposed: on a short one that does too little."""
     plain = stretches(setting)
-    wide = [one for one in (*plain, *_from_above(setting)) if np.diff(ends_of(one)) > _OPPOSED_FROM_M]
-    opposed = [_opposed(setting, one) for one in wide]
+    opposed = [_opposed(setting, one) for one in plain if np.diff(ends_of(one)) > _OPPOSED_FROM_M]
     return (*plain, *(one for one in opposed if one is not None))
 
 
@@ -120,23 +122,13 @@ def _lengths(setting: Setting) -> list[float]:
     return [length for length in STRETCHES_M if length <= 1.2 * (last - first)]
 
 
-def _row(setting: Setting, length: float, first: float, last: float) -> list[Shape]:
-    """Stretches of one length, overlapping, from one place to another, or one if it is longer than that."""
-    n = int(np.ceil(max(last - first - length, 0.0) / (_STEP_IN_LENGTHS * length)))
-    starts = np.linspace(first, max(last - length, first), n + 1)
-    return [Shape(float(start), float(min(start + length, setting.terrain.length_m))) for start in starts]
-
-
-def _from_above(setting: Setting) -> list[Shape]:
-    """Stretches that begin above the recorded part and end in it or where it begins."""
-    first, _ = setting.recorded_m
-    shapes = [
-        shape
-        for length in _lengths(setting)
-        for shape in _row(setting, length, first - length, first + length)
-    ]
-    # The last of a row begins where the recorded part does, but for rounding: it is among the others.
-    return [one for one in shapes if 0.0 <= ends_of(one)[0] < first - 1.0]
+def _row(setting: Setting, length: float) -> list[Shape]:
+    """Stretches of one length, overlapping; they share its prior probability, the same for each length."""
+    first, last = setting.recorded_m
+    n = int(np.ceil((last - first) / (_STEP_IN_LENGTHS * length)))
+    ends = np.linspace(first, last, n + 1)[1:]
+    found = [Shape(max(float(end) - length, 0.0), float(end)) for end in ends]
+    return [replace(one, prior_weight=1.0 / len(found)) for one in found]
 
 
 def _opposed(setting: Setting, shape: Shape, relief: float = 1.0) -> Shape | None:

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.report.shared.draws import INTERVAL, chains_of, density, interval, kernels, shaded_density
+from skred.report.shared.draws import (
+    INTERVAL,
+    chains_of,
+    density,
+    interval,
+    kernels,
+    region_levels,
+    shaded_density,
+)
 from skred.report.shared.labels import figure_text, parameter_label, population_role, symbol_text, unit_text
 from skred.report.shared.law import law_of
 from skred.report.shared.numbers import decimals_for, rounded
@@ -167,7 +174,7 @@ def _pair(
     """Regions that hold 50 and 90 % of new avalanches, and the recorded ones."""
     x, y = (_edges(values) for values in new)
     mass = _smooth_mass(np.log(new[0]), np.log(new[1]), np.log(x), np.log(y))
-    levels = _levels(mass, (0.9, 0.5))
+    levels = region_levels(mass, (0.9, 0.5))
     outer, inner = tint(colour, 0.22), tint(colour, 0.5)
     if levels[0] < levels[1] < mass.max():
         axes.contourf(x, y, mass.T, [*levels, mass.max()], colors=[outer, inner])
@@ -202,13 +209,6 @@ def _smooth_mass(x: FloatArray, y: FloatArray, grid_x: FloatArray, grid_y: Float
         sides.append(kernels(grid, (edges[1:] + edges[:-1]) / 2, width))
     mass = sides[0] @ counts @ sides[1].T
     return np.asarray(mass / mass.sum())
-
-
-def _levels(mass: FloatArray, shares: Sequence[float]) -> list[float]:
-    """Heights above which shares of the mass lie."""
-    ordered = np.sort(mass.ravel())[::-1]
-    inside = np.cumsum(ordered)
-    return [float(ordered[min(int(np.searchsorted(inside, share)), ordered.size - 1)]) for share in shares]
 
 
 def set_limits(axes: Axes, axis: Axis, low: float, high: float, *, linear: bool = False) -> None:

@@ -138,9 +138,10 @@ def conditional_rows(document: doc.Document) -> list[dict[str, str]]:
         decimals = 0 if unit == "m" else 1
         words = {"all": f"{printable(doc.get(entry, 'sensor'))} [{unit}]", **_PARTS}
         gains = {"all": name_text(doc.get(entry, "gain") or "")}
+        carried = bool(doc.get(entry, "carrying"))
         for key, name in words.items():
             scores = doc.get(entry, key)
-            if scores:
+            if scores and (carried or key == "all"):
                 rows.append({"name": name, "gain": gains.get(key, ""), **_row(scores, decimals)})
     return rows
 

@@ -11,6 +11,7 @@ from skred.report.diagnosis.check import check_figure
 from skred.report.diagnosis.conditional import conditional_figure, has_conditional
 from skred.report.diagnosis.evidence import group_of, probabilities_figure, strength_figure
 from skred.report.diagnosis.held_out import is_compared, left_out_figure, scores_figure
+from skred.report.diagnosis.influence import has_influence, influence_figure
 from skred.report.diagnosis.places import places_figure, places_of, where_figure
 from skred.report.diagnosis.terminal import diagnosis_table
 from skred.report.diagnosis.words import comparisons, leading_name
@@ -25,7 +26,7 @@ __all__ = ["FIGURES", "diagnosis_table", "render_diagnosis", "save_diagnosis_fig
 _OF_COMPARISONS = ("probabilities", "strength", "places")
 FIGURES = (
     "conditional", "check", "where", *_OF_COMPARISONS, *(f"{name}_2" for name in _OF_COMPARISONS),
-    "left_out", "scores",
+    "left_out", "scores", "influence",
 )  # fmt: skip
 """Names of all figures that there may be."""
 
@@ -65,6 +66,8 @@ def save_diagnosis_figures(document: doc.Document, tree: xr.DataTree, folder: Pa
         makers["left_out"] = partial(left_out_figure, tree)
     if is_compared(tree):
         makers["scores"] = partial(scores_figure, tree)
+    if has_influence(document):
+        makers["influence"] = partial(influence_figure, document)
     return {name: write_png(make(), folder / f"{name}.png") for name, make in makers.items()}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -69,6 +70,20 @@ def kernels(grid: FloatArray, centres: FloatArray, width: float) -> FloatArray:
     """Gaussian kernels, (n_grid, n_centres)."""
     z = (grid[:, None] - centres[None, :]) / width
     return np.asarray(np.exp(-0.5 * z**2) / (width * np.sqrt(2 * np.pi)))
+
+
+def region_levels(mass: FloatArray, shares: Sequence[float]) -> list[float]:
+    """Heights of contours that hold shares of the mass on a grid, one for each share.
+
+    Parameters
+    ----------
+    mass : (n, m) array
+        Of the cells, one in all.
+    shares : sequence of float
+    """
+    ordered = np.sort(mass.ravel())[::-1]
+    inside = np.cumsum(ordered)
+    return [float(ordered[min(int(np.searchsorted(inside, share)), ordered.size - 1)]) for share in shares]
 
 
 def gate_text(tree: xr.DataTree) -> str:

@@ -1,0 +1,1 @@
+"""Slow, independent log Bayes factors, to compare those of the diagnosis with."""

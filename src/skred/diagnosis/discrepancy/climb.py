@@ -1,0 +1,107 @@
+"""Climbs to the maximum of the posterior of a force that is not in the list, under one prior.
+
+Gauss-Newton steps around the events' modes: score and information of the knots' values are efficient ones,
+with what events and population take of them taken out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.discrepancy.explored import Expansion, prior_penalty
+from skred.diagnosis.discrepancy.profile import Kind, combined, knot_by_knot
+from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, look_around
+from skred.diagnosis.evidence.extension import extended
+from skred.diagnosis.evidence.linear_mixed_model import efficient_scores, mean_prior
+from skred.diagnosis.evidence.refit import Fit, Rounds, refit
+
+FloatArray = NDArray[np.float64]
+_ROUNDS = 6
+"""Gauss-Newton steps at most: at kinks where fronts stop a climb could go to and fro."""
+_SHARES = (1.0, 0.4, 0.15, 0.05)
+"""Shares of a step that are tried one after the other: a full step can stop fronts that went on."""
+_SETTLED = 0.05
+"""Nats gained by a step below which a climb has arrived."""
+
+
+def start_from(base: Base, fit: Fit) -> tuple[Population, FloatArray]:
+    """Population and events' points of a fit, where a refit begins."""
+    return fit.found.population(len(base.law.mechanisms)), fit.points
+
+
+def expanded_at(
+    base: Base, kind: Kind, at: FloatArray, values: FloatArray, start: tuple[Population, FloatArray]
+) -> Expansion:
+    """The log likelihood around some values of a profile, population and events refitted with them in.
+
+    Parameters
+    ----------
+    at, values : (n_knots,) arrays
+        Places of the knots [m], and the profile there in the kind's unit.
+    start : (Population, points)
+        Where the refit begins.
+    """
+    return _around(base, kind, at, values, _fit_at(base, kind, at, values, start))
+
+
+def climb(base: Base, kind: Kind, at: FloatArray, start: Expansion, cover: FloatArray) -> Expansion:
+    """The maximum of the posterior under one prior.
+
+    Parameters
+    ----------
+    at : (n_knots,) array
+        Places of the knots [m].
+    start : Expansion
+        Around the values to begin from.
+    cover : (n_knots, n_knots) array
+        Covariance of the values under the prior.
+    """
+    maximum = start
+    precision = np.linalg.inv(cover)
+    for _ in range(_ROUNDS):
+        step = np.linalg.solve(maximum.information + precision, maximum.score - precision @ maximum.values)
+        height = maximum.fit.found.log_evidence - prior_penalty(maximum.values, precision)
+        expected = 0.5 * float(step @ (maximum.score - precision @ maximum.values))
+        for share in _SHARES:
+            if share * (2.0 - share) * expected < _SETTLED:
+                return _arrived(maximum, precision)
+            values = maximum.values + share * step
+            fit = _fit_at(base, kind, at, values, start_from(base, maximum.fit))
+            gained = fit.found.log_evidence - prior_penalty(values, precision) - height
+            if gained > 0.0:
+                break
+        else:
+            break
+        maximum = _around(base, kind, at, values, fit)
+        if gained < _SETTLED:
+            break
+    return _arrived(maximum, precision)
+
+
+def _arrived(maximum: Expansion, precision: FloatArray) -> Expansion:
+    """A maximum that was climbed to: a score that is left over, at kinks where fronts stop, leads nowhere."""
+    return replace(maximum, score=precision @ maximum.values)
+
+
+def _fit_at(
+    base: Base, kind: Kind, at: FloatArray, values: FloatArray, start: tuple[Population, FloatArray]
+) -> Fit:
+    """Population and events with the profile in."""
+    direction = combined(base.setting, kind, at, values)
+    extension = extended(base.problem, base.law, [*base.directions, direction])
+    strengths = np.append(base.strengths, 1.0)[None, :]
+    return refit(extension, base.rows, strengths, start, Rounds(least=1))[0]
+
+
+def _around(base: Base, kind: Kind, at: FloatArray, values: FloatArray, fit: Fit) -> Expansion:
+    """With efficient score and information of the knots' values at what they are."""
+    wide = knot_by_knot(base, kind, at)
+    population, points = start_from(base, fit)
+    around = look_around(EventLikelihood(wide, base.rows, np.concatenate([base.strengths, values])), points)
+    found = efficient_scores(around, base.rows, population, mean_prior(base.law))
+    n_before = len(base.directions)
+    return Expansion(values, fit, found.score[0, n_before:], found.information[0, n_before:, n_before:])

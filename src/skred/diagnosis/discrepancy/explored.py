@@ -1,0 +1,199 @@
+"""What maxima under some priors say of the force that is not in the list under all of its priors.
+
+From score and information at a maximum the Laplace approximation gives the evidence under any other prior.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.discrepancy.profile import Mode, Prior
+from skred.diagnosis.evidence.refit import Fit
+
+FloatArray = NDArray[np.float64]
+SURE = 1.0
+"""Nats that decide nothing: priors not climbed under that could add less together are left."""
+_NO_FORCE = -0.5
+"""Log Bayes factor below which the force is less probable than none under every prior, and climbs end."""
+_MODES_WITHIN = 4.0
+"""Nats behind the most probable prior from which on none is worth to be sampled under."""
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """The log likelihood of a profile's values to second order, around some of them.
+
+    Attributes
+    ----------
+    values : (n_knots,) array
+        Around which.
+    fit : Fit
+        Population and events with these values in.
+    score : (n_knots,) array
+        Slope of the log likelihood there, what is known of population and events taken out.
+    information : (n_knots, n_knots) array
+        Its negative curvature.
+    """
+
+    values: FloatArray
+    fit: Fit
+    score: FloatArray
+    information: FloatArray
+
+
+class Laplace(NamedTuple):
+    """The Laplace approximation of a prior's evidence, from score and information at a maximum.
+
+    Attributes
+    ----------
+    gain : float
+        Of the log likelihood, at the most probable values under the prior.
+    prior_penalty : float
+        What the prior takes off at those values.
+    occam_penalty : float
+        What it takes off for the room that it gives to all others.
+    values : (n_knots,) array
+    covariance : (n_knots, n_knots) array
+        Of the values, by prior and recordings together.
+    """
+
+    gain: float
+    prior_penalty: float
+    occam_penalty: float
+    values: FloatArray
+    covariance: FloatArray
+
+    def log_factor(self, most: float = math.inf) -> float:
+        """Log Bayes factor if no values gain more than `most`; at least that of no force at all."""
+        return max(self._above_none(most), 0.0) - self.occam_penalty
+
+    def mode(self, most: float, log_factor: float) -> Mode:
+        """Where values are; around none where no force at all is better."""
+        mean = self.values if self._above_none(most) > 0.0 else np.zeros_like(self.values)
+        return Mode(mean, self.covariance, log_factor)
+
+    def _above_none(self, most: float) -> float:
+        return min(self.gain, most) - self.prior_penalty
+
+
+class ExploredPriors:
+    """Maxima under some priors, and what they say of all of them.
+
+    Where fronts stop, score and information at one maximum are a poor guide to another far away. A prior that
+    was climbed under has its own factor. One about the same place as some that were has the least of their
+    approximations. Any other has the largest of all, so that it is climbed under while it could matter. What
+    is only approximated in the end counts as if no values gained more than the best that were computed.
+
+    Parameters
+    ----------
+    height : float
+        Log evidence of no force.
+    at : (n_knots,) array
+        Places of the knots [m].
+    priors : dict
+        All priors, and the log of each one's probability.
+    """
+
+    def __init__(self, height: float, at: FloatArray, priors: dict[Prior, float]) -> None:
+        self.height = height
+        self.shares = priors
+        self.covers = {prior: prior.cover(at) for prior in priors}
+        self.maxima: dict[Prior, Expansion] = {}
+        self.approximations: dict[Prior, dict[Prior, Laplace]] = {prior: {} for prior in priors}
+
+    def add(self, climbed: Prior, maximum: Expansion) -> None:
+        """A maximum under a prior."""
+        self.maxima[climbed] = maximum
+        for prior, cover in self.covers.items():
+            self.approximations[prior][climbed] = laplace(maximum, self.height, cover)
+
+    def factor(self, prior: Prior, most: float = math.inf) -> float:
+        """Log Bayes factor and log prior probability of a prior, as far as is known."""
+        most = self._counted(prior, most)
+        return self.approximation(prior, most).log_factor(most) + self.shares[prior]
+
+    def approximation(self, prior: Prior, most: float = math.inf) -> Laplace:
+        """The approximation of a prior that counts, of those from all maxima."""
+        approximations = self.approximations[prior]
+        if prior in approximations:
+            return approximations[prior]
+        near = [one for climbed, one in approximations.items() if climbed.centre_m == prior.centre_m]
+        if near:
+            return min(near, key=lambda one: one.log_factor(most))
+        return max(approximations.values(), key=lambda one: one.log_factor(most))
+
+    @property
+    def open(self) -> list[Prior]:
+        """The most probable prior not climbed under; none where all of those are improbable together.
+
+        Nor where all priors are less probable than no force, even by their approximations.
+        """
+        left = {prior: self.factor(prior) for prior in self.shares if prior not in self.maxima}
+        known = np.logaddexp.reduce([self.factor(prior) for prior in self.shares])
+        if not left or known < _NO_FORCE or np.logaddexp.reduce(list(left.values())) < known - SURE:
+            return []
+        return [max(left, key=lambda one: left[one])]
+
+    @property
+    def log_factor(self) -> float:
+        """Log Bayes factor over all priors."""
+        return float(np.logaddexp.reduce([self.factor(prior, self._most) for prior in self.shares]))
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """Where values may be, under each prior that is not far behind the most probable one."""
+        factors = {prior: self.factor(prior, self._most) for prior in self.shares}
+        least = max(factors.values()) - _MODES_WITHIN
+        chosen = {prior: factor for prior, factor in factors.items() if factor > least}
+        return tuple(
+            self.approximation(prior, self._most).mode(self._counted(prior, self._most), factor)
+            for prior, factor in chosen.items()
+        )
+
+    def _counted(self, prior: Prior, most: float) -> float:
+        """The most that values under a prior may gain: what was climbed to needs no limit."""
+        return math.inf if prior in self.maxima else most
+
+    @property
+    def _most(self) -> float:
+        """The most that any values computed have gained."""
+        most = max(maximum.fit.found.log_evidence - self.height for maximum in self.maxima.values())
+        return max(most, 0.0)
+
+
+def laplace(maximum: Expansion, height: float, cover: FloatArray) -> Laplace:
+    """The Laplace approximation of a prior's evidence.
+
+    Parameters
+    ----------
+    maximum : Expansion
+        Around a maximum, which may be under another prior.
+    height : float
+        Log evidence of no force.
+    cover : (n_knots, n_knots) array
+        Covariance of the values under the prior.
+    """
+    precision = np.linalg.inv(cover)
+    left = np.linalg.inv(maximum.information + precision)
+    step = left @ (maximum.score - precision @ maximum.values)
+    score, information = maximum.score, maximum.information
+    gain = maximum.fit.found.log_evidence - height + score @ step - 0.5 * step @ information @ step
+    values = maximum.values + step
+    penalties = prior_penalty(values, precision), occam_penalty(maximum, cover)
+    return Laplace(float(gain), *penalties, values, 0.5 * (left + left.T))
+
+
+def prior_penalty(values: FloatArray, precision: FloatArray) -> float:
+    """What a prior takes off the log density at some values."""
+    return 0.5 * float(values @ precision @ values)
+
+
+def occam_penalty(maximum: Expansion, cover: FloatArray) -> float:
+    """What the room that a prior gives to the values takes off the log evidence."""
+    _, log_det = np.linalg.slogdet(np.eye(len(cover)) + cover @ maximum.information)
+    return 0.5 * float(log_det)

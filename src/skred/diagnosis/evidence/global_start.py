@@ -1,0 +1,212 @@
+"""Where along a coefficient the evidence may have a maximum: climbs from several starts, everything refitted.
+
+Around the events' modes readings are linear in the population's median, in the events' own strengths and in
+the coefficient, all at once. A step therefore moves all of them together. A drag that the base law's friction
+has absorbed comes in while friction falls to a third; neither a derivative at nil nor a refit at a fixed
+coefficient gets there. Each event's point follows the step in the linear model, so that fronts stay with
+their readings. This is Gauss and Newton's method for a nonlinear mixed model (Lindstrom and Bates, 1990, doi
+10.2307/2532087), with spreads by expectation-maximisation. It begins at nil and at the prior's scale.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.evidence.conditional_map import (
+    EventLikelihood,
+    Modes,
+    Population,
+    Rows,
+    event_modes,
+    log_joint,
+    look_around,
+)
+from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.evidence.linear_mixed_model import (
+    MeanPrior,
+    deviations,
+    joint_step,
+    mean_prior,
+    most_probable_covariance,
+)
+from skred.diagnosis.evidence.refit import Fit, unfitted
+from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
+
+FloatArray = NDArray[np.float64]
+STARTS = (0.0, 0.3, 1.2)
+"""Where climbs begin, in scales of the prior: nil, and either side of its median (0.67)."""
+_ROUNDS = 15
+"""Steps at most. Where fronts stop a climb could go to and fro."""
+_SHARES = (1.0, 0.35, 0.12, 0.04)
+"""Shares of a step that are tried one after the other."""
+_SETTLED = 1e-2
+"""Nats gained by a step below which a climb has arrived."""
+_SAME = 1.0
+"""Standard deviations apart below which two climbs have come to the same maximum."""
+_CLIMB = 4
+"""Steps of the events' modes after each step of the others."""
+
+
+class Start(NamedTuple):
+    """A maximum along the coefficient, in the linear model around the events' modes.
+
+    Attributes
+    ----------
+    strength, sd : float
+        In the coefficient's unit.
+    height : float
+        Log posterior density there, the events' strengths integrated, relative to no coefficient.
+    fit : Fit
+        Population and events there; its evidence is not known.
+    """
+
+    strength: float
+    sd: float
+    height: float
+    fit: Fit
+
+
+class _State(NamedTuple):
+    """Where all climbs are, one group each."""
+
+    strengths: FloatArray
+    population: Population
+    modes: Modes
+    height: FloatArray
+
+
+class _Climb:
+    """Climbs along the last of an extension's directions, side by side."""
+
+    def __init__(
+        self, extension: Extension, rows: Rows, held: FloatArray, scale: float, either_sign: bool
+    ) -> None:
+        self.extension, self.rows, self.held = extension, rows, held
+        self.either_sign, self.precision = either_sign, scale**-2.0
+        self.prior: MeanPrior = mean_prior(extension.law)
+
+    def at(self, strengths: FloatArray, population: Population, points: FloatArray, n_steps: int) -> _State:
+        """The events' modes, from points nearby, and the height there."""
+        given = np.column_stack([np.tile(self.held, (len(strengths), 1)), strengths])
+        likelihood = EventLikelihood(self.extension, self.rows, np.empty(0)).in_groups(given)
+        points = event_modes(likelihood, points, population, n_steps).points
+        modes = look_around(likelihood, points)
+        return _State(strengths, population, modes, self._height(likelihood, modes, population, strengths))
+
+    def _height(
+        self, likelihood: EventLikelihood, modes: Modes, population: Population, strengths: FloatArray
+    ) -> FloatArray:
+        """Log posterior density, each event's integral by the Laplace approximation."""
+        precision = population.precision[likelihood.rows.group]
+        integrals = log_joint(likelihood, modes.points, population)
+        with np.errstate(invalid="ignore"):  # a climb that has left what numbers can hold is not taken
+            integrals -= 0.5 * np.linalg.slogdet(modes.information + precision)[1]
+            integrals += 0.5 * np.linalg.slogdet(precision)[1]
+        spreads = 0.5 * np.log(np.einsum("gii->gi", population.covariance))
+        height = integrals.reshape(len(strengths), -1).sum(axis=1)
+        height -= 0.5 * (((spreads - math.log(SPREAD_MEDIAN)) / SPREAD_LOG_SD) ** 2).sum(axis=1)
+        height -= 0.5 * (((population.mean - self.prior.mean) / self.prior.sd) ** 2).sum(axis=1)
+        found: FloatArray = np.nan_to_num(height - 0.5 * self.precision * strengths**2, nan=-np.inf)
+        return found
+
+    def moved(self, state: _State) -> _State:
+        """One step of each climb, or a part of it, as far as it gains."""
+        n_groups = len(state.strengths)
+        rows = self.rows.repeated(n_groups)
+        population = self._with_spreads(state, rows)
+        step = joint_step(state.modes, rows, population, self.prior, state.strengths, self.precision)
+        if not self.either_sign:
+            step = step.held(np.flatnonzero(state.strengths + step.strength < 0.0), -state.strengths)
+        share, open_ = np.ones(n_groups), np.ones(n_groups, dtype=bool)
+        for part in _SHARES:
+            share[open_] = part
+            there = self.at(
+                state.strengths + share * step.strength,
+                Population(state.population.mean + share[:, None] * step.mean, population.covariance),
+                state.modes.points + step.of_points(share, rows),
+                _CLIMB,
+            )
+            gained = open_ & (there.height >= state.height - 1e-9)
+            state = _chosen(there, state, gained)
+            open_ &= ~gained
+            if not open_.any():
+                break
+        return state
+
+    def _with_spreads(self, state: _State, rows: Rows) -> Population:
+        """The populations with the covariances that the events ask for."""
+        mean, n = state.population.mean, state.population.mean.shape[1]
+        cover = np.linalg.inv(state.modes.information + state.population.precision[rows.group])
+        deviation = deviations(state.modes.points, rows, state.population)
+        return Population(mean, most_probable_covariance(rows, deviation[:, :n], cover[:, :n, :n]))
+
+
+def _chosen(one: _State, other: _State, taken: NDArray[np.bool_]) -> _State:
+    """One state's groups where they are taken, else the other's."""
+    rows = np.repeat(taken, len(one.modes.points) // len(taken))
+
+    def pick(a: FloatArray, b: FloatArray, chosen: NDArray[np.bool_]) -> FloatArray:
+        return np.where(chosen.reshape(-1, *(1,) * (a.ndim - 1)), a, b)
+
+    return _State(
+        pick(one.strengths, other.strengths, taken),
+        Population(*(pick(a, b, taken) for a, b in zip(one.population, other.population, strict=True))),
+        Modes(*(pick(a, b, rows) for a, b in zip(one.modes, other.modes, strict=True))),
+        pick(one.height, other.height, taken),
+    )
+
+
+def global_starts(
+    extension: Extension,
+    rows: Rows,
+    held: FloatArray,
+    begin: tuple[Population, FloatArray],
+    scale: float,
+    either_sign: bool,
+) -> list[Start]:
+    """Maxima along the coefficient of an extension's last direction, the highest first.
+
+    Parameters
+    ----------
+    extension : Extension
+    rows : Rows
+        The campaign's rows.
+    held : (n_directions - 1,) array
+        Strengths of the directions before.
+    begin : (Population, (n_events, n_base + 1) array)
+        The fit without the last direction.
+    scale : float
+        Of the coefficient's prior, in its unit.
+    either_sign : bool
+        Whether the coefficient may be negative.
+    """
+    signs = np.array([-1.0, 1.0] if either_sign else [1.0])
+    starts = np.unique(np.multiply.outer(signs, scale * np.array(STARTS)))
+    n_groups, n_events = len(starts), len(rows.event)
+    climb = _Climb(extension, rows, held, scale, either_sign)
+    population = Population(*(np.repeat(part, n_groups, axis=0) for part in begin[0]))
+    state = climb.at(starts, population, np.tile(begin[1], (n_groups, 1)), _CLIMB)
+    nil = float(state.height[starts == 0.0][0])
+    for _ in range(_ROUNDS):
+        before, state = state, climb.moved(state)
+        if (state.height <= before.height + _SETTLED).all():
+            break
+    all_rows = rows.repeated(n_groups)
+    sd = joint_step(state.modes, all_rows, state.population, climb.prior, state.strengths, climb.precision).sd
+    found: list[Start] = []
+    for k in np.argsort(-state.height):
+        population = Population(*(part[k : k + 1] for part in state.population))
+        points = state.modes.points[k * n_events : (k + 1) * n_events]
+        one = Start(
+            float(state.strengths[k]),
+            float(sd[k]),
+            float(state.height[k]) - nil,
+            Fit(unfitted(population), points),
+        )
+        if all(abs(one.strength - other.strength) > _SAME * other.sd for other in found):
+            found.append(one)
+    return found

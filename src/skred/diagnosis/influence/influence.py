@@ -1,0 +1,254 @@
+"""How far an answer hangs on few recordings: its evidence again without each avalanche, each kind of reading.
+
+The population and every avalanche are refitted to what is left, at all strengths of the named mechanism's
+leading shapes, or with the whole profile. Nothing is chosen again: the question is whether what was answered
+would still stand. Of a speed that is left out it stays known that the front came there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.comparison import Comparison
+from skred.diagnosis.compare.decision import NOTHING_ALONE
+from skred.diagnosis.discrepancy.fit import fit_profile
+from skred.diagnosis.discrepancy.profile import Profile, most_probable
+from skred.diagnosis.evidence.coefficient import Base, curve_at
+from skred.diagnosis.evidence.conditional_map import Rows
+from skred.diagnosis.evidence.event_quadrature import USUAL
+from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
+from skred.diagnosis.evidence.refit import Fit
+from skred.parallel.threads import side_by_side
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+MOST = 1.0 / 3.0
+"""Share of the avalanches that an answer may hang on and be said to be carried by few: more is not few."""
+_SHAPES_WITHIN = 2.0
+"""Nats behind a mechanism's best shape within which shapes are computed again: the others hold little."""
+
+
+@dataclass(frozen=True)
+class ReadingsLeftOut:
+    """The evidence without some of the readings.
+
+    Attributes
+    ----------
+    kind : str
+        ``zeros``, ``near a stop``, or ``sensor``.
+    sensor : str or None
+        Which one, where it is a sensor's.
+    n : int
+        How many readings were left out.
+    log_bayes_factor : float
+    """
+
+    kind: str
+    sensor: str | None
+    n: int
+    log_bayes_factor: float
+
+
+@dataclass(frozen=True, eq=False)
+class Influence:
+    """What the leading answer hangs on.
+
+    Attributes
+    ----------
+    answer : str
+        Id of a mechanism, or ``unlisted``.
+    log_bayes_factor : float
+        Against nothing, by all recordings.
+    needed : float
+        Log Bayes factor that it needs for an alarm by itself.
+    events : tuple of str
+    without_each : (n_events,) array
+        Log Bayes factor without each avalanche.
+    carried_by : tuple of str
+        The fewest avalanches, at most a third of them, without which it has less than it needs; empty where
+        there are none. They are looked for in the order of what each one takes by itself.
+    without_them : float or None
+        Log Bayes factor without those.
+    without_a_third : float or None
+        Without the third of the avalanches that take most of it, where it has what it needs then too.
+    readings : tuple of ReadingsLeftOut
+    """
+
+    answer: str
+    log_bayes_factor: float
+    needed: float
+    events: tuple[str, ...]
+    without_each: FloatArray
+    carried_by: tuple[str, ...]
+    without_them: float | None
+    without_a_third: float | None
+    readings: tuple[ReadingsLeftOut, ...]
+
+
+def influence(comparison: Comparison, answer: str) -> Influence:
+    """What an answer of a comparison hangs on, under the error model that it has most evidence under.
+
+    Parameters
+    ----------
+    answer : str
+        Id of a mechanism that was compared, or ``unlisted``.
+    """
+    under_errors = comparison.leading(answer)
+    base = under_errors.base
+    if answer == UNLISTED:
+        again = _of_profile(most_probable(under_errors.profiles))
+    else:
+        again = _of_mechanism(under_errors.candidates[answer])
+    n = len(base.rows.event)
+    everything = np.ones(n, dtype=bool)
+    kinds = _kinds(base)
+    parts = [_Part(np.arange(n) != event) for event in range(n)]
+    parts += [_Part(everything, chosen) for _, _, chosen in kinds]
+    whole, *found = side_by_side(lambda part: again(base, part), [_Part(everything), *parts])
+    # By the same, quicker method on both sides; only the difference is taken from it.
+    stated = under_errors.log_factors[answer]
+    factors = stated + np.array(found) - whole
+    needed = _needed(comparison, answer)
+    order = np.argsort(factors[:n])
+    carried, left = _carried(lambda part: stated + again(base, part) - whole, order, needed)
+    ids = base.problem.campaign.event_ids
+    return Influence(
+        answer,
+        stated,
+        needed,
+        tuple(ids),
+        factors[:n],
+        tuple(ids[k] for k in sorted(carried)),
+        left if carried else None,
+        None if carried else left,
+        tuple(
+            ReadingsLeftOut(kind, sensor, int(chosen.sum()), float(factor))
+            for (kind, sensor, chosen), factor in zip(kinds, factors[n:], strict=True)
+        ),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A part of the recordings.
+
+    Attributes
+    ----------
+    kept : (n_events,) boolean array
+        Avalanches that are kept.
+    left_out : (n_events, n_sensors) boolean array, optional
+        Readings that are not.
+    """
+
+    kept: BoolArray
+    left_out: BoolArray | None = None
+
+    def rows(self, rows: Rows) -> Rows:
+        """The rows that are kept, without the readings that are not."""
+        if self.left_out is not None:
+            readings = rows.readings
+            left = readings._replace(observed=readings.observed & ~self.left_out)
+            rows = rows._replace(readings=left)
+        return rows.take(np.flatnonzero(self.kept))
+
+    def fit(self, fit: Fit) -> Fit:
+        """Where to begin with the avalanches that are kept."""
+        return fit._replace(points=fit.points[self.kept])
+
+    def base(self, base: Base) -> Base:
+        """The base law on what is kept."""
+        return replace(base, rows=self.rows(base.rows), fit=self.fit(base.fit))
+
+
+Again = Callable[[Base, _Part], float]
+
+
+def _of_mechanism(candidate: Candidate) -> Again:
+    """The log Bayes factor of a mechanism by a part of the recordings, over its leading shapes."""
+    factors = candidate.log_factors
+    chosen = np.flatnonzero(factors > factors.max() - _SHAPES_WITHIN)
+
+    def again(base: Base, part: _Part) -> float:
+        rest, found = part.base(base), []
+        for k in chosen:
+            curve = candidate.curves[k]
+            known = {strength: part.fit(fit) for strength, fit in curve.known.items()}
+            one = curve_at(rest, curve.mechanism, curve.shape, curve.strengths, USUAL, known)
+            found.append(candidate.log_weights[k] + one.log_bayes_factor)
+        return float(np.logaddexp.reduce(found))
+
+    return again
+
+
+def _of_profile(profile: Profile) -> Again:
+    """The log Bayes factor of a profile by a part of the recordings."""
+
+    def again(base: Base, part: _Part) -> float:
+        population = profile.fit.found.population(len(base.law.mechanisms))
+        near = profile.mean, (population, part.fit(profile.fit).points)
+        return fit_profile(part.base(base), profile.kind, near, profile.prior).log_bayes_factor
+
+    return again
+
+
+def _needed(comparison: Comparison, answer: str) -> float:
+    """The log Bayes factor that makes nothing improbable enough for an alarm, if all else has none."""
+    odds = comparison.odds
+    return math.log((1.0 - NOTHING_ALONE) / NOTHING_ALONE * odds[NOTHING] / odds[answer])
+
+
+def _carried(
+    factor: Callable[[_Part], float], order: Sequence[int] | NDArray[np.int64], needed: float
+) -> tuple[list[int], float | None]:
+    """The first avalanches of an order without which an answer has too little, and what it has then.
+
+    None, and what it has without a third of them, where that is still enough.
+    """
+    n, left = len(order), None
+    for many in range(1, int(MOST * n) + 1):
+        kept = np.ones(n, dtype=bool)
+        kept[order[:many]] = False
+        left = factor(_Part(kept))
+        if left < needed:
+            return [int(k) for k in order[:many]], left
+    return [], left
+
+
+def _kinds(base: Base) -> list[tuple[str, str | None, BoolArray]]:
+    """Readings that may mean something else than they say, and each sensor's, as (n_events, n_sensors)."""
+    readings, campaign = base.rows.readings, base.problem.campaign
+    observed = readings.observed
+    speeds = observed & readings.is_velocity
+    stops, stop_sd = _stops(base)
+    places = np.array(
+        [np.nan if place is None else 0.5 * (place[0] + place[1]) for place in base.problem.sensor_places]
+    )
+    near = speeds & (np.abs(places - stops[:, None]) <= stop_sd[:, None])
+    kinds: list[tuple[str, str | None, BoolArray]] = [
+        ("zeros", None, speeds & (readings.values == 0.0)),
+        ("near a stop", None, near),
+    ]
+    for j, sensor in enumerate(campaign.sensor_ids):
+        own = np.zeros_like(observed)
+        own[:, j] = observed[:, j]
+        kinds.append(("sensor", sensor, own))
+    return [one for one in kinds if one[2].any()]
+
+
+def _stops(base: Base) -> tuple[FloatArray, FloatArray]:
+    """Each avalanche's recorded stop [m] and its standard deviation; NaN where none is recorded."""
+    readings = base.rows.readings
+    n = len(readings.values)
+    stops, sd = np.full(n, np.nan), np.full(n, np.nan)
+    noise = readings.sd(np.arange(n), readings.values)
+    for j, sensor in enumerate(base.problem.campaign.sensors):
+        if sensor.is_runout:
+            seen = readings.observed[:, j]
+            stops[seen], sd[seen] = readings.values[seen, j], noise[seen, j]
+    return stops, sd

@@ -1,0 +1,78 @@
+"""Figure of what the answer hangs on: its evidence without each avalanche and without kinds of readings."""
+
+from __future__ import annotations
+
+from collections.abc import Set
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from skred.report.diagnosis.words import AFTER, MISMATCH, in_words
+from skred.report.shared import document as doc
+from skred.report.shared.labels import figure_text
+from skred.report.shared.style import GREY, legend_below, new_figure, styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_MOST_NAMED = 40
+"""Avalanches that are named on the axis; of more only those that carry the answer are."""
+
+
+def has_influence(document: doc.Document) -> bool:
+    """Whether the verdict says what its answer hangs on."""
+    return bool(doc.get(document, "influence", "events"))
+
+
+@styled
+def influence_figure(document: doc.Document) -> Figure:
+    """Log Bayes factor of the answer without each avalanche, and without kinds of readings."""
+    found = doc.get(document, "influence")
+    name = figure_text(in_words([found["answer"]])[0], 40)
+    figure = new_figure(3.6, f"What the answer hangs on: {name}, again without some of the recordings")
+    readings = doc.listed(found, "readings")
+    panels = figure.subplots(1, 2, sharey=True, width_ratios=[3, 1.2]).ravel()
+    carried = set(found["carried_by"])
+    without = {one["event"]: float(one["log_bayes_factor"]) for one in found["events"]}
+    events = sorted(without, key=lambda event: without[event])
+    _points(panels[0], found, events, [without[event] for event in events], carried)
+    panels[0].set_xlabel(
+        "without avalanche" if len(events) <= _MOST_NAMED else f"without each of {len(events)}"
+    )
+    panels[0].set_ylabel("log Bayes factor\nagainst nothing [nats]")
+    _points(panels[1], found, [_kind(one) for one in readings], [one["log_bayes_factor"] for one in readings])
+    panels[1].set_xlabel("without readings")
+    if found["without_them"] is not None:
+        panels[0].plot(
+            [(len(carried) - 1) / 2.0], [found["without_them"]], linestyle="none", marker="D", color=MISMATCH,
+            label=f"without the {len(carried)} avalanches that carry it",
+        )  # fmt: skip
+    legend_below(figure, panels, columns=2)
+    return figure
+
+
+def _points(
+    axes: Axes,
+    found: dict[str, Any],
+    names: list[str],
+    values: list[float],
+    carried: Set[str] = frozenset(),
+) -> None:
+    """One point for each part that is left out, with the evidence of all and what is needed as lines."""
+    at = np.arange(len(names))
+    axes.axhline(found["log_bayes_factor"], color=AFTER, linewidth=1.0, label="by all recordings")
+    axes.axhline(found["needed"], color=GREY, linewidth=1.0, linestyle="--", label="needed for the answer")
+    if names:
+        colours = [MISMATCH if name in carried else AFTER for name in names]
+        axes.vlines(at, values, found["log_bayes_factor"], color=colours, linewidth=1.4, alpha=0.5)
+        axes.scatter(at, values, color=colours, s=18, zorder=3)
+    shown = names if len(names) <= _MOST_NAMED else [one if one in carried else "" for one in names]
+    axes.set_xticks(at, [figure_text(one, 16) for one in shown], rotation=90, fontsize=7)
+    axes.set_xlim(-0.7, max(len(names), 1) - 0.3)
+
+
+def _kind(readings: dict[str, Any]) -> str:
+    """Some of the readings, and how many they are."""
+    what = readings["sensor"] if readings["kind"] == "sensor" else readings["kind"]
+    return f"{what} ({readings['n']})"

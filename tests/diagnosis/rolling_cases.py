@@ -1,0 +1,63 @@
+"""Bodies that roll out on level ground behind a ramp, in closed form: friction, and a drag with U^2."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skred.campaign import Campaign, Event, Sensor, Status, Track
+
+G_M_S2 = 9.81
+"""Standard gravity to the digits that matter here."""
+STEEP = np.pi / 6.0
+"""Angle of the ramp."""
+RAMP_M, LEVEL_M, RELEASE_M = 100.0, 900.0, 20.0
+"""Lengths of ramp and level ground, and from where the bodies start, on the ramp."""
+PLACES_M = (140.0, 290.0, 440.0, 590.0, 740.0, 840.0)
+
+
+def speed(s: float, release: float, friction: float, drag: float) -> float:
+    """Front speed [m/s]: dv/ds = 2 g (sin(phi) - friction cos(phi)) - 2 drag v on ramp and level ground."""
+
+    def after(v: float, length: float, force: float) -> float:
+        end = force / drag
+        return end + (v - end) * np.exp(-2.0 * drag * length)
+
+    v = after(0.0, RAMP_M - release, G_M_S2 * (np.sin(STEEP) - friction * np.cos(STEEP)))
+    return float(np.sqrt(max(after(v, s - RAMP_M, -G_M_S2 * friction), 0.0)))
+
+
+def rolling(drag: float, n_events: int = 20, friction: float = 0.006, seed: int = 1) -> Campaign:
+    """Runs of bodies whose friction and releases vary, read at six places to 0.1 m/s."""
+    rng = np.random.default_rng(seed)
+    frictions = friction * np.exp(0.1 * rng.standard_normal(n_events))
+    releases = RELEASE_M + 2.0 * rng.standard_normal(n_events)
+    values = np.array(
+        [
+            [speed(s, release, mu, drag) for s in PLACES_M]
+            for mu, release in zip(frictions, releases, strict=True)
+        ]
+    )
+    values += 0.1 * rng.standard_normal(values.shape)
+    x = np.array([0.0, RAMP_M * np.cos(STEEP), RAMP_M * np.cos(STEEP) + LEVEL_M])
+    z = np.array([RAMP_M * np.sin(STEEP), 0.0, 0.0])
+    along = np.unique(np.concatenate([np.linspace(0.0, x[1], 21), np.linspace(x[1], x[2], 91)]))
+    sensors = tuple(
+        Sensor(f"s{k}", "front_velocity", place, place, relative_sd=0.0, absolute_sd=0.1)
+        for k, place in enumerate(PLACES_M)
+    )
+    events = tuple(
+        Event(f"run{k:02d}", release_s_m=RELEASE_M, release_sd_m=2.0, covariates={}) for k in range(n_events)
+    )
+    return Campaign(
+        name="rolling",
+        description="bodies rolling out",
+        source="closed form",
+        origin="simulated",
+        reference_s_m=None,
+        track=Track(along, np.interp(along, x, z)),
+        sensors=sensors,
+        events=events,
+        values=values,
+        status=np.full(values.shape, int(Status.OBSERVED), dtype=np.int8),
+        stated_sd=np.full(values.shape, np.nan),
+    )

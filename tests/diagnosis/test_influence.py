@@ -1,0 +1,76 @@
+"""What an answer hangs on: against the same evidence computed from campaigns that lack the recordings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosis_cases import base_of
+from rolling_cases import rolling
+
+from skred.campaign import Campaign
+from skred.campaign.parts import of_events
+from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
+from skred.diagnosis.compare.screening import curve, screening_budget
+from skred.diagnosis.evidence.coefficient import Curve, curve_near
+from skred.diagnosis.evidence.prior_odds import prior_odds
+from skred.diagnosis.influence.influence import MOST, influence
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.spec import Shape
+
+DRAG = mechanisms()["turbulent_drag"]
+
+
+def drag_in(campaign: Campaign) -> tuple[Comparison, Curve]:
+    """A comparison that has drag along the track alone."""
+    base = base_of(campaign, "coulomb")
+    budget = screening_budget(base)
+    found = curve_near(base, DRAG, Shape(), curve(base, DRAG, Shape(), budget), budget)
+    candidates = {DRAG.id: Candidate(DRAG, (found,), np.zeros(1))}
+    under_errors = ComparisonUnderErrors("robust", base, candidates, [], [found])
+    return Comparison((under_errors,), prior_odds([DRAG]), {"robust": 0.0}), found
+
+
+def without_one(campaign: Campaign, event: int) -> float:
+    """The log Bayes factor by a campaign that never had an avalanche."""
+    others = [k for k in range(campaign.n_events) if k != event]
+    return drag_in(of_events(campaign, others))[1].log_bayes_factor
+
+
+def test_without_an_avalanche_as_in_a_campaign_that_never_had_it() -> None:
+    campaign = rolling(2.4e-4, n_events=10)
+    comparison, found = drag_in(campaign)
+    said = influence(comparison, DRAG.id)
+    assert said.log_bayes_factor == pytest.approx(found.log_bayes_factor)
+    for event in (0, 7):
+        assert said.without_each[event] == pytest.approx(without_one(campaign, event), abs=0.5)
+
+
+def test_a_strong_effect_in_all_avalanches_hangs_on_no_few() -> None:
+    said = influence(drag_in(rolling(2.4e-4, n_events=12))[0], DRAG.id)
+    assert said.carried_by == () and said.without_them is None
+    assert said.without_a_third is not None and said.needed < said.without_a_third < said.log_bayes_factor
+
+
+def test_avalanches_that_carry_an_answer_are_found() -> None:
+    """Two runs are read finely enough to tell a drag, the others far too coarsely."""
+    campaign = rolling(2.4e-4, n_events=9)
+    coarse = np.full(campaign.values.shape, 3.0)
+    coarse[[2, 5]] = 0.1
+    said = influence(drag_in(replace(campaign, stated_sd=coarse))[0], DRAG.id)
+    assert set(said.carried_by) <= {"run02", "run05"} and said.carried_by
+    assert len(said.carried_by) <= MOST * campaign.n_events
+    assert said.without_them is not None and said.without_them < said.needed < said.log_bayes_factor
+    assert {said.events[k] for k in np.argsort(said.without_each)[:2]} == {"run02", "run05"}
+
+
+def test_readings_are_left_out_by_sensor_and_kind() -> None:
+    """Readings of zero are a kind of their own; no runout is recorded, so nothing is beside a stop."""
+    campaign = rolling(2.4e-4, n_events=8)
+    values = np.array(campaign.values)
+    values[3, -1] = 0.0
+    said = influence(drag_in(replace(campaign, values=values))[0], DRAG.id)
+    kinds = [(one.kind, one.sensor, one.n) for one in said.readings]
+    assert kinds == [("zeros", None, 1), *(("sensor", f"s{k}", 8) for k in range(6))]
