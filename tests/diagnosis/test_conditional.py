@@ -191,6 +191,13 @@ def test_nothing_is_gained_where_before_is_after(ryggfonn: HierarchicalProblem) 
     assert (
         "Nothing is gained: the speed at CD" in document["statement"] and "as before" in document["statement"]
     )
+    alone, without = (
+        document["statement"]
+        .split("The avalanches that carry the answer, by themselves: ")[1]
+        .split(". Without them, ")
+    )
+    assert alone.startswith("the speed at CD (error") and "log score 0.0 ± 0.0, 2 readings" in alone
+    assert without.startswith("no reading is clearly predicted better") and "18 readings" in without
     assert document["sensors"][0]["carrying"]["n"] == 2 and document["sensors"][0]["others"]["n"] == 18
     assert document["sensors"][1]["carrying"] is None
 

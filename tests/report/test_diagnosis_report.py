@@ -61,7 +61,7 @@ def test_every_kind_has_a_page_that_needs_nothing_else(kind, picture):
         (
             "two",
             {"check", "where", "probabilities", "strength", "places", "left_out", "scores", "influence"}
-            | {"probabilities_2", "strength_2", "places_2", "conditional"},
+            | {"probabilities_2", "strength_2", "places_2", "conditional_speeds", "conditional_runouts"},
         ),
     ],
 )
@@ -182,10 +182,11 @@ def test_the_improvement_is_on_the_first_screen(kind, tmp_path):
     """Readings given those above: figure and sentence before the contents, the table in its section."""
     document, tree = documents(kind)
     files = save_diagnosis_figures(document, tree, tmp_path)
-    assert files["conditional"].stat().st_size > 10_000
+    assert all(files[f"conditional_{one}"].stat().st_size > 5_000 for one in ("speeds", "runouts"))
     html = render_diagnosis(document, tree, files)
     first, rest = html.split("<nav>")
-    assert "predicted from the readings of the same avalanche above it" in first
+    assert first.count("<img") == 3 and "predicted from all speeds of the same avalanche" in first
+    assert ("A ring marks" in first) == bool(document["influence"]["carried_by"])
     sentence = document["conditional"]["statement"]
     assert sentence.startswith("Given the readings") and sentence in first
     table = rest[rest.index("Given the readings above") :]
@@ -196,7 +197,9 @@ def test_the_improvement_is_on_the_first_screen(kind, tmp_path):
 def test_nothing_is_given_above_where_nothing_was_added(tmp_path):
     document, tree = documents("nothing")
     assert document["conditional"] is None and "conditional" not in tree.children
-    assert "conditional" not in save_diagnosis_figures(document, tree, tmp_path)
+    assert not any(
+        name.startswith("conditional") for name in save_diagnosis_figures(document, tree, tmp_path)
+    )
     assert "Given the readings" not in render_diagnosis(document, tree, {})
 
 
@@ -212,8 +215,11 @@ def test_avalanches_that_carry_the_answer_have_rows_of_their_own():
     document, _ = documents("unexplained")
     rows = [row["name"] for row in conditional_rows(document)]
     assert rows[:3] == ["CD [m/s]", "those that carry the answer", "the others"]
-    assert "avalanches that carry the answer" in document["conditional"]["statement"]
+    assert rows[-3] == "all speeds [m/s]"
+    assert ". Without them, " in document["conditional"]["statement"]
     # Where no few avalanches carry it, there are no others either.
     document, _ = documents("tie")
-    assert {row["name"][-1] for row in conditional_rows(document)} == {"]"}
+    assert [row["name"] for row in conditional_rows(document)] == [
+        "CD [m/s]", "b [m/s]", "runout [m]", "all speeds [m/s]"
+    ]  # fmt: skip
     assert "that carry the answer" not in document["conditional"]["statement"]

@@ -21,18 +21,27 @@ def given_above(document: dict[str, Any]) -> str:
     rows = _rows(document)
     if not rows:
         return "No avalanche has two readings, so none is predicted from those above it."
+    parts = [f"Given the readings of the same avalanche above it, {_gains(rows, 'all')}"]
+    carried = [row for row in rows if row[2]["carrying"] is not None]
+    if carried:
+        alone = [f"{name} ({_change(sets['carrying'], unit)})" for name, unit, sets in carried]
+        parts.append(f"The avalanches that carry the answer, by themselves: {enumerated(alone)}.")
+    rest = [row for row in carried if row[2]["others"] is not None]
+    if rest:
+        parts.append(f"Without them, {_gains(rest, 'others')}")
+    return " ".join((*parts, "After ± stands twice the standard error."))
+
+
+def _gains(rows: list[tuple[str, str, dict[str, Any]]], which: str) -> str:
+    """What is better over some avalanches, and all that is not; begins with a small letter."""
     told: dict[str, list[str]] = {CLEAR: [], UNCLEAR: [], NOTHING_GAINED: [], WORSE: []}
     for name, unit, sets in rows:
-        told[gain_of(sets["all"])].append(f"{name} ({_change(sets['all'], unit)})")
+        told[gain_of(sets[which])].append(f"{name} ({_change(sets[which], unit)})")
+    first = "no reading is clearly predicted better with what was added."
     if told[CLEAR]:
-        first = f"what was added improves the prediction of {enumerated(told[CLEAR])}"
-    else:
-        first = "no reading is clearly predicted better with what was added"
-    parts = [f"Given the readings of the same avalanche above it, {first}."]
-    for gain, words in ((UNCLEAR, "No clear gain"), (NOTHING_GAINED, "Nothing is gained"), (WORSE, "Worse")):
-        if told[gain]:
-            parts.append(f"{words}: {enumerated(told[gain])}.")
-    return " ".join(part for part in (*parts, _carriers(rows)) if part)
+        first = f"what was added improves the prediction of {enumerated(told[CLEAR])}."
+    kinds = ((UNCLEAR, "No clear gain"), (NOTHING_GAINED, "Nothing is gained"), (WORSE, "Worse"))
+    return " ".join((first, *(f"{words}: {enumerated(told[one])}." for one, words in kinds if told[one])))
 
 
 def gain_of(scores: dict[str, Any]) -> str:
@@ -68,10 +77,11 @@ def _name(row: dict[str, Any]) -> str:
 
 
 def _change(scores: dict[str, Any], unit: str) -> str:
+    """Errors before and after, and by how much the log score of all readings together rises."""
     n, doubled = scores["n"], scores["log_score_diff_2se"]
-    error = f"twice its standard error {n * doubled:.1f}" if doubled is not None else "one avalanche"
+    error = "" if doubled is None else f" ± {n * doubled:.1f}"
     return (
-        f"error {_errors(scores, unit)}, log score {_signed(n * scores['log_score_diff'])}, {error};"
+        f"error {_errors(scores, unit)}, log score {_signed(n * scores['log_score_diff'])}{error},"
         f" {n} {'reading' if n == 1 else 'readings'}"
     )
 
@@ -88,16 +98,3 @@ def _errors(scores: dict[str, Any], unit: str) -> str:
 def _signed(value: float) -> str:
     text = f"{value:+.1f}"
     return "0.0" if float(text) == 0.0 else text
-
-
-def _carriers(rows: list[tuple[str, str, dict[str, Any]]]) -> str:
-    """Errors of the avalanches that carry the answer, and of the others, where most is gained."""
-    known = [row for row in rows if row[2]["carrying"] is not None and row[2]["others"] is not None]
-    if not known:
-        return ""
-    name, unit, sets = max(known, key=lambda row: row[2]["all"]["n"] * row[2]["all"]["log_score_diff"])
-    carrying, others = sets["carrying"], sets["others"]
-    return (
-        f"For {name} the error is {_errors(carrying, unit)} over the {carrying['n']} avalanches that carry"
-        f" the answer, and {_errors(others, unit)} over the other {others['n']}."
-    )

@@ -13,7 +13,17 @@ from skred.report.shared import document as doc
 from skred.report.shared.labels import figure_text, name_text, printable, unit_text
 from skred.report.shared.numbers import fixed, is_number
 from skred.report.shared.recordings import Recordings, recordings_of
-from skred.report.shared.style import GREY, MARKERS, PALETTE, legend_below, new_figure, styled, tint
+from skred.report.shared.style import (
+    GREY,
+    MARKERS,
+    PALETTE,
+    RECORDED,
+    WIDTH,
+    legend_below,
+    new_figure,
+    styled,
+    tint,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,7 +34,7 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 _MOST_STYLES = 6
 """Sensors of speed that have a style of their own; more are put together by where they are."""
-_FARTHEST = 0.5
+_FARTHEST = 0.25
 """How far beyond the recordings a prediction is shown where it is, in their range."""
 _WHEN = ("before", "after")
 _PARTS = {"carrying": "those that carry the answer", "others": "the others"}
@@ -40,25 +50,31 @@ class _Style:
     marker: str
 
 
-def has_conditional(tree: xr.DataTree) -> bool:
-    """Whether any reading was predicted from those above it."""
-    group = "conditional" in tree.children
-    return group and bool((tree["conditional"].to_dataset()["n_above"].values > 0).any())
+def conditional_kinds(tree: xr.DataTree) -> list[str]:
+    """Of speeds and runouts, which were predicted from readings above them."""
+    if "conditional" not in tree.children:
+        return []
+    runout, shown = recordings_of(tree).is_runout, _values(tree, "before", "n_above") > 0
+    of_kind = {"speeds": shown[:, ~runout], "runouts": shown[:, runout]}
+    return [kind for kind, one in of_kind.items() if one.any()]
 
 
 @styled
-def conditional_figure(tree: xr.DataTree) -> Figure:
-    """Predicted against recorded, before and after: speeds, and runouts."""
-    recordings = recordings_of(tree)
-    shown = _values(tree, "before", "n_above") > 0
-    runout = recordings.is_runout
-    kinds = [kind for kind in (~runout, runout) if shown[:, kind].any()]
-    figure = new_figure(3.15, "Each reading, predicted from the readings of the same avalanche above it")
-    panels = figure.subplots(1, 2 * len(kinds), squeeze=False)[0]
-    for k, kind in enumerate(kinds):
-        styles = _styles(recordings, kind & shown.any(axis=0), first=k * _MOST_STYLES)
-        _panels(panels[2 * k : 2 * k + 2], tree, recordings, shown & kind, styles)
-    legend_below(figure, panels, columns=5)
+def conditional_figure(document: doc.Document, tree: xr.DataTree, kind: str) -> Figure:
+    """Predicted against recorded, before and after: ``speeds`` or ``runouts``.
+
+    They stand side by side on a wide screen, and on a narrow one below each other.
+    """
+    recordings, runout = recordings_of(tree), kind == "runouts"
+    shown = (_values(tree, "before", "n_above") > 0) & (recordings.is_runout == runout)
+    styles = _styles(recordings, shown.any(axis=0), first=_MOST_STYLES if runout else 0)
+    carrying = np.isin(recordings.event_ids, doc.get(document, "influence", "carried_by") or [])
+    given = "all speeds" if runout else "those above it"
+    figure = new_figure(3.3, f"{kind.capitalize()}, each predicted from {given}", width=0.5 * WIDTH)
+    panels = figure.subplots(1, 2, sharey=True)
+    _panels(panels, tree, recordings, shown, styles)
+    _mark(panels, tree, recordings, shown & carrying[:, None])
+    legend_below(figure, panels, columns=3)
     return figure
 
 
@@ -66,8 +82,7 @@ def _panels(
     panels: Sequence[Axes], tree: xr.DataTree, recordings: Recordings, shown: BoolArray, styles: list[_Style]
 ) -> None:
     """Before and after of speeds or of runouts, on the same axes."""
-    runout = bool(recordings.is_runout[styles[0].columns].all())
-    zero = (recordings.reference_s_m or 0.0) if runout else 0.0
+    runout, zero = _scale(recordings, shown)
     what, unit = ("runout", "m") if runout else ("speed", unit_text("m s-1"))
     recorded = recordings.values - zero
     x = recorded[shown]
@@ -97,12 +112,30 @@ def _panels(
             )
             outside = recorded[at][~inside], np.clip(mean[at][~inside], least, most)
             axes.plot(*outside, markerfacecolor="none", markeredgewidth=0.8, **points)
-        axes.set_title(f"{what}s, {when}", fontsize=8.5)
+        axes.set_title(when, fontsize=8.5)
         axes.set_xlabel(f"recorded {what} [{unit}]")
         axes.set_xlim(x.min() - 0.08 * size, x.max() + 0.08 * size)
         axes.set_ylim(*line)
     panels[0].set_ylabel(f"predicted {what} [{unit}]")
-    panels[1].set_yticklabels([])
+
+
+def _mark(panels: Sequence[Axes], tree: xr.DataTree, recordings: Recordings, carrying: BoolArray) -> None:
+    """A ring around the readings of avalanches that carry the answer."""
+    _, zero = _scale(recordings, carrying)
+    for axes, when in zip(panels, _WHEN, strict=True) if carrying.any() else ():
+        least, most = axes.get_ylim()
+        inset = 0.05 / 1.1 * (most - least)
+        y = np.clip(_values(tree, when, "mean")[carrying] - zero, least + inset, most - inset)
+        axes.plot(
+            recordings.values[carrying] - zero, y, linestyle="none", marker="o", color=RECORDED,
+            markersize=7.5, markerfacecolor="none", markeredgewidth=0.9, label="carries the answer",
+        )  # fmt: skip
+
+
+def _scale(recordings: Recordings, shown: BoolArray) -> tuple[bool, float]:
+    """Whether these readings are runouts, and where they are counted from."""
+    runout = bool(recordings.is_runout[shown.any(axis=0)].all())
+    return runout, (recordings.reference_s_m or 0.0) if runout else 0.0
 
 
 def _styles(recordings: Recordings, columns: BoolArray, first: int) -> list[_Style]:
@@ -133,7 +166,11 @@ def _values(tree: xr.DataTree, when: str, name: str) -> FloatArray:
 def conditional_rows(document: doc.Document) -> list[dict[str, str]]:
     """For each sensor, over all avalanches and over parts of them: errors and scores before and after."""
     rows = []
-    for entry in doc.listed(document, "conditional", "sensors"):
+    entries = doc.listed(document, "conditional", "sensors")
+    speeds = doc.get(document, "conditional", "speeds")
+    if speeds and sum(doc.get(entry, "quantity") != "runout" for entry in entries) > 1:
+        entries = [*entries, {"sensor": "all speeds", "unit": "m s-1", **speeds}]
+    for entry in entries:
         unit = unit_text(doc.get(entry, "unit"))
         decimals = 0 if unit == "m" else 1
         words = {"all": f"{printable(doc.get(entry, 'sensor'))} [{unit}]", **_PARTS}
@@ -152,6 +189,7 @@ def _row(scores: doc.Document, decimals: int) -> dict[str, str]:
         "error": _pair(scores, "rmse", decimals),
         "error_change": _change(scores, "rmse", decimals),
         "crps": _pair(scores, "crps", decimals),
+        "crps_change": _change(scores, "crps", decimals),
         "log_score": _pair(scores, "log_score", 2),
         "log_score_change": _change(scores, "log_score", 2),
         "inside": _pair(scores, "coverage_90", 0, 100.0),

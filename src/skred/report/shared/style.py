@@ -159,7 +159,8 @@ def legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(str(label), handle)
-    columns = next((n for n in range(columns, 1, -1) if _legend_width(list(entries), n) <= _LEGEND_WIDTH), 1)
+    most = _LEGEND_WIDTH * figure.get_figwidth() / WIDTH
+    columns = next((n for n in range(columns, 1, -1) if _legend_width(list(entries), n) <= most), 1)
     figure.legend(list(entries.values()), list(entries), loc="outside lower left", ncols=columns)
 
 
