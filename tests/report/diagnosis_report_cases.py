@@ -79,7 +79,9 @@ def curves_of(mechanism, setting, top: float, at: float) -> Candidate:
     return Candidate(mechanism, tuple(curves), np.full(len(curves), -np.log(len(curves))))
 
 
-def race_of(problem: HierarchicalProblem, tops: dict[str, float], n_heats: int = 1) -> Comparison:
+def comparison_of(
+    problem: HierarchicalProblem, tops: dict[str, float], n_error_models: int = 1
+) -> Comparison:
     """A comparison in which some candidates have evidence."""
     setting = setting_of(problem, LAW)
     candidates = {
@@ -92,7 +94,7 @@ def race_of(problem: HierarchicalProblem, tops: dict[str, float], n_heats: int =
     profile = SimpleNamespace(log_bayes_factor=tops.get("unlisted", -1.0), kind=KINDS[0])
     under_each = tuple(
         ComparisonUnderErrors(name, SimpleNamespace(), candidates, [profile], [])
-        for name in ("robust", "student")[:n_heats]
+        for name in ("robust", "student")[:n_error_models]
     )
     odds = prior_odds(candidate.mechanism for candidate in candidates.values())
     return Comparison(under_each, odds, {"robust": -100.0, "student": -103.0})
@@ -186,7 +188,7 @@ def diagnosis(kind: str, text: str = "") -> Outcome:
         "sensor": {"sensor_bias": 40.0},
         "unexplained": {"unlisted": 30.0},
     }.get(kind, {kind: 40.0})
-    comparison = race_of(problem, tops, 2 if kind in ("tie", "sensor") else 1)
+    comparison = comparison_of(problem, tops, 2 if kind in ("tie", "sensor") else 1)
     names = {
         "tie": ("entrainment", "segment_drag"), "two": ("covariate_friction",), "sensor": ("sensor_bias",),
     }.get(kind, (kind,) if kind in mechanisms() else ())  # fmt: skip
@@ -251,18 +253,20 @@ def profile_law(problem: HierarchicalProblem, clean: np.ndarray) -> ProfileLaw:
 def _steps(problem, comparison, names, clean, *, second):
     if not names:
         return ()
-    raced = [(names, comparison)]
+    compared = [(names, comparison)]
     if second:
-        again = race_of(problem, {"obstacle": 30.0})
-        raced.append((("obstacle",), again))
+        again = comparison_of(problem, {"obstacle": 30.0})
+        compared.append((("obstacle",), again))
     added, steps = (), []
-    for (name, *tied), its_race in raced:
-        candidate = its_race.under_each[0].candidates[name]
+    for (name, *tied), its_comparison in compared:
+        candidate = its_comparison.under_each[0].candidates[name]
         best = candidate.best
         strength = best.mechanism.strength.name
         added += (SimpleNamespace(name=strength, mechanism=best.mechanism, shape=best.shape),)
         steps.append(
-            Step(candidate, tuple(tied), its_race, calibration(problem, added), BootstrapTest(0.1, clean))
+            Step(
+                candidate, tuple(tied), its_comparison, calibration(problem, added), BootstrapTest(0.1, clean)
+            )
         )
     return tuple(steps)
 

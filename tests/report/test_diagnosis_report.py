@@ -75,6 +75,16 @@ def test_figures_that_apply_are_written(kind, names, tmp_path):
     assert page.tags.count("img") == len(names)
 
 
+@pytest.mark.parametrize(("n", "said"), [(0, "0 cases"), (1, "1 case"), (2, "2 cases")])
+def test_how_many_readings_are_not_there(n, said):
+    document, tree = documents("nothing")
+    campaign = document["report"]["campaign"]
+    counts = campaign["readings"] | {"not_reached": n, "missing": n}
+    report = document["report"] | {"campaign": campaign | {"readings": counts}}
+    text = Page(render_diagnosis(document | {"report": report}, tree, {})).text
+    assert f"In {said} the front stopped above" in text and f"In {said} the reading is missing" in text
+
+
 def test_a_tie_says_that_it_is_one():
     text = Page(rendered("tie")).text
     assert "cannot tell entrainment from segment drag" in text

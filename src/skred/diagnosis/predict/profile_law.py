@@ -96,7 +96,7 @@ def profile_law(under_errors: ComparisonUnderErrors, most: int, seed: int) -> Pr
     before, after = (_held_out(base, [part[k] for part in parts]) for k in range(2))
     check, rng = _check(base, profile, most, seed), np.random.default_rng([seed, 55])
     _, without = _plain(base, rng)
-    _, within = _with(base, profile, rng)
+    _, within = with_profile(base, profile, rng)
     return ProfileLaw(profile, base.problem.error_model.id, check, before, after, without, within)
 
 
@@ -120,7 +120,7 @@ def _left_out(base: Base, profile: Profile, event: int, seed: int) -> tuple[_Eve
     population = profile.fit.found.population(len(base.law.mechanisms))
     near = profile.mean, (population, profile.fit.points[others])
     again = fit_profile(rest, profile.kind, near, profile.prior)
-    return before, _event(base, *_with(rest, again, rng), event, rng)
+    return before, _event(base, *with_profile(rest, again, rng), event, rng)
 
 
 def base_left_out(base: Base, seed: int) -> HeldOut:
@@ -145,8 +145,16 @@ def _plain(base: Base, rng: np.random.Generator) -> tuple[Extension, Draws]:
     return plain, _draws(base, plain, base.fit, base.strengths, own, rng)
 
 
-def _with(base: Base, profile: Profile, rng: np.random.Generator) -> tuple[Extension, Draws]:
-    """The law with a profile fitted to the base's events, each knot a strength; draws by those events."""
+def with_profile(base: Base, profile: Profile, rng: np.random.Generator) -> tuple[Extension, Draws]:
+    """The law with a profile fitted to the base's events, each knot a strength; draws by those events.
+
+    Parameters
+    ----------
+    base : Base
+    profile : Profile
+        Whose values are drawn by the Laplace approximation.
+    rng : numpy.random.Generator
+    """
     wide = knot_by_knot(base, profile.kind, profile.knots_m)
     own = np.tile(base.strengths, (_DRAWS, 1))
     values = rng.multivariate_normal(profile.mean, profile.covariance, _DRAWS)
