@@ -9,7 +9,7 @@ from rich.console import Console
 from test_report_html import Page, nulls
 
 from skred.campaign import Sensor
-from skred.report.diagnosis.conditional import _styles, conditional_rows
+from skred.report.diagnosis.conditional import conditional_rows, styles_of
 from skred.report.diagnosis.equation import equations, formula
 from skred.report.diagnosis.report import FIGURES, diagnosis_table, render_diagnosis, save_diagnosis_figures
 
@@ -216,7 +216,7 @@ def test_nothing_is_given_above_where_nothing_was_added(tmp_path):
 def test_many_sensors_share_a_style():
     """Forty sensors are put together by where they are, each in one part only."""
     sensors = tuple(Sensor(f"g{k}", "front_velocity", 10.0 * k, 10.0 * k, 0.1, 1.0) for k in range(40))
-    styles = _styles(SimpleNamespace(sensors=sensors), np.full(40, True), 0)
+    styles = styles_of(SimpleNamespace(sensors=sensors), np.full(40, True), 0)
     assert len(styles) == 6 and styles[0].label == "s = 0 to 60 m"
     assert np.sum([style.columns for style in styles], axis=0).tolist() == [1] * 40
 

@@ -41,7 +41,7 @@ _PARTS = {"carrying": "those that carry the answer", "others": "the others"}
 
 
 @dataclass(frozen=True)
-class _Style:
+class Style:
     """What readings of some sensors look like."""
 
     columns: BoolArray
@@ -67,7 +67,7 @@ def conditional_figure(document: doc.Document, tree: xr.DataTree, kind: str) -> 
     """
     recordings, runout = recordings_of(tree), kind == "runouts"
     shown = (_values(tree, "before", "n_above") > 0) & (recordings.is_runout == runout)
-    styles = _styles(recordings, shown.any(axis=0), first=_MOST_STYLES if runout else 0)
+    styles = styles_of(recordings, shown.any(axis=0), first=_MOST_STYLES if runout else 0)
     carrying = np.isin(recordings.event_ids, doc.get(document, "influence", "carried_by") or [])
     given = "all speeds" if runout else "those above it"
     figure = new_figure(3.3, f"{kind.capitalize()}, each predicted from {given}", width=0.5 * WIDTH)
@@ -79,7 +79,7 @@ def conditional_figure(document: doc.Document, tree: xr.DataTree, kind: str) -> 
 
 
 def _panels(
-    panels: Sequence[Axes], tree: xr.DataTree, recordings: Recordings, shown: BoolArray, styles: list[_Style]
+    panels: Sequence[Axes], tree: xr.DataTree, recordings: Recordings, shown: BoolArray, styles: list[Style]
 ) -> None:
     """Before and after of speeds or of runouts, on the same axes."""
     runout, zero = _scale(recordings, shown)
@@ -138,7 +138,7 @@ def _scale(recordings: Recordings, shown: BoolArray) -> tuple[bool, float]:
     return runout, (recordings.reference_s_m or 0.0) if runout else 0.0
 
 
-def _styles(recordings: Recordings, columns: BoolArray, first: int) -> list[_Style]:
+def styles_of(recordings: Recordings, columns: BoolArray, first: int) -> list[Style]:
     """A colour and a marker for each sensor, or for each of six stretches of the track."""
     numbers = np.flatnonzero(columns)
     parts = [[k] for k in numbers]
@@ -154,7 +154,7 @@ def _styles(recordings: Recordings, columns: BoolArray, first: int) -> list[_Sty
             label = f"s = {sensors[0].s_from_m:.0f} to {sensors[-1].s_to_m:.0f} m"
         chosen = np.isin(np.arange(len(columns)), part)
         colour, marker = PALETTE[(first + k) % len(PALETTE)], MARKERS[(first + k) % len(MARKERS)]
-        styles.append(_Style(chosen, figure_text(label, 24), colour, marker))
+        styles.append(Style(chosen, figure_text(label, 24), colour, marker))
     return styles
 
 
