@@ -32,8 +32,10 @@ from skred.diagnosis.outcome import (
     Outcome,
     ProfileAdded,
 )
+from skred.diagnosis.predict.conditional import BeforeAfter, Conditional, above
+from skred.diagnosis.predict.draws import Draws
 from skred.diagnosis.predict.held_out import HeldOut
-from skred.diagnosis.predict.profile_law import Draws, ProfileLaw
+from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.document import verdict
 from skred.diagnosis.verdict.figure_data import figure_data
 from skred.diagnosis.verdict.report_facts import report_facts
@@ -136,6 +138,19 @@ def held(problem: HierarchicalProblem, better: float) -> HeldOut:
     )
 
 
+def given_above(problem: HierarchicalProblem, better: float) -> Conditional:
+    """Readings by those above them: in all avalanches better by as much, and nearer to what was read."""
+    rng = np.random.default_rng(6)
+    seen = problem.observed
+    off = rng.normal(0.0, 6.0, seen.shape) / (1.0 + better)
+    mean = np.where(seen, problem.values + off, np.nan)
+    score = np.where(seen, rng.normal(-3.0, 0.5, seen.shape) + better, np.nan)
+    n_above = np.where(seen, seen.astype(int) @ above(problem).T.astype(int), 0)
+    return Conditional(
+        mean, mean - 8.0, mean + 8.0, score, np.abs(off), n_above, np.where(seen, 240.0, np.nan)
+    )
+
+
 def calibration(problem: HierarchicalProblem, added: tuple = (), gate: Gate = GATE) -> SimpleNamespace:
     """What the report reads of a calibration; with added strengths, of an augmented law's."""
     tree = hierarchical_calibration(problem, LAW)
@@ -195,6 +210,9 @@ def diagnosis(kind: str, text: str = "") -> Outcome:
         problem, LAW, calibration(problem), SimpleNamespace(), table,
         BootstrapTest(30.0 if alarm else 0.3, clean), comparison, Decision(verdict_, names),
         location(), finding, held(problem, 0.0), hangs_on(verdict_, names, problem),
+        None if isinstance(finding, NothingAdded) else BeforeAfter(
+            given_above(problem, 0.0), given_above(problem, 0.4)
+        ),
         {"base": 12.3, "comparison": 45.6},
     )  # fmt: skip
 

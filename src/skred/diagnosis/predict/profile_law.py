@@ -29,6 +29,7 @@ from skred.diagnosis.evidence.extension import Extension, extended
 from skred.diagnosis.evidence.marginal import evidence, importance_draws, population_at
 from skred.diagnosis.evidence.predictive import Predicted, predict_event
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
+from skred.diagnosis.predict.draws import Draws, LeftOut
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.predict.unseen import log_densities
 from skred.parallel.threads import side_by_side
@@ -41,14 +42,6 @@ _FRONTS = 1200
 """New fronts for the predictions of an avalanche, as of mechanisms."""
 _BUDGET = USUAL.times(2)
 """Quadrature points of a population fitted to the others: their draws are weighed, not only its maximum."""
-
-
-class Draws(NamedTuple):
-    """Draws of populations, and of the strengths of what is added, (n_draws, ...)."""
-
-    means: FloatArray
-    factors: FloatArray
-    strengths: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +77,7 @@ class _Event(NamedTuple):
 
     log_score: float
     predicted: Predicted
+    others: LeftOut
 
 
 def profile_law(under_errors: ComparisonUnderErrors, most: int, seed: int) -> ProfileLaw:
@@ -212,7 +206,8 @@ def _event(base: Base, extension: Extension, draws: Draws, event: int, rng: np.r
     means, factors, strengths = (np.resize(part, (_FRONTS, *part.shape[1:])) for part in draws)
     predicted = predict_event(extension, event, means, factors, strengths, rng)
     # NumPy's, not scipy's: see `comparison` on threads.
-    return _Event(float(np.logaddexp.reduce(densities)) - math.log(len(densities)), predicted)
+    score = float(np.logaddexp.reduce(densities)) - math.log(len(densities))
+    return _Event(score, predicted, LeftOut(extension, draws))
 
 
 def _held_out(base: Base, parts: Sequence[_Event]) -> HeldOut:
@@ -221,5 +216,5 @@ def _held_out(base: Base, parts: Sequence[_Event]) -> HeldOut:
     found = Predicted(*(np.array(values) for values in zip(*(part.predicted for part in parts), strict=True)))
     scores = np.array([part.log_score for part in parts])
     covered = found.covered(readings.values, readings.observed)
-    ids = tuple(base.problem.campaign.event_ids)
-    return HeldOut(scores, np.zeros(len(scores)), ids, (), found.where(readings.observed), covered)
+    ids, others = tuple(base.problem.campaign.event_ids), tuple(part.others for part in parts)
+    return HeldOut(scores, np.zeros(len(scores)), ids, (), found.where(readings.observed), covered, others)
