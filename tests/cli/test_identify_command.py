@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -227,6 +228,40 @@ def test_a_command_that_is_interrupted_leaves_earlier_results(command: str, fold
     assert "Traceback" not in told
     assert [file.name for file in out.iterdir() if file.is_dir()] == []
     assert (out / f"{command}.json").read_text() == "earlier"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_diagnosis_that_is_ended_leaves_no_process_and_no_semaphore(
+    number: signal.Signals, code: int, folder: Path
+) -> None:
+    """In the midst of the comparison, which has worker processes."""
+    with subprocess.Popen(
+        [sys.executable, "-c", CALLED, "diagnose", "--out", "out"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=folder,
+        env=os.environ | {"OMP_NUM_THREADS": "2"},
+        start_new_session=True,
+    ) as process:
+        assert process.stderr is not None
+        for line in process.stderr:
+            if line.startswith("what could be missing"):
+                break
+        time.sleep(3.0)
+        process.send_signal(number)
+        told = process.stderr.read()
+    assert process.returncode == code, told
+    assert "Traceback" not in told and "leaked" not in told
+    assert not (folder / "out").exists() or list((folder / "out").iterdir()) == []
+    for _ in range(20):  # the resource tracker ends once its last client has
+        time.sleep(0.25)
+        try:
+            os.killpg(process.pid, 0)
+        except ProcessLookupError:
+            return
+    pytest.fail("something of the diagnosis still runs")
 
 
 BAD = [

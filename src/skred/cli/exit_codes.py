@@ -8,8 +8,8 @@ BAD_INPUT = 2
 """Something given cannot be used, or a file cannot be read or written."""
 FAULT = 3
 """A fault of skred; its traceback is in a file."""
-INTERRUPTED = 130
-"""Ctrl-C."""
+INTERRUPTED, TERMINATED = 130, 143
+"""Ctrl-C, and SIGTERM."""
 MEANING = (
     "Ends with 0: an answer, cannot_tell included; 1: the chains did not converge; 2: something given cannot "
     "be used; 3: a fault of skred."

@@ -1,17 +1,20 @@
 """A program of commands, run to its exit code; what goes wrong is told on stderr, never by a traceback."""
 
 import os
+import signal
 import sys
 import tempfile
+import threading
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cyclopts import App, CycloptsError
 
-from skred.cli.exit_codes import BAD_INPUT, DONE, FAULT, INTERRUPTED, MEANING
+from skred.cli.exit_codes import BAD_INPUT, DONE, FAULT, INTERRUPTED, MEANING, TERMINATED
 from skred.cli.terminal import write_what_it_can
 from skred.errors import InputError
 
@@ -19,6 +22,10 @@ if TYPE_CHECKING:
     from skred.campaign import CampaignError
 
 TRACEBACK = "traceback.txt"
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM. A run ends as by Ctrl-C: with what it started, and keeping what was finished."""
 
 
 def new_program(name: str, purpose: str) -> App:
@@ -47,7 +54,8 @@ def exit_code_of(work: Callable[[], object]) -> int:
     """
     write_what_it_can(sys.stdout, sys.stderr)
     try:
-        code = work()
+        with _terminated_by_exception():
+            code = work()
         sys.stdout.flush()
     except CycloptsError:
         return BAD_INPUT  # cyclopts has told what is wrong
@@ -56,7 +64,7 @@ def exit_code_of(work: Callable[[], object]) -> int:
         return BAD_INPUT
     except KeyboardInterrupt as error:
         print(f"interrupted{_what_is_left(error)}", file=sys.stderr)
-        return INTERRUPTED
+        return TERMINATED if isinstance(error, Terminated) else INTERRUPTED
     except BrokenPipeError:
         _discard_output()  # its reader, such as `head`, has seen enough
         return DONE
@@ -68,6 +76,23 @@ def exit_code_of(work: Callable[[], object]) -> int:
         _tell_fault(error)
         return FAULT
     return code if isinstance(code, int) else DONE
+
+
+@contextmanager
+def _terminated_by_exception() -> Iterator[None]:
+    """Raise what SIGTERM means, so that contexts are left and workers end; by itself it would leave them."""
+
+    def end(number: int, frame: object) -> None:
+        raise Terminated
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _tell_bad_input(error: InputError) -> None:

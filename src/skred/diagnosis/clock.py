@@ -1,4 +1,4 @@
-"""How long each stage of a diagnosis takes, told as it begins."""
+"""How long each stage of a diagnosis takes, told as it begins, and how far a long one has come."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable
 
 Tell = Callable[[str], None]
+_TOLD_EVERY_S = 10.0
+"""Seconds between two lines on how far a stage has come: those that are done sooner say nothing."""
 
 
 class Clock:
@@ -14,6 +16,7 @@ class Clock:
     def __init__(self, tell: Tell) -> None:
         self.tell, self.seconds = tell, dict[str, float]()
         self._last, self._name = time.monotonic(), ""
+        self._told = self._last
 
     def stage(self, name: str, line: str) -> None:
         """Begin a stage."""
@@ -21,9 +24,21 @@ class Clock:
         self._name = name
         self.tell(line)
 
+    def progress(self, done: int, of: int) -> None:
+        """Tell how much of the present stage is done, and about how long the rest takes."""
+        now = time.monotonic()
+        if 0 < done < of and now - self._told > _TOLD_EVERY_S:
+            left = (now - self._last) * (of - done) / done
+            self.tell(f"  {done} of {of}, about {_in_words(left)} left")
+            self._told = now
+
     def end(self) -> None:
         """End the present stage."""
         now = time.monotonic()
         if self._name:
             self.seconds[self._name] = self.seconds.get(self._name, 0.0) + now - self._last
-        self._last, self._name = now, ""
+        self._last, self._name, self._told = now, "", now
+
+
+def _in_words(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.0f} min"

@@ -91,7 +91,7 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
     table = identify(score_test, base.rows, base.fit.points, base.population)
 
     clock.stage("comparison", "what could be missing: every candidate refitted")
-    comparison = compare(base)
+    comparison = compare(base, clock.progress)
 
     clock.stage("check", "is anything wrong: clean campaigns simulated and refitted")
     start, odds = (base.population, base.fit.points), comparison.log_odds
