@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign
-from skred.diagnosis.compare.decision import blamed
+from skred.diagnosis.check.decision import blamed
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds, probabilities, same_term
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms

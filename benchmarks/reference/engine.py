@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
+from skred.diagnosis.augment.problem import as_diagnosed
 from skred.diagnosis.compare.comparison import with_errors
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import Place, candidates_of, leading
 from skred.diagnosis.compare.screening import curve, screening_budget
-from skred.diagnosis.diagnose import as_diagnosed
 from skred.diagnosis.evidence.coefficient import Base, curve_near, fit_base
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.linear_mixed_model import mean_prior

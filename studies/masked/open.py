@@ -30,9 +30,8 @@ import numpy as np
 from benchmarks.commit import commit
 from skred.campaign import Campaign, read_campaign, write_campaign
 from skred.diagnosis.check.bootstrap_test import bootstrap_test
+from skred.diagnosis.check.decision import alarmed
 from skred.diagnosis.compare.comparison import compare
-from skred.diagnosis.compare.decision import alarmed
-from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.effort import REPLICAS
 from skred.diagnosis.evidence.prior_odds import NOTHING
 from skred.simulator.detectability import over_noise
@@ -127,13 +126,9 @@ def alarm_of(campaign: Campaign, law_id: str) -> dict[str, Any]:
         if found is None:
             return {"alarm": False, "failed": "gate"}
         base, draws = found
-        score_test, start = (
-            ScoreTest(base.problem, base.law, base.setting),
-            (base.population, base.fit.points),
-        )
         comparison = compare(base)
         log_odds, probability = comparison.log_odds, comparison.probability
-        check = bootstrap_test(score_test, base.rows, start, draws, 0, REPLICAS, log_odds)
+        check = bootstrap_test(base, draws, 0, REPLICAS, log_odds)
     except np.linalg.LinAlgError as error:
         return {"alarm": False, "failed": repr(error)}
     return {

@@ -20,7 +20,7 @@ import cyclopts
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.compare.decision import decide
+from skred.diagnosis.check.decision import decide
 from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.prove.scoring.standards import LOG_SCORE_FLOOR
 from skred.simulator.draw import SHARES

@@ -26,8 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign, read_campaign, write_campaign
+from skred.diagnosis.augment.problem import as_diagnosed
 from skred.diagnosis.compare.comparison import Comparison, compare
-from skred.diagnosis.diagnose import as_diagnosed
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS
 from skred.diagnosis.effort import REPLICAS, SAMPLING

@@ -20,7 +20,7 @@ app = cyclopts.App(help=__doc__)
 def main(*, law: str = "pcm", errors: str = "scaled", seed: int = 0) -> None:
     """Score Ryggfonn's avalanches, each by the others."""
     from skred.campaign import find_campaign, read_campaign
-    from skred.diagnosis.diagnose import as_diagnosed
+    from skred.diagnosis.augment.problem import as_diagnosed
     from skred.diagnosis.effort import SAMPLING
     from skred.diagnosis.evidence.coefficient import fit_base
     from skred.diagnosis.evidence.population_draws import population_draws, typical

@@ -17,7 +17,7 @@ from typing import Any
 
 import cyclopts
 
-from skred.diagnosis.compare.decision import TIED_NATS
+from skred.diagnosis.check.decision import TIED_NATS
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.physics.mechanisms import mechanisms
 from skred.prove.scoring.answers import Pair

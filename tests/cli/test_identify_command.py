@@ -21,6 +21,7 @@ from rich.console import Console
 from skred.campaign import Campaign, find_campaign, read_campaign, write_campaign
 from skred.cli.main import app, run
 from skred.cli.options import DIAGNOSING
+from skred.diagnosis.augment.problem import as_diagnosed
 from skred.diagnosis.detect.run import (
     base_of,
     identifiability,
@@ -28,7 +29,6 @@ from skred.diagnosis.detect.run import (
     identify_to,
 )
 from skred.diagnosis.detect.score_test import placed_mechanisms
-from skred.diagnosis.diagnose import as_diagnosed
 from skred.diagnosis.effort import QUICK_REPLICAS, SAMPLING, Effort
 from skred.inference.calibrate import calibrate
 from skred.inference.hierarchical.problem import hierarchical_problem

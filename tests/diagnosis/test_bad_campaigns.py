@@ -13,8 +13,8 @@ from diagnosis_cases import base_of, first_events, trial, with_sensors
 from numpy.testing import assert_allclose
 
 from skred.campaign import Campaign, CampaignError, Sensor, Status, write_campaign
+from skred.diagnosis.check.decision import decide
 from skred.diagnosis.compare.comparison import compare
-from skred.diagnosis.compare.decision import decide
 from skred.diagnosis.compare.location import locate
 from skred.diagnosis.detect.detectability import told
 from skred.diagnosis.detect.score_test import ScoreTest

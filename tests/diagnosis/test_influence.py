@@ -11,16 +11,22 @@ from rolling_cases import rolling
 
 from skred.campaign import Campaign
 from skred.campaign.parts import of_events
+from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
 from skred.diagnosis.compare.screening import curve, screening_budget
 from skred.diagnosis.evidence.coefficient import Curve, curve_near
 from skred.diagnosis.evidence.prior_odds import prior_odds
-from skred.diagnosis.influence.influence import MOST, influence
+from skred.diagnosis.influence.influence import MOST, FloatArray, influence
+from skred.diagnosis.predict.held_out import held_out
+from skred.inference.calibrate import calibrate
+from skred.inference.sampling import SamplerSettings
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Shape
 
 DRAG = mechanisms()["turbulent_drag"]
+CRITICAL = 1.73
+"""Log odds that are an alarm."""
 
 
 def drag_in(campaign: Campaign) -> tuple[Comparison, Curve]:
@@ -39,17 +45,29 @@ def without_one(campaign: Campaign, event: int) -> float:
     return drag_in(of_events(campaign, others))[1].log_bayes_factor
 
 
+def each_takes(campaign: Campaign, comparison: Comparison) -> FloatArray:
+    """What each avalanche takes of the log Bayes factor, by the campaigns that never had it."""
+    factor = comparison.under_each[0].log_factors[DRAG.id]
+    return np.array([factor - without_one(campaign, event) for event in range(campaign.n_events)])
+
+
 def test_without_an_avalanche_as_in_a_campaign_that_never_had_it() -> None:
+    """The gain in its density, given the others, is what it takes: by sampling, and by leaving it out."""
     campaign = rolling(2.4e-4, n_events=10)
     comparison, found = drag_in(campaign)
-    said = influence(comparison, DRAG.id, 1.73)
+    base, settings = comparison.under_each[0].base, SamplerSettings("metropolis", draws=600, tune=500, seed=0)
+    with_drag = calibrate(augmented_problem(base, [found]), base.law, settings)
+    without = calibrate(base.problem, base.law, settings)
+    gained = held_out(with_drag, 0).pointwise - held_out(without, 0).pointwise
+    said = influence(comparison, DRAG.id, CRITICAL, gained)
     assert said.log_bayes_factor == pytest.approx(found.log_bayes_factor)
     for event in (0, 7):
         assert said.without_each[event] == pytest.approx(without_one(campaign, event), abs=0.5)
 
 
 def test_a_strong_effect_in_all_avalanches_hangs_on_no_few() -> None:
-    said = influence(drag_in(rolling(2.4e-4, n_events=12))[0], DRAG.id, 1.73)
+    comparison = drag_in(rolling(2.4e-4, n_events=12))[0]
+    said = influence(comparison, DRAG.id, CRITICAL, np.full(12, comparison.log_factors[DRAG.id] / 12))
     assert said.carried_by == () and said.without_them is None
     assert said.without_a_third is not None and said.needed < said.without_a_third < said.log_bayes_factor
 
@@ -59,7 +77,9 @@ def test_avalanches_that_carry_an_answer_are_found() -> None:
     campaign = rolling(2.4e-4, n_events=9)
     coarse = np.full(campaign.values.shape, 3.0)
     coarse[[2, 5]] = 0.1
-    said = influence(drag_in(replace(campaign, stated_sd=coarse))[0], DRAG.id, 1.73)
+    campaign = replace(campaign, stated_sd=coarse)
+    comparison = drag_in(campaign)[0]
+    said = influence(comparison, DRAG.id, CRITICAL, each_takes(campaign, comparison))
     assert set(said.carried_by) <= {"run02", "run05"} and said.carried_by
     assert len(said.carried_by) <= MOST * campaign.n_events
     assert said.without_them is not None and said.without_them < said.needed < said.log_bayes_factor
@@ -71,6 +91,6 @@ def test_readings_are_left_out_by_sensor_and_kind() -> None:
     campaign = rolling(2.4e-4, n_events=8)
     values = np.array(campaign.values)
     values[3, -1] = 0.0
-    said = influence(drag_in(replace(campaign, values=values))[0], DRAG.id, 1.73)
+    said = influence(drag_in(replace(campaign, values=values))[0], DRAG.id, CRITICAL, np.zeros(8))
     kinds = [(one.kind, one.sensor, one.n) for one in said.readings]
     assert kinds == [("zeros", None, 1), *(("sensor", f"s{k}", 8) for k in range(6))]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from skred.diagnosis.check.bootstrap_test import LIMIT, BootstrapTest
-from skred.diagnosis.compare.decision import Decision, decide, smallest_set
+from skred.diagnosis.check.decision import Decision, decide, smallest_set
 from skred.diagnosis.evidence.prior_odds import POWER, prior_odds, probabilities, stated
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group

@@ -6,7 +6,7 @@ import os
 
 import numpy as np
 import pytest
-from diagnosis_cases import score_test_of, sparse_base
+from diagnosis_cases import sparse_base
 
 from skred.diagnosis.augment.coefficient_grid import locate
 from skred.diagnosis.augment.tables import BUDGETS, build_tables
@@ -49,13 +49,28 @@ def test_the_check_is_the_same_in_threads(monkeypatch: pytest.MonkeyPatch) -> No
     found = []
     for said in ("1", "2"):
         monkeypatch.setenv("OMP_NUM_THREADS", said)
-        found.append(
-            bootstrap_test(score_test_of(base), base.rows, (base.population, base.fit.points), draws, 5, 120)
-        )
+        found.append(bootstrap_test(base, draws, 5, 120))
     one, two = found
     assert one.statistic == two.statistic
     assert 25 <= len(one.simulated) < 120  # it stopped early, with batches begun that do not count
     np.testing.assert_array_equal(one.simulated, two.simulated)
+
+
+def test_high_odds_of_simulated_campaigns_are_those_of_their_fronts() -> None:
+    """Where the linear model reaches the recordings' odds; below, its own stay, for they cannot count."""
+    base = sparse_base()
+    n = len(base.law.mechanisms)
+    draws = np.tile(base.population.mean, (25, 1)), np.tile(0.1 * np.eye(n), (25, 1, 1))
+    linear = bootstrap_test(base, draws, 5, 25)
+    reach = max(float(np.sort(linear.simulated)[-3]), 0.01)
+    found = bootstrap_test(base, draws, 5, 25, log_odds=reach)
+    assert found.linear == linear.statistic and found.statistic == reach
+    high = linear.simulated >= reach
+    assert 1 <= high.sum() <= 3
+    np.testing.assert_array_equal(found.simulated[~high], linear.simulated[~high])
+    assert (found.simulated[high] != linear.simulated[high]).all()
+    # By fronts a clean campaign has little evidence for anything: as Markov's inequality wants it.
+    assert (found.simulated[high] < 3.0).all()
 
 
 @pytest.mark.slow

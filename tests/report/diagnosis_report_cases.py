@@ -12,9 +12,9 @@ from hierarchical_cases import hierarchical_calibration, hierarchical_ryggfonn
 
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
+from skred.diagnosis.check.decision import Decision, blamed
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
-from skred.diagnosis.compare.decision import Decision, blamed
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Detectability, Identifiability
 from skred.diagnosis.discrepancy.profile import KINDS, Prior, Profile

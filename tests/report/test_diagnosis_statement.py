@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from skred.diagnosis.augment.coefficient import strength_of
 from skred.diagnosis.augment.step import Left
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
+from skred.diagnosis.check.decision import Decision
 from skred.diagnosis.compare.candidate import FORM, Candidate
-from skred.diagnosis.compare.decision import Decision
 from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.evidence.refit import Fit

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from skred.diagnosis.augment.add import Adding, add_mechanisms
-from skred.diagnosis.augment.problem import CLAIM_LIMIT
+from skred.diagnosis.augment.problem import as_diagnosed
 from skred.diagnosis.augment.reference import Reference
 from skred.diagnosis.augment.step import Augmented, NotAugmented
 from skred.diagnosis.check.bootstrap_test import bootstrap_test
+from skred.diagnosis.check.decision import Decision, decide
 from skred.diagnosis.clock import Clock, Tell
 from skred.diagnosis.compare.comparison import Comparison, compare
-from skred.diagnosis.compare.decision import Decision, decide
 from skred.diagnosis.compare.location import location_of
 from skred.diagnosis.detect.detectability import identify
 from skred.diagnosis.detect.score_test import ScoreTest
@@ -38,7 +36,7 @@ from skred.diagnosis.predict.conditional import BeforeAfter
 from skred.diagnosis.predict.held_out import HeldOut, held_out
 from skred.diagnosis.predict.profile_law import profile_law
 from skred.inference.calibrate import Calibration, calibrate_surely
-from skred.inference.hierarchical.problem import COARSER, HierarchicalProblem
+from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.sampling import SamplerSettings
 from skred.parallel.processes import meanwhile
 from skred.physics.law import Law
@@ -66,11 +64,6 @@ def diagnose(
         return NotDiagnosed(problem, law, why, seconds=run.clock.seconds)
 
 
-def as_diagnosed(problem: HierarchicalProblem) -> HierarchicalProblem:
-    """How a base law's recordings are integrated: what a claim rests on is computed apart from that."""
-    return replace(problem, integration_limit=CLAIM_LIMIT, fineness=COARSER)
-
-
 def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
     """All steps of a diagnosis."""
     clock, effort = run.clock, run.effort
@@ -94,10 +87,9 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
     comparison = compare(base, clock.progress)
 
     clock.stage("check", "is anything wrong: clean campaigns simulated and refitted")
-    start, odds = (base.population, base.fit.points), comparison.log_odds
-    check = bootstrap_test(score_test, base.rows, start, draws, run.seed, effort.replicas, odds)
+    check = bootstrap_test(base, draws, run.seed, effort.replicas, comparison.log_odds)
     decision = decide(comparison.probability, check.p_value, table.can_tell)
-    location = location_of(comparison, decision)
+    location = location_of(comparison, next(iter(decision.names), None))
 
     added: Augmented | NotAugmented | None = None
     if decision.names:
@@ -110,10 +102,11 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
     else:
         finding, before = _predicted(added, calibration, run)
     hangs_on = given = None
-    if decision.answer is not None:
-        clock.stage("influence", "what the answer hangs on: without each avalanche, each kind of reading")
-        hangs_on = influence(comparison, decision.answer, max(check.critical, 0.0))
     if not isinstance(finding, NothingAdded):
+        assert decision.answer is not None
+        clock.stage("influence", "what the answer hangs on: without each avalanche, each kind of reading")
+        gained = _with_the_answer(finding, run).pointwise - before.pointwise
+        hangs_on = influence(comparison, decision.answer, max(check.critical, 0.0), gained)
         clock.stage("conditional", "predicting each reading from those above it")
         given = BeforeAfter.of(before, finding.after, run.seed)
     clock.end()
@@ -121,6 +114,13 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
         problem, law, calibration, score_test, table, check, comparison, decision, location, finding, before,
         hangs_on, given, clock.seconds,
     )  # fmt: skip
+
+
+def _with_the_answer(finding: MechanismsAdded | ProfileAdded, run: Run) -> HeldOut:
+    """Avalanches left out as the law with the first that was added predicts them."""
+    if isinstance(finding, MechanismsAdded) and len(finding.steps) > 1:
+        return held_out(finding.steps[0].calibration, run.seed)
+    return finding.after
 
 
 def _with_profile(comparison: Comparison, run: Run) -> tuple[Finding, HeldOut]:

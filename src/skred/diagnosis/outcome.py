@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 from skred.diagnosis.augment.step import Left, Step
 from skred.diagnosis.check.bootstrap_test import LIMIT, BootstrapTest
+from skred.diagnosis.check.decision import Decision, alarmed
 from skred.diagnosis.compare.comparison import Comparison
-from skred.diagnosis.compare.decision import Decision, alarmed
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.detect.score_test import ScoreTest

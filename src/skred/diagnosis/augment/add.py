@@ -9,8 +9,8 @@ from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.augment.check_again import Again, check_again
 from skred.diagnosis.augment.reference import Reference
 from skred.diagnosis.augment.step import Augmented, Left, NotAugmented, Step
+from skred.diagnosis.check.decision import decide
 from skred.diagnosis.compare.comparison import Comparison, compare
-from skred.diagnosis.compare.decision import decide
 from skred.diagnosis.effort import Run
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.inference.calibrate import Calibration, calibrate_surely

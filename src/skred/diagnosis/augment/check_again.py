@@ -8,7 +8,6 @@ from functools import partial
 
 from skred.diagnosis.augment.coefficient import added_draws
 from skred.diagnosis.check.bootstrap_test import BootstrapTest, bootstrap_test
-from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.effort import Run
 from skred.diagnosis.evidence.coefficient import Base, Curve, fit_base
 from skred.diagnosis.evidence.population_draws import population_draws, typical
@@ -53,9 +52,7 @@ def check_again(base: Base, calibration: Calibration, chosen: Sequence[Curve], r
     again = fit_base(base.problem, base.law, typical(draws), base.fit.points, directions, strengths)
     setting = replace(again.setting, base=(*base.setting.base, *_global_ids(chosen)))
     again = replace(again, setting=setting)
-    score_test = ScoreTest(base.problem, base.law, setting, directions, strengths)
-    start = (again.population, again.fit.points)
-    test = partial(bootstrap_test, score_test, again.rows, start, draws, run.seed + 1, run.effort.replicas)
+    test = partial(bootstrap_test, again, draws, run.seed + 1, run.effort.replicas)
     return Again(test(), again, test)
 
 

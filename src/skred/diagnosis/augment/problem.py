@@ -27,7 +27,7 @@ from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.extension import Extension
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.population import population_of, population_samples, population_variables
-from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.hierarchical.problem import COARSER, HierarchicalProblem
 from skred.inference.hierarchical.rough_population import moments_of
 from skred.inference.hierarchical.surface import Surfaces
 from skred.physics.kernel.fronts import front_speeds
@@ -54,6 +54,11 @@ _START_WIDER = 1.5
 """How much wider than the posterior chains start, as r-hat asks for."""
 _INSIDE = 0.02
 """How far inside the range of a strength chains start, as a share of it: at its end steps shrink."""
+
+
+def as_diagnosed(problem: HierarchicalProblem) -> HierarchicalProblem:
+    """How a base law's recordings are integrated: what a claim rests on is computed apart from that."""
+    return replace(problem, integration_limit=CLAIM_LIMIT, fineness=COARSER)
 
 
 def extension_with(base: Base, added: Sequence[AddedStrength]) -> Extension:

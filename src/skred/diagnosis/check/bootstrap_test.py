@@ -2,8 +2,8 @@
 
 The statistic is the log odds of anything against nothing. Whole campaigns are simulated from the base law's
 posterior and everything is refitted to each, so that looking at many mechanisms and places is accounted for.
-Of simulated campaigns the odds are those of the linear model: nothing is hidden there, and close to nothing
-it is exact. Sampling stops as soon as the answer is clear (Besag and Clifford, 1991, doi
+Of simulated campaigns the odds are those of the linear model; where these reach the recordings', they are
+computed by fronts (`by_fronts`). Sampling stops as soon as the answer is clear (Besag and Clifford, 1991, doi
 10.1093/biomet/78.2.301).
 """
 
@@ -12,14 +12,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import batched
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
+from skred.diagnosis.check.by_fronts import log_odds_by_fronts
 from skred.diagnosis.detect.score_test import ScoreTest
+from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
-from skred.diagnosis.evidence.linear_mixed_model import fit_population
+from skred.diagnosis.evidence.linear_mixed_model import Scores, fit_population
 from skred.parallel.threads import side_by_side, threads
 
 FloatArray = NDArray[np.float64]
@@ -80,50 +83,75 @@ class BootstrapTest:
 
 
 def bootstrap_test(
-    score_test: ScoreTest,
-    rows: Rows,
-    start: tuple[Population, FloatArray],
+    base: Base,
     draws: tuple[FloatArray, FloatArray],
     seed: int,
     most: int = 300,
     log_odds: float | None = None,
 ) -> BootstrapTest:
-    """Check the base law.
+    """Check a law, perhaps with mechanisms added.
 
     Parameters
     ----------
-    start : (Population, points)
-        Of the real recordings.
+    base : Base
+        Fitted to the recordings.
     draws : (n, n_base) and (n, n_base, n_base) arrays
-        Means and factors of populations from the base law's posterior, at least `most` of them.
+        Means and factors of populations from the law's posterior, at least `most` of them.
     log_odds : float, optional
-        Of anything against nothing, as a comparison has them; in the linear model unless given.
+        Of anything against nothing, as a comparison has them; in the linear model unless given, and then of
+        simulated campaigns as well.
     """
-    linear = float(_refitted(score_test, rows, start)[0])
+    test = ScoreTest(base.problem, base.law, base.setting, base.directions, base.strengths)
+    linear = float(_refitted(test, base.rows, (base.population, base.fit.points)).log_odds[0])
     statistic = linear if log_odds is None else log_odds
+    # At less than even odds there is no alarm, whatever clean campaigns have.
+    by_fronts = log_odds is not None and log_odds > 0.0
     rng = np.random.default_rng([seed, 21])
     simulated: list[FloatArray] = []
     for some in batched(range(0, most, _BATCH), threads()):
         # Simulated one after the other and counted in order: how many threads there are changes nothing.
-        made = [_simulated(score_test, draws, slice(first, min(first + _BATCH, most)), rng) for first in some]
-        for refitted in side_by_side(lambda clean: _refitted(score_test, *clean), made):
-            simulated.append(refitted)
+        made = [_simulated(test, draws, slice(first, min(first + _BATCH, most)), rng) for first in some]
+        for refitted in side_by_side(lambda clean: _refitted(test, *clean), made):
+            found = refitted.log_odds
+            if by_fronts:
+                high = np.flatnonzero(found >= statistic)
+                parts = [refitted.one(int(group)) for group in high]
+                found[high] = side_by_side(lambda one: log_odds_by_fronts(base, test, *one, statistic), parts)
+            simulated.append(found)
             if np.sum(np.concatenate(simulated) >= statistic) >= _ENOUGH_ABOVE:
                 return BootstrapTest(statistic, np.concatenate(simulated), linear)
     return BootstrapTest(statistic, np.concatenate(simulated), linear)
 
 
+class _Refitted(NamedTuple):
+    """Simulated campaigns, one group each, refitted; what the linear model says of them."""
+
+    rows: Rows
+    population: Population
+    points: FloatArray
+    scores: Scores
+    log_odds: FloatArray
+
+    def one(self, group: int) -> tuple[Rows, tuple[Population, FloatArray], Scores]:
+        """One of the campaigns by itself."""
+        own = np.flatnonzero(self.rows.group == group)
+        rows = self.rows.take(own)._replace(group=np.zeros(len(own), dtype=np.int64))
+        scores = Scores(*(values[group : group + 1] for values in self.scores))
+        return rows, (self.population.groups[group], self.points[own]), scores
+
+
 def _simulated(
-    score_test: ScoreTest, draws: tuple[FloatArray, FloatArray], batch: slice, rng: np.random.Generator
+    test: ScoreTest, draws: tuple[FloatArray, FloatArray], batch: slice, rng: np.random.Generator
 ) -> tuple[Rows, tuple[Population, FloatArray]]:
     """Clean campaigns from some of the draws, and where to begin refitting them."""
     means, factors = draws[0][batch], draws[1][batch]
-    rows, points = bootstrap_campaigns(score_test.extension, score_test.strengths, means, factors, rng)
+    rows, points = bootstrap_campaigns(test.extension, test.strengths, means, factors, rng)
     return rows, (Population(means.copy(), np.einsum("gij,gkj->gik", factors, factors)), points)
 
 
-def _refitted(score_test: ScoreTest, rows: Rows, start: tuple[Population, FloatArray]) -> FloatArray:
-    """The statistic after refitting populations and events, (n_groups,)."""
-    likelihood = EventLikelihood(score_test.extension, rows, score_test.strengths)
-    population, points = fit_population(likelihood, score_test.prior, start)
-    return score_test.statistic(score_test.scores(rows, points, population))
+def _refitted(test: ScoreTest, rows: Rows, start: tuple[Population, FloatArray]) -> _Refitted:
+    """Populations and events refitted."""
+    likelihood = EventLikelihood(test.extension, rows, test.strengths)
+    population, points = fit_population(likelihood, test.prior, start)
+    scores = test.scores(rows, points, population)
+    return _Refitted(rows, population, points, scores, test.statistic(scores))

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
-from skred.diagnosis.compare.decision import Decision
 from skred.diagnosis.discrepancy.profile import Kind, Profile, most_probable, spline_basis
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.prior_odds import UNLISTED
@@ -90,12 +89,12 @@ def locate(under_errors: ComparisonUnderErrors, opposed: bool | None = None) -> 
     )
 
 
-def location_of(comparison: Comparison, decision: Decision) -> Location:
-    """Where: of what is named the profile that goes with speed as that does, else the most probable."""
+def location_of(comparison: Comparison, name: str | None) -> Location:
+    """Where: of a named mechanism the profile that goes with speed as it does, else the most probable."""
     under_errors = comparison.leading(UNLISTED)
-    if not decision.names:
+    if name is None:
         return locate(under_errors)
-    named = comparison.leading(decision.names[0]).candidates[decision.names[0]]
+    named = comparison.leading(name).candidates[name]
     return locate(under_errors, is_opposed(named.best.shape))
 
 

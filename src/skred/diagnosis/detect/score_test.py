@@ -25,7 +25,7 @@ from skred.diagnosis.evidence.linear_mixed_model import (
     mean_prior,
     without,
 )
-from skred.diagnosis.evidence.prior_odds import prior_odds
+from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.kernel.columns import Column
 from skred.physics.law import Law
@@ -162,33 +162,39 @@ class ScoreTest:
                 result[:, k] += math.log(2.0) + log_ndtr(score[:, k] / np.sqrt(precision))
         return result
 
-    def log_factor_of_unlisted(self, scores: Scores) -> FloatArray:
-        """Log Bayes factor of the force not in the list in the linear model, (n_groups,)."""
+    def log_factors_of_kinds(self, scores: Scores) -> FloatArray:
+        """Log Bayes factor of each kind of force not in the list in the linear model, (n_kinds, n_groups)."""
         first = sum(not candidate.with_speed for candidate in self.placed_mechanisms)
         n = len(self.knots_m)
         factors = []
         for number, kind in enumerate(KINDS):
             part = slice(first + n * number, first + n * (number + 1))
             score, information = scores.score[:, part], scores.information[:, part, part]
-            for prior, share in priors_of(kind, self.knots_m).items():
-                found = log_factor_of_process(score, information, prior.cover(self.knots_m))
-                factors.append(found + share + math.log(kind.share))
-        result: FloatArray = np.logaddexp.reduce(np.array(factors), axis=0)
-        return result
+            of_kind = [
+                log_factor_of_process(score, information, prior.cover(self.knots_m)) + share
+                for prior, share in priors_of(kind, self.knots_m).items()
+            ]
+            factors.append(np.logaddexp.reduce(of_kind, axis=0))
+        return np.array(factors)
 
     def statistic(self, scores: Scores) -> FloatArray:
         """Log odds that anything is missing against nothing, in the linear model, (n_groups,)."""
-        factors, unlisted = self.log_factors(scores), self.log_factor_of_unlisted(scores)
+        return np.asarray(np.logaddexp.reduce(list(self.log_terms(scores).values()), axis=0))
+
+    def log_terms(self, scores: Scores) -> dict[str, FloatArray]:
+        """Log odds of each id against nothing, in the linear model, (n_groups,) each."""
+        factors = self.log_factors(scores)
+        log_shares_of_kinds = np.log([kind.share for kind in KINDS])[:, None]
+        unlisted = np.logaddexp.reduce(self.log_factors_of_kinds(scores) + log_shares_of_kinds, axis=0)
         odds = prior_odds({candidate.mechanism for candidate in self.placed_mechanisms})
         ids = np.array([candidate.mechanism.id for candidate in self.placed_mechanisms])
         shapes = [candidate.shape for candidate in self.placed_mechanisms]
-        terms = [unlisted + math.log(odds["unlisted"])]
-        for name in dict.fromkeys(ids):
+        terms = {UNLISTED: unlisted + math.log(odds[UNLISTED] / odds[NOTHING])}
+        for name in dict.fromkeys(ids.tolist()):
             own = np.flatnonzero(ids == name)
-            log_shares = np.log(shares([shapes[k] for k in own]))
-            terms.append(np.logaddexp.reduce(factors[:, own] + log_shares, axis=1) + math.log(odds[name]))
-        result: FloatArray = np.logaddexp.reduce(np.array(terms), axis=0) - math.log(odds["nothing"])
-        return result
+            of_shapes = factors[:, own] + np.log(shares([shapes[k] for k in own]))
+            terms[name] = np.logaddexp.reduce(of_shapes, axis=1) + math.log(odds[name] / odds[NOTHING])
+        return terms
 
 
 def log_factor_of_process(score: FloatArray, information: FloatArray, cover: FloatArray) -> FloatArray:

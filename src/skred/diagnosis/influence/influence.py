@@ -1,8 +1,11 @@
 """How far an answer hangs on few recordings: its evidence again without each avalanche, each kind of reading.
 
-The population and every avalanche are refitted to what is left, at all strengths of the named mechanism's
-leading shapes, or with the whole profile. Nothing is chosen again: the question is whether what was answered
-would still stand. Of a speed that is left out it stays known that the front came there.
+Of a single avalanche no refit is needed: evidence is what all others have, times the density of this one
+given them. So the Bayes factor without it is that of all, less what it is predicted better with the answer.
+Without several, or without a kind of reading, population and every avalanche are refitted to what is left, at
+all strengths of the named mechanism's leading shapes, or with the whole profile. Nothing is chosen again: the
+question is whether what was answered would still stand. Of a speed that is left out it stays known that the
+front came there.
 """
 
 from __future__ import annotations
@@ -90,7 +93,7 @@ class Influence:
     readings: tuple[ReadingsLeftOut, ...]
 
 
-def influence(comparison: Comparison, answer: str, critical: float) -> Influence:
+def influence(comparison: Comparison, answer: str, critical: float, gained: FloatArray) -> Influence:
     """What an answer of a comparison hangs on, under the error model that it has most evidence under.
 
     Parameters
@@ -99,6 +102,8 @@ def influence(comparison: Comparison, answer: str, critical: float) -> Influence
         Id of a mechanism that was compared, or ``unlisted``.
     critical : float
         The log odds of anything against nothing from which on there is an alarm.
+    gained : (n_events,) array
+        Log predictive density of each avalanche given the others with the answer, less that without it.
     """
     under_errors = comparison.leading(answer)
     base = under_errors.base
@@ -109,15 +114,14 @@ def influence(comparison: Comparison, answer: str, critical: float) -> Influence
     n = len(base.rows.event)
     everything = np.ones(n, dtype=bool)
     kinds = _kinds(base)
-    parts = [_Part(np.arange(n) != event) for event in range(n)]
-    parts += [_Part(everything, chosen) for _, _, chosen in kinds]
+    parts = [_Part(everything, chosen) for _, _, chosen in kinds]
     whole, *found = side_by_side(lambda part: again(base, part), [_Part(everything), *parts])
     # By the same, quicker method on both sides; only the difference is taken from it.
     stated = under_errors.log_factors[answer]
-    factors = stated + np.array(found) - whole
+    without_each = stated - gained
     # An answer that alone is worth so much raises the alarm, if all else has no evidence.
     needed = critical + math.log(comparison.odds[NOTHING] / comparison.odds[answer])
-    order = np.argsort(factors[:n])
+    order = np.argsort(without_each)
     carried, left = _carried(lambda part: stated + again(base, part) - whole, order, needed)
     ids = base.problem.campaign.event_ids
     return Influence(
@@ -125,13 +129,13 @@ def influence(comparison: Comparison, answer: str, critical: float) -> Influence
         stated,
         needed,
         tuple(ids),
-        factors[:n],
+        without_each,
         tuple(ids[k] for k in sorted(carried)),
         left if carried else None,
         None if carried else left,
         tuple(
             ReadingsLeftOut(kind, sensor, int(chosen.sum()), float(factor))
-            for (kind, sensor, chosen), factor in zip(kinds, factors[n:], strict=True)
+            for (kind, sensor, chosen), factor in zip(kinds, stated + np.array(found) - whole, strict=True)
         ),
     )
 
@@ -202,18 +206,30 @@ def _of_profile(profile: Profile) -> Again:
 def _carried(
     factor: Callable[[_Part], float], order: Sequence[int] | NDArray[np.int64], needed: float
 ) -> tuple[list[int], float | None]:
-    """The first avalanches of an order without which an answer has too little, and what it has then.
+    """The fewest first avalanches of an order without which an answer has too little; what it has then.
 
-    None, and what it has without a third of them, where that is still enough.
+    None, and what it has without a third of them, where that is still enough. The order is of what each
+    takes, so that each one more leaves less: their number is found by halving.
     """
-    n, left = len(order), None
-    for many in range(1, int(MOST * n) + 1):
+    n = len(order)
+
+    def without(many: int) -> float:
         kept = np.ones(n, dtype=bool)
         kept[order[:many]] = False
-        left = factor(_Part(kept))
-        if left < needed:
-            return [int(k) for k in order[:many]], left
-    return [], left
+        return factor(_Part(kept))
+
+    enough, too_many = 0, int(MOST * n)
+    left = without(too_many) if too_many else None
+    if left is None or left >= needed:
+        return [], left
+    while too_many - enough > 1:
+        many = (enough + too_many) // 2
+        there = without(many)
+        if there < needed:
+            too_many, left = many, there
+        else:
+            enough = many
+    return [int(k) for k in order[:too_many]], left
 
 
 def _kinds(base: Base) -> list[tuple[str, str | None, BoolArray]]:

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from skred.diagnosis.check.bootstrap_test import BootstrapTest, bootstrap_test
 from skred.diagnosis.compare.comparison import ComparisonUnderErrors
-from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, combined, knot_by_knot, most_probable
 from skred.diagnosis.evidence.coefficient import Base
@@ -103,12 +102,11 @@ def profile_law(under_errors: ComparisonUnderErrors, most: int, seed: int) -> Pr
 def _check(base: Base, profile: Profile, most: int, seed: int) -> BootstrapTest:
     """The bootstrap test of the law with the profile in."""
     directions, strengths = _added_terms(base, profile)
-    score_test = ScoreTest(base.problem, base.law, base.setting, directions, strengths)
+    added = replace(base, directions=directions, strengths=strengths, fit=profile.fit)
     rng = np.random.default_rng([seed, 51])
     extension = extended(base.problem, base.law, directions)
     draws = _draws(base, extension, profile.fit, strengths, np.empty((most, 0)), rng)
-    start = profile.fit.found.population(len(base.law.mechanisms)), profile.fit.points
-    return bootstrap_test(score_test, base.rows, start, (draws.means, draws.factors), seed + 1, most)
+    return bootstrap_test(added, (draws.means, draws.factors), seed + 1, most)
 
 
 def _left_out(base: Base, profile: Profile, event: int, seed: int) -> tuple[_Event, _Event]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
-from skred.diagnosis.compare.decision import NOTHING_AT_MOST, Decision
+from skred.diagnosis.check.decision import NOTHING_AT_MOST, Decision
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
