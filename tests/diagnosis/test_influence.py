@@ -25,8 +25,6 @@ from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Shape
 
 DRAG = mechanisms()["turbulent_drag"]
-CRITICAL = 1.73
-"""Log odds that are an alarm."""
 
 
 def drag_in(campaign: Campaign) -> tuple[Comparison, Curve]:
@@ -59,7 +57,7 @@ def test_without_an_avalanche_as_in_a_campaign_that_never_had_it() -> None:
     with_drag = calibrate(augmented_problem(base, [found]), base.law, settings)
     without = calibrate(base.problem, base.law, settings)
     gained = held_out(with_drag, 0).pointwise - held_out(without, 0).pointwise
-    said = influence(comparison, DRAG.id, CRITICAL, gained)
+    said = influence(comparison, DRAG.id, gained)
     assert said.log_bayes_factor == pytest.approx(found.log_bayes_factor)
     for event in (0, 7):
         assert said.without_each[event] == pytest.approx(without_one(campaign, event), abs=0.5)
@@ -67,7 +65,7 @@ def test_without_an_avalanche_as_in_a_campaign_that_never_had_it() -> None:
 
 def test_a_strong_effect_in_all_avalanches_hangs_on_no_few() -> None:
     comparison = drag_in(rolling(2.4e-4, n_events=12))[0]
-    said = influence(comparison, DRAG.id, CRITICAL, np.full(12, comparison.log_factors[DRAG.id] / 12))
+    said = influence(comparison, DRAG.id, np.full(12, comparison.log_factors[DRAG.id] / 12))
     assert said.carried_by == () and said.without_them is None
     assert said.without_a_third is not None and said.needed < said.without_a_third < said.log_bayes_factor
 
@@ -79,7 +77,7 @@ def test_avalanches_that_carry_an_answer_are_found() -> None:
     coarse[[2, 5]] = 0.1
     campaign = replace(campaign, stated_sd=coarse)
     comparison = drag_in(campaign)[0]
-    said = influence(comparison, DRAG.id, CRITICAL, each_takes(campaign, comparison))
+    said = influence(comparison, DRAG.id, each_takes(campaign, comparison))
     assert set(said.carried_by) <= {"run02", "run05"} and said.carried_by
     assert len(said.carried_by) <= MOST * campaign.n_events
     assert said.without_them is not None and said.without_them < said.needed < said.log_bayes_factor
@@ -91,6 +89,6 @@ def test_readings_are_left_out_by_sensor_and_kind() -> None:
     campaign = rolling(2.4e-4, n_events=8)
     values = np.array(campaign.values)
     values[3, -1] = 0.0
-    said = influence(drag_in(replace(campaign, values=values))[0], DRAG.id, CRITICAL, np.zeros(8))
+    said = influence(drag_in(replace(campaign, values=values))[0], DRAG.id, np.zeros(8))
     kinds = [(one.kind, one.sensor, one.n) for one in said.readings]
     assert kinds == [("zeros", None, 1), *(("sensor", f"s{k}", 8) for k in range(6))]

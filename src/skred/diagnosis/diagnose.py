@@ -106,7 +106,7 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
         assert decision.answer is not None
         clock.stage("influence", "what the answer hangs on: without each avalanche, each kind of reading")
         gained = _with_the_answer(finding, run).pointwise - before.pointwise
-        hangs_on = influence(comparison, decision.answer, max(check.critical, 0.0), gained)
+        hangs_on = influence(comparison, decision.answer, gained)
         clock.stage("conditional", "predicting each reading from those above it")
         given = BeforeAfter.of(before, finding.after, run.seed)
     clock.end()

@@ -9,7 +9,6 @@ computed by fronts (`by_fronts`). Sampling stops as soon as the answer is clear 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from itertools import batched
 from typing import NamedTuple
@@ -66,14 +65,6 @@ class BootstrapTest:
     def p_value_in_linear_model(self) -> float:
         """The same of the recordings in the linear model."""
         return self._share(self.statistic if self.linear is None else self.linear)
-
-    @property
-    def critical(self) -> float:
-        """The log odds from which on the limit is passed; infinite where too few were simulated for it."""
-        may_be_above = math.floor(LIMIT * (len(self.simulated) + 1) - 1.0 + 1e-9)
-        if may_be_above < 0:
-            return math.inf
-        return float(np.sort(self.simulated)[::-1][may_be_above])
 
     def _share(self, statistic: float) -> float:
         above = int(np.sum(self.simulated >= statistic))

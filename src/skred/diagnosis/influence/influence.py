@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.diagnosis.check.bootstrap_test import LIMIT
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.discrepancy.fit import fit_profile
@@ -68,7 +69,8 @@ class Influence:
     log_bayes_factor : float
         Against nothing, by all recordings.
     needed : float
-        Log Bayes factor that it needs for an alarm by itself.
+        Log Bayes factor that it needs for an alarm by itself: it makes nothing so improbable as at most one
+        in a hundred clean campaigns does, whatever they are like (Markov's inequality).
     events : tuple of str
     without_each : (n_events,) array
         Log Bayes factor without each avalanche.
@@ -93,15 +95,13 @@ class Influence:
     readings: tuple[ReadingsLeftOut, ...]
 
 
-def influence(comparison: Comparison, answer: str, critical: float, gained: FloatArray) -> Influence:
+def influence(comparison: Comparison, answer: str, gained: FloatArray) -> Influence:
     """What an answer of a comparison hangs on, under the error model that it has most evidence under.
 
     Parameters
     ----------
     answer : str
         Id of a mechanism that was compared, or ``unlisted``.
-    critical : float
-        The log odds of anything against nothing from which on there is an alarm.
     gained : (n_events,) array
         Log predictive density of each avalanche given the others with the answer, less that without it.
     """
@@ -119,8 +119,7 @@ def influence(comparison: Comparison, answer: str, critical: float, gained: Floa
     # By the same, quicker method on both sides; only the difference is taken from it.
     stated = under_errors.log_factors[answer]
     without_each = stated - gained
-    # An answer that alone is worth so much raises the alarm, if all else has no evidence.
-    needed = critical + math.log(comparison.odds[NOTHING] / comparison.odds[answer])
+    needed = math.log((1.0 - LIMIT) / LIMIT * comparison.odds[NOTHING] / comparison.odds[answer])
     order = np.argsort(without_each)
     carried, left = _carried(lambda part: stated + again(base, part) - whole, order, needed)
     ids = base.problem.campaign.event_ids
