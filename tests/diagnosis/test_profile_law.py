@@ -152,4 +152,5 @@ def test_before_is_what_sampling_and_refits_say(hidden: Base, added: ProfileLaw)
     # Sampling weights its draws for this, few of which count for an avalanche that is unlike the others.
     seen = hidden.problem.observed
     ratio = added.before.predicted.mean[seen] / sampled.predicted.mean[seen]
-    assert abs(np.median(ratio) - 1.0) < 0.02 and np.all(np.abs(ratio - 1.0) < 0.12)
+    assert abs(np.median(ratio) - 1.0) < 0.02
+    assert np.abs(ratio - 1.0).max() < 0.2
