@@ -76,6 +76,21 @@ BROKEN = {
     "release below the track": ("events.csv", "first,0", "first,1e4", 2, "release_s_m", "on the track"),
     "release is empty": ("events.csv", "first,0", "first,", 2, "release_s_m", "empty"),
     "release sd is zero": ("events.csv", "first,0,5", "first,0,0", 2, "release_sd_m", "greater than 0"),
+    "release speed is negative": (
+        "events.csv", "snow_temperature_degC,snow_type\nfirst,0,5,-3.5,dry\nsecond,10,,,wet\nthird,5,2.5,-8,",
+        "release_speed_m_s,snow_type\nfirst,0,5,-3.5,dry\nsecond,10,,,wet\nthird,5,2.5,8,", 2,
+        "release_speed_m_s", "0 or a greater",
+    ),
+    "release speed too fast": (
+        "events.csv", "snow_temperature_degC,snow_type\nfirst,0,5,-3.5,dry\nsecond,10,,,wet\nthird,5,2.5,-8,",
+        "release_speed_m_s,snow_type\nfirst,0,5,,dry\nsecond,10,,,wet\nthird,5,2.5,350,", 4,
+        "release_speed_m_s", "at most 200",
+    ),
+    "sd of no release speed": (
+        "events.csv", "snow_temperature_degC,snow_type\nfirst,0,5,-3.5,dry\nsecond,10,,,wet\nthird,5,2.5,-8,",
+        "release_speed_sd_m_s,snow_type\nfirst,0,5,,dry\nsecond,10,,,wet\nthird,5,2.5,1,", 4,
+        "release_speed_sd_m_s", "not given",
+    ),
     "text in a column with a unit": (
         "events.csv", "-3.5", "cold", 2, "snow_temperature_degC", "ends in a unit",
     ),
@@ -190,6 +205,19 @@ def test_bounds_are_read(texts, folder_with):
     text = texts["recordings.csv"].replace("upper,30", "upper,200").replace("span,25,3", "span,25,1e-4")
     campaign = read_campaign(folder_with({"recordings.csv": text}))
     assert campaign.values[0, 0] == 200 and campaign.stated_sd[0, 1] == 1e-4
+
+
+def test_a_track_may_be_level_where_fronts_are_released_with_a_speed(texts, folder_with):
+    level = "x_m,z_m\n0,300\n60,300\n120,300\n500,300\n"
+    with pytest.raises(CampaignError, match="ends no lower than it starts"):
+        read_campaign(folder_with({"track.csv": level}))
+    events = (
+        "event,release_s_m,release_speed_m_s,release_speed_sd_m_s\nfirst,5,35,1\nsecond,10,22,\nthird,5,,\n"
+    )
+    campaign = read_campaign(folder_with({"track.csv": level, "events.csv": events}))
+    assert [event.release_speed_m_s for event in campaign.events] == [35.0, 22.0, None]
+    assert [event.release_speed_sd_m_s for event in campaign.events] == [1.0, None, None]
+    assert campaign.events[0].covariates == {}
 
 
 def test_the_span_rule_looks_at_the_span_s_upper_end(texts, folder_with):

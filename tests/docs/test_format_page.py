@@ -125,14 +125,6 @@ def test_what_is_reserved_is_refused(tmp_path: Path, file: str, old: str, new: s
     assert f"`{word}`" in PAGE
 
 
-def test_reserved_release_speeds_are_covariates_so_far(tmp_path: Path) -> None:
-    texts = example()
-    texts["events.csv"] = texts["events.csv"].replace("release_volume_m3", "release_speed_m_s")
-    campaign = read_campaign(write(tmp_path, texts))
-    assert campaign.events[0].covariates["release_speed_m_s"] == 12000.0
-    assert "`release_speed_m_s`" in PAGE
-
-
 def test_a_missing_row_is_a_missing_reading(tmp_path: Path) -> None:
     texts = example()
     row = "2011-01-09,upper,,,missing\n"

@@ -125,7 +125,7 @@ def test_wrong_inputs_are_named() -> None:
         front_readings(STRENGTHS, RELEASES, PATH, PCM._replace(columns=np.array([3.0, 2.0])), SENSORS)
     with pytest.raises(TypeError, match="sensors: expected 2 dimensions, found 1"):
         front_readings(STRENGTHS, RELEASES, PATH, PCM, SENSORS[0])
-    with pytest.raises(TypeError, match="expected 11 inputs, found 1"):
+    with pytest.raises(TypeError, match="expected 12 inputs, found 1"):
         FrontReadings()(STRENGTHS)
 
 

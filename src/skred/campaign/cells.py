@@ -80,6 +80,11 @@ def optional_positive(text: str) -> float | None:
     return None if text == "" else positive(text)
 
 
+def optional_not_negative(text: str) -> float | None:
+    """Read a number that is 0 or greater, or nothing from an empty cell."""
+    return None if text == "" else not_negative(text)
+
+
 def optional_word(text: str) -> str | None:
     """Read a short text, or nothing from an empty cell."""
     return None if text == "" else word(text)

@@ -32,6 +32,8 @@ EVENTS = (
     Column("event", cells.word),
     Column("release_s_m", cells.number),
     Column("release_sd_m", cells.optional_positive, required=False),
+    Column("release_speed_m_s", cells.optional_not_negative, required=False),
+    Column("release_speed_sd_m_s", cells.optional_positive, required=False),
 )
 RECORDINGS = (
     Column("event", cells.word),
@@ -69,7 +71,8 @@ def read_campaign(folder: Path) -> Campaign:
     event_table = read_table(folder, rules.EVENTS, EVENTS, _covariate_reader)
     recording_table = read_table(folder, rules.RECORDINGS, RECORDINGS)
 
-    track, track_problems = _track(track_table)
+    moving = any((row.number_or_none("release_speed_m_s") or 0.0) > 0 for row in event_table.rows)
+    track, track_problems = _track(track_table, may_be_level=moving)
     length_m = track.length_m if track else None
     if description is not None:
         problems += rules.reference_problems(description.reference_s_m, reference_row, length_m)
@@ -116,11 +119,11 @@ def _ids(table: Table, column: str) -> frozenset[str] | None:
     return frozenset(row.word(column) for row in table.rows if row.has(column))
 
 
-def _track(table: Table) -> tuple[Track | None, list[Problem]]:
+def _track(table: Table, *, may_be_level: bool) -> tuple[Track | None, list[Problem]]:
     """Build the track, or say why there is none."""
     problems = list(table.problems)
     if table.is_usable:
-        problems += rules.track_problems(table.rows)
+        problems += rules.track_problems(table.rows, may_be_level=may_be_level)
     if problems:
         return None, problems
     columns = {name: np.array([row.number(name) for row in table.rows]) for name in table.columns}
@@ -159,6 +162,8 @@ def _events(table: Table) -> tuple[Event, ...]:
             release_s_m=row.number("release_s_m"),
             release_sd_m=row.number_or_none("release_sd_m"),
             covariates={name: row.cells[name] for name in covariates},
+            release_speed_m_s=row.number_or_none("release_speed_m_s"),
+            release_speed_sd_m_s=row.number_or_none("release_speed_sd_m_s"),
         )
         for row in table.rows
     )

@@ -117,17 +117,22 @@ class Event:
     id : str
         Unique in the campaign.
     release_s_m : float
-        Where the front starts from rest, arc length in m.
+        Where the front starts, arc length in m.
     release_sd_m : float or None
         Standard deviation of that place, m, where one is stated.
     covariates : mapping of str to float, str or None
         Further properties; numbers have their unit in the name. None: not known.
+    release_speed_m_s, release_speed_sd_m_s : float or None
+        Speed of the front there, m/s, and its standard deviation; None where it starts from rest, and where
+        the speed is exact.
     """
 
     id: str
     release_s_m: float
     release_sd_m: float | None
     covariates: Mapping[str, Covariate]
+    release_speed_m_s: float | None = None
+    release_speed_sd_m_s: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,7 +240,7 @@ class Campaign:
         }
         events = {
             event.id: {
-                "release": [_plain(event.release_s_m), _plain(event.release_sd_m)],
+                "release": _release(event),
                 "covariates": {k: _plain(v) for k, v in event.covariates.items() if _plain(v) is not None},
             }
             for event in self.events
@@ -255,6 +260,13 @@ class Campaign:
             "events": events,
             "readings": readings,
         }
+
+
+def _release(event: Event) -> list[Covariate]:
+    """Where and how an event starts; a campaign without speeds keeps the fingerprint that it always had."""
+    place = [_plain(event.release_s_m), _plain(event.release_sd_m)]
+    speed = [_plain(event.release_speed_m_s), _plain(event.release_speed_sd_m_s)]
+    return place if speed == [None, None] else [*place, *speed]
 
 
 def _plain(value: Covariate) -> Covariate:

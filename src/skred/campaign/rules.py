@@ -29,8 +29,8 @@ that the model is right to so many digits, and every number that follows is then
 TRACK, SENSORS, EVENTS, RECORDINGS = "track.csv", "sensors.csv", "events.csv", "recordings.csv"
 
 
-def track_problems(rows: Sequence[Row]) -> list[Problem]:
-    """Check that the track has enough points, in downhill order."""
+def track_problems(rows: Sequence[Row], *, may_be_level: bool = False) -> list[Problem]:
+    """Check that the track has enough points, in downhill order; a level one moves no front from rest."""
     if len(rows) < FEWEST_TRACK_POINTS:
         message = f"the track has {len(rows)} points; give at least {FEWEST_TRACK_POINTS}"
         return [Problem(TRACK, None, None, None, message)]
@@ -47,7 +47,8 @@ def track_problems(rows: Sequence[Row]) -> list[Problem]:
             )
             problems.append(_at(TRACK, row, "x_m", message))
         s_m += max(step_m, 0.0)
-    if points and points[-1].number("z_m") >= points[0].number("z_m"):
+    fall = points[0].number("z_m") - points[-1].number("z_m") if points else 1.0
+    if fall < 0 or (fall == 0 and not may_be_level):
         start = f"{points[0].number('z_m'):g} m"
         message = f"the track ends no lower than it starts ({start}); order the points downhill"
         problems.append(_at(TRACK, points[-1], "z_m", message))
@@ -86,6 +87,20 @@ def event_problems(rows: Sequence[Row], length_m: float | None) -> list[Problem]
     for row in rows:
         if row.has("release_s_m"):
             problems += _off_track(EVENTS, row, "release_s_m", row.number("release_s_m"), length_m)
+        problems += _release_speed_problems(row)
+    return problems
+
+
+def _release_speed_problems(row: Row) -> list[Problem]:
+    """Check the speed with which a front starts."""
+    speed, sd = (row.number_or_none(name) for name in ("release_speed_m_s", "release_speed_sd_m_s"))
+    problems = []
+    if speed is not None and speed > FASTEST_M_S:
+        message = f"expected a speed of at most {FASTEST_M_S:g} m/s; correct it, or write it in m/s"
+        problems.append(_at(EVENTS, row, "release_speed_m_s", message))
+    if sd is not None and speed is None and "release_speed_m_s" not in row.unreadable:
+        message = "the standard deviation of a speed that is not given; write release_speed_m_s, or remove it"
+        problems.append(_at(EVENTS, row, "release_speed_sd_m_s", message))
     return problems
 
 

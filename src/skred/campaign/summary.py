@@ -18,12 +18,19 @@ def campaign_summary(campaign: Campaign) -> dict[str, Any]:
         "events": campaign.n_events,
         "sensors": campaign.n_sensors,
         "readings": {status.name.lower(): int((campaign.status == status).sum()) for status in Status},
+        "released_with_a_speed": sum(bool(event.release_speed_m_s) for event in campaign.events),
         "covariates": sorted({name for event in campaign.events for name in event.covariates}),
         "track_points": len(campaign.track.x_m),
         "track_length_m": campaign.track.length_m,
         "reference_s_m": campaign.reference_s_m,
         "fingerprint": campaign.fingerprint(),
     }
+
+
+def _events(summary: dict[str, Any]) -> str:
+    """How many events, and how many of them do not start from rest."""
+    moving = summary["released_with_a_speed"]
+    return f"{summary['events']}{f', {moving} released with a speed' if moving else ''}"
 
 
 def summary_table(summary: dict[str, Any]) -> Table:
@@ -34,7 +41,7 @@ def summary_table(summary: dict[str, Any]) -> Table:
     reference = summary["reference_s_m"]
     rows = {
         "campaign": f"{summary['name']} ({summary['origin']}): no problems",
-        "events": str(summary["events"]),
+        "events": _events(summary),
         "sensors": str(summary["sensors"]),
         "readings": readings,
         "covariates": ", ".join(summary["covariates"]) or "none",

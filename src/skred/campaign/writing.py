@@ -136,15 +136,18 @@ def _sensors(campaign: Campaign) -> str:
 def _events(campaign: Campaign) -> str:
     """Return the text of events.csv."""
     covariates = list(dict.fromkeys(name for event in campaign.events for name in event.covariates))
-    has_sd = any(event.release_sd_m is not None for event in campaign.events)
-    header = ["event", "release_s_m", *(["release_sd_m"] if has_sd else []), *covariates]
+    optional = ("release_sd_m", "release_speed_m_s", "release_speed_sd_m_s")
+    used = [name for name in optional if any(getattr(event, name) is not None for event in campaign.events)]
     rows = [
-        (event.id, event.release_s_m)
-        + ((event.release_sd_m,) if has_sd else ())
-        + tuple(event.covariates.get(name) for name in covariates)
+        (
+            event.id,
+            event.release_s_m,
+            *(getattr(event, name) for name in used),
+            *(event.covariates.get(name) for name in covariates),
+        )
         for event in campaign.events
     ]
-    return _table(header, rows)
+    return _table(["event", "release_s_m", *used, *covariates], rows)
 
 
 def _recordings(campaign: Campaign) -> str:

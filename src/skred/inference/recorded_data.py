@@ -47,6 +47,11 @@ def _constant(problem: Problem) -> xr.Dataset:
             "relative_sd": ("sensor", [s.relative_sd for s in campaign.sensors], {"units": "1"}),
             "absolute_sd": ("sensor", [s.absolute_sd for s in campaign.sensors], reading),
             "release_s": ("event", [e.release_s_m for e in campaign.events], {"units": "m"}),
+            "release_speed": (
+                "event",
+                [e.release_speed_m_s or 0.0 for e in campaign.events],
+                {"units": "m s-1"},
+            ),
             **_track(problem),
             "cell_edge": ("edge", terrain.edge_s_m, {"units": "m"}),
             "slope": ("cell", terrain.slope_rad, {"units": "rad"}),

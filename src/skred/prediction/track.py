@@ -14,8 +14,8 @@ from skred.campaign.reading import TRACK
 from skred.campaign.rules import track_problems
 from skred.campaign.tables import read_table
 from skred.errors import InputError
-from skred.inference.hierarchical.bisection import Releases
 from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.hierarchical.releases import Releases, exact_release
 from skred.physics.terrain import CELL_M, Terrain, build_terrain
 
 
@@ -113,16 +113,19 @@ def _single(release_s_m: float, length_m: float) -> Releases:
         raise InputError(
             f"--release {release_s_m:g}: expected a place on the track, from 0 to below {length_m:.1f} m"
         )
-    return Releases(np.array([release_s_m]), np.zeros(1), length_m)
+    return exact_release(release_s_m, length_m)
 
 
 def _release_text(releases: Releases) -> str:
     """The campaign's releases in words."""
     low, high = float(releases.mean.min()), float(releases.mean.max())
     which = f"s = {low:.0f} m" if low == high else f"the recorded releases, s = {low:.0f} to {high:.0f} m"
-    if not releases.sd.any():
-        return which
-    return f"{which}, known to {np.median(releases.sd[releases.sd > 0.0]):.0f} m"
+    if releases.sd.any():
+        which += f", known to {np.median(releases.sd[releases.sd > 0.0]):.0f} m"
+    if releases.speed.any():
+        slow, fast = float(releases.speed.min()), float(releases.speed.max())
+        which += f", at {slow:.1f} m/s" if slow == fast else f", at {slow:.1f} to {fast:.1f} m/s"
+    return which
 
 
 def read_track(file: Path) -> Track:

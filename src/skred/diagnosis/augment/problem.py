@@ -225,7 +225,11 @@ class AugmentedProblem(HierarchicalProblem):
         return errors
 
     def speeds(
-        self, mechanisms: Sequence[Mechanism], strengths: FloatArray, release_s_m: float | FloatArray
+        self,
+        mechanisms: Sequence[Mechanism],
+        strengths: FloatArray,
+        release_s_m: float | FloatArray,
+        release_speed_m_s: float | FloatArray = 0.0,
     ) -> FloatArray:
         """Front speed [m/s] at the cell edges, what is added as strong as its posterior mean."""
         extension = self.extension
@@ -233,7 +237,8 @@ class AugmentedProblem(HierarchicalProblem):
         columns = np.repeat(added, [len(d.columns) for d in extension.directions])
         rows = np.column_stack([np.asarray(strengths, float), np.tile(columns, (len(strengths), 1))])
         releases = np.full(len(rows), release_s_m, dtype=float)  # where fronts start, an offset included
-        speeds: FloatArray = front_speeds(rows, releases, self.path, extension.contributions)
+        law = extension.contributions
+        speeds: FloatArray = front_speeds(rows, releases, self.path, law, release_speed_m_s)
         return speeds
 
     def finer(self, law: Law, posterior: xr.Dataset) -> AugmentedProblem | None:

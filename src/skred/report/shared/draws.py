@@ -187,7 +187,8 @@ def sensor_draws(tree: xr.DataTree, recordings: Recordings, sensor: Sensor) -> S
     column = recordings.sensors.index(sensor)
     predictive = tree["posterior_predictive"].to_dataset()
     response = predictive["mean_response"].transpose("chain", "draw", "release", "sensor").values[..., column]
-    _, events_per_release = np.unique(recordings.release_s_m, return_counts=True)
+    begin = np.column_stack([recordings.release_s_m, recordings.release_speed_m_s])
+    _, events_per_release = np.unique(begin, axis=0, return_counts=True)
     reading = predictive["reading"].transpose("chain", "draw", "event", "sensor").values[..., column]
     return SensorDraws(
         **recorded,

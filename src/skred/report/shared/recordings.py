@@ -30,7 +30,8 @@ class Recordings:
         Readings and their standard deviations, NaN where there is none.
     status : (n_events, n_sensors) array
         A `Status` for each.
-    release_s_m : (n_events,) array
+    release_s_m, release_speed_m_s : (n_events,) arrays
+        Where fronts start, and how fast; 0 from rest.
     track_s_m, track_z_m : (n_points,) arrays
     edge_s_m : (n_cells + 1,) array
         Ends of the terrain's cells.
@@ -44,6 +45,7 @@ class Recordings:
     reading_sd: FloatArray
     status: NDArray[np.int8]
     release_s_m: FloatArray
+    release_speed_m_s: FloatArray
     track_s_m: FloatArray
     track_z_m: FloatArray
     edge_s_m: FloatArray
@@ -110,6 +112,7 @@ def recordings_of(tree: xr.DataTree) -> Recordings:
         reading_sd=_floats(constant["reading_sd"].transpose("event", "sensor")),
         status=np.asarray(constant["status"].transpose("event", "sensor").values, dtype=np.int8),
         release_s_m=_floats(constant["release_s"]),
+        release_speed_m_s=_floats(constant.get("release_speed", 0.0 * constant["release_s"])),
         track_s_m=_floats(constant["track_s"]),
         track_z_m=_floats(constant["track_z"]),
         edge_s_m=_floats(constant["cell_edge"]),
