@@ -9,6 +9,8 @@ import re
 # Larger than any SI quantity of an avalanche, and small enough that its square is still an ordinary number.
 LARGEST_NUMBER = 1e12
 LONGEST_WORD = 200
+STATUSES = ("observed", "not_reached", "missing", "at_least", "at_most", "between")
+"""What can be known of a reading, in the order of `skred.campaign.records.Status`."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+", re.ASCII)
@@ -110,8 +112,9 @@ def quantity(text: str) -> str:
 
 def status(text: str) -> str:
     """Read what is known of a reading."""
-    if text not in ("observed", "not_reached", "missing"):
-        raise CellError("expected 'observed', 'not_reached' or 'missing'; correct it")
+    if text not in STATUSES:
+        named = ", ".join(f"'{word}'" for word in STATUSES[:-1])
+        raise CellError(f"expected {named} or '{STATUSES[-1]}'; correct it")
     return text
 
 

@@ -27,6 +27,7 @@ SENSORS = (
     Column("s_to_m", cells.optional_number),
     Column("relative_sd", cells.not_negative),
     Column("absolute_sd", cells.not_negative),
+    Column("place_sd_m", cells.optional_positive, required=False),
 )
 EVENTS = (
     Column("event", cells.word),
@@ -39,6 +40,7 @@ RECORDINGS = (
     Column("event", cells.word),
     Column("sensor", cells.word),
     Column("value", cells.optional_number),
+    Column("value_to", cells.optional_number, required=False),
     Column("sd", cells.optional_positive, required=False),
     Column("status", cells.status),
 )
@@ -134,7 +136,7 @@ def _sensors(rows: Sequence[Row]) -> tuple[Sensor, ...]:
     """Build the sensors whose cells could all be read and that have a place if they need one."""
     sensors = []
     for row in rows:
-        if not row.has(*(column.name for column in SENSORS)):
+        if not row.has(*(column.name for column in SENSORS if column.required)):
             continue
         s_from_m, s_to_m = row.number_or_none("s_from_m"), row.number_or_none("s_to_m")
         is_runout = row.word("quantity") == "runout"
@@ -148,6 +150,7 @@ def _sensors(rows: Sequence[Row]) -> tuple[Sensor, ...]:
                 s_to_m=np.nan if s_to_m is None else s_to_m,
                 relative_sd=row.number("relative_sd"),
                 absolute_sd=row.number("absolute_sd"),
+                place_sd_m=row.number_or_none("place_sd_m"),
             )
         )
     return tuple(sensors)
@@ -207,15 +210,15 @@ def _campaign(
 ) -> Campaign:
     """Put the parts together once nothing is wrong with any of them."""
     shape = (len(events), len(sensors))
-    values, stated_sd = np.full(shape, np.nan), np.full(shape, np.nan)
+    values, stated_sd, values_to = (np.full(shape, np.nan) for _ in range(3))
     status = np.full(shape, Status.MISSING, dtype=np.int8)
     event_index = {event.id: i for i, event in enumerate(events)}
     sensor_index = {sensor.id: j for j, sensor in enumerate(sensors)}
     for row in rows:
         place = event_index[row.word("event")], sensor_index[row.word("sensor")]
-        value, sd = row.number_or_none("value"), row.number_or_none("sd")
-        values[place] = np.nan if value is None else value
-        stated_sd[place] = np.nan if sd is None else sd
+        for column, into in (("value", values), ("sd", stated_sd), ("value_to", values_to)):
+            number = row.number_or_none(column)
+            into[place] = np.nan if number is None else number
         status[place] = Status[row.word("status").upper()]
     return Campaign(
         name=description.name,
@@ -229,4 +232,5 @@ def _campaign(
         values=values,
         status=status,
         stated_sd=stated_sd,
+        values_to=values_to,
     )

@@ -156,29 +156,60 @@ def _reading_problems(row: Row, sensor: Sensor | None, length_m: float | None) -
     if status == "not_reached" and sensor is not None and sensor.is_runout:
         message = "every avalanche has a runout; write 'missing' if it is not known"
         return [_at(RECORDINGS, row, "status", message)]
-    if status != "observed":
+    problems = _value_to_problems(row, status)
+    if status in ("not_reached", "missing"):
         if value is None:
-            return []
+            return problems
         message = f"a reading with status '{status}' carries no value; remove it or correct the status"
-        return [_at(RECORDINGS, row, "value", message)]
+        return [*problems, _at(RECORDINGS, row, "value", message)]
     if value is None:
-        message = "an observed reading needs a value; write it, or the status 'missing' or 'not_reached'"
-        return [_at(RECORDINGS, row, "value", message)]
+        what = "an observed reading needs a value" if status == "observed" else f"'{status}' needs a value"
+        message = f"{what}; write it, or the status 'missing' or 'not_reached'"
+        return [*problems, _at(RECORDINGS, row, "value", message)]
     if sensor is None:
-        return []
-    problems = []
-    if sensor.is_runout:
-        problems += _off_track(RECORDINGS, row, "value", value, length_m)
-    elif value < 0:
-        problems.append(_at(RECORDINGS, row, "value", "a front velocity is not negative; correct it"))
-    elif value > FASTEST_M_S:
-        message = f"expected a front velocity of at most {FASTEST_M_S:g} m/s; correct it, or write it in m/s"
-        problems.append(_at(RECORDINGS, row, "value", message))
+        return problems
+    for column in ("value", "value_to"):
+        number = row.number_or_none(column)
+        if number is not None:
+            problems += _size_problems(row, column, number, sensor, length_m)
     return problems + _sd_problems(row, sensor, value)
 
 
+def _value_to_problems(row: Row, status: str) -> list[Problem]:
+    """Check that an interval, and nothing else, has a second end below its first."""
+    value, value_to = row.number_or_none("value"), row.number_or_none("value_to")
+    if status != "between":
+        if value_to is None:
+            return []
+        message = f"a reading with status '{status}' has one value; remove value_to, or write 'between'"
+        return [_at(RECORDINGS, row, "value_to", message)]
+    if value_to is None:
+        if "value_to" in row.unreadable:
+            return []
+        message = "'between' needs both ends; write the upper one here, or the status 'at_least'"
+        return [Problem(RECORDINGS, row.line, "value_to", None, message)]
+    if value is not None and value_to <= value:
+        message = f"value_to must be greater than value ({value:g}); exchange or correct them"
+        return [_at(RECORDINGS, row, "value_to", message)]
+    return []
+
+
+def _size_problems(
+    row: Row, column: str, value: float, sensor: Sensor, length_m: float | None
+) -> list[Problem]:
+    """Check that a reading or a bound is a place on the track, or a speed that something can have."""
+    if sensor.is_runout:
+        return _off_track(RECORDINGS, row, column, value, length_m)
+    if value < 0:
+        return [_at(RECORDINGS, row, column, "a front velocity is not negative; correct it")]
+    if value > FASTEST_M_S:
+        message = f"expected a front velocity of at most {FASTEST_M_S:g} m/s; correct it, or write it in m/s"
+        return [_at(RECORDINGS, row, column, message)]
+    return []
+
+
 def _sd_problems(row: Row, sensor: Sensor, value: float) -> list[Problem]:
-    """Check that the standard deviation of an observed reading is one that something can measure to."""
+    """Check that the standard deviation of a reading or bound is one that something can measure to."""
     if "sd" in row.unreadable:
         return []
     stated = row.number_or_none("sd")
@@ -209,17 +240,23 @@ def not_reached_problems(rows: Sequence[Row], sensors: Mapping[str, Sensor]) -> 
     problems = []
     for row in rows:
         sensor = _velocity_sensor(row, sensors)
-        if sensor is None or row.word("event") not in uppermost or row.word("status") != "observed":
+        if sensor is None or row.word("event") not in uppermost or not has_speed(row):
             continue
         stop_m, not_reached = uppermost[row.word("event")]
-        value = row.number_or_none("value") if row.has("value") else None
-        if value is not None and value > 0 and sensor.s_from_m >= stop_m:
+        if sensor.s_from_m >= stop_m:
             message = (
                 f"event '{row.word('event')}' did not reach sensor '{not_reached.word('sensor')}' (row "
                 f"{not_reached.line}), so it has no speed here, further down; correct one of the two"
             )
             problems.append(_at(RECORDINGS, row, "value", message))
     return problems
+
+
+def has_speed(row: Row) -> bool:
+    """Whether a reading of velocity says that the front moved there."""
+    if row.word("status") not in ("observed", "at_least", "between"):
+        return False
+    return (row.number_or_none("value") or 0.0) > 0.0
 
 
 def _velocity_sensor(row: Row, sensors: Mapping[str, Sensor]) -> Sensor | None:

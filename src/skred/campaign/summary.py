@@ -19,12 +19,23 @@ def campaign_summary(campaign: Campaign) -> dict[str, Any]:
         "sensors": campaign.n_sensors,
         "readings": {status.name.lower(): int((campaign.status == status).sum()) for status in Status},
         "released_with_a_speed": sum(bool(event.release_speed_m_s) for event in campaign.events),
+        "places_known_to": {
+            sensor.id: sensor.place_sd_m for sensor in campaign.sensors if sensor.place_sd_m is not None
+        },
         "covariates": sorted({name for event in campaign.events for name in event.covariates}),
         "track_points": len(campaign.track.x_m),
         "track_length_m": campaign.track.length_m,
         "reference_s_m": campaign.reference_s_m,
         "fingerprint": campaign.fingerprint(),
     }
+
+
+def place_sentences(places_known_to: dict[str, float]) -> list[str]:
+    """How well the places of sensors are known, sensor by sensor; said, because no model uses it yet."""
+    return [
+        f"{sensor}: place known to ± {sd:g} m; not yet part of the models"
+        for sensor, sd in places_known_to.items()
+    ]
 
 
 def _events(summary: dict[str, Any]) -> str:
@@ -35,14 +46,17 @@ def _events(summary: dict[str, Any]) -> str:
 
 def summary_table(summary: dict[str, Any]) -> Table:
     """Show a summary as a table."""
+    usual = [status.name.lower() for status in Status if not status.is_bound]
     readings = ", ".join(
-        f"{count} {status.replace('_', ' ')}" for status, count in summary["readings"].items()
+        f"{count} {status.replace('_', ' ')}"
+        for status, count in summary["readings"].items()
+        if count or status in usual
     )
     reference = summary["reference_s_m"]
     rows = {
         "campaign": f"{summary['name']} ({summary['origin']}): no problems",
         "events": _events(summary),
-        "sensors": str(summary["sensors"]),
+        "sensors": "\n".join([str(summary["sensors"]), *place_sentences(summary["places_known_to"])]),
         "readings": readings,
         "covariates": ", ".join(summary["covariates"]) or "none",
         "track": f"{summary['track_length_m']:.1f} m, {summary['track_points']} points",

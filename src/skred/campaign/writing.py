@@ -130,7 +130,10 @@ def _sensors(campaign: Campaign) -> str:
     """Return the text of sensors.csv."""
     header = ["sensor", "quantity", "s_from_m", "s_to_m", "relative_sd", "absolute_sd"]
     rows = [(s.id, s.quantity, s.s_from_m, s.s_to_m, s.relative_sd, s.absolute_sd) for s in campaign.sensors]
-    return _table(header, rows)
+    if all(sensor.place_sd_m is None for sensor in campaign.sensors):
+        return _table(header, rows)
+    places = [(sensor.place_sd_m,) for sensor in campaign.sensors]
+    return _table([*header, "place_sd_m"], [row + place for row, place in zip(rows, places, strict=True)])
 
 
 def _events(campaign: Campaign) -> str:
@@ -152,15 +155,14 @@ def _events(campaign: Campaign) -> str:
 
 def _recordings(campaign: Campaign) -> str:
     """Return the text of recordings.csv."""
-    has_sd = bool(np.isfinite(campaign.stated_sd).any())
-    header = ["event", "sensor", "value", *(["sd"] if has_sd else []), "status"]
+    numbers = {"value": campaign.values, "value_to": campaign.values_to, "sd": campaign.stated_sd}
+    used = {name: array for name, array in numbers.items() if name == "value" or np.isfinite(array).any()}
     rows = []
     for i, event_id in enumerate(campaign.event_ids):
         for j, sensor_id in enumerate(campaign.sensor_ids):
-            value, sd = float(campaign.values[i, j]), float(campaign.stated_sd[i, j])
             status = Status(campaign.status[i, j]).name.lower()
-            rows.append((event_id, sensor_id, value) + ((sd,) if has_sd else ()) + (status,))
-    return _table(header, rows)
+            rows.append((event_id, sensor_id, *(float(array[i, j]) for array in used.values()), status))
+    return _table(["event", "sensor", *used, "status"], rows)
 
 
 def _table(header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:

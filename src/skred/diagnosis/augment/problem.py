@@ -22,7 +22,7 @@ from skred.diagnosis.augment.tables import Tables, build_tables, exact_nodes
 from skred.diagnosis.augment.tabulated_op import tabulated_log_densities
 from skred.diagnosis.augment.truncated_normal import truncated_normal
 from skred.diagnosis.evidence.coefficient import Base
-from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows, take_rows
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.extension import Extension
 from skred.inference.hierarchical.event_density import integrated_log_density
@@ -210,7 +210,7 @@ class AugmentedProblem(HierarchicalProblem):
         """
         base = self.base
         population = Population(means, np.einsum("nij,nkj->nik", factors, factors))
-        rows = Rows(chosen, np.zeros_like(chosen), take_rows(base.rows.readings, chosen), base.rows.errors)
+        rows = Rows(chosen, np.zeros_like(chosen), base.rows.readings.take(chosen), base.rows.errors)
         start = self.tables.modes[self.tables.grid.nearest(added)][:, chosen]
         given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
         more = 2 ** int(np.clip(np.log2(runs / (len(added) * len(chosen))), 0, 3))

@@ -296,16 +296,7 @@ class HierarchicalProblem(Problem):
         rng = np.random.default_rng([seed, 5])
         chosen = np.sort(rng.permutation(n_events)[:n_checked])
         fronts = self.fronts(law.mechanisms)
-        readings = fronts.readings
-        fronts = fronts._replace(
-            readings=readings._replace(
-                **{
-                    name: getattr(readings, name)[chosen]
-                    for name in ("values", "observed", "stated_sd", "reached", "not_reached")
-                }
-            ),
-            releases=fronts.releases.take(chosen),
-        )
+        fronts = fronts._replace(readings=fronts.readings.take(chosen), releases=fronts.releases.take(chosen))
         finer = self._resolve(law.mechanisms, fronts, self._next_fineness, envelope_around(means, factors))
         exact = self._log_likelihood(finer, law, samples)
         found = self.log_likelihood(law, samples)[:, chosen]
@@ -350,6 +341,6 @@ def hierarchical_problem(
     """
     terrain = build_terrain(campaign.track.x_m, campaign.track.z_m, smoothing_m=smoothing_m, cell_m=cell_m)
     problem = HierarchicalProblem(campaign, terrain, ERROR_MODELS[error_model])
-    if not problem.observed.any():
+    if not (problem.observed | problem.readings.bounded).any():
         raise ValueError("no reading is observed: there is nothing to calibrate against")
     return problem

@@ -72,7 +72,12 @@ class PooledProblem(Problem):
     def arrays(self) -> PooledArrays:
         """The recordings as the log density reads them."""
         return pooled_arrays(
-            self.values, self.observed, self.not_reached, self.release_of_event, self.covariance
+            self.values,
+            self.observed,
+            self.not_reached,
+            self.release_of_event,
+            self.covariance,
+            *self.campaign.bounds,
         )
 
     def parameters(self, law: Law) -> tuple[Parameter, ...]:

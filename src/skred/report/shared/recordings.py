@@ -71,6 +71,16 @@ class Recordings:
         """Where the front stopped above the sensor, (n_events, n_sensors)."""
         return np.asarray(self.status == Status.NOT_REACHED)
 
+    @cached_property
+    def bounded(self) -> NDArray[np.bool_]:
+        """Of which readings only bounds are known, (n_events, n_sensors)."""
+        return np.asarray(self.status >= Status.AT_LEAST)
+
+    @cached_property
+    def missing(self) -> NDArray[np.bool_]:
+        """Of which readings nothing is known, (n_events, n_sensors)."""
+        return np.asarray(self.status == Status.MISSING)
+
     @property
     def is_runout(self) -> NDArray[np.bool_]:
         """Which sensors record where an avalanche stopped, (n_sensors,)."""
@@ -102,10 +112,14 @@ def recordings_of(tree: xr.DataTree) -> Recordings:
     observed, constant = tree["observed_data"].to_dataset(), tree["constant_data"].to_dataset()
     columns = ("quantity", "s_from", "s_to", "relative_sd", "absolute_sd")
     sensors = zip(constant["sensor"].values, *(constant[name].values for name in columns), strict=True)
+    places = {}
+    if "place_sd" in constant:
+        known = zip(constant["sensor"].values, constant["place_sd"].values, strict=True)
+        places = {str(name): float(sd) for name, sd in known if np.isfinite(sd)}
     return Recordings(
         event_ids=tuple(map(str, constant["event"].values)),
         sensors=tuple(
-            Sensor(str(name), cast(Quantity, str(quantity)), *map(float, numbers))
+            Sensor(str(name), cast(Quantity, str(quantity)), *map(float, numbers), places.get(str(name)))
             for name, quantity, *numbers in sensors
         ),
         values=_floats(observed["reading"].transpose("event", "sensor")),
