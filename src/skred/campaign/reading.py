@@ -8,15 +8,18 @@ import numpy as np
 
 from skred.campaign import cells, rules
 from skred.campaign.description import Description, read_description
+from skred.campaign.order_rules import order_problems
 from skred.campaign.problems import CampaignError, Problem
 from skred.campaign.records import Campaign, Event, Quantity, Sensor, Status, Track
 from skred.campaign.tables import MOST_PROBLEMS, Column, ReadCell, Row, Table, read_table
+from skred.campaign.track_rules import TRACK as TRACK_FILE
+from skred.campaign.track_rules import track_problems
 
 # Events times sensors: the arrays of a campaign hold one number for each pair.
 MOST_READINGS = 5_000_000
 
 TRACK = (
-    Column("x_m", cells.number),
+    Column("x_m", cells.coordinate),
     Column("z_m", cells.number),
     Column("width_m", cells.positive, required=False),
 )
@@ -68,17 +71,17 @@ def read_campaign(folder: Path) -> Campaign:
     folder = Path(folder)
     _require_folder(folder)
     description, reference_row, problems = read_description(folder)
-    track_table = read_table(folder, rules.TRACK, TRACK)
+    track_table = read_table(folder, TRACK_FILE, TRACK)
     sensor_table = read_table(folder, rules.SENSORS, SENSORS)
     event_table = read_table(folder, rules.EVENTS, EVENTS, _covariate_reader)
     recording_table = read_table(folder, rules.RECORDINGS, RECORDINGS)
 
     moving = any((row.number_or_none("release_speed_m_s") or 0.0) > 0 for row in event_table.rows)
-    track, track_problems = _track(track_table, may_be_level=moving)
+    track, of_track = _track(track_table, may_be_level=moving)
     length_m = track.length_m if track else None
     if description is not None:
         problems += rules.reference_problems(description.reference_s_m, reference_row, length_m)
-    problems += track_problems
+    problems += of_track
     problems += sensor_table.problems
     if sensor_table.is_usable:
         problems += rules.sensor_problems(sensor_table.rows, length_m)
@@ -91,7 +94,7 @@ def read_campaign(folder: Path) -> Campaign:
         by_id = {sensor.id: sensor for sensor in sensors}
         event_ids, sensor_ids = _ids(event_table, "event"), _ids(sensor_table, "sensor")
         problems += rules.recording_problems(recording_table.rows, event_ids, sensor_ids, by_id, length_m)
-        problems += rules.not_reached_problems(recording_table.rows, by_id)
+        problems += order_problems(recording_table.rows, by_id, _releases(event_table, length_m))
     problems += _too_many(event_table, sensor_table)
     if problems or description is None or track is None:
         raise CampaignError(_bounded(_in_order(problems)))
@@ -121,11 +124,18 @@ def _ids(table: Table, column: str) -> frozenset[str] | None:
     return frozenset(row.word(column) for row in table.rows if row.has(column))
 
 
+def _releases(table: Table, length_m: float | None) -> dict[str, Row]:
+    """Return the rows of events whose release lies on the track, by the events' ids."""
+    readable = [row for row in table.rows if row.has("event", "release_s_m")]
+    end_m = np.inf if length_m is None else length_m
+    return {row.word("event"): row for row in readable if 0.0 <= row.number("release_s_m") <= end_m}
+
+
 def _track(table: Table, *, may_be_level: bool) -> tuple[Track | None, list[Problem]]:
     """Build the track, or say why there is none."""
     problems = list(table.problems)
     if table.is_usable:
-        problems += rules.track_problems(table.rows, may_be_level=may_be_level)
+        problems += track_problems(table.rows, may_be_level=may_be_level)
     if problems:
         return None, problems
     columns = {name: np.array([row.number(name) for row in table.rows]) for name in table.columns}

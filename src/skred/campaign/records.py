@@ -199,7 +199,8 @@ class Campaign:
         object.__setattr__(self, "events", tuple(self.events))
         if not np.isfinite(self.values_to).any():  # then it fits arrays of any shape
             object.__setattr__(self, "values_to", np.full((self.n_events, self.n_sensors), np.nan))
-        for name, dtype in (*((name, np.float64) for name in _READINGS), ("status", np.int8)):
+        for name in (*_READINGS, "status"):
+            dtype: type[np.generic] = np.int8 if name == "status" else np.float64
             object.__setattr__(self, name, _frozen(getattr(self, name), dtype))
             if getattr(self, name).shape != (self.n_events, self.n_sensors):
                 raise ValueError(f"{name} needs the shape {self.n_events, self.n_sensors}: events, sensors")

@@ -129,11 +129,13 @@ def _track(campaign: Campaign) -> str:
 def _sensors(campaign: Campaign) -> str:
     """Return the text of sensors.csv."""
     header = ["sensor", "quantity", "s_from_m", "s_to_m", "relative_sd", "absolute_sd"]
-    rows = [(s.id, s.quantity, s.s_from_m, s.s_to_m, s.relative_sd, s.absolute_sd) for s in campaign.sensors]
-    if all(sensor.place_sd_m is None for sensor in campaign.sensors):
-        return _table(header, rows)
-    places = [(sensor.place_sd_m,) for sensor in campaign.sensors]
-    return _table([*header, "place_sd_m"], [row + place for row, place in zip(rows, places, strict=True)])
+    rows: list[tuple[Cell, ...]] = [
+        (s.id, s.quantity, s.s_from_m, s.s_to_m, s.relative_sd, s.absolute_sd) for s in campaign.sensors
+    ]
+    if any(sensor.place_sd_m is not None for sensor in campaign.sensors):
+        header.append("place_sd_m")
+        rows = [(*row, s.place_sd_m) for row, s in zip(rows, campaign.sensors, strict=True)]
+    return _table(header, rows)
 
 
 def _events(campaign: Campaign) -> str:
@@ -141,7 +143,7 @@ def _events(campaign: Campaign) -> str:
     covariates = list(dict.fromkeys(name for event in campaign.events for name in event.covariates))
     optional = ("release_sd_m", "release_speed_m_s", "release_speed_sd_m_s")
     used = [name for name in optional if any(getattr(event, name) is not None for event in campaign.events)]
-    rows = [
+    rows: list[tuple[Cell, ...]] = [
         (
             event.id,
             event.release_s_m,
@@ -157,7 +159,7 @@ def _recordings(campaign: Campaign) -> str:
     """Return the text of recordings.csv."""
     numbers = {"value": campaign.values, "value_to": campaign.values_to, "sd": campaign.stated_sd}
     used = {name: array for name, array in numbers.items() if name == "value" or np.isfinite(array).any()}
-    rows = []
+    rows: list[tuple[Cell, ...]] = []
     for i, event_id in enumerate(campaign.event_ids):
         for j, sensor_id in enumerate(campaign.sensor_ids):
             status = Status(campaign.status[i, j]).name.lower()

@@ -11,12 +11,12 @@ import numpy as np
 from skred.campaign import CampaignError, Problem, Track
 from skred.campaign.problems import SHOWN_CHARACTERS
 from skred.campaign.reading import TRACK
-from skred.campaign.rules import track_problems
 from skred.campaign.tables import read_table
+from skred.campaign.track_rules import track_problems
 from skred.errors import InputError
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.hierarchical.releases import Releases, exact_release
-from skred.physics.terrain import CELL_M, Terrain, build_terrain
+from skred.physics.terrain import Terrain, build_terrain
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ def prediction_track(
         return _own(problem, release_s_m)
     track = read_track(file)
     try:
-        terrain = build_terrain(track.x_m, track.z_m, smoothing_m=problem.terrain.smoothing_m, cell_m=CELL_M)
+        terrain = build_terrain(track.x_m, track.z_m, smoothing_m=problem.terrain.smoothing_m)
     except ValueError as error:
         raise InputError(f"--track {file}: {error}") from error
     place = 0.0 if release_s_m is None else release_s_m

@@ -37,7 +37,7 @@ from skred.physics.geometry import sensor_table
 from skred.physics.kernel.fronts import simulate
 from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
-from skred.physics.terrain import CELL_M, SMOOTHING_M, build_terrain
+from skred.physics.terrain import build_terrain
 
 FloatArray = NDArray[np.float64]
 _BELOW_SCALE, _ABOVE_SCALE = 6.0, 7.0
@@ -329,8 +329,8 @@ def hierarchical_problem(
     campaign: Campaign,
     *,
     error_model: str = DEFAULT_ERRORS,
-    smoothing_m: float = SMOOTHING_M,
-    cell_m: float = CELL_M,
+    smoothing_m: float | None = None,
+    cell_m: float | None = None,
 ) -> HierarchicalProblem:
     """Problem of a campaign.
 

@@ -18,7 +18,7 @@ from skred.physics.geometry import sensor_table
 from skred.physics.kernel.fronts import simulate
 from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
-from skred.physics.terrain import CELL_M, SMOOTHING_M, build_terrain
+from skred.physics.terrain import build_terrain
 
 FloatArray = NDArray[np.float64]
 
@@ -170,7 +170,7 @@ class PooledProblem(Problem):
 
 
 def pooled_problem(
-    campaign: Campaign, *, smoothing_m: float = SMOOTHING_M, cell_m: float = CELL_M
+    campaign: Campaign, *, smoothing_m: float | None = None, cell_m: float | None = None
 ) -> PooledProblem:
     """Problem of a campaign, with the covariance of its recordings.
 
@@ -182,5 +182,5 @@ def pooled_problem(
     terrain = build_terrain(campaign.track.x_m, campaign.track.z_m, smoothing_m=smoothing_m, cell_m=cell_m)
     not_reached = campaign.status == Status.NOT_REACHED
     values = np.where(campaign.status == Status.OBSERVED, campaign.values, np.nan)
-    mean, covariance = recordings_covariance(values, not_reached)
+    mean, covariance = recordings_covariance(values, not_reached, campaign.sensor_ids)
     return PooledProblem(campaign, terrain, covariance, mean)

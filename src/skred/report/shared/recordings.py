@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, cast
 
@@ -119,7 +119,10 @@ def recordings_of(tree: xr.DataTree) -> Recordings:
     return Recordings(
         event_ids=tuple(map(str, constant["event"].values)),
         sensors=tuple(
-            Sensor(str(name), cast(Quantity, str(quantity)), *map(float, numbers), places.get(str(name)))
+            replace(
+                Sensor(str(name), cast(Quantity, str(quantity)), *map(float, numbers)),
+                place_sd_m=places.get(str(name)),
+            )
             for name, quantity, *numbers in sensors
         ),
         values=_floats(observed["reading"].transpose("event", "sensor")),
