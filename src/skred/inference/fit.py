@@ -155,7 +155,7 @@ def calibration_statement(entry: dict[str, Any]) -> list[str]:
     """
     gate = entry["gate"]
     aside = entry.get("bounds_left_out")
-    unseen = [f"{aside} readings known by bounds only take no part in the check of fit."] if aside else []
+    unseen = [f"Readings known by bounds only ({aside}) take no part in the check of fit."] if aside else []
     measured = f"r-hat at most {gate['r_hat_max']:.3f}, effective draws at least {gate['ess_bulk_min']:.0f}"
     if not gate["passed"]:
         return [f"THE CHAINS DID NOT CONVERGE: do not use this result ({measured})", *gate["problems"]]
