@@ -15,9 +15,9 @@ import cyclopts
 from benchmarks.development_set import EACH
 from benchmarks.files import RESULTS
 from benchmarks.page.results import result_of
+from benchmarks.scorecard_tables import bars_table, found_of, named_of
 from skred.output import write_text
 from skred.simulator.unlisted import UNLISTED
-from studies.proof.__main__ import bars_table, found_of, named_of
 
 _HEAD = """# The development set
 

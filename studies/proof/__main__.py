@@ -19,6 +19,7 @@ from typing import Annotated, Any
 
 import cyclopts
 
+from benchmarks.scorecard_tables import STRONG, asked, bars_table, found_of, measured, named_of
 from skred.output import write_text
 from skred.prove.ledger import ledger_sha256
 from skred.prove.scorecard import DIAGNOSIS, scorecard
@@ -98,8 +99,6 @@ all batches, and what was written about each batch. The files are in `{kept}`:
 
 `tests/studies/test_record.py` recomputes every hash.
 """
-_STRONG = 5.5
-"""Signal-to-noise from which on effects should be found."""
 _BEFORE_COMPENSATED = 2
 """Opened batches whose code did not look for forces that are nil on average."""
 
@@ -125,7 +124,7 @@ def page(figures: Sequence[str], run: Found) -> str:
     parts += [f"![{name.replace('_', ' ')}](figures/proof-{name}.png)\n" for name in figures]
     parts += ["Open and compensated effects of the blind run:\n", _open_and_compensated(run)]
     parts += ["What was hidden in the blind run:\n", _by_hidden(run["trials"])]
-    parts += ["## Every batch\n", _ORDER.format(strong=_STRONG), _by_batch(every, lines)]
+    parts += ["## Every batch\n", _ORDER.format(strong=STRONG), _by_batch(every, lines)]
     parts += ["## The full record\n", _FULL.format(command=COMMAND, kept=KEPT)]
     return "\n".join(parts)
 
@@ -204,37 +203,9 @@ def criteria(run: Found, newest: Found) -> str:
     ]
     other = {(one["goal"], one["what"]): one for one in newest["bars"]}
     for one in run["bars"]:
-        cells = [*_asked(one), *_measured(one), *_measured(other.get((one["goal"], one["what"])))]
+        cells = [*asked(one), *measured(one), *measured(other.get((one["goal"], one["what"])))]
         rows.append(f"| {' | '.join(cells)} |")
     return "\n".join(rows) + "\n"
-
-
-def bars_table(document: Found) -> str:
-    """Criteria, and what was measured in one set."""
-    rows = [
-        "| goal | what | bar | linearised ceiling | measured (95 %) | trials | |",
-        "| --- | --- | --- | --- | --- | --- | --- |",
-    ]
-    rows += [f"| {' | '.join([*_asked(one), *_measured(one)])} |" for one in document["bars"]]
-    return "\n".join(rows) + "\n"
-
-
-def _asked(one: Found) -> list[str]:
-    """A criterion, its limits, and the linearised ceiling."""
-    limit = [f"at least {one['at_least']:g}"] if one["at_least"] is not None else []
-    limit += [f"at most {one['at_most']:g}"] if one["at_most"] is not None else []
-    ceiling = "" if one["ceiling"] is None else f"{one['ceiling']:.2f}"
-    return [one["goal"], one["what"], ", ".join(limit), ceiling]
-
-
-def _measured(one: Found | None) -> list[str]:
-    """What was measured, of how many trials, and whether that is enough."""
-    if one is None:
-        return ["-", "0", ""]
-    if one["measured"] is None:
-        return ["-", str(one["n"]), one["status"]]
-    between = f" ({one['low']:.3g} to {one['high']:.3g})" if one["low"] is not None else ""
-    return [f"{one['measured']:.3g}{between}", str(one["n"]), one["status"]]
 
 
 def _open_and_compensated(document: Found) -> str:
@@ -297,21 +268,6 @@ def _by_hidden(lines: Sequence[Found]) -> str:
             f"| {shown.get(name, name)} | {len(own)} | {found_of(own)} | {' | '.join(named_of(own))} |"
         )
     return "\n".join(rows) + "\n"
-
-
-def found_of(lines: Sequence[Found]) -> str:
-    """How many of the strong effects were found."""
-    strong = [one["right"] for one in lines if one["true_ids"] and one["snr"] >= _STRONG]
-    return f"{sum(right not in ('failed', 'not found') for right in strong)} of {len(strong)}"
-
-
-def named_of(lines: Sequence[Found]) -> list[str]:
-    """How many single names are right, and how many ties hold a truth."""
-    cells = []
-    for several, good in ((False, ("right",)), (True, ("right", "in the set"))):
-        named = [one["right"] for one in lines if one["names"] and (len(one["names"]) > 1) == several]
-        cells.append(f"{sum(right in good for right in named)} of {len(named)}")
-    return cells
 
 
 def _wrong(batches: Sequence[Batch]) -> str:

@@ -32,11 +32,11 @@ def line_nodes() -> str:
     return f"""
 ## Integrating one free strength out
 
-`python -m studies.thresholds.line_nodes`: {max(n)} of the integrations of
-Ryggfonn's comparison under M1 and M3, by trapezoids between nodes on a line and by importance nodes as laws
-of two strengths have them, each against a line with sixteen times the nodes. What a log evidence [nats] is
-off by, less what it is off by at the other strengths of its curve; seconds are of one core, with another one
-busy.
+`python -m studies.thresholds.line_nodes`: {max(n)} of the curves of Ryggfonn's
+comparison under M1 and M3, each integrated again at all of its strengths: by trapezoids between nodes on a
+line, and by importance nodes as laws of two strengths have them; each against a line with sixteen times the
+nodes. What a log evidence [nats] is off by, less what it is off by at the other strengths of its curve;
+seconds of a processor.
 
 | base law | budget | rule | nodes of an event | median | nine in ten within | 97 in 100 within | seconds |
 | --- | --- | --- | --- | --- | --- | --- | --- |

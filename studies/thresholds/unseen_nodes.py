@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import time
 from typing import Any
-from unittest.mock import patch
 
 import cyclopts
 import numpy as np
@@ -20,38 +19,35 @@ from skred.diagnosis.discrepancy.profile import Profile, most_probable
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.prior_odds import UNLISTED
-from skred.diagnosis.predict import unseen
-from skred.diagnosis.predict.profile_law import _with
+from skred.diagnosis.predict.profile_law import with_profile
+from skred.diagnosis.predict.unseen import NODES, log_densities
 from studies.files import RESULTS, write
 from studies.thresholds.compared_again import base_on
 
 app = cyclopts.App(help=__doc__)
 RESULT = RESULTS / "unseen_nodes.json"
-USED = unseen._NODES
 BUDGETS = {
-    "used": USED,
-    "twice": USED.times(2),
+    "used": NODES,
+    "twice": NODES.times(2),
     "with adapted ones": Budget(64, 32, 64, 1.5, 1.8),
     "eight times those": Budget(512, 256, 512, 1.5, 1.8),
 }
-EXACT, SHIFTS = USED.times(16), 3
+EXACT, SHIFTS = NODES.times(16), 3
 
 
 def score(base: Base, event: int, added: Any, budget: Budget, seed: int) -> float:
     """Log score of an avalanche."""
     extension, draws = added
     rows = base.rows.take(np.array([event]))
-    with patch.object(unseen, "_NODES", budget):
-        densities = unseen.log_densities(extension, rows, draws.means, draws.factors, draws.strengths, seed)[
-            :, 0
-        ]
+    given = draws.means, draws.factors, draws.strengths
+    densities = log_densities(extension, rows, *given, seed, budget)[:, 0]
     return float(np.logaddexp.reduce(densities) - np.log(len(densities)))
 
 
 def measured(base: Base, profile: Profile) -> list[dict[str, Any]]:
     """By budget: what scores are off by, and seconds."""
     events = range(len(base.rows.event))
-    drawn = [_with(base, profile, np.random.default_rng(event)) for event in events]
+    drawn = [with_profile(base, profile, np.random.default_rng(event)) for event in events]
     exact = np.array([score(base, event, drawn[event], EXACT, 0) for event in events])
     rows = []
     for name, budget in BUDGETS.items():
@@ -59,7 +55,7 @@ def measured(base: Base, profile: Profile) -> list[dict[str, Any]]:
         found = [[score(base, k, drawn[k], budget, seed) for k in events] for seed in range(SHIFTS)]
         rows.append(_row(name, np.array(found) - exact, budget.total))
         rows[-1]["seconds"] = (time.perf_counter() - started) / SHIFTS
-    others = [_with(base, profile, np.random.default_rng(1000 + event)) for event in events]
+    others = [with_profile(base, profile, np.random.default_rng(1000 + event)) for event in events]
     again = np.array([score(base, k, others[k], EXACT, 0) for k in events])
     return [*rows, _row("other draws", again - exact, EXACT.total)]
 

@@ -6,7 +6,8 @@ import pickle
 import numpy as np
 import pytest
 
-from skred.campaign import CampaignError, Status, find_campaign, read_campaign, tables, write_campaign
+from skred.campaign import CampaignError, Status, find_campaign, read_campaign, write_campaign
+from skred.campaign.tables import LARGEST_FILE_BYTES, MOST_ROWS
 
 FILES = ("campaign.toml", "track.csv", "sensors.csv", "events.csv", "recordings.csv")
 
@@ -126,17 +127,12 @@ def test_other_files_are_not_looked_at(folder_with):
     assert read_campaign(folder_with({"notes.csv": b"\0\xff"})).n_events == 3
 
 
-def test_sizes_are_bounded(texts, folder_with, monkeypatch):
-    monkeypatch.setattr(tables, "LARGEST_FILE_BYTES", 2000)
-    problem = only_problem(folder_with({"events.csv": texts["events.csv"] + " " * 2000}))
+def test_sizes_are_bounded(texts, folder_with):
+    problem = only_problem(folder_with({"events.csv": texts["events.csv"] + " " * LARGEST_FILE_BYTES}))
     assert (problem.file, problem.row) == ("events.csv", None)
-    monkeypatch.undo()
-    monkeypatch.setattr(tables, "MOST_ROWS", 10)
-    problem = only_problem(
-        folder_with({"track.csv": texts["track.csv"] + "".join(f"{i},9,9\n" for i in range(301, 311))})
-    )
-    assert (problem.file, problem.row) == ("track.csv", 12)
-    monkeypatch.undo()
+    further = "".join(f"{i},9,9\n" for i in range(301, 301 + MOST_ROWS))
+    problem = only_problem(folder_with({"track.csv": texts["track.csv"] + further}))
+    assert (problem.file, problem.row) == ("track.csv", MOST_ROWS + 2)
     header = "event,release_s_m," + ",".join(f"c{i}" for i in range(200))
     assert "columns" in only_problem(folder_with({"events.csv": header})).message
     long_field = texts["events.csv"].replace("dry", "d" * 200_000)

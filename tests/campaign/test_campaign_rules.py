@@ -124,10 +124,10 @@ BROKEN = {
     ),
     "velocity just beyond": ("recordings.csv", "upper,30", "upper,200.1", 2, "value", "write it in m/s"),
     "sd that nothing measures to": (
-        "recordings.csv", "span,25,3", "span,25,1e-12", 3, "sd", "at least 0.0001 m/s",
+        "recordings.csv", "span,25,3", "span,25,1e-12", 3, "sd", "at least 0.03 m/s",
     ),
     "sd of a runout that nothing measures to": (
-        "recordings.csv", "stop,180,20", "stop,180,9e-5", 9, "sd", "at least 0.0001 m;",
+        "recordings.csv", "stop,180,20", "stop,180,9e-5", 9, "sd", "at least 0.039 m, ",
     ),
     "runout off the track": ("recordings.csv", "stop,320", "stop,900", 5, "value", "on the track"),
     "runout not reached": (
@@ -151,7 +151,7 @@ BROKEN = {
         "recordings.csv", "upper,30,,observed", "upper,-3,,at_least", 2, "value", "not negative",
     ),
     "a bound that nothing measures to": (
-        "recordings.csv", "span,25,3,observed", "span,25,1e-6,at_most", 3, "sd", "at least 0.0001",
+        "recordings.csv", "span,25,3,observed", "span,25,1e-6,at_most", 3, "sd", "at least 0.03 m/s",
     ),
     "at least some speed below a sensor not reached": (
         "recordings.csv", "lower,,,not_reached", "lower,4,,at_least", 8, "value", "did not reach sensor",
@@ -228,9 +228,11 @@ def test_a_sensor_s_own_sd_is_told_at_each_reading(texts, folder_with):
 
 
 def test_bounds_are_read(texts, folder_with):
-    text = texts["recordings.csv"].replace("upper,30", "upper,200").replace("span,25,3", "span,25,1e-4")
+    text = texts["recordings.csv"].replace("upper,30", "upper,200").replace("span,25,3", "span,25,0.2")
     campaign = read_campaign(folder_with({"recordings.csv": text}))
-    assert campaign.values[0, 0] == 200 and campaign.stated_sd[0, 1] == 1e-4
+    assert campaign.values[0, 0] == 200 and campaign.stated_sd[0, 1] == 0.2
+    with pytest.raises(CampaignError, match="0.19, expected at least 0.2 m/s, 1/1000 of the largest"):
+        read_campaign(folder_with({"recordings.csv": text.replace("25,0.2", "25,0.19")}))
 
 
 def test_a_track_may_be_level_where_fronts_are_released_with_a_speed(texts, folder_with):

@@ -12,7 +12,7 @@ import pytest
 
 from skred.campaign import CampaignError
 from skred.campaign.problems import Problem
-from skred.cli.diagnose import is_answer
+from skred.cli.diagnose import ends_with
 from skred.cli.program import exit_code_of
 from skred.errors import InputError
 from skred.output import results_folder
@@ -93,16 +93,15 @@ def test_a_fault_that_cannot_be_written_down() -> None:
 @pytest.mark.parametrize(
     ("document", "expected"),
     [
-        ({"reason": None, "converged": True}, True),
-        ({"reason": "only 5 avalanches", "converged": True}, True),
-        ({"reason": "the chains did not converge", "converged": False}, False),
-        ({"reason": None, "converged": False}, True),
+        ({"reason": None, "converged": True}, 0),
+        ({"reason": "only 5 avalanches", "converged": True}, 0),
+        ({"reason": "the chains did not converge", "converged": False}, 1),
+        ({"reason": None, "converged": False}, 0),
     ],
 )
-def test_convergence_alone_decides_what_a_diagnosis_ends_with(
-    document: dict[str, object], expected: bool
-) -> None:
-    assert is_answer(document) is expected
+def test_what_a_diagnosis_ends_with(document: dict[str, object], expected: int) -> None:
+    """A verdict of which a refit did not converge is an answer, and says so."""
+    assert ends_with(document) == expected
 
 
 FAULT = """

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-import importlib
 import io
 import json
+import os
+import signal
+import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from rich.console import Console
-from rich.text import Text
 
 from skred.campaign import Campaign, find_campaign, read_campaign, write_campaign
-from skred.cli.main import run
+from skred.cli.main import app, run
+from skred.cli.options import DIAGNOSING
 from skred.diagnosis.detect.run import (
     base_of,
     identifiability,
@@ -26,14 +27,12 @@ from skred.diagnosis.detect.run import (
     identify_to,
 )
 from skred.diagnosis.detect.score_test import placed_mechanisms
-from skred.diagnosis.detect.too_little import too_little
-from skred.diagnosis.effort import QUICK_REPLICAS, Effort
-from skred.diagnosis.outcome import NotDiagnosed
-from skred.diagnosis.verdict.document import verdict
+from skred.diagnosis.diagnose import as_diagnosed
+from skred.diagnosis.effort import QUICK_REPLICAS, SAMPLING, Effort
+from skred.inference.calibrate import calibrate
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.physics.laws import load_law
 from skred.report.diagnosis.identify import identify_table
-from skred.report.diagnosis.report import diagnosis_table
 
 RYGGFONN = read_campaign(find_campaign("ryggfonn"))
 
@@ -184,65 +183,50 @@ def runouts_only(campaign: Campaign) -> Campaign:
 def test_too_few_recordings_are_an_answer_before_anything_is_sampled(
     campaign: Campaign, have: str, more: str, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def sampled(*_: Any) -> Any:
-        raise AssertionError("something was sampled")
-
-    monkeypatch.setattr("skred.diagnosis.diagnose.calibrate_surely", sampled)
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     write_campaign(campaign, folder / "few")
     assert run(["diagnose", "few", "--quiet", "--out", "told"]) == 0
     document = json.loads((folder / "told" / "verdict.json").read_text())
     assert document["verdict"] == "cannot_tell" and document["converged"] is True
     assert document["reason"].startswith(have) and more in document["statement"]
+    assert document["seconds"] == {}, "a stage was begun"
     assert run(["identify", "few", "--quiet", "--out", "identified"]) == 0
     assert json.loads((folder / "identified" / "identify.json").read_text())["reason"] == document["reason"]
 
 
+CALLED = """
+import signal
+from skred.cli.main import main
+signal.signal(signal.SIGINT, signal.default_int_handler)  # as in a terminal, however the tests were started
+main()
+"""
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("error", "code", "said"),
-    [
-        (KeyboardInterrupt, 130, "interrupted; what was finished is in {left}"),
-        (OSError, 2, "what was finished is in {left}"),
-        (ZeroDivisionError, 3, "the traceback is in {left}/traceback.txt"),
-    ],
-)
-@pytest.mark.parametrize(
-    ("command", "module", "function", "file"),
-    [
-        ("identify", "skred.diagnosis.detect.run", "identify_to", "identify.json"),
-        ("diagnose", "skred.diagnosis.run", "diagnose_to", "verdict.json"),
-        ("predict", "skred.prediction.predict", "predict", "predict.json"),
-        ("compare", "skred.model_selection.compare", "compare", "compare.json"),
-    ],
-)
-def test_a_command_that_breaks_off_leaves_earlier_results(
-    command: str,
-    module: str,
-    function: str,
-    file: str,
-    error: type[BaseException],
-    code: int,
-    said: str,
-    folder: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """And says where what it had written is: a verdict is not lost because a figure cannot be drawn."""
-    (folder / "out").mkdir()
-    (folder / "out" / file).write_text("earlier")
-
-    def breaks_off(*given: Any, **more: Any) -> None:
-        (where,) = (one for one in given if isinstance(one, Path))
-        (where / file).write_text("new")
-        raise error
-
-    monkeypatch.setenv("OMP_NUM_THREADS", "1")  # no helpers: they would start for nothing
-    monkeypatch.setattr(importlib.import_module(module), function, breaks_off)
-    assert run([command, "--out", "out", "--force", "--quiet"]) == code
-    left = Path("out") / ".skred-unfinished"
-    assert said.format(left=left) in capsys.readouterr().err
-    assert (folder / "out" / file).read_text() == "earlier" and (left / file).read_text() == "new"
+@pytest.mark.parametrize("command", ["identify", "diagnose", "predict", "compare"])
+def test_a_command_that_is_interrupted_leaves_earlier_results(command: str, folder: Path) -> None:
+    """By Ctrl-C as soon as it tells of its first stage; it was about to write elsewhere."""
+    out = folder / "out"
+    out.mkdir()
+    (out / f"{command}.json").write_text("earlier")
+    with subprocess.Popen(
+        [sys.executable, "-c", CALLED, command, "--out", "out", "--force"],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=folder,
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
+    ) as process:
+        assert process.stderr is not None
+        stage = process.stderr.readline()
+        assert "pcm" in stage or command == "compare", stage
+        assert (out / ".skred-unfinished").is_dir()
+        process.send_signal(signal.SIGINT)
+        told = process.stderr.read()
+    assert process.returncode == 130 and told.splitlines()[-1] == "interrupted", told
+    assert "Traceback" not in told
+    assert [file.name for file in out.iterdir() if file.is_dir()] == []
+    assert (out / f"{command}.json").read_text() == "earlier"
 
 
 BAD = [
@@ -276,94 +260,59 @@ def test_bad_efforts_are_told(words: list[str], folder: Path, capsys: pytest.Cap
     assert list(folder.iterdir()) == []
 
 
-Diagnosed = Callable[..., list[dict[str, Any]]]
-
-
 @pytest.fixture
-def diagnosed(monkeypatch: pytest.MonkeyPatch) -> Diagnosed:
-    """Diagnoses made up instead of computed; what they were asked for is kept."""
-    import skred.diagnosis.run as module
-
+def few(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a campaign of five avalanches: too few, so that their diagnosis ends at once."""
     monkeypatch.setenv("OMP_NUM_THREADS", "1")  # no helpers: they would start for nothing
-    asked: list[dict[str, Any]] = []
-
-    def with_reason(reason: str | None, converged: bool = True) -> list[dict[str, Any]]:
-        def made_up(
-            problem: Any, law: Any, settings: Any, effort: Any, folder: Any, tell: Any, **more: Any
-        ) -> Any:
-            tell("a stage")
-            asked.append({"problem": problem, "law": law, "settings": settings, "effort": effort, **more})
-            document = {"verdict": "cannot_tell", "reason": reason, "converged": converged}
-            return document | {"statement": "What [it] says."}
-
-        monkeypatch.setattr(module, "diagnose_to", made_up)
-        monkeypatch.setattr("skred.report.folders.write_reports", lambda folder: [])
-        return asked
-
-    report = ModuleType("skred.report.diagnosis.report")
-    report.diagnosis_table = lambda document: Text(document["statement"])  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "skred.report.diagnosis.report", report)
-    return with_reason
+    write_campaign(first_events(5), folder / "few")
+    return folder
 
 
-def test_a_diagnosis_is_told_with_its_statement() -> None:
-    problem = hierarchical_problem(first_events(5))
-    document = verdict(NotDiagnosed(problem, load_law("pcm"), too_little(problem)))
-    told = io.StringIO()
-    Console(width=80, file=told).print(diagnosis_table(document))
-    assert " ".join(told.getvalue().split()).count(document["statement"]) == 1
-
-
-@pytest.mark.parametrize(
-    ("reason", "converged", "code"),
-    [(None, True, 0), ("the gate failed", False, 1), ("too few avalanches", True, 0), (None, False, 0)],
-)
-def test_what_a_diagnosis_ends_with(
-    reason: str | None,
-    converged: bool,
-    code: int,
-    folder: Path,
-    diagnosed: Diagnosed,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """A verdict of which a refit did not converge is an answer, and says so."""
-    diagnosed(reason, converged)
-    assert run(["diagnose", "--out", "told"]) == code
+def test_a_diagnosis_is_told_with_its_statement(few: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["diagnose", "few", "--out", "told"]) == 0
     told = capsys.readouterr()
-    assert told.err == "a stage\nwriting the report\n"
-    assert told.out == "What [it] says.\n\nwritten: told\n"
-    assert run(["diagnose", "--json"]) == code
+    assert told.err == "writing the report\n"
+    document = json.loads((few / "told" / "verdict.json").read_text())
+    assert " ".join(told.out.split()).count(document["statement"]) == 1
+    assert "[bold]few" in told.out and told.out.endswith("\n\nwritten: told\n")
+    assert (few / "told" / "report.html").is_file()
+    assert run(["diagnose", "few", "--json"]) == 0
     told = capsys.readouterr()
-    assert json.loads(told.out)["reason"] == reason and told.err == ""
-    assert run(["diagnose", "--quiet"]) == code
+    assert json.loads(told.out) == document and told.err == ""
+    assert run(["diagnose", "few", "--quiet"]) == 0
     assert capsys.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        ([], (Effort().replicas, 2, False)),
-        (["--quick"], (QUICK_REPLICAS, 1, False)),
-        (["--quick", "--max-mechanisms", "2"], (QUICK_REPLICAS, 2, False)),
-        (["--max-mechanisms", "1", "--exact-loo"], (Effort().replicas, 1, True)),
+        ([], Effort()),
+        (["--quick"], Effort(QUICK_REPLICAS, 1)),
+        (["--quick", "--max-mechanisms", "2"], Effort(QUICK_REPLICAS, 2)),
+        (["--max-mechanisms", "1", "--exact-loo"], Effort(Effort().replicas, 1, exact_loo=True)),
     ],
 )
-def test_how_much_is_computed(
-    words: list[str], expected: tuple[int, int, bool], folder: Path, diagnosed: Diagnosed
-) -> None:
-    asked = diagnosed(None)
-    assert run(["diagnose", *words]) == 0
-    effort = asked[0]["effort"]
-    assert (effort.replicas, effort.max_mechanisms, effort.exact_loo) == expected
+def test_how_much_is_computed(words: list[str], expected: Effort, few: Path) -> None:
+    _, given, _ = app.parse_args(["diagnose", "few", *words])
+    assert given.arguments.get("diagnosing", DIAGNOSING).effort() == expected
+    assert run(["diagnose", "few", *words, "--out", "told", "--quiet"]) == 0
+    settings = json.loads((few / "told" / "verdict.json").read_text())["settings"]
+    assert settings["replicas"] == expected.replicas
 
 
-def test_what_a_diagnosis_is_asked(folder: Path, diagnosed: Diagnosed) -> None:
-    asked = diagnosed(None)
-    words = ["diagnose", "ryggfonn-with-dam", "--base-model", "constant", "--seed", "7"]
-    assert run([*words, "--smoothing", "20", "--errors", "student"]) == 0
-    (one,) = asked
-    problem, settings = one["problem"], one["settings"]
-    assert problem.campaign.name == "ryggfonn-with-dam" and problem.likelihood == "hierarchical"
-    assert problem.terrain.smoothing_m == 20.0 and problem.error_model.id == "student"
-    assert one["law"].id == "constant"
-    assert (settings.sampler, settings.seed, settings.draws, settings.tune) == ("metropolis", 7, 600, 1000)
+@pytest.mark.slow
+def test_what_a_diagnosis_is_asked(folder: Path) -> None:
+    """The base law's draws are those of a calibration with the same law, errors, terrain and seed."""
+    campaign = first_events(8)
+    write_campaign(campaign, folder / "eight")
+    words = ["diagnose", "eight", "--base-model", "constant", "--seed", "7", "--quick"]
+    assert run([*words, "--smoothing", "20", "--errors", "student", "--out", "told", "--quiet"]) == 0
+    document = json.loads((folder / "told" / "verdict.json").read_text())
+    settings = replace(SAMPLING, seed=7)
+    assert document["base_model"] == "constant"
+    assert document["settings"] == settings.as_dict() | {"replicas": QUICK_REPLICAS}
+    problem = as_diagnosed(hierarchical_problem(campaign, error_model="student", smoothing_m=20.0))
+    draws = calibrate(problem, load_law("constant"), settings).tree["posterior"]["retardation"]
+    with xr.open_datatree(folder / "told" / "base.nc", engine="h5netcdf") as written:
+        assert written.attrs["campaign_fingerprint"] == campaign.fingerprint()
+        np.testing.assert_allclose(written["posterior"]["retardation"], draws, rtol=1e-10)

@@ -15,6 +15,8 @@ from skred.report.mechanisms import mechanism_document
 
 ALL = mechanisms()
 COLUMNS = 80
+UNITS = {"1": "-", "m": "m", "m-1": "1/m", "s-1": "1/s", "m s-2": "m/s²"}
+"""As people read them."""
 
 
 @pytest.fixture(autouse=True)
@@ -38,7 +40,7 @@ def test_all_in_a_table(capsys: pytest.CaptureFixture[str]) -> None:
         (row,) = (line for line in lines if line.startswith(f"{mechanism.id} "))
         strength, added = mechanism.strength, mechanism.added
         assert added is not None
-        assert f"{strength.symbol} [{strength.unit}]" in row and f" {added.scale:g} " in row
+        assert f"{strength.symbol} [{UNITS[strength.unit]}]" in row and f" {added.scale:g} " in row
         assert ("±" in row) is added.either_sign and str(mechanism.group) in row
     assert max(map(len, lines)) <= COLUMNS
 
@@ -63,6 +65,7 @@ def test_one_in_full(mechanism_id: str, capsys: pytest.CaptureFixture[str]) -> N
         assert text in flat
     assert f"https://doi.org/{mechanism.doi}" in out and mechanism.strength.name in out
     assert ("sign either" in flat) is added.either_sign
+    assert f"unit {UNITS[mechanism.strength.unit]} sign" in flat and " m s-" not in flat
 
 
 def test_shapes_in_words(capsys: pytest.CaptureFixture[str]) -> None:

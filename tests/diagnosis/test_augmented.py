@@ -247,7 +247,7 @@ def test_chains_start_around_the_posterior(problem: AugmentedProblem, calibratio
     assert np.median(problem.log_likelihood(law, prior).sum(axis=1)) < np.median(height) - 25.0
 
 
-def test_draws_agree_with_the_race(drag: Curve, calibration: Any) -> None:
+def test_draws_agree_with_the_comparison(drag: Curve, calibration: Any) -> None:
     mean, sd = drag.moments
     draws = calibration.tree["posterior"]["turbulent_drag"].values
     assert abs(draws.mean() - mean) < 0.35 * sd  # three events: Laplace's formula is rough

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,9 +24,10 @@ from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.verdict.document import verdict
-from skred.inference.hierarchical.problem import hierarchical_problem
+from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
 from skred.inference.sampling import SamplerSettings
 from skred.physics.laws import load_law
+from skred.physics.mechanisms.spec import Mechanism
 
 
 def small(n_events: int = 8) -> Campaign:
@@ -91,12 +93,16 @@ def test_a_gate_that_fails_gives_no_name() -> None:
     assert_refused(verdict(found), "the gate of the base law's calibration failed")
 
 
-def test_numerics_that_break_down_give_no_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(*_: object) -> Any:
+class BreaksDown(HierarchicalProblem):
+    """Recordings whose integration over events fails."""
+
+    def surfaces(self, mechanisms: Sequence[Mechanism]) -> Any:
         raise np.linalg.LinAlgError("Matrix is not positive definite")
 
-    monkeypatch.setattr("skred.diagnosis.diagnose.calibrate_surely", fails)
-    document = diagnosed(small())
+
+def test_numerics_that_break_down_give_no_name() -> None:
+    problem = hierarchical_problem(small())
+    document = diagnosed(small(), BreaksDown(problem.campaign, problem.terrain))
     assert_refused(document, "the numerics broke down in 'base': Matrix is not positive definite")
 
 

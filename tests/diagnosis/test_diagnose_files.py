@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import xarray as xr
-from diagnosis_cases import gates_diagnosis
+from diagnosis_cases import gates_campaign, gates_diagnosis
 
 from skred.campaign.parts import of_events
 from skred.diagnosis.effort import Effort
@@ -71,3 +72,18 @@ def test_files_of_what_is_not_there_are_not_written(tmp_path: Path) -> None:
     clean.mkdir()
     write_trees(gates_diagnosis(biased=False), clean)
     assert {file.name for file in clean.iterdir()} == {"base.nc", "diagnosis.nc"}
+
+
+@pytest.mark.slow
+def test_locked_avalanches_and_folds_are_in_the_verdict(tmp_path: Path) -> None:
+    """The diagnosis is repeated without each fold of those that are not locked."""
+    problem = hierarchical_problem(gates_campaign(range(16), biased=True))
+    settings, effort = SamplerSettings("metropolis", 300, 300, 4, 0), Effort(replicas=25, max_mechanisms=1)
+    diagnose_to(problem, load_law("constant"), settings, effort, tmp_path, lock=3, folds=2)
+    document = json.loads((tmp_path / "verdict.json").read_text())
+    locked, folds = document["locked"]["events"], document["outer_folds"]["folds"]
+    assert len(locked) == 3 and len(folds) == 2
+    others = [event for fold in folds for event in fold["events"]]
+    assert sorted([*locked, *others]) == sorted(problem.campaign.event_ids)
+    assert document["mechanism"] == "sensor_bias" == folds[0]["mechanism"] == folds[1]["mechanism"]
+    assert document["locked"]["elpd_diff"] > 0.0 and document["outer_folds"]["elpd_diff"] > 0.0

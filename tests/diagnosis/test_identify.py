@@ -88,8 +88,6 @@ def test_more_events_tell_more(base: Base, table: dict[str, Detectability]) -> N
     events = tuple(replace(event, id=f"{event.id} {k}") for k, event in enumerate(four.events))
     problem = replace(base.problem, campaign=replace(four, events=events))
     score_test = ScoreTest(problem, base.law, setting_of(problem, base.law))
-    kept = [c for c in score_test.placed_mechanisms if c.direction.log_strengths is None]
-    score_test.__dict__["candidates"] = kept
     rows = campaign_rows(score_test.extension)
     scores = score_test.scores(rows, np.tile(base.fit.points, (4, 1)), base.population)
     for row in told(score_test, scores):

@@ -145,13 +145,13 @@ def test_ties_across_groups() -> None:
     assert not decide(shares(0.2, 0.3, sensor_bias=0.5), 0.9, True).disputed
 
 
-def test_no_instrument_in_the_race() -> None:
+def test_no_instrument_in_the_comparison() -> None:
     assert decide(shares(0.1, 0.05, obstacle=0.85), 0.005, True).names == ("obstacle",)
     assert decide(shares(0.1, 0.2, obstacle=0.7), 0.005, True).names == ("obstacle", "unlisted")
     assert decide(shares(0.1, 0.9), 0.005, True).verdict == "unexplained"
 
 
-def test_the_race_alone_and_the_check_alone() -> None:
+def test_the_comparison_alone_and_the_check_alone() -> None:
     """A comparison that leaves nothing less than 15 % is an alarm; a check that fires against it is none."""
     sure = shares(0.14, 0.01, obstacle=0.85)
     assert decide(sure, p_value=0.9, can_tell=True).names == ("obstacle",)

@@ -28,7 +28,7 @@ KEYS = (
     "indistinguishable", "location", "strength", "covariate", "sensor", "equation", "evidence", "held_out",
     "detection_limits", "next_sensor", "diagnostics", "statement",
 )  # fmt: skip
-MORE = ("alarm_by", "converged", "refits_not_converged", "influence")
+MORE = ("alarm_by", "converged", "refits_not_converged", "influence", "conditional")
 """Keys that came later: they are written, and verdicts before them stay whole."""
 NULLABLE = {
     "evidence": ("elpd_diff", "elpd_se", "log_bayes_factor", "p_value"),
@@ -120,6 +120,21 @@ def failed() -> dict[str, Any]:
     return cannot_tell() | nothing | {"probability": {}, "detection_limits": {}, "next_sensor": None}
 
 
+def given_above(**more: Any) -> dict[str, Any]:
+    """Readings predicted from those above them."""
+    scores: dict[str, Any] = {"n": 20, "coverage_90_before": 0.65, "coverage_90_after": 0.8}
+    for name in ("rmse", "crps", "log_score"):
+        sign = -1.0 if name == "log_score" else 1.0
+        scores |= {f"{name}_before": sign * 10.4, f"{name}_after": sign * 8.3, f"{name}_diff": -sign * 2.1}
+        scores |= {f"{name}_{key}_2se": 1.5 for key in ("before", "after", "diff")}
+    sets = {"gain": "better", "all": scores, "carrying": scores | more, "others": None}
+    sensor = {"sensor": "CD", "quantity": "front_velocity", "unit": "m s-1", **sets}
+    return {
+        "sensors": [sensor], "speeds": sets, "effective_draws_min": 40.0, "n_few_draws": 2,
+        "statement": "So.",
+    }  # fmt: skip
+
+
 VALID: dict[str, Callable[[], dict[str, Any]]] = {
     "nothing": nothing_missing,
     "named": lambda: named("segment_drag", location=STRETCH),
@@ -140,6 +155,11 @@ VALID: dict[str, Callable[[], dict[str, Any]]] = {
     "not converged": lambda: nothing_missing() | {"converged": False, "refits_not_converged": ["3"]},
     "an interval of the place": lambda: named(
         "segment_drag", location=STRETCH | {"s_from_interval_m": [1850.0, 1900.0], "s_to_interval_m": None}
+    ),
+    "given above": lambda: named("segment_drag", location=STRETCH, conditional=given_above()),
+    "nothing given above": lambda: nothing_missing() | {"conditional": None},
+    "one avalanche given above": lambda: named(
+        "segment_drag", location=STRETCH, conditional=given_above(rmse_diff_2se=None)
     ),
     "more keys": lambda: nothing_missing() | {"reason": None, "seconds": {"comparison": 3.0}},
 }
@@ -218,6 +238,15 @@ def test_numbers_may_be_null_but_not_left_out(part: str, key: str) -> None:
         ("not converged", "converged", None),
         ("not converged", "refits_not_converged", [3]),
         ("an interval of the place", "location.s_from_interval_m", [1850.0]),
+        ("given above", "conditional.sensors.0.all.n", 0),
+        ("given above", "conditional.sensors.0.all.rmse_before", None),
+        ("given above", "conditional.sensors.0.all.crps_after", -1.0),
+        ("given above", "conditional.sensors.0.all.coverage_90_after", 1.2),
+        ("given above", "conditional.sensors.0.all", None),
+        ("given above", "conditional.sensors.0.gain", "very much"),
+        ("given above", "conditional.speeds.carrying.log_score_diff_2se", -0.1),
+        ("given above", "conditional.statement", ""),
+        ("given above", "conditional.n_few_draws", None),
         ("nothing", "indistinguishable", ["obstacle"]),
         ("named", "verdict", "nothing_missing"),
         ("named", "verdict", "instrument"),

@@ -12,6 +12,7 @@ import xarray as xr
 
 from skred.inference.calibrate import Calibration, calibrate
 from skred.inference.hierarchical.problem import INTEGRATION_LIMIT, HierarchicalProblem, hierarchical_problem
+from skred.inference.hierarchical.results import MOST_AVALANCHES
 from skred.inference.results import predictive, save
 from skred.inference.sampling import SamplerSettings
 from skred.output import plain
@@ -31,11 +32,17 @@ def test_the_gate_is_passed_and_the_integration_checked(calibrated: Calibration)
     assert integration["checked_events"] == 22
 
 
-def test_a_wrong_integration_fails_the_gate(calibrated: Calibration, monkeypatch: pytest.MonkeyPatch) -> None:
-    wrong = lambda self, law, samples, seed=0: np.full((3, 22), 0.02)  # noqa: E731
-    monkeypatch.setattr(HierarchicalProblem, "integration_errors", wrong)
+class Wrong(HierarchicalProblem):
+    """With an integration over events that is wrong by 0.02 nats."""
+
+    def integration_errors(self, law: Any, samples: Any, seed: int = 0) -> Any:
+        return np.full((3, 22), 0.02)
+
+
+def test_a_wrong_integration_fails_the_gate(calibrated: Calibration) -> None:
     posterior = calibrated.tree["posterior"].to_dataset()
-    [problem] = calibrated.problem.numerical_problems(calibrated.law, posterior)
+    wrong = Wrong(calibrated.problem.campaign, calibrated.problem.terrain)
+    [problem] = wrong.numerical_problems(calibrated.law, posterior)
     assert "wrong by 0.02 nats per event" in problem
     assert not calibrated.gate.with_numerical_problems([problem]).passed
 
@@ -79,12 +86,13 @@ def test_the_summary_sets_the_next_avalanche_beside_the_recorded(calibrated: Cal
     assert fast["low"] < fast["median"] < fast["high"] < slow["median"]
 
 
-def test_many_events_thin_the_draws(calibrated: Calibration, monkeypatch: pytest.MonkeyPatch) -> None:
-    import skred.inference.hierarchical.results as module
-
-    monkeypatch.setattr(module, "MOST_AVALANCHES", 22 * 100)
+def test_many_draws_are_thinned(calibrated: Calibration) -> None:
+    """Ten times the posterior's, of 22 avalanches."""
     tree = calibrated.tree
     posterior, prior = tree["posterior"].to_dataset(), tree["prior"].to_dataset()
-    groups = predictive(calibrated.problem, calibrated.law, posterior, prior, 0)
-    assert groups["event_posterior"].sizes["draw"] * 4 <= 100
-    assert groups["event_posterior"]["draw"].values[1] == 20
+    many = xr.concat([posterior] * 10, "draw").assign_coords(draw=np.arange(5000))
+    groups = predictive(calibrated.problem, calibrated.law, many, prior, 0)
+    for name in ("event_posterior", "posterior_predictive"):
+        draws = groups[name]["draw"].values
+        assert draws[1] == 3 and len(draws) * 4 * 22 <= MOST_AVALANCHES < 2 * len(draws) * 4 * 22
+    assert groups["prior_predictive"].sizes["draw"] == prior.sizes["draw"]

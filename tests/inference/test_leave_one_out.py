@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skred.inference.leave_one_out import ExactLoo, exact_leave_one_out
+from skred.inference.leave_one_out import ExactLoo, exact_leave_one_out, samples_of
 
 
 @pytest.fixture(scope="module")
@@ -88,3 +88,18 @@ def test_a_refit_that_does_not_converge_is_named(calibration: Any) -> None:
     apart: Any = ChainsApart()
     result = exact_leave_one_out(calibration.model, apart, ["bad", "good"], 0)
     assert result.failed == ("bad",)
+
+
+def test_draws_of_a_refit_are_those_of_the_weighted_posterior(exact: ExactLoo, calibration: Any) -> None:
+    """Each parameter by the other events: back from its transform, against importance sampling."""
+    samples = samples_of(calibration.model, calibration.step, exact.draws[:3])
+    posterior = calibration.tree["posterior"].to_dataset()
+    terms = calibration.tree["log_likelihood"]["recordings"].transpose("chain", "draw", ...).values
+    assert len(samples) == 3
+    for event, one in enumerate(samples):
+        weights = np.exp(-terms[..., event].ravel())
+        for parameter in calibration.problem.parameters(calibration.law):
+            draws = posterior[parameter.name].transpose("chain", "draw").values.ravel()
+            expected, sd = np.average(draws, weights=weights), draws.std()
+            assert abs(one[parameter.name].mean() - expected) < 0.15 * sd
+            assert 0.8 * sd < one[parameter.name].std() < 1.25 * sd

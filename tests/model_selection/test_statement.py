@@ -59,7 +59,7 @@ def test_a_clear_winner() -> None:
     assert "Evidence by sequential Monte Carlo agrees" in text
 
 
-def test_a_close_race_prefers_nobody() -> None:
+def test_laws_close_to_each_other_are_not_preferred() -> None:
     text = told(model("A"), behind("B", 1.5, 2.0, False), behind("C", 40.0, 5.0, True))
     assert "recordings put first law A" in text and "prefer law" not in text
     assert "law B is behind by 1.50 (standard error 2.00): no practical difference" in text

@@ -9,14 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from skred.parallel import processes as helping
 from skred.parallel.processes import helpers, meanwhile, worker_pool
 from skred.parallel.threads import threads
 
 
 @pytest.fixture
 def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(helping, "threads", lambda: 2)
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
 
 
 def where(number: int, base: list[int]) -> tuple[int, int, int, int]:
@@ -25,7 +24,7 @@ def where(number: int, base: list[int]) -> tuple[int, int, int, int]:
     return number, number + base[0], os.getpid(), threads()
 
 
-def test_a_crew_shares_jobs_between_this_process_and_a_helper(two_cores: None) -> None:
+def test_a_worker_pool_shares_jobs_between_this_process_and_a_helper(two_cores: None) -> None:
     base = [100]
     with helpers("skred.physics.kernel.fronts"), worker_pool() as pool:
         found = list(pool.map(lambda number: where(number, base), range(60)))  # closures go there too
@@ -45,7 +44,7 @@ def test_without_helpers_all_is_done_here(two_cores: None) -> None:
 
 
 def test_one_core_has_no_helpers(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(helping, "threads", lambda: 1)
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
     with helpers():
         assert meanwhile(os.getpid)() == os.getpid()
 

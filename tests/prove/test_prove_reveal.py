@@ -7,11 +7,16 @@ import shutil
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from prove_cases import Alone, silent
 from rich.console import Console
 
+from skred.campaign import read_campaign
 from skred.cli.main import run as skred
+from skred.diagnosis.predict.gain import realised_gain
+from skred.diagnosis.predict.predictor_document import as_dict
+from skred.diagnosis.predict.unseen import Predictor
 from skred.errors import InputError
 from skred.prove.folder import ProofFolder, read_object
 from skred.prove.ledger import read_ledger
@@ -174,36 +179,37 @@ def test_trials_are_shown_once_they_are_opened(
         opened_trial(answered, "2")
 
 
-def test_gains_are_realised_once(answered: ProofFolder, monkeypatch: pytest.MonkeyPatch) -> None:
-    import skred.diagnosis.predict.gain
+def predictor(retardation: float) -> dict[str, Any]:
+    """Of a law with one retardation [m s-2], on any path."""
+    means, factors = np.full((5, 1), np.log(retardation)), np.full((5, 1, 1), 0.3)
+    return as_dict(Predictor("constant", "robust", 8.0, 10.0, means, factors, (), np.empty((5, 0))))
 
-    asked: list[Any] = []
 
-    def realised(predictors: Any, campaign: Any, fresh: Any) -> dict[str, Any]:
-        asked.append(predictors["after"])
-        assert campaign.name and fresh.n_events == 12
-        if predictors["after"] == "damaged":
-            raise InputError("damaged")
-        return {"realised": 0.4, "se": 0.1, "n_fresh": 12}
+def gains(proof: ProofFolder) -> list[dict[str, Any]]:
+    """Of all three trials, as the scorer gets them."""
+    scorer = Scorer()
+    reveal(proof, Alone(), silent, score=scorer)
+    return [scorer.given[3]["skred"][f"trial-{number:04d}"]["gain"] for number in (1, 2, 3)]
 
-    monkeypatch.setattr(skred.diagnosis.predict.gain, "realised_gain", realised)
-    for number, after in enumerate(["good", "damaged", None], 1):
-        edit(
-            answered.answer(f"trial-{number:04d}"),
-            predictors={"before": 0, "after": after},
-            gain={"promised": 0.5},
-        )
-    for _ in range(2):
-        scorer = Scorer()
-        reveal(answered, Alone(), silent, score=scorer)
-        given = scorer.given[3]["skred"]
-        assert given["trial-0001"]["gain"] == {"promised": 0.5, "realised": 0.4, "se": 0.1, "n_fresh": 12}
-        assert given["trial-0002"]["gain"] == {"promised": 0.5, "error": "damaged"}
-        assert given["trial-0003"]["gain"] == {"promised": 0.5}
-    assert asked == ["good", "damaged"]
-    edit(answered.answer("trial-0001"), predictors={"before": 0, "after": "better"})
-    reveal(answered, Alone(), silent, score=Scorer())
-    assert asked == ["good", "damaged", "better"]
+
+def test_gains_are_realised_once(answered: ProofFolder) -> None:
+    before, after = predictor(2.0), predictor(3.0)
+    damaged = {**after, "law": "bingham"}
+    for number, one in enumerate([after, damaged, None], 1):
+        predictors = {"before": before, "after": one}
+        edit(answered.answer(f"trial-{number:04d}"), predictors=predictors, gain={"promised": 0.5})
+    campaign, fresh = (read_campaign(at("trial-0001")) for at in (answered.campaign, answered.fresh))
+    exact = realised_gain({"before": before, "after": after}, campaign, fresh)
+    assert exact is not None and exact["realised"] != 0.0 and exact["n_fresh"] == 12
+    first, second, third = gains(answered)
+    assert first == {"promised": 0.5, **exact} and third == {"promised": 0.5}
+    assert set(second) == {"promised", "error"} and "bingham" in second["error"]
+    # What was computed is kept, and belongs to that very answer.
+    kept = answered.path / "gains" / "skred" / "trial-0001.json"
+    edit(kept, gain=exact | {"realised": 0.4})
+    assert gains(answered)[0]["realised"] == 0.4
+    edit(answered.answer("trial-0001"), predictors={"before": before, "after": before})
+    assert gains(answered)[0]["realised"] == 0.0
 
 
 def test_truth_beside_answer() -> None:

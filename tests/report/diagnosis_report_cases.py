@@ -32,8 +32,10 @@ from skred.diagnosis.outcome import (
     Outcome,
     ProfileAdded,
 )
+from skred.diagnosis.predict.conditional import BeforeAfter, Conditional, above
+from skred.diagnosis.predict.draws import Draws
 from skred.diagnosis.predict.held_out import HeldOut
-from skred.diagnosis.predict.profile_law import Draws, ProfileLaw
+from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.document import verdict
 from skred.diagnosis.verdict.figure_data import figure_data
 from skred.diagnosis.verdict.report_facts import report_facts
@@ -77,7 +79,9 @@ def curves_of(mechanism, setting, top: float, at: float) -> Candidate:
     return Candidate(mechanism, tuple(curves), np.full(len(curves), -np.log(len(curves))))
 
 
-def race_of(problem: HierarchicalProblem, tops: dict[str, float], n_heats: int = 1) -> Comparison:
+def comparison_of(
+    problem: HierarchicalProblem, tops: dict[str, float], n_error_models: int = 1
+) -> Comparison:
     """A comparison in which some candidates have evidence."""
     setting = setting_of(problem, LAW)
     candidates = {
@@ -90,7 +94,7 @@ def race_of(problem: HierarchicalProblem, tops: dict[str, float], n_heats: int =
     profile = SimpleNamespace(log_bayes_factor=tops.get("unlisted", -1.0), kind=KINDS[0])
     under_each = tuple(
         ComparisonUnderErrors(name, SimpleNamespace(), candidates, [profile], [])
-        for name in ("robust", "student")[:n_heats]
+        for name in ("robust", "student")[:n_error_models]
     )
     odds = prior_odds(candidate.mechanism for candidate in candidates.values())
     return Comparison(under_each, odds, {"robust": -100.0, "student": -103.0})
@@ -134,6 +138,19 @@ def held(problem: HierarchicalProblem, better: float) -> HeldOut:
     )
 
 
+def given_above(problem: HierarchicalProblem, better: float) -> Conditional:
+    """Readings by those above them: in all avalanches better by as much, and nearer to what was read."""
+    rng = np.random.default_rng(6)
+    seen = problem.observed
+    off = rng.normal(0.0, 6.0, seen.shape) / (1.0 + better)
+    mean = np.where(seen, problem.values + off, np.nan)
+    score = np.where(seen, rng.normal(-3.0, 0.5, seen.shape) + better, np.nan)
+    n_above = np.where(seen, seen.astype(int) @ above(problem).T.astype(int), 0)
+    return Conditional(
+        mean, mean - 8.0, mean + 8.0, score, np.abs(off), n_above, np.where(seen, 240.0, np.nan)
+    )
+
+
 def calibration(problem: HierarchicalProblem, added: tuple = (), gate: Gate = GATE) -> SimpleNamespace:
     """What the report reads of a calibration; with added strengths, of an augmented law's."""
     tree = hierarchical_calibration(problem, LAW)
@@ -171,7 +188,7 @@ def diagnosis(kind: str, text: str = "") -> Outcome:
         "sensor": {"sensor_bias": 40.0},
         "unexplained": {"unlisted": 30.0},
     }.get(kind, {kind: 40.0})
-    comparison = race_of(problem, tops, 2 if kind in ("tie", "sensor") else 1)
+    comparison = comparison_of(problem, tops, 2 if kind in ("tie", "sensor") else 1)
     names = {
         "tie": ("entrainment", "segment_drag"), "two": ("covariate_friction",), "sensor": ("sensor_bias",),
     }.get(kind, (kind,) if kind in mechanisms() else ())  # fmt: skip
@@ -193,6 +210,9 @@ def diagnosis(kind: str, text: str = "") -> Outcome:
         problem, LAW, calibration(problem), SimpleNamespace(), table,
         BootstrapTest(30.0 if alarm else 0.3, clean), comparison, Decision(verdict_, names),
         location(), finding, held(problem, 0.0), hangs_on(verdict_, names, problem),
+        None if isinstance(finding, NothingAdded) else BeforeAfter(
+            given_above(problem, 0.0), given_above(problem, 0.4)
+        ),
         {"base": 12.3, "comparison": 45.6},
     )  # fmt: skip
 
@@ -233,18 +253,20 @@ def profile_law(problem: HierarchicalProblem, clean: np.ndarray) -> ProfileLaw:
 def _steps(problem, comparison, names, clean, *, second):
     if not names:
         return ()
-    raced = [(names, comparison)]
+    compared = [(names, comparison)]
     if second:
-        again = race_of(problem, {"obstacle": 30.0})
-        raced.append((("obstacle",), again))
+        again = comparison_of(problem, {"obstacle": 30.0})
+        compared.append((("obstacle",), again))
     added, steps = (), []
-    for (name, *tied), its_race in raced:
-        candidate = its_race.under_each[0].candidates[name]
+    for (name, *tied), its_comparison in compared:
+        candidate = its_comparison.under_each[0].candidates[name]
         best = candidate.best
         strength = best.mechanism.strength.name
         added += (SimpleNamespace(name=strength, mechanism=best.mechanism, shape=best.shape),)
         steps.append(
-            Step(candidate, tuple(tied), its_race, calibration(problem, added), BootstrapTest(0.1, clean))
+            Step(
+                candidate, tuple(tied), its_comparison, calibration(problem, added), BootstrapTest(0.1, clean)
+            )
         )
     return tuple(steps)
 

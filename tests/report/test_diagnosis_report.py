@@ -1,11 +1,15 @@
 import io
 import re
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from diagnosis_report_cases import documents
 from rich.console import Console
 from test_report_html import Page, nulls
 
+from skred.campaign import Sensor
+from skred.report.diagnosis.conditional import conditional_rows, styles_of
 from skred.report.diagnosis.equation import equations, formula
 from skred.report.diagnosis.report import FIGURES, diagnosis_table, render_diagnosis, save_diagnosis_figures
 
@@ -57,7 +61,7 @@ def test_every_kind_has_a_page_that_needs_nothing_else(kind, picture):
         (
             "two",
             {"check", "where", "probabilities", "strength", "places", "left_out", "scores", "influence"}
-            | {"probabilities_2", "strength_2", "places_2"},
+            | {"probabilities_2", "strength_2", "places_2", "conditional_speeds", "conditional_runouts"},
         ),
     ],
 )
@@ -69,6 +73,16 @@ def test_figures_that_apply_are_written(kind, names, tmp_path):
     )
     page = Page(rendered(kind, files))
     assert page.tags.count("img") == len(names)
+
+
+@pytest.mark.parametrize(("n", "said"), [(0, "0 cases"), (1, "1 case"), (2, "2 cases")])
+def test_how_many_readings_are_not_there(n, said):
+    document, tree = documents("nothing")
+    campaign = document["report"]["campaign"]
+    counts = campaign["readings"] | {"not_reached": n, "missing": n}
+    report = document["report"] | {"campaign": campaign | {"readings": counts}}
+    text = Page(render_diagnosis(document | {"report": report}, tree, {})).text
+    assert f"In {said} the front stopped above" in text and f"In {said} the reading is missing" in text
 
 
 def test_a_tie_says_that_it_is_one():
@@ -171,3 +185,51 @@ def test_a_formula_keeps_what_it_says():
         "-D<sub>f</sub> U<sup>2</sup> for s<sub>1</sub> &lt; s &lt; s<sub>2</sub>"
     )
     assert formula("mu g cos(phi)") == "μ g cos(φ)"
+
+
+@pytest.mark.parametrize("kind", ["tie", "unexplained"])
+def test_the_improvement_is_on_the_first_screen(kind, tmp_path):
+    """Readings given those above: figure and sentence before the contents, the table in its section."""
+    document, tree = documents(kind)
+    files = save_diagnosis_figures(document, tree, tmp_path)
+    assert all(files[f"conditional_{one}"].stat().st_size > 5_000 for one in ("speeds", "runouts"))
+    html = render_diagnosis(document, tree, files)
+    first, rest = html.split("<nav>")
+    assert first.count("<img") == 3 and "predicted from all speeds of the same avalanche" in first
+    assert ("A ring marks" in first) == bool(document["influence"]["carried_by"])
+    sentence = document["conditional"]["statement"]
+    assert sentence.startswith("Given the readings") and sentence in first
+    table = rest[rest.index("Given the readings above") :]
+    row = document["conditional"]["sensors"][0]["all"]
+    assert f"{row['rmse_before']:.1f} → {row['rmse_after']:.1f}" in table and "CD [m/s]" in table
+
+
+def test_nothing_is_given_above_where_nothing_was_added(tmp_path):
+    document, tree = documents("nothing")
+    assert document["conditional"] is None and "conditional" not in tree.children
+    assert not any(
+        name.startswith("conditional") for name in save_diagnosis_figures(document, tree, tmp_path)
+    )
+    assert "Given the readings" not in render_diagnosis(document, tree, {})
+
+
+def test_many_sensors_share_a_style():
+    """Forty sensors are put together by where they are, each in one part only."""
+    sensors = tuple(Sensor(f"g{k}", "front_velocity", 10.0 * k, 10.0 * k, 0.1, 1.0) for k in range(40))
+    styles = styles_of(SimpleNamespace(sensors=sensors), np.full(40, True), 0)
+    assert len(styles) == 6 and styles[0].label == "s = 0 to 60 m"
+    assert np.sum([style.columns for style in styles], axis=0).tolist() == [1] * 40
+
+
+def test_avalanches_that_carry_the_answer_have_rows_of_their_own():
+    document, _ = documents("unexplained")
+    rows = [row["name"] for row in conditional_rows(document)]
+    assert rows[:3] == ["CD [m/s]", "those that carry the answer", "the others"]
+    assert rows[-3] == "all speeds [m/s]"
+    assert ". Without them, " in document["conditional"]["statement"]
+    # Where no few avalanches carry it, there are no others either.
+    document, _ = documents("tie")
+    assert [row["name"] for row in conditional_rows(document)] == [
+        "CD [m/s]", "b [m/s]", "runout [m]", "all speeds [m/s]"
+    ]  # fmt: skip
+    assert "that carry the answer" not in document["conditional"]["statement"]

@@ -4,23 +4,32 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnosis_report_cases import diagnosis, document_of, with_finding
+from diagnosis_report_cases import comparison_of, diagnosis, document_of, with_finding
+from numpy.typing import NDArray
 
 from skred.diagnosis.augment.coefficient import strength_of
 from skred.diagnosis.augment.step import Left
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
-from skred.diagnosis.compare.candidate import FORM
+from skred.diagnosis.compare.candidate import FORM, Candidate
 from skred.diagnosis.compare.decision import Decision
+from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
+from skred.diagnosis.evidence.refit import Fit
+from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.verdict.document import verdict
 from skred.diagnosis.verdict.figure_data import figure_data
 from skred.diagnosis.verdict.statement import statement
+from skred.physics.mechanisms.placed import direction_of
+from skred.physics.mechanisms.spec import Setting
 from skred.physics.mechanisms.stretches import U_1, U_2
 from skred.report.diagnosis.report import render_diagnosis
 from skred.report.shared.draws import chains_of
+
+FloatArray = NDArray[np.float64]
 
 
 def document(probability: dict[str, float]) -> dict:
@@ -48,7 +57,7 @@ def test_a_lean_that_the_check_does_not_bear_out_is_told_and_not_claimed(kind: s
     assert "by the check they are odder than all but 1 % of clean campaigns" in odd
 
 
-def test_what_a_last_race_leaned_to_is_told() -> None:
+def test_what_a_last_comparison_leaned_to_is_told() -> None:
     """Also that it was not added, and why; and nothing where it leaned to nothing, or was not run."""
     found = diagnosis("tie")
     assert verdict(found)["left"] is None and "Another comparison" not in verdict(found)["statement"]
@@ -88,20 +97,43 @@ def test_that_a_named_drag_is_compensated_is_told() -> None:
     assert "(U^2 - U_0^2)" in document["equation"] and document["mechanisms"][0]["constants"][U_1] == 31.0
 
 
-def test_physics_and_instruments_tied_are_both_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also a force in no list; neither statement nor page says that it is the instruments."""
-    splits = {
-        "quantity": "front_velocity", "s_from_m": 1700.0, "s_to_m": 1700.0,
-        "splits": ["sensor_bias", "obstacle"], "power_with": None,
-    }  # fmt: skip
-    monkeypatch.setattr("skred.diagnosis.verdict.document.next_sensor", lambda found: splits)
+def fitted(candidate: Candidate, setting: Setting, points: FloatArray) -> Candidate:
+    """With what its curves change on the track, and the events' modes at each of their strengths."""
+    curves = tuple(
+        replace(
+            one,
+            direction=direction_of(one.mechanism, setting, one.shape),
+            fits=(Fit(None, points),) * len(one.strengths),
+        )
+        for one in candidate.curves
+    )
+    return replace(candidate, curves=curves)
+
+
+def tied_with_a_dam() -> Diagnosis:
+    """A sensor's bias is named; an obstacle and a force in no list are tied with it."""
     found, tied = diagnosis("sensor"), ("obstacle", UNLISTED)
-    step = replace(found.steps[0], tied=tied)
-    alone = verdict(found)
-    found = replace(found, decision=Decision("instrument", ("sensor_bias", *tied)))
-    found = with_finding(found, steps=(step,))
-    document = verdict(found)
-    assert document["indistinguishable"] == document["mechanisms"][0]["tied_with"] == list(tied)
+    (step,), problem = found.steps, found.problem
+    setting, n_events = setting_of(problem, found.law), problem.campaign.n_events
+    comparison = comparison_of(problem, {"sensor_bias": 40.0, "obstacle": 39.6, UNLISTED: 39.0})
+    (under_errors,) = comparison.under_each
+    points = np.column_stack([np.full(n_events, np.log(0.4)), np.zeros(n_events)])
+    both = {
+        name: fitted(under_errors.candidates[name], setting, points) for name in ("sensor_bias", "obstacle")
+    }
+    candidates = {**under_errors.candidates, **both}
+    under_errors = replace(under_errors, base=SimpleNamespace(setting=setting), candidates=candidates)
+    comparison = replace(comparison, under_each=(under_errors,))
+    step = replace(step, candidate=both["sensor_bias"], tied=tied, comparison=comparison)
+    decision = Decision("instrument", ("sensor_bias", *tied))
+    return with_finding(replace(found, decision=decision, comparison=comparison), steps=(step,))
+
+
+def test_physics_and_instruments_tied_are_both_told() -> None:
+    """Also a force in no list; neither statement nor page says that it is the instruments."""
+    found, tied = tied_with_a_dam(), ["obstacle", UNLISTED]
+    document, alone = verdict(found), verdict(diagnosis("sensor"))
+    assert document["indistinguishable"] == document["mechanisms"][0]["tied_with"] == tied
     bias, dam = "one sensor reads too high or too low", "an obstacle"
     assert alone["statement"].startswith(f"The recordings are off: {bias}")
     assert document["statement"].startswith(
@@ -109,11 +141,21 @@ def test_physics_and_instruments_tied_are_both_told(monkeypatch: pytest.MonkeyPa
     )
     told = rf"cannot tell it from: {dam} \([^)]*%\), a force not in the list \([^)]*%\)\."
     assert re.search(told, document["statement"])
-    assert f"A speed at s = 1700 m would split {bias} and {dam} best." in document["statement"]
+    sensor = document["next_sensor"]
+    assert sensor["quantity"] == "front_velocity" and sensor["splits"] == ["sensor_bias", "obstacle"]
+    place = sensor["s_from_m"]
+    assert f"A speed at s = {place:.0f} m would split {bias} and {dam} best." in document["statement"]
     html = render_diagnosis(document_of(found), figure_data(found), {})
     assert "If it is the recordings that are off, the equation of motion itself keeps its terms" in html
     assert "Physics is missing, or the recordings are off</strong>" in html
     assert "from obstacle, a force not in the list." in html and "not the physics" not in html
+
+
+def test_the_next_speed_is_where_a_dam_slows_fronts() -> None:
+    """A sensor's bias changes no front: what splits both is a speed at or below the dam."""
+    found = tied_with_a_dam()
+    dam = found.comparison.leading("obstacle").candidates["obstacle"].best.shape
+    assert dam.s_from_m is not None and verdict(found)["next_sensor"]["s_from_m"] > dam.s_from_m > 1600.0
 
 
 @pytest.mark.parametrize("tied", [("segment_drag",), ("segment_drag", UNLISTED), (UNLISTED,)])

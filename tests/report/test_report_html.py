@@ -67,6 +67,14 @@ def test_it_says_what_was_found(figures):
     assert "m/s" in text and "63" in text, "runout relative to the reference"
 
 
+@pytest.mark.parametrize(("n", "said"), [(0, "0 times"), (1, "once"), (2, "2 times")])
+def test_how_often_fronts_stopped_above(n, said):
+    document = comparison()
+    document["campaign"]["readings"]["not_reached"] = n
+    text = Page(render_comparison(document, {})).text
+    assert f"14 readings observed, {said} the front stopped above the sensor" in text
+
+
 def test_no_false_decimals_in_parameters(figures):
     text = Page(render_comparison(comparison(), figures)).text
     assert "0.287 0.027 0.243 to 0.333 0.0005 3240 3425 1.0020" in text

@@ -19,11 +19,12 @@ FASTEST_M_S = 200.0
 Twice that of the fastest avalanches measured, about 100 m/s; a free fall reaches it after 2 km. What lies
 beyond is in another unit or a slip.
 """
-SMALLEST_SD = 1e-4
-"""Smallest standard deviation of a reading that is read, m/s or m.
+SMALLEST_VELOCITY_SD, SMALLEST_RUNOUT_SD = 1e-3, 1e-4
+"""Smallest standard deviation of a reading that is read: of velocities as a share of the largest one
+recorded, of runouts as a share of the track's length.
 
-A tenth of a millimetre, or of a millimetre a second: what cameras reach in a laboratory. A smaller one claims
-that the model is right to so many digits, and every number that follows is then lost to rounding.
+The likelihood takes it for what the model is right to as well. At a thousandth of this, fronts that miss
+their readings by metres a second are a million standard deviations off, and every number is lost to rounding.
 """
 SENSORS, EVENTS, RECORDINGS = "sensors.csv", "events.csv", "recordings.csv"
 
@@ -120,7 +121,7 @@ def recording_problems(
         if row.has("value", "status"):
             sensor = sensors.get(row.word("sensor")) if row.has("sensor") else None
             problems += _reading_problems(row, sensor, length_m)
-    return problems
+    return problems + (_sd_problems(rows, sensors, length_m) if length_m is not None else [])
 
 
 def _reading_problems(row: Row, sensor: Sensor | None, length_m: float | None) -> list[Problem]:
@@ -145,7 +146,7 @@ def _reading_problems(row: Row, sensor: Sensor | None, length_m: float | None) -
         number = row.number_or_none(column)
         if number is not None:
             problems += _size_problems(row, column, number, sensor, length_m)
-    return problems + _sd_problems(row, sensor, value)
+    return problems
 
 
 def _value_to_problems(row: Row, status: str) -> list[Problem]:
@@ -181,16 +182,37 @@ def _size_problems(
     return []
 
 
-def _sd_problems(row: Row, sensor: Sensor, value: float) -> list[Problem]:
-    """Check that the standard deviation of a reading or bound is one that something can measure to."""
-    if "sd" in row.unreadable:
-        return []
+def _sd_problems(rows: Sequence[Row], sensors: Mapping[str, Sensor], length_m: float) -> list[Problem]:
+    """Check that standard deviations of readings and bounds are such as a model can be right to."""
+    read = [
+        (row, sensors[row.word("sensor")], row.number("value"))
+        for row in rows
+        if row.has("sensor", "value", "status")
+        and row.word("sensor") in sensors
+        and row.number_or_none("value") is not None
+        and "sd" not in row.unreadable
+    ]
+    possible = [value for _, sensor, value in read if not sensor.is_runout and value <= FASTEST_M_S]
+    fastest = max(possible, default=0.0)
+    least = {True: SMALLEST_RUNOUT_SD * length_m, False: SMALLEST_VELOCITY_SD * fastest}
+    problems = list[Problem]()
+    for row, sensor, value in read:
+        problems += _sd_problem(row, sensor, value, least[sensor.is_runout])
+    return problems[:MOST_PROBLEMS]
+
+
+def _sd_problem(row: Row, sensor: Sensor, value: float, least: float) -> list[Problem]:
+    """Check the standard deviation of one reading or bound."""
     stated = row.number_or_none("sd")
     sd = hypot(sensor.relative_sd * value, sensor.absolute_sd) if stated is None else stated
-    if sd >= SMALLEST_SD:
+    if sd >= least:
         return []
-    unit = "m" if sensor.is_runout else "m/s"
-    message = f"the reading's standard deviation is {sd:g}, expected at least {SMALLEST_SD:g} {unit}"
+    at_least = (
+        f"{least:.2g} m, 1/10000 of the track"
+        if sensor.is_runout
+        else (f"{least:.2g} m/s, 1/1000 of the largest velocity")
+    )
+    message = f"the reading's standard deviation is {sd:g}, expected at least {at_least}"
     if stated is not None:
         return [problem_at(RECORDINGS, row, "sd", f"{message}; write how far readings of this kind are off")]
     message += f"; state one, or give sensor '{sensor.id}' an absolute_sd"

@@ -54,12 +54,12 @@ def diagnose(
             output.tell("writing the report")
             write_reports(results.unfinished)
     output.show(document, diagnosis_table, [], results.path)  # the statement is in the table
-    return DONE if is_answer(document) else NOT_CONVERGED
+    return ends_with(document)
 
 
-def is_answer(document: Mapping[str, Any]) -> bool:
-    """Whether a verdict answers the question; that it cannot tell, or that one refit failed, is an answer.
+def ends_with(document: Mapping[str, Any]) -> int:
+    """Exit code of a verdict; that it cannot tell, or that one refit failed, is an answer.
 
-    It does not where chains that did not converge stood in the way of an answer.
+    It is none where chains that did not converge stood in the way of an answer.
     """
-    return document["reason"] is None or bool(document["converged"])
+    return DONE if document["reason"] is None or document["converged"] else NOT_CONVERGED

@@ -34,6 +34,7 @@ from skred.diagnosis.outcome import (
     Outcome,
     ProfileAdded,
 )
+from skred.diagnosis.predict.conditional import BeforeAfter
 from skred.diagnosis.predict.held_out import HeldOut, held_out
 from skred.diagnosis.predict.profile_law import profile_law
 from skred.inference.calibrate import Calibration, calibrate_surely
@@ -76,7 +77,8 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
     clock.stage("base", f"{law.id}: calibrating the base law")
     meanwhile(compile_ahead, asked.readings, asked.error_model)  # where there are workers
     calibration = calibrate_surely(as_diagnosed(asked), law, run.settings)
-    problem = _problem_of(calibration)
+    problem = calibration.problem  # perhaps finer than was asked for
+    assert isinstance(problem, HierarchicalProblem)
     if not calibration.gate.passed:
         clock.end()
         why = "the gate of the base law's calibration failed: " + "; ".join(calibration.gate.problems)
@@ -107,22 +109,18 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
         finding, before = _with_profile(comparison, run)
     else:
         finding, before = _predicted(added, calibration, run)
-    hangs_on = None
+    hangs_on = given = None
     if decision.answer is not None:
         clock.stage("influence", "what the answer hangs on: without each avalanche, each kind of reading")
         hangs_on = influence(comparison, decision.answer)
+    if not isinstance(finding, NothingAdded):
+        clock.stage("conditional", "predicting each reading from those above it")
+        given = BeforeAfter.of(before, finding.after, run.seed)
     clock.end()
     return Diagnosis(
         problem, law, calibration, score_test, table, check, comparison, decision, location, finding, before,
-        hangs_on, clock.seconds,
+        hangs_on, given, clock.seconds,
     )  # fmt: skip
-
-
-def _problem_of(calibration: Calibration) -> HierarchicalProblem:
-    """What a base law was calibrated on: perhaps finer than was asked for."""
-    problem = calibration.problem
-    assert isinstance(problem, HierarchicalProblem)
-    return problem
 
 
 def _with_profile(comparison: Comparison, run: Run) -> tuple[Finding, HeldOut]:

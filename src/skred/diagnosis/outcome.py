@@ -12,6 +12,7 @@ from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.influence.influence import Influence
+from skred.diagnosis.predict.conditional import BeforeAfter
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.inference.calibrate import Calibration
@@ -141,6 +142,8 @@ class Diagnosis:
         Avalanches left out, as the base law predicts them, under the error model of what was added.
     influence : Influence or None
         What the answer hangs on; None where none is given.
+    conditional : BeforeAfter or None
+        Each reading as predicted by those of the same avalanche above it; None where nothing was added.
     seconds : dict
         Of each stage.
     """
@@ -157,6 +160,7 @@ class Diagnosis:
     finding: Finding
     before: HeldOut
     influence: Influence | None = None
+    conditional: BeforeAfter | None = None
     seconds: dict[str, float] = field(default_factory=dict)
 
     @property

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import arviz_stats as az
 import numpy as np
 import pymc as pm
+import pytensor.tensor as pt
 import xarray as xr
 from numpy.typing import NDArray
 from pymc.blocking import DictToArrayBijection
@@ -18,6 +19,7 @@ from skred.inference.joint_metropolis import JointMetropolis
 from skred.parallel.threads import side_by_side
 
 FloatArray = NDArray[np.float64]
+Samples = dict[str, FloatArray]
 REFIT_CHAINS, REFIT_DRAWS, REFIT_BURN = 4, 500, 100
 """Draws of models of one or two parameters; chains of more are longer."""
 _ADAPTATION = 500
@@ -38,11 +40,14 @@ class ExactLoo:
         Monte Carlo standard error of the sum.
     failed : tuple of str
         Events whose refit did not converge; a comparison must not hang on them.
+    draws : (n, n_chains, n_draws, n_q) array
+        Raveled values of the (transformed) variables by the other events, see `samples_of`.
     """
 
     pointwise: FloatArray
     mcse: float
     failed: tuple[str, ...]
+    draws: FloatArray = field(default_factory=lambda: np.empty(0), repr=False)
 
     @property
     def elpd(self) -> float:
@@ -89,7 +94,26 @@ def exact_leave_one_out(
     r_hat = _r_hat(draws)
     failed = tuple(events[k] for k, value in zip(left_out, r_hat, strict=True) if not value <= R_HAT_LIMIT)
     pointwise = logsumexp(densities, axis=(1, 2)) - np.log(densities[0].size)
-    return ExactLoo(pointwise, float(np.sqrt(np.sum(_mcse(densities) ** 2))), failed)
+    return ExactLoo(pointwise, float(np.sqrt(np.sum(_mcse(densities) ** 2))), failed, draws)
+
+
+def samples_of(model: pm.Model, step: JointMetropolis, draws: FloatArray) -> tuple[Samples, ...]:
+    """Draws of refits, as `ExactLoo` has them, as arrays by name of parameter for each event.
+
+    Every parameter is a scalar, and none's range depends on another.
+    """
+    columns = draws.reshape(len(draws), -1, draws.shape[-1])
+    result: list[Samples] = [{} for _ in columns]
+    for k, value in enumerate(step.vars):
+        variable = model.values_to_rvs[value]
+        transform, found = model.rvs_to_transforms[variable], columns[:, :, k]
+        if transform is not None:
+            # Compiled as quickly as can be: it runs once.
+            untransformed = transform.backward(pt.as_tensor(found), *variable.owner.inputs)
+            found = np.asarray(untransformed.eval(mode="FAST_COMPILE"))
+        for samples, values in zip(result, found, strict=True):
+            samples[variable.name] = values
+    return tuple(result)
 
 
 def _refit(

@@ -14,6 +14,7 @@ from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism, Setting, Sh
 from skred.physics.mechanisms.stretches import OPPOSED_SCALES, ends_of, is_opposed
 from skred.physics.plugins import OWN_PACKAGE
 from skred.physics.terrain import Terrain
+from skred.report.shared.labels import unit_text, with_units
 from skred.report.shared.tables import plain_table, plain_text
 
 if TYPE_CHECKING:
@@ -171,7 +172,7 @@ def mechanisms_table(documents: Sequence[dict[str, Any]], n_laws: int) -> Table:
     table.columns[5].max_width = 9
     for one in documents:
         strength = one["strength"]
-        symbol = f"{strength['symbol']} [{strength['unit']}]"
+        symbol = f"{strength['symbol']} [{unit_text(strength['unit'])}]"
         scale = ("± " if strength["either_sign"] else "") + f"{one['prior']['scale']:g}"
         words = (one["id"], one["title"], one["group"], symbol, scale, _missing_from(one, n_laws))
         table.add_row(*map(plain_text, words))
@@ -190,12 +191,12 @@ def mechanism_table(document: dict[str, Any], n_laws: int) -> RenderableType:
 
     strength, prior, in_base = document["strength"], document["prior"], document["prior_in_a_base_law"]
     paper = f", in the paper {strength['paper_symbol']}" if strength["paper_symbol"] else ""
-    unit = "" if strength["unit"] == "1" else f" {strength['unit']}"
+    unit = "" if strength["unit"] == "1" else f" {unit_text(strength['unit'])}"
     rows = {
         "group": _GROUPS[document["group"]],
         "enters as": document["equation"],
         "coefficient": f"{strength['parameter']}, symbol {strength['symbol']}{paper}",
-        "unit": strength["unit"],
+        "unit": unit_text(strength["unit"]),
         "sign": "either" if strength["either_sign"] else "positive only",
         "prior": f"{prior['kind']}, scale {prior['scale']:g}{unit}: {prior['reason']}",
         "relevant": f"{prior['relevant']:.2g}{unit} or more: the median size under that prior",
@@ -203,7 +204,7 @@ def mechanism_table(document: dict[str, Any], n_laws: int) -> RenderableType:
         if in_base is None
         else f"{in_base['kind']}, scale {in_base['scale']:g}{unit}: {in_base['reason']}",
         "missing from": _missing_from(document, n_laws),
-        "looked for in": document["looked_for"],
+        "looked for in": with_units(document["looked_for"]),
         "diagnostic signature": document["signature"],
         "same term as": ", ".join(document["same_term"]) or "none other",
         "reference": document["reference"],

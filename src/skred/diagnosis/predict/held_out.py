@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,14 +11,15 @@ from arviz_stats.base import array_stats
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from skred.diagnosis.augment.coefficient import added_draws
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.predictive import Predicted, predict_event
+from skred.diagnosis.predict.draws import Draws, LeftOut
 from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.population import population_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
-from skred.inference.leave_one_out import exact_leave_one_out
+from skred.inference.leave_one_out import Samples, exact_leave_one_out, samples_of
+from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
 K_LIMIT = 0.7
@@ -47,6 +49,8 @@ class HeldOut:
         Of each reading, (n_events, n_sensors); NaN where there is none.
     covered : (n_events, n_sensors) array
         1 where the central 90 % of the predictions hold the reading, NaN where there is none.
+    others : tuple of LeftOut
+        What the others say of each event; empty for avalanches that no calibration has seen.
     """
 
     pointwise: FloatArray
@@ -55,6 +59,7 @@ class HeldOut:
     not_converged: tuple[str, ...]
     predicted: Predicted
     covered: FloatArray
+    others: tuple[LeftOut, ...] = field(default=(), repr=False)
 
     @property
     def elpd(self) -> float:
@@ -83,12 +88,15 @@ def held_out(calibration: Calibration, seed: int, *, exact: bool = False) -> Hel
     events = list(problem.campaign.event_ids)
     again = list(range(len(events))) if exact else [int(e) for e in np.flatnonzero(~(k <= K_LIMIT))]
     failed: tuple[str, ...] = ()
+    refitted: dict[int, Samples] = {}
     if again:
         refits = exact_leave_one_out(calibration.model, calibration.step, events, seed, which=again)
         pointwise[again] = refits.pointwise
-        failed = refits.failed
-    predicted, covered = _predictions(calibration, weights, seed)
-    return HeldOut(pointwise, k, tuple(events[e] for e in again), failed, predicted, covered)
+        samples = samples_of(calibration.model, calibration.step, refits.draws)
+        failed, refitted = refits.failed, dict(zip(again, samples, strict=True))
+    others = _others(calibration, weights, refitted, seed)
+    predicted, covered = _predictions(others, seed)
+    return HeldOut(pointwise, k, tuple(events[e] for e in again), failed, predicted, covered, others)
 
 
 def leave_out_weights(densities: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -109,23 +117,40 @@ def leave_out_weights(densities: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.asarray(log_weights, dtype=float).T, np.asarray(k, dtype=float)
 
 
-def _predictions(calibration: Calibration, weights: FloatArray, seed: int) -> tuple[Predicted, FloatArray]:
-    """Predictions of each event's readings by the others, and whether 90 % intervals hold them."""
+def _others(
+    calibration: Calibration, weights: FloatArray, refitted: Mapping[int, Samples], seed: int
+) -> tuple[LeftOut, ...]:
+    """What the others say of each event: draws by their weights, or of the refit where there is one."""
     problem, law = calibration.problem, calibration.law
     assert isinstance(problem, HierarchicalProblem)
     extension = problem.extension if isinstance(problem, AugmentedProblem) else extended(problem, law)
-    added = added_draws(calibration)
     posterior = calibration.tree["posterior"].to_dataset()
     names = [parameter.name for parameter in problem.parameters(law)]
-    samples = {name: posterior[name].transpose("chain", "draw").values.ravel() for name in names}
-    means, factors = population_of(law, samples)
+    every = _draws(problem, law, {n: posterior[n].transpose("chain", "draw").values.ravel() for n in names})
     rng = np.random.default_rng([seed, 31])
-    n_events, readings = problem.campaign.n_events, problem.readings
     parts = []
-    for event in range(n_events):
-        drawn = rng.choice(len(weights), size=_DRAWS, p=weights[:, event])
-        drawn = np.repeat(drawn, _FRONTS)
-        parts.append(predict_event(extension, event, means[drawn], factors[drawn], added[drawn], rng))
+    for event in range(problem.campaign.n_events):
+        draws, share = every, weights[:, event]
+        if event in refitted:
+            draws = _draws(problem, law, refitted[event])
+            share = np.full(len(draws.means), 1.0 / len(draws.means))
+        parts.append(LeftOut(extension, draws.take(rng.choice(len(share), size=_DRAWS, p=share))))
+    return tuple(parts)
+
+
+def _draws(problem: HierarchicalProblem, law: Law, samples: Samples) -> Draws:
+    added = problem.added_rows(samples) if isinstance(problem, AugmentedProblem) else None
+    means, factors = population_of(law, samples)
+    return Draws(means, factors, np.empty((len(means), 0)) if added is None else added)
+
+
+def _predictions(others: Sequence[LeftOut], seed: int) -> tuple[Predicted, FloatArray]:
+    """Predictions of each event's readings by the others, and whether 90 % intervals hold them."""
+    readings, rng = others[0].extension.problem.readings, np.random.default_rng([seed, 32])
+    parts = []
+    for event, (extension, draws) in enumerate(others):
+        fronts = draws.take(np.repeat(np.arange(len(draws.means)), _FRONTS))
+        parts.append(predict_event(extension, event, *fronts, rng))
     found = Predicted(*(np.array(values) for values in zip(*parts, strict=True)))
     return found.where(readings.observed), found.covered(readings.values, readings.observed)
 

@@ -29,6 +29,7 @@ from skred.diagnosis.evidence.extension import Extension, extended
 from skred.diagnosis.evidence.marginal import evidence, importance_draws, population_at
 from skred.diagnosis.evidence.predictive import Predicted, predict_event
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
+from skred.diagnosis.predict.draws import Draws, LeftOut
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.predict.unseen import log_densities
 from skred.parallel.threads import side_by_side
@@ -41,14 +42,6 @@ _FRONTS = 1200
 """New fronts for the predictions of an avalanche, as of mechanisms."""
 _BUDGET = USUAL.times(2)
 """Quadrature points of a population fitted to the others: their draws are weighed, not only its maximum."""
-
-
-class Draws(NamedTuple):
-    """Draws of populations, and of the strengths of what is added, (n_draws, ...)."""
-
-    means: FloatArray
-    factors: FloatArray
-    strengths: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +77,7 @@ class _Event(NamedTuple):
 
     log_score: float
     predicted: Predicted
+    others: LeftOut
 
 
 def profile_law(under_errors: ComparisonUnderErrors, most: int, seed: int) -> ProfileLaw:
@@ -102,7 +96,7 @@ def profile_law(under_errors: ComparisonUnderErrors, most: int, seed: int) -> Pr
     before, after = (_held_out(base, [part[k] for part in parts]) for k in range(2))
     check, rng = _check(base, profile, most, seed), np.random.default_rng([seed, 55])
     _, without = _plain(base, rng)
-    _, within = _with(base, profile, rng)
+    _, within = with_profile(base, profile, rng)
     return ProfileLaw(profile, base.problem.error_model.id, check, before, after, without, within)
 
 
@@ -126,7 +120,7 @@ def _left_out(base: Base, profile: Profile, event: int, seed: int) -> tuple[_Eve
     population = profile.fit.found.population(len(base.law.mechanisms))
     near = profile.mean, (population, profile.fit.points[others])
     again = fit_profile(rest, profile.kind, near, profile.prior)
-    return before, _event(base, *_with(rest, again, rng), event, rng)
+    return before, _event(base, *with_profile(rest, again, rng), event, rng)
 
 
 def base_left_out(base: Base, seed: int) -> HeldOut:
@@ -151,8 +145,16 @@ def _plain(base: Base, rng: np.random.Generator) -> tuple[Extension, Draws]:
     return plain, _draws(base, plain, base.fit, base.strengths, own, rng)
 
 
-def _with(base: Base, profile: Profile, rng: np.random.Generator) -> tuple[Extension, Draws]:
-    """The law with a profile fitted to the base's events, each knot a strength; draws by those events."""
+def with_profile(base: Base, profile: Profile, rng: np.random.Generator) -> tuple[Extension, Draws]:
+    """The law with a profile fitted to the base's events, each knot a strength; draws by those events.
+
+    Parameters
+    ----------
+    base : Base
+    profile : Profile
+        Whose values are drawn by the Laplace approximation.
+    rng : numpy.random.Generator
+    """
     wide = knot_by_knot(base, profile.kind, profile.knots_m)
     own = np.tile(base.strengths, (_DRAWS, 1))
     values = rng.multivariate_normal(profile.mean, profile.covariance, _DRAWS)
@@ -204,7 +206,8 @@ def _event(base: Base, extension: Extension, draws: Draws, event: int, rng: np.r
     means, factors, strengths = (np.resize(part, (_FRONTS, *part.shape[1:])) for part in draws)
     predicted = predict_event(extension, event, means, factors, strengths, rng)
     # NumPy's, not scipy's: see `comparison` on threads.
-    return _Event(float(np.logaddexp.reduce(densities)) - math.log(len(densities)), predicted)
+    score = float(np.logaddexp.reduce(densities)) - math.log(len(densities))
+    return _Event(score, predicted, LeftOut(extension, draws))
 
 
 def _held_out(base: Base, parts: Sequence[_Event]) -> HeldOut:
@@ -213,5 +216,5 @@ def _held_out(base: Base, parts: Sequence[_Event]) -> HeldOut:
     found = Predicted(*(np.array(values) for values in zip(*(part.predicted for part in parts), strict=True)))
     scores = np.array([part.log_score for part in parts])
     covered = found.covered(readings.values, readings.observed)
-    ids = tuple(base.problem.campaign.event_ids)
-    return HeldOut(scores, np.zeros(len(scores)), ids, (), found.where(readings.observed), covered)
+    ids, others = tuple(base.problem.campaign.event_ids), tuple(part.others for part in parts)
+    return HeldOut(scores, np.zeros(len(scores)), ids, (), found.where(readings.observed), covered, others)

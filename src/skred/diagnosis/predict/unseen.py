@@ -46,7 +46,7 @@ from skred.physics.terrain import build_terrain
 FloatArray = NDArray[np.float64]
 N_DRAWS = 200
 """Draws that a predictor keeps: few enough to be written beside an answer."""
-_NODES = Budget(32, 32, 0, 1.5, 1.8)
+NODES = Budget(32, 32, 0, 1.5, 1.8)
 """Quadrature points of an event for each draw; their errors average out over the draws. None are adapted:
 where those go depends on the others' weights, and few of them are too low in the mean
 (``studies.thresholds.unseen_nodes``)."""
@@ -289,7 +289,13 @@ def _direction(term: Term, problem: HierarchicalProblem, law: Law) -> Direction:
 
 
 def log_densities(
-    extension: Extension, rows: Rows, means: FloatArray, factors: FloatArray, strengths: FloatArray, seed: int
+    extension: Extension,
+    rows: Rows,
+    means: FloatArray,
+    factors: FloatArray,
+    strengths: FloatArray,
+    seed: int,
+    budget: Budget = NODES,
 ) -> FloatArray:
     """Log density of each row's event for each draw, its own strengths integrated out, (n_draws, n_rows).
 
@@ -299,6 +305,9 @@ def log_densities(
         Of populations.
     strengths : (n_draws, n_directions) array
         Of what is added.
+    seed : int
+    budget : Budget
+        Quadrature points of an event for each draw.
     """
     covariances = np.einsum("nij,nkj->nik", factors, factors)
     typical = Population(means.mean(axis=0)[None], covariances.mean(axis=0)[None])
@@ -309,7 +318,7 @@ def log_densities(
     if (strengths == strengths[0]).all():
         # Readings are then as likely at a node whichever draw it is: one set of many nodes serves all.
         shared = EventLikelihood(extension, rows, strengths[0])
-        nodes = exact_nodes(shared, typical, start[None], _NODES.times(_SHARED), typical)
+        nodes = exact_nodes(shared, typical, start[None], budget.times(_SHARED), typical)
         for k, mean in enumerate(means):
             result[k] = integrated_log_density(np.tile(mean, (n_events, 1)), factors[k], *nodes)
         return result
@@ -319,7 +328,7 @@ def log_densities(
         starts = np.tile(start, (len(population.mean), 1, 1))
         shifts = rng.random((starts.shape[0] * n_events, starts.shape[2]))
         likelihood = EventLikelihood(extension, rows, strengths[0]).in_groups(strengths[part])
-        nodes = exact_nodes(likelihood, population, starts, _NODES, typical, shifts)
+        nodes = exact_nodes(likelihood, population, starts, budget, typical, shifts)
         for k in range(len(population.mean)):
             of_draw = nodes.first[k * n_events : (k + 1) * n_events + 1]
             mean = np.tile(population.mean[k], (n_events, 1))

@@ -24,6 +24,7 @@ from skred.diagnosis.outcome import (
 )
 from skred.diagnosis.predict.held_out import HeldOut, errors, paired
 from skred.diagnosis.predict.profile_law import ProfileLaw
+from skred.diagnosis.verdict.conditional import conditional_document
 from skred.diagnosis.verdict.mechanisms import (
     added_document,
     candidate_documents,
@@ -201,7 +202,7 @@ def _more(found: Outcome) -> dict[str, Any]:
         "seconds": found.seconds,
     }
     if isinstance(found, NotDiagnosed):
-        return more | {"alarm_by": None, "influence": None}
+        return more | {"alarm_by": None, "influence": None, "conditional": None}
     return (
         more
         | {
@@ -212,6 +213,7 @@ def _more(found: Outcome) -> dict[str, Any]:
             "error_models": [under_errors.error_model for under_errors in found.comparison.under_each],
             "candidates": candidate_documents(found, found.comparison),
             "influence": _influence(found.influence),
+            "conditional": conditional_document(found),
         }
         | _of_finding(found.finding)
         | {

@@ -17,6 +17,7 @@ from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.evidence.coefficient import Curve
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, NothingAdded, Outcome
+from skred.diagnosis.verdict.conditional import conditional_dataset
 from skred.diagnosis.verdict.mechanisms import candidates_of
 from skred.diagnosis.verdict.report_facts import FORMAT, checks_of, comparisons_of
 from skred.inference.recorded_data import recorded_groups
@@ -45,6 +46,8 @@ def figure_data(found: Outcome) -> xr.DataTree:
         log Bayes factor by the prior's scale (of those above 1 % of probability, and of the first)
     shapes, shapes_2 : log Bayes factor of each candidate at each place, sensor or covariate
     held_out : each avalanche as predicted from the others, ``before`` and ``after`` something was added
+    conditional : each reading as predicted from those above it, ``before`` and ``after``; where something was
+        added
     added : draws of the strengths that were added
 
     Of what was not diagnosed only the first two.
@@ -56,6 +59,8 @@ def figure_data(found: Outcome) -> xr.DataTree:
             ending = f"_{number + 1}" if number else ""
             groups[f"comparison{ending}"] = _curves(comparison)
             groups[f"shapes{ending}"] = _shapes(comparison)
+        if found.conditional is not None:
+            groups["conditional"] = conditional_dataset(found.conditional, found.problem)
         if found.steps:
             groups["added"] = _added(found)
     tree = xr.DataTree.from_dict(groups)

@@ -22,7 +22,7 @@ from skred.report.diagnosis.words import (
 )
 from skred.report.shared import document as doc
 from skred.report.shared.draws import chains_of, density
-from skred.report.shared.labels import figure_text, name_text, printable, symbol_text
+from skred.report.shared.labels import figure_text, name_text, printable, symbol_text, with_units
 from skred.report.shared.numbers import fixed, floats, is_number
 from skred.report.shared.style import GREY, INK, PALE, RECORDED, legend_below, new_figure, styled, tint
 
@@ -114,7 +114,9 @@ def _shape_text(comparison: doc.Document, name: str) -> str:
     else:
         constants = doc.get(shape, "constants") or {}
         parts += [
-            f"{symbol_text(symbol)} = {value:g}" for symbol, value in constants.items() if is_number(value)
+            f"{symbol_text(with_units(symbol))} = {value:g}"
+            for symbol, value in constants.items()
+            if is_number(value)
         ]
     parts += [
         f"{key} {printable(doc.get(shape, key))}" for key in ("sensor", "covariate") if doc.get(shape, key)

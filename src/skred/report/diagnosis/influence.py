@@ -10,6 +10,7 @@ import numpy as np
 from skred.report.diagnosis.words import AFTER, MISMATCH, in_words
 from skred.report.shared import document as doc
 from skred.report.shared.labels import figure_text
+from skred.report.shared.numbers import is_number
 from skred.report.shared.style import GREY, legend_below, new_figure, styled
 
 if TYPE_CHECKING:
@@ -21,8 +22,11 @@ _MOST_NAMED = 40
 
 
 def has_influence(document: doc.Document) -> bool:
-    """Whether the verdict says what its answer hangs on."""
-    return bool(doc.get(document, "influence", "events"))
+    """Whether the verdict says what its answer hangs on, and no number of it is null."""
+    found, key = doc.get(document, "influence"), "log_bayes_factor"
+    parts = [*doc.listed(found, "events"), *doc.listed(found, "readings")]
+    values = [doc.get(found, key), doc.get(found, "needed"), *(doc.get(one, key) for one in parts)]
+    return bool(doc.listed(found, "events")) and all(map(is_number, values))
 
 
 @styled

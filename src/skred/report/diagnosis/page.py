@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skred.report.diagnosis import rows, unseen
+from skred.report.diagnosis.conditional import conditional_rows
 from skred.report.diagnosis.equation import equations, parameter_rows, symbol_rows
 from skred.report.diagnosis.evidence import group_of
 from skred.report.diagnosis.words import comparisons, in_words, law_id, stretch_in, verdict_words
@@ -61,6 +62,7 @@ def page(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Path])
             symbols=symbol_rows(document),
             parameters=parameter_rows(document),
             held=rows.held_out_rows(document),
+            given=conditional_rows(document),
             difference=_difference(document),
             locked=locked,
             folds=folds,

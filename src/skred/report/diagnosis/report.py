@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from skred.report.diagnosis.check import check_figure
+from skred.report.diagnosis.conditional import conditional_figure, conditional_kinds
 from skred.report.diagnosis.evidence import group_of, probabilities_figure, strength_figure
 from skred.report.diagnosis.held_out import is_compared, left_out_figure, scores_figure
 from skred.report.diagnosis.influence import has_influence, influence_figure
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
 __all__ = ["FIGURES", "diagnosis_table", "render_diagnosis", "save_diagnosis_figures"]
 _OF_COMPARISONS = ("probabilities", "strength", "places")
 FIGURES = (
-    "check", "where", *_OF_COMPARISONS, *(f"{name}_2" for name in _OF_COMPARISONS), "left_out", "scores",
-    "influence",
+    "conditional_speeds", "conditional_runouts", "check", "where",
+    *_OF_COMPARISONS, *(f"{name}_2" for name in _OF_COMPARISONS), "left_out", "scores", "influence",
 )  # fmt: skip
 """Names of all figures that there may be."""
 
@@ -59,6 +60,8 @@ def save_diagnosis_figures(document: doc.Document, tree: xr.DataTree, folder: Pa
             makers[group_of("strength", number)] = partial(strength_figure, document, tree, number)
         if places_of(tree, number):
             makers[group_of("places", number)] = partial(places_figure, document, tree, number)
+    for kind in conditional_kinds(tree):
+        makers[f"conditional_{kind}"] = partial(conditional_figure, document, tree, kind)
     if "held_out" in tree.children:
         makers["left_out"] = partial(left_out_figure, tree)
     if is_compared(tree):

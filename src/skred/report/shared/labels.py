@@ -37,6 +37,11 @@ def unit_text(unit: Any) -> str:
     return "-" if shown == "1" else units.unit_text(shown)
 
 
+def with_units(text: Any) -> str:
+    """A text for people: ``U_c [m s-1] of 4 or 8`` as U_c [m/s] of 4 or 8."""
+    return re.sub(r"\[([^\[\]]+)\]", lambda match: f"[{unit_text(match[1])}]", printable(text))
+
+
 def symbol_text(symbol: Any) -> str:
     """A symbol with its Greek letters: ``xi h`` as ξ h, ``sd(log mu)`` as sd(log μ)."""
     shown = " ".join(printable(symbol).split())

@@ -27,8 +27,8 @@ RECORDED = "#111111"
 """What was recorded is black in every figure."""
 
 # Okabe and Ito (2008): told apart with any colour vision; the yellow is too pale for lines.
-_PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#5E4B3C")
-_MARKERS = ("o", "s", "D", "^", "v", "P")  # one fewer than colours: together they repeat late
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#5E4B3C")
+MARKERS = ("o", "s", "D", "^", "v", "P")  # one fewer than colours: together they repeat late
 _RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 8.5,
@@ -77,12 +77,12 @@ def styled[**P, R](make: Callable[P, R]) -> Callable[P, R]:
 
 def law_colours(law_ids: Iterable[str]) -> dict[str, str]:
     """One colour per law, the same in every figure of an installation."""
-    return {law_id: _PALETTE[place % len(_PALETTE)] for law_id, place in _places(law_ids).items()}
+    return {law_id: PALETTE[place % len(PALETTE)] for law_id, place in _places(law_ids).items()}
 
 
 def law_markers(law_ids: Iterable[str]) -> dict[str, str]:
     """One marker per law, for eyes and printers that do not tell colours apart."""
-    return {law_id: _MARKERS[place % len(_MARKERS)] for law_id, place in _places(law_ids).items()}
+    return {law_id: MARKERS[place % len(MARKERS)] for law_id, place in _places(law_ids).items()}
 
 
 def _places(law_ids: Iterable[str]) -> dict[str, int]:
@@ -159,7 +159,8 @@ def legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(str(label), handle)
-    columns = next((n for n in range(columns, 1, -1) if _legend_width(list(entries), n) <= _LEGEND_WIDTH), 1)
+    most = _LEGEND_WIDTH * figure.get_figwidth() / WIDTH
+    columns = next((n for n in range(columns, 1, -1) if _legend_width(list(entries), n) <= most), 1)
     figure.legend(list(entries.values()), list(entries), loc="outside lower left", ncols=columns)
 
 

@@ -1,0 +1,243 @@
+"""Each reading as predicted by the readings of the same avalanche above it.
+
+Most of the error of an avalanche that was left out is what avalanches differ in, and no added force changes
+that. Given the readings further up, it is known, and what is left shows what a law says of the stretch in
+between. Populations and coefficients are draws by the other avalanches alone.
+
+An avalanche's own strengths and release are drawn around where the readings above put them, for each draw of
+the population: the linear model at the conditional MAP gives a Student t. Some are drawn from the population
+itself, so that weights stay bounded where the linear model is wrong. All draws serve all of an avalanche's
+readings, weighed by the likelihood of those above: p(y | above) is a ratio of two such means.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Rows
+from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.predict.draws import Draws, LeftOut
+from skred.diagnosis.predict.event_proposal import Sample, Sizes, sample
+from skred.diagnosis.predict.held_out import HeldOut
+from skred.inference.error_model import ErrorModel, EventReadings
+from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.intervals import INTERVAL_PROBABILITY
+from skred.inference.reading_density import log_likelihoods
+from skred.parallel.threads import side_by_side
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+ENOUGH = 100.0
+"""Effective draws below which an avalanche is drawn again around what was missed, and it is told."""
+_USUAL, _MORE = Sizes(4, 2, (1.3,)), Sizes(16, 8, (1.3, 5.0))
+"""Points for each draw of the population: as usual, and where those were too few. Beside a stop the linear
+model is far too narrow: nothing is read of how far above a sensor a front stopped."""
+_AGAIN = 2
+"""Times that an avalanche is drawn again at most."""
+_MOST_DRAWS, _LEAST_DRAWS, _IN_ALL = 300, 100, 40_000
+"""Draws of the population for an avalanche: at most, at least, and together for all avalanches."""
+
+
+@dataclass(frozen=True, eq=False)
+class Conditional:
+    """Each reading by those above it, under one law; all (n_events, n_sensors), NaN where nothing is read.
+
+    Attributes
+    ----------
+    mean, low, high : arrays, m/s or m
+        Of what would be read, errors included: mean, and 5 and 95 % quantiles.
+    log_score : array
+        Log predictive density of the reading.
+    crps : array, m/s or m
+        Continuous ranked probability score.
+    n_above : integer array
+        Readings of the same avalanche above it; 0 also where there is no reading.
+    effective : array
+        Effective number of draws.
+    """
+
+    mean: FloatArray
+    low: FloatArray
+    high: FloatArray
+    log_score: FloatArray
+    crps: FloatArray
+    n_above: IntArray
+    effective: FloatArray
+
+    def covered(self, values: FloatArray) -> FloatArray:
+        """1 where the central 90 % of the predictions hold the reading, else 0, NaN where there is none."""
+        inside = (values >= self.low) & (values <= self.high)
+        return np.where(np.isfinite(self.mean), inside, np.nan)
+
+
+class BeforeAfter(NamedTuple):
+    """By the base law, and by the law with what was added."""
+
+    before: Conditional
+    after: Conditional
+
+    @classmethod
+    def of(cls, before: HeldOut, after: HeldOut, seed: int) -> BeforeAfter:
+        """Predict every reading twice, from what the other avalanches say and from those above it."""
+        return cls(conditional(before.others, seed), conditional(after.others, seed))
+
+
+class _Given(NamedTuple):
+    """What is predicted of one avalanche, and from what.
+
+    Attributes
+    ----------
+    sensors : (n,) integer array
+        Whose readings are predicted.
+    sets : (n_sets, n_sensors) boolean array
+        Sets of its readings, the empty one first.
+    above, with_it : (n,) integer arrays
+        Which set lies above each, and which holds it too.
+    """
+
+    sensors: IntArray
+    sets: BoolArray
+    above: IntArray
+    with_it: IntArray
+
+
+def conditional(others: Sequence[LeftOut], seed: int) -> Conditional:
+    """Predict each reading of each avalanche from those above it.
+
+    Parameters
+    ----------
+    others : sequence of LeftOut
+        What the other avalanches say of each.
+    seed : int
+        The same for two laws, so that they differ by themselves and not by random numbers.
+    """
+    n_draws = int(np.clip(_IN_ALL // len(others), _LEAST_DRAWS, _MOST_DRAWS))
+
+    def of_event(event: int) -> FloatArray:
+        extension, draws = others[event]
+        draws = draws.take(np.linspace(0, len(draws.means) - 1, n_draws).round().astype(int))
+        return _event(extension, event, draws, seed)
+
+    parts = np.array(side_by_side(of_event, range(len(others))))
+    mean, low, high, log_score, crps, n_above, effective = parts.transpose(1, 0, 2)
+    n_above = np.nan_to_num(n_above).astype(np.int64)
+    return Conditional(mean, low, high, log_score, crps, n_above, effective)
+
+
+def above(problem: HierarchicalProblem) -> BoolArray:
+    """Which sensors lie wholly above which, (n_sensors, n_sensors): row k has those above k.
+
+    A front passes every sensor of speed before it stops: all of them are above the runout.
+    """
+    velocity = problem.readings.is_velocity
+    ends = [(np.nan, np.nan) if place is None else place for place in problem.sensor_places]
+    first, last = np.array(ends, dtype=float).T
+    passed = (last[None, :] <= first[:, None]) & (last[None, :] < last[:, None])
+    return np.where(velocity[:, None], passed, velocity[None, :]) & velocity[None, :]
+
+
+def _given(problem: HierarchicalProblem, event: int) -> _Given:
+    observed = problem.readings.observed[event]
+    sensors = np.flatnonzero(observed)
+    before = above(problem)[sensors] & observed
+    with_it = before.copy()
+    with_it[np.arange(len(sensors)), sensors] = True
+    nothing = np.zeros((1, len(observed)), dtype=bool)
+    sets, place = np.unique(np.vstack([nothing, before, with_it]), axis=0, return_inverse=True)
+    place = place.ravel()[1:]
+    return _Given(sensors, sets, place[: len(sensors)], place[len(sensors) :])
+
+
+def readings_of(problem: HierarchicalProblem, event: int, sets: BoolArray) -> EventReadings:
+    """Some of an avalanche's readings, one row for each set; where it did not come is not among them."""
+    readings = problem.readings
+    ends = np.array([np.nan if place is None else place[1] for place in problem.sensor_places])
+    moved = sets & readings.is_velocity & (readings.values[event] > 0.0)
+    return readings.take(np.full(len(sets), event))._replace(
+        observed=sets,
+        reached=np.where(moved, ends, -np.inf).max(axis=1, initial=-np.inf),
+        not_reached=np.full(len(sets), np.inf),
+    )
+
+
+def _event(extension: Extension, event: int, draws: Draws, seed: int) -> FloatArray:
+    """What `Conditional` has of one avalanche, (7, n_sensors)."""
+    problem = extension.problem
+    readings, errors = problem.readings, problem.error_model
+    result = np.full((7, len(readings.is_velocity)), np.nan)
+    given = _given(problem, event)
+    if not len(given.sensors):
+        return result
+    rows = Rows(
+        np.full(len(given.sets), event),
+        np.zeros(len(given.sets), dtype=np.int64),
+        readings_of(problem, event, given.sets),
+        errors.errors,
+    )
+    rng = np.random.default_rng([seed, 61, event])
+    likelihood = EventLikelihood(extension, rows, draws.strengths.mean(axis=0))
+    found = sample(likelihood, draws, _USUAL, np.empty((0, extension.n_base + 1)), rng)
+    for _ in range(_AGAIN):
+        missed = found.missed(ENOUGH)
+        if len(missed):
+            found = sample(likelihood, draws, _MORE, missed, rng)
+    fronts = found.fronts[:, :-1]
+    drawn = errors.draw(fronts, readings.sd(event, fronts), readings.is_velocity, rng)
+    for sensor, before, with_it in zip(given.sensors, given.above, given.with_it, strict=True):
+        log_weights = found.log_weights[before]
+        weights = _normalised(log_weights + _together(found, rows, before, sensor, drawn, errors))
+        value, x = readings.values[event, sensor], drawn[:, sensor]
+        effective = [1.0 / np.sum(w**2) for w in (weights, _normalised(found.log_weights[with_it]))]
+        score = np.logaddexp.reduce(found.log_weights[with_it]) - np.logaddexp.reduce(log_weights)
+        mean, low, high, crps = _summary(x, weights, value)
+        result[:, sensor] = mean, low, high, score, crps, given.sets[before].sum(), min(effective)
+    return result
+
+
+def _normalised(log_weights: FloatArray) -> FloatArray:
+    weights = np.exp(log_weights - log_weights.max())
+    return weights / weights.sum()
+
+
+def _together(
+    found: Sample, rows: Rows, before: int, sensor: int, drawn: FloatArray, errors: ErrorModel
+) -> FloatArray | float:
+    """By how much a reading's error is more probable beside those above, as a logarithm for each draw.
+
+    Errors of an avalanche's readings have a factor or a part in common under some error models; drawn anew
+    they have not. Where nothing is in common it is nothing.
+    """
+    common = errors.errors.common > 0.0 or np.ptp(errors.errors.scales) > 0.0
+    if not common or not rows.readings.observed[before].any():
+        return 0.0
+    n = len(drawn)
+    readings = rows.readings.take(np.full(n, before))
+    values, alone = readings.values.copy(), np.zeros_like(readings.observed)
+    values[:, sensor], alone[:, sensor] = drawn[:, sensor], True
+    both, at = readings.observed | alone, np.arange(n)
+    # Without where the front is known to have come: the same in both.
+    readings = readings._replace(values=values, reached=np.full(n, -np.inf))
+    joint, own = (
+        log_likelihoods(at, found.fronts, readings._replace(observed=seen), rows.errors)
+        for seen in (both, alone)
+    )
+    those = log_likelihoods(at, found.fronts, readings, rows.errors)
+    ratio: FloatArray = joint - own - those
+    return ratio
+
+
+def _summary(x: FloatArray, weights: FloatArray, value: float) -> tuple[float, float, float, float]:
+    """Mean, quantiles and continuous ranked probability score of weighed draws."""
+    order = np.argsort(x)
+    x, weights = x[order], weights[order]
+    below = np.cumsum(weights)
+    tail = 0.5 * (1.0 - INTERVAL_PROBABILITY)
+    low, high = np.interp([tail, 1.0 - tail], below - 0.5 * weights, x)
+    apart = np.sum(weights * x * (2.0 * below - weights - 1.0))
+    return float(weights @ x), float(low), float(high), float(weights @ np.abs(x - value) - apart)
