@@ -38,8 +38,8 @@ class LogProbability:
     """Unnormalised log posterior of many log strengths."""
 
     def __init__(self, problem: PooledProblem) -> None:
-        if len(problem.releases) != 1:
-            raise ValueError("this peer knows one release place")
+        if len(problem.releases) != 1 or problem.release_speeds.any():
+            raise ValueError("this peer knows one release place, from rest")
         law = problem.contributions(LAW.mechanisms)
         # Compiled anew for every run, as the other peers' functions are.
         self._compiled = njit(error_model="numpy")(_log_densities)

@@ -62,8 +62,9 @@ def track_of(problem: PooledProblem) -> Track:
     """
     path, sensors = problem.path, problem.sensors
     points, runout = sensors[:-1], sensors[-1]
-    if len(problem.releases) != 1 or len(path.barriers) or runout[0] != RUNOUT:
-        raise ValueError("the peers know one release place, no dams, and a runout as the last sensor")
+    one = len(problem.releases) == 1 and not problem.release_speeds.any()
+    if not one or len(path.barriers) or runout[0] != RUNOUT:
+        raise ValueError("the peers know one release from rest, no dams, and a runout as the last sensor")
     if np.any(points[:, 0] == RUNOUT) or np.any(points[:, 1] != points[:, 2]):
         raise ValueError("the peers know speeds at points only")
     release = float(problem.releases[0])

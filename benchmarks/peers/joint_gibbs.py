@@ -44,6 +44,7 @@ class JointGibbs:
         n_events = problem.campaign.n_events
         self.event = np.tile(np.arange(n_events), n_chains)
         self.release = self.fronts.releases.mean[self.event]
+        self.release_speed = self.fronts.releases.speed[self.event]
         # Population: means of logs, logs of spreads, and the correlation if there are two strengths.
         n_pairs = self.n * (self.n - 1) // 2
         self.population = np.column_stack(
@@ -60,7 +61,7 @@ class JointGibbs:
         """Of each event of each chain: (n_chains, n_events, n) to (n_chains, n_events)."""
         strengths = np.exp(np.clip(x.reshape(-1, self.n), -30.0, 10.0))
         fronts = self.fronts
-        runs = simulate(strengths, self.release, fronts.path, fronts.law, fronts.sensors)
+        runs = simulate(strengths, self.release, fronts.path, fronts.law, fronts.sensors, self.release_speed)
         result: FloatArray = log_likelihoods(self.event, runs, fronts.readings, fronts.errors)
         return result.reshape(x.shape[:2])
 

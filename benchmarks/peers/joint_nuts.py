@@ -52,10 +52,11 @@ def joint_model(problem: HierarchicalProblem, law: Law) -> pm.Model:
     Raises
     ------
     ValueError
-        For error models other than "normal" and uncertain releases.
+        For error models other than "normal", uncertain releases, and readings known by bounds only.
     """
-    if problem.error_model.id != "normal" or problem.releases.sd.any():
-        raise ValueError("normal errors and certain releases only")
+    known = not (problem.releases.uncertain.any() or problem.readings.bounded.any())
+    if problem.error_model.id != "normal" or not known:
+        raise ValueError("normal errors, certain releases and exact readings only")
     return law.build(_Joint(problem))
 
 
@@ -77,7 +78,10 @@ class _Joint:
 def log_likelihood(problem: HierarchicalProblem, mechanisms: Any, logs: Any) -> Any:
     """Symbolic log likelihood of all events given the logarithms of their strengths."""
     fronts, readings = problem.fronts(mechanisms), problem.readings
-    predicted = front_readings(pt.exp(logs), fronts.releases.mean, fronts.path, fronts.law, fronts.sensors)
+    releases = fronts.releases
+    predicted = front_readings(
+        pt.exp(logs), releases.mean, fronts.path, fronts.law, fronts.sensors, releases.speed
+    )
     prediction, stop = predicted[:, :-1], predicted[:, -1]
     variance = pt.square(readings.relative_sd * prediction) + readings.absolute_sd**2
     variance = pt.switch(readings.stated_sd > 0.0, readings.stated_sd**2, variance)

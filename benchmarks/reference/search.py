@@ -50,7 +50,7 @@ class Recorded:
     @property
     def loose(self) -> NDArray[np.bool_]:
         """Whose release is uncertain, (n_events,)."""
-        return np.asarray(self.extension.problem.releases.sd > 0.0)
+        return self.extension.problem.releases.uncertain
 
     def log_likelihood(self, events: IntArray, points: FloatArray) -> FloatArray:
         """Of points of events, (k,) and (k, n + 1) to (k,); a release's own prior density is not in it."""

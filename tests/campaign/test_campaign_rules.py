@@ -2,9 +2,12 @@
 
 import re
 
+import numpy as np
 import pytest
 
-from skred.campaign import CampaignError, read_campaign
+from skred.campaign import CampaignError, read_campaign, write_campaign
+from skred.campaign.parts import of_events
+from skred.campaign.summary import campaign_summary, place_sentences
 
 # file, text in the good file, what replaces it; row, column and words of the problem
 # fmt: off
@@ -76,6 +79,21 @@ BROKEN = {
     "release below the track": ("events.csv", "first,0", "first,1e4", 2, "release_s_m", "on the track"),
     "release is empty": ("events.csv", "first,0", "first,", 2, "release_s_m", "empty"),
     "release sd is zero": ("events.csv", "first,0,5", "first,0,0", 2, "release_sd_m", "greater than 0"),
+    "release speed is negative": (
+        "events.csv", "snow_temperature_degC,snow_type\nfirst,0,5,-3.5,dry\nsecond,10,,,wet\nthird,5,2.5,-8,",
+        "release_speed_m_s,snow_type\nfirst,0,5,-3.5,dry\nsecond,10,,,wet\nthird,5,2.5,8,", 2,
+        "release_speed_m_s", "0 or a greater",
+    ),
+    "release speed too fast": (
+        "events.csv", "snow_temperature_degC,snow_type\nfirst,0,5,-3.5,dry\nsecond,10,,,wet\nthird,5,2.5,-8,",
+        "release_speed_m_s,snow_type\nfirst,0,5,,dry\nsecond,10,,,wet\nthird,5,2.5,350,", 4,
+        "release_speed_m_s", "at most 200",
+    ),
+    "sd of no release speed": (
+        "events.csv", "snow_temperature_degC,snow_type\nfirst,0,5,-3.5,dry\nsecond,10,,,wet\nthird,5,2.5,-8,",
+        "release_speed_sd_m_s,snow_type\nfirst,0,5,,dry\nsecond,10,,,wet\nthird,5,2.5,1,", 4,
+        "release_speed_sd_m_s", "not given",
+    ),
     "text in a column with a unit": (
         "events.csv", "-3.5", "cold", 2, "snow_temperature_degC", "ends in a unit",
     ),
@@ -121,6 +139,29 @@ BROKEN = {
     "speed below a sensor not reached": (
         "recordings.csv", "lower,,,not_reached", "lower,4,,observed", 8, "value",
         "did not reach sensor 'span'",
+    ),
+    "a bound without a value": ("recordings.csv", "upper,30,", "upper,,", 2, "value", "needs a value"),
+    "an interval without its end": (
+        "recordings.csv", "first,stop,320,,observed", "first,stop,320,,between", 5, "value_to", "both ends",
+    ),
+    "a bound off the track": (
+        "recordings.csv", "stop,320,,observed", "stop,900,,at_most", 5, "value", "on the track",
+    ),
+    "a bound of speed below nil": (
+        "recordings.csv", "upper,30,,observed", "upper,-3,,at_least", 2, "value", "not negative",
+    ),
+    "a bound that nothing measures to": (
+        "recordings.csv", "span,25,3,observed", "span,25,1e-6,at_most", 3, "sd", "at least 0.03 m/s",
+    ),
+    "at least some speed below a sensor not reached": (
+        "recordings.csv", "lower,,,not_reached", "lower,4,,at_least", 8, "value", "did not reach sensor",
+    ),
+    "place sd is zero": (
+        "sensors.csv", "relative_sd,absolute_sd\nupper,front_velocity,100,100,0.1,1\n"
+        "span,front_velocity,120,200,0.1,1\nlower,front_velocity,250,250,0.1,0\nstop,runout,,,0,10\n",
+        "relative_sd,absolute_sd,place_sd_m\nupper,front_velocity,100,100,0.1,1,0\n"
+        "span,front_velocity,120,200,0.1,1,\nlower,front_velocity,250,250,0.1,0,\nstop,runout,,,0,10,\n",
+        2, "place_sd_m", "greater than 0",
     ),
     "ragged row": ("recordings.csv", "upper,30,,observed", "upper,30,5,,observed", 2, None, "6 cells"),
     "short row": ("recordings.csv", "upper,30,,observed", "upper,30,observed", 2, None, "4 cells"),
@@ -192,6 +233,74 @@ def test_bounds_are_read(texts, folder_with):
     assert campaign.values[0, 0] == 200 and campaign.stated_sd[0, 1] == 0.2
     with pytest.raises(CampaignError, match="0.19, expected at least 0.2 m/s, 1/1000 of the largest"):
         read_campaign(folder_with({"recordings.csv": text.replace("25,0.2", "25,0.19")}))
+
+
+def test_a_track_may_be_level_where_fronts_are_released_with_a_speed(texts, folder_with):
+    level = "x_m,z_m\n0,300\n60,300\n120,300\n500,300\n"
+    with pytest.raises(CampaignError, match="ends no lower than it starts"):
+        read_campaign(folder_with({"track.csv": level}))
+    events = (
+        "event,release_s_m,release_speed_m_s,release_speed_sd_m_s\nfirst,5,35,1\nsecond,10,22,\nthird,5,,\n"
+    )
+    campaign = read_campaign(folder_with({"track.csv": level, "events.csv": events}))
+    assert [event.release_speed_m_s for event in campaign.events] == [35.0, 22.0, None]
+    assert [event.release_speed_sd_m_s for event in campaign.events] == [1.0, None, None]
+    assert campaign.events[0].covariates == {}
+
+
+BOUNDS = (
+    "event,sensor,value,value_to,status\n"
+    "first,upper,30,,observed\nfirst,stop,320,,at_least\n"
+    "second,upper,20,25,between\nsecond,stop,180,230,between\n"
+    "third,upper,28,,at_most\nthird,stop,330,,at_most\n"
+)
+
+
+def test_bounds_are_read_and_written(folder_with, tmp_path):
+    campaign = read_campaign(folder_with({"recordings.csv": BOUNDS}))
+    least, most = campaign.bounds
+    np.testing.assert_array_equal(least[:, 0], [-np.inf, 20.0, -np.inf])
+    np.testing.assert_array_equal(most[:, 0], [np.inf, 25.0, 28.0])
+    np.testing.assert_array_equal(least[:, 3], [320.0, 180.0, -np.inf])
+    np.testing.assert_array_equal(most[:, 3], [np.inf, 230.0, 330.0])
+    write_campaign(campaign, tmp_path / "copy")
+    copy = read_campaign(tmp_path / "copy")
+    assert copy.fingerprint() == campaign.fingerprint()
+    assert of_events(copy, [1]).bounds[1][0, 3] == 230.0
+    other = read_campaign(folder_with({"recordings.csv": BOUNDS.replace("180,230", "180,231")}))
+    assert other.fingerprint() != campaign.fingerprint()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "row", "words"),
+    [
+        ("180,230,between", "230,180,between", 5, "greater than value"),
+        ("320,,at_least", "320,330,at_least", 3, "remove value_to"),
+        ("180,230,between", "180,900,between", 5, "on the track"),
+        ("20,25,between", "20,300,between", 4, "at most 200"),
+    ],
+)
+def test_both_ends_of_an_interval_are_checked(old, new, row, words, folder_with):
+    with pytest.raises(CampaignError) as caught:
+        read_campaign(folder_with({"recordings.csv": BOUNDS.replace(old, new)}))
+    (problem,) = caught.value.problems
+    assert (problem.row, problem.column) == (row, "value_to") and words in problem.message
+
+
+def test_how_well_places_are_known_is_kept(texts, folder_with, tmp_path):
+    lines = texts["sensors.csv"].splitlines()
+    ends = ["place_sd_m", "40", "", "12.5", ""]
+    text = "\n".join(f"{line},{end}" for line, end in zip(lines, ends, strict=True))
+    campaign = read_campaign(folder_with({"sensors.csv": text}))
+    assert [sensor.place_sd_m for sensor in campaign.sensors] == [40.0, None, 12.5, None]
+    write_campaign(campaign, tmp_path / "copy")
+    assert read_campaign(tmp_path / "copy").sensors == campaign.sensors
+    assert campaign.fingerprint() != read_campaign(folder_with({})).fingerprint()
+    summary = campaign_summary(campaign)
+    assert summary["places_known_to"] == {"upper": 40.0, "lower": 12.5}
+    assert place_sentences(summary["places_known_to"])[0] == (
+        "upper: place known to ± 40 m; not yet part of the models"
+    )
 
 
 def test_the_span_rule_looks_at_the_span_s_upper_end(texts, folder_with):

@@ -19,7 +19,6 @@ from skred.diagnosis.evidence.conditional_map import (
     event_modes,
     log_joint,
     look_around,
-    take_rows,
 )
 from skred.diagnosis.evidence.extension import Extension, extended
 from skred.inference.error_model import ERROR_MODELS
@@ -131,7 +130,7 @@ def test_groups_are_separate_calls() -> None:
     second = Population(base.population.mean + 0.3, base.population.covariance * 2.0)
     both = Population(*(np.concatenate([a, b]) for a, b in zip(first, second, strict=True)))
     twice = np.tile(np.arange(n), 2)
-    rows = Rows(twice, np.repeat([0, 1], n), take_rows(base.rows.readings, twice), base.rows.errors)
+    rows = Rows(twice, np.repeat([0, 1], n), base.rows.readings.take(twice), base.rows.errors)
     together = event_modes(EventLikelihood(extension, rows, NONE), np.tile(start, (2, 1)), both)
     for group, alone in enumerate((first, second)):
         part = event_modes(EventLikelihood(extension, base.rows, NONE), start, alone)

@@ -8,7 +8,7 @@ from diagnosis_cases import score_test_of, sparse_base
 from numpy.testing import assert_allclose
 
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
-from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population, Rows, take_rows
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population, Rows
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import (
     MeanPrior,
@@ -45,7 +45,9 @@ def random_inputs(n: int, n_groups: int, seed: int) -> tuple[Modes, Rows, Popula
         np.sqrt(curvature) * rng.uniform(0.2, 0.9, curvature.shape) / np.sqrt(N_COLUMNS),
     )
     empty = np.zeros((n_rows, 0))
-    readings = EventReadings(empty, empty > 0, empty, *[np.zeros(0)] * 3, *[np.zeros(n_rows)] * 2, 8.0)
+    readings = EventReadings(
+        empty, empty > 0, empty, *[np.zeros(0)] * 3, *[np.zeros(n_rows)] * 2, 8.0, empty, empty
+    )
     group = np.repeat(np.arange(n_groups), N_EVENTS)
     rows = Rows(np.tile(np.arange(N_EVENTS), n_groups), group, readings, ERROR_MODELS["normal"].errors)
     return modes, rows, population, MeanPrior(rng.standard_normal(n), rng.uniform(0.3, 2.0, n))
@@ -147,7 +149,7 @@ def test_order_of_events_does_not_matter() -> None:
     base = sparse_base()
     score_test = score_test_of(base)
     order = np.random.default_rng(2).permutation(len(base.rows.event))
-    turned = base.rows._replace(event=base.rows.event[order], readings=take_rows(base.rows.readings, order))
+    turned = base.rows._replace(event=base.rows.event[order], readings=base.rows.readings.take(order))
     found = []
     for rows, points in ((base.rows, base.fit.points), (turned, base.fit.points[order])):
         likelihood = EventLikelihood(score_test.extension, rows, np.zeros(0))

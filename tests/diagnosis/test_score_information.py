@@ -14,7 +14,15 @@ MODELS = ["normal", "robust", "student", "scaled", "correlated"]
 INF = np.inf
 
 
-def readings_of(values: np.ndarray, stated: float = 0.0, *, reached: float = -INF, not_reached: float = INF):  # type: ignore[no-untyped-def]
+def readings_of(
+    values: np.ndarray,
+    stated: float = 0.0,
+    *,
+    reached: float = -INF,
+    not_reached: float = INF,
+    least=None,
+    most=None,
+):  # type: ignore[no-untyped-def]
     """Two speeds and a runout, for each row of values."""
     n = len(values)
     observed = np.isfinite(values)
@@ -28,6 +36,8 @@ def readings_of(values: np.ndarray, stated: float = 0.0, *, reached: float = -IN
         np.full(n, reached),
         np.full(n, not_reached),
         8.0,
+        np.full((n, 3), -INF) if least is None else np.tile(least, (n, 1)),
+        np.full((n, 3), INF) if most is None else np.tile(most, (n, 1)),
     )
 
 

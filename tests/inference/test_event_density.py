@@ -40,6 +40,8 @@ def readings_of(
     stated: np.ndarray | None = None,
     reached: float = -np.inf,
     not_reached: float = np.inf,
+    least: np.ndarray | None = None,
+    most: np.ndarray | None = None,
 ) -> EventReadings:
     """One event, four gates and a runout, as event number 1 of 2."""
     observed = np.ones(5, dtype=bool) if observed is None else observed
@@ -55,6 +57,8 @@ def readings_of(
         np.array([0.0, reached]),
         np.array([5.0, not_reached]),
         PLACE_SD,
+        np.full((2, 5), -np.inf) if least is None else np.array([np.full(5, -np.inf), least]),
+        np.full((2, 5), np.inf) if most is None else np.array([np.full(5, np.inf), most]),
     )
 
 
@@ -225,7 +229,7 @@ def test_more_readings_than_a_product_holds(name: str, sd: float) -> None:
     velocity = np.arange(n) < n - 1
     readings = EventReadings(
         values[None, :], everything, np.full((1, n), sd), np.zeros(n), np.zeros(n), velocity,
-        np.array([-np.inf]), np.array([np.inf]), PLACE_SD,
+        np.array([-np.inf]), np.array([np.inf]), PLACE_SD, np.full((1, n), -np.inf), np.full((1, n), np.inf),
     )  # fmt: skip
     found = log_likelihood(0, np.full(n + 1, 20.0), readings, ERROR_MODELS[name].errors)
     assert_allclose(found, BY_HAND[name](sd * z, np.full(n, sd), velocity), rtol=1e-9)

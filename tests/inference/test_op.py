@@ -59,6 +59,26 @@ def test_value_and_gradient_agree_with_the_reference(mode: str) -> None:
             assert_allclose(found, derivative @ [1.0, 2.0, 3.0], rtol=1e-9, atol=1e-12)
 
 
+def test_gradients_of_fronts_that_are_released_with_a_speed() -> None:
+    speeds = np.array([0.0, 21.0, 9.0, 14.0])
+    strengths, releases = pt.dmatrix("strengths"), pt.dvector("releases")
+    readings = front_readings(strengths, releases, PATH, PCM, SENSORS, speeds)
+    gradients = pytensor.grad(readings.sum(), [strengths, releases])
+    function = pytensor.function([strengths, releases], [readings, *gradients], mode="FAST_COMPILE")
+    found, by_strength, by_release = function(STRENGTHS, RELEASES)
+    assert_allclose(found, simulate(STRENGTHS, RELEASES, PATH, PCM, SENSORS, speeds), rtol=1e-14)
+    assert found[3, 2] > RELEASES[3] + 1.0, "friction holds it at rest, not in motion"
+    sensors = [("point", 1650.0, 1650.0), ("span", 1810.0, 1910.0), ("runout", 0.0, 0.0)]
+    for run, speed in enumerate(speeds):
+        for k in range(3):
+            step = 1e-40j * (np.arange(3) == k)
+            table = np.zeros((5, TERRAIN.n_cells), dtype=complex)
+            table[3], table[2] = STRENGTHS[run] + step[:2]
+            front = read_front(TERRAIN, table, RELEASES[run] + step[2], sensors, release_speed=speed)
+            one = by_strength[run, k] if k < 2 else by_release[run]
+            assert_allclose(one, front.imag.sum() / 1e-40, rtol=1e-9, atol=1e-12)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("run", [0, 2])
 def test_verify_grad(run: int) -> None:
@@ -125,7 +145,7 @@ def test_wrong_inputs_are_named() -> None:
         front_readings(STRENGTHS, RELEASES, PATH, PCM._replace(columns=np.array([3.0, 2.0])), SENSORS)
     with pytest.raises(TypeError, match="sensors: expected 2 dimensions, found 1"):
         front_readings(STRENGTHS, RELEASES, PATH, PCM, SENSORS[0])
-    with pytest.raises(TypeError, match="expected 11 inputs, found 1"):
+    with pytest.raises(TypeError, match="expected 12 inputs, found 1"):
         FrontReadings()(STRENGTHS)
 
 

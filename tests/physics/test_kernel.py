@@ -53,12 +53,13 @@ POINTS = np.array([0.0, 0.02, 0.11, 0.25, 0.371, 0.5, 0.6, 0.77, 0.86, 0.999, 1.
 
 @dataclass(frozen=True)
 class Case:
-    """A front: five strengths in the order of `Column`, its release, and barriers."""
+    """A front: five strengths in the order of `Column`, its release, barriers, the speed at the release."""
 
     terrain: str
     strengths: tuple[float, ...]
     release_s_m: float
     barriers: tuple[tuple[float, float, float], ...] = ()
+    release_speed: float = 0.0
     sensors: tuple[tuple[str, float, float], ...] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -91,13 +92,18 @@ class Case:
             path_of(terrain, self.barriers),
             law,
             table,
+            np.array([self.release_speed]),
         )
-        readings, jacobian = simulate_with_jacobian(*arguments)
+        readings, jacobian = simulate_with_jacobian(*arguments, by_speed=True)
         np.testing.assert_array_equal(simulate(*arguments), readings)
+        np.testing.assert_array_equal(simulate_with_jacobian(*arguments)[1], jacobian[..., :-1])
         return readings[0], jacobian[0]
 
     def reference(self, along: int | None = None) -> np.ndarray:
-        """Readings, or their derivative by a strength (or the release, number 5) by a complex step."""
+        """Readings, or their derivative by a strength by a complex step.
+
+        Number 5 is the place of the release, 6 the speed there.
+        """
         step = 0.0 if along is None else 1e-40j
         strengths = [value + step * (k == along) for k, value in enumerate(self.strengths)]
         readings = read_front(
@@ -107,6 +113,7 @@ class Case:
             self.sensors,
             weakening_speed=WEAKENING_SPEED,
             barriers=self.barriers,
+            release_speed=self.release_speed + step * (along == 6),
         )
         return readings if along is None else readings.imag / 1e-40
 
@@ -118,6 +125,7 @@ class Case:
             self.release_s_m,
             weakening_speed=WEAKENING_SPEED,
             barriers=self.barriers,
+            release_speed=self.release_speed,
         ).runout_s_m
         at_barrier = [place for place, _, _ in self.barriers]
         ends = np.array([t for _, _, t in self.sensors])
@@ -143,7 +151,8 @@ def cases(draw: st.DrawFn, speed_terms: bool = True) -> Case:
     strengths = tuple(strength(value) if value > 0 else 0.0 for value in largest)
     barrier = st.tuples(place, st.floats(0.0, 20.0), st.sampled_from([0.0, 10.0, 60.0]))
     release = draw(st.one_of(st.sampled_from([0.0, edges[-1]]), place))
-    return Case(name, strengths, release, tuple(sorted(draw(st.lists(barrier, max_size=3)))))
+    speed = draw(st.one_of(st.just(0.0), st.floats(0.5, 60.0)))
+    return Case(name, strengths, release, tuple(sorted(draw(st.lists(barrier, max_size=3)))), speed)
 
 
 SLIPPERY = (0.0, 0.0, 0.0, 0.05, 0.0)
@@ -170,8 +179,10 @@ def test_terms_in_speed_agree_with_the_reference(case: Case) -> None:
     compare(case)
 
 
-def directed(terrain: str, release: float, barriers: tuple = (), **columns: float) -> Case:
-    return Case(terrain, tuple(columns.get(c.name.lower(), 0.0) for c in Column), release, barriers)
+def directed(
+    terrain: str, release: float, barriers: tuple = (), speed: float = 0.0, **columns: float
+) -> Case:
+    return Case(terrain, tuple(columns.get(c.name.lower(), 0.0) for c in Column), release, barriers, speed)
 
 
 DIRECTED = {
@@ -201,6 +212,16 @@ DIRECTED = {
     "barrier at the end": directed("roll over", 7.0, ((900.0, 1.0, 2.0),), friction=0.1),
     "never starts": directed("ryggfonn", 100.0, friction=1.5),
     "one cell": directed("plane of one cell", 12.0, friction=0.2, quadratic=2e-3, linear=0.1),
+    "with a speed, at an edge": directed("counter slope", 60.0, speed=21.0, friction=0.4, quadratic=1e-3),
+    "with a speed, in a cell": directed("ryggfonn", 703.3, speed=31.0, friction=0.3, quadratic=1e-3),
+    "with a speed and terms in U": directed(
+        "ryggfonn", 703.3, speed=31.0, friction=0.2, linear=0.02, weakening=0.1
+    ),
+    "with a speed, off the ground": directed("rough", 33.0, speed=40.0, friction=0.2, quadratic=1e-3),
+    "with a speed, stops in its cell": directed("plane of one cell", 12.0, speed=9.0, friction=1.2),
+    "with a speed, before a barrier": directed(
+        "counter slope", 301.0, ((303.0, 3.0, 20.0),), speed=12.0, friction=0.3
+    ),
 }
 
 
@@ -212,7 +233,7 @@ def test_readings_and_jacobian_agree_with_the_reference(name: str) -> None:
     # A span that starts at the release has an infinite derivative by it, a point there none.
     settled &= [case.release_s_m not in (s, t) for _, s, t in case.sensors]
     speed_terms = case.strengths[Column.LINEAR] + case.strengths[Column.WEAKENING] > 0
-    for k in range(6):
+    for k in range(7):
         if k in (Column.LINEAR, Column.WEAKENING) and not speed_terms:
             continue
         expected = case.reference(k)[settled]
@@ -225,7 +246,7 @@ def test_readings_and_jacobian_agree_with_the_reference(name: str) -> None:
 def test_jacobian_agrees_with_a_complex_step_of_the_reference(case: Case) -> None:
     jacobian, settled = case.kernel()[1], case.settled()
     settled &= [case.release_s_m not in (s, t) for _, s, t in case.sensors]
-    for k in (Column.CONSTANT, Column.QUADRATIC, Column.FRICTION, 5):
+    for k in (Column.CONSTANT, Column.QUADRATIC, Column.FRICTION, 5, 6):
         expected = case.reference(k)[settled]
         scale = max(np.abs(expected).max(initial=0.0), 1e-3)
         assert_allclose(jacobian[settled, k], expected, rtol=1e-7, atol=1e-8 * scale)
@@ -236,8 +257,12 @@ def test_front_speeds_are_those_of_the_reference() -> None:
     terrain = TERRAINS[case.terrain]
     law = make_contributions(COLUMNS, np.ones((5, terrain.n_cells)), WEAKENING_SPEED)
     path = path_of(terrain)
-    speeds = front_speeds(np.array([case.strengths]), np.array([case.release_s_m]), path, law)[0]
     table = np.repeat(np.array(case.strengths)[:, None], terrain.n_cells, axis=1)
+    for release, begin in ((case.release_s_m, 30.0), (terrain.edge_s_m[5], 25.0)):
+        fast = front_speeds(np.array([case.strengths]), np.array([release]), path, law, begin)[0]
+        expected = run_front(terrain, table, release, release_speed=begin).edge_speed_squared
+        assert_allclose(fast, np.sqrt(expected), rtol=1e-10)
+    speeds = front_speeds(np.array([case.strengths]), np.array([case.release_s_m]), path, law)[0]
     run = run_front(terrain, table, case.release_s_m)
     assert_allclose(speeds, np.sqrt(run.edge_speed_squared), rtol=1e-10)
     airborne = GRAVITY * terrain.cos_slope + terrain.curvature * speeds[:-1] ** 2 < 0
@@ -312,11 +337,13 @@ def test_a_front_with_terms_in_speed_is_the_same_alone_and_beside_others(name: s
     end = terrain.length_m
     path = path_of(terrain, ((0.6 * end, 5.0, 50.0),))
     sensors = sensor_table([(0.5 * end, 0.5 * end), (0.3 * end, 0.9 * end), None])
-    together = simulate_with_jacobian(strengths, releases, path, law, sensors)
-    speeds = front_speeds(strengths, releases, path, law)
+    begin = np.where(np.arange(n) % 3 == 0, 0.0, 15.0)
+    together = simulate_with_jacobian(strengths, releases, path, law, sensors, begin)
+    speeds = front_speeds(strengths, releases, path, law, begin)
     assert len(np.unique(together[0][:, 2])) > 3
     for k in range(n):
-        alone = simulate_with_jacobian(strengths[[k]], releases[[k]], path, law, sensors)
+        one_alone = strengths[[k]], releases[[k]], path, law
+        alone = simulate_with_jacobian(*one_alone, sensors, begin[[k]])
         for one, own in zip(together, alone, strict=True):
             np.testing.assert_array_equal(one[k], own[0])
-        np.testing.assert_array_equal(speeds[k], front_speeds(strengths[[k]], releases[[k]], path, law)[0])
+        np.testing.assert_array_equal(speeds[k], front_speeds(*one_alone, begin[[k]])[0])

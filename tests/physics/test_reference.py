@@ -12,7 +12,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from time_integrator import integrate_in_time
 
+from skred.physics.geometry import path_of, sensor_table
 from skred.physics.kernel.columns import GRAVITY, Column
+from skred.physics.kernel.fronts import simulate
+from skred.physics.kernel.inputs import make_contributions
 from skred.physics.reference import read_front, run_front
 from skred.physics.terrain import Terrain
 
@@ -61,6 +64,21 @@ def counter_slope(s: float) -> float:
 
 def derivative(slope: SlopeFunction) -> SlopeFunction:
     return lambda s: -(slope(s + 1e-3) - slope(s - 1e-3)) / 2e-3
+
+
+def test_a_front_that_is_released_with_a_speed_on_a_plane() -> None:
+    terrain, mu, begin = plane(10.0, 900.0, 41), 0.4, 23.0
+    cell = coefficients(terrain, friction=mu)
+    slowing = GRAVITY * (mu * math.cos(math.radians(10.0)) - math.sin(math.radians(10.0)))
+    places = [20.0, 50.0, 99.0]
+    sensors = [*(("point", s, s) for s in places), ("runout", 0.0, 0.0)]
+    found = read_front(terrain, cell, 20.0, sensors, release_speed=begin)
+    speeds = [math.sqrt(begin**2 - 2 * slowing * (s - 20.0)) for s in places]
+    assert_allclose(found, [*speeds, 20.0 + begin**2 / (2 * slowing)], rtol=1e-13)
+    path, law = path_of(terrain), make_contributions(np.array([3]), np.ones((1, 41)), 8.0)
+    table = sensor_table([*((s, s) for s in places), None])
+    kernel = simulate(np.array([[mu]]), np.array([20.0]), path, law, table, begin)[0]
+    assert_allclose(kernel, found, rtol=1e-12)
 
 
 def test_coulomb_front_on_a_plane() -> None:

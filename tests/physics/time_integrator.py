@@ -34,8 +34,9 @@ def integrate_in_time(
     weakening_speed: float = np.inf,
     end: float = np.inf,
     duration: float = 500.0,
+    release_speed: float = 0.0,
 ) -> TimeRun:
-    """Integrate dU/dt along the track from rest until U falls to zero or the track ends."""
+    """Integrate dU/dt along the track until U falls to zero or the track ends."""
     g = 9.81
 
     def motion(_: float, state: np.ndarray) -> list[float]:
@@ -60,7 +61,7 @@ def integrate_in_time(
     solution = solve_ivp(
         motion,
         (0.0, duration),
-        [release, 0.0],
+        [release, release_speed],
         method="DOP853",
         events=events,
         rtol=1e-11,

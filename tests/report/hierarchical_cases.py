@@ -56,6 +56,7 @@ def avalanches(problem, law, medians, size, spread, rng):
     }
     release = np.array([event.release_s_m for event in campaign.events])
     made["release"] = (dims, np.broadcast_to(release, (*size, n_events)).copy())
+    made["release_speed"] = (dims, np.zeros((*size, n_events)))
     is_runout = np.array([sensor.is_runout for sensor in campaign.sensors])
     shape = (*size, n_events, campaign.n_sensors)
     front = np.where(is_runout, 1970.0, 25.0) * np.exp(-0.3 * logs.sum(-1).reshape(*size, n_events, 1))

@@ -9,6 +9,10 @@ import re
 # Larger than any SI quantity of an avalanche, and small enough that its square is still an ordinary number.
 LARGEST_NUMBER = 1e12
 LONGEST_WORD = 200
+NO_DATA = frozenset({-999.0, -9999.0, -99999.0, -999999.0, -32767.0, -32768.0, -3.4028234663852886e38})
+"""Numbers by which terrain models and loggers say that they have none."""
+STATUSES = ("observed", "not_reached", "missing", "at_least", "at_most", "between")
+"""What can be known of a reading, in the order of `skred.campaign.records.Status`."""
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+", re.ASCII)
@@ -29,8 +33,20 @@ def number(text: str) -> float:
     Raises
     ------
     CellError
-        For anything else, including ``nan``, ``inf``, thousands separators and decimal commas.
+        For anything else, including ``nan``, ``inf``, thousands separators, decimal commas and the numbers
+        that stand for no value.
     """
+    value = coordinate(text)
+    if value in NO_DATA:
+        raise CellError(
+            f"{value:g} is how other programs write that there is no value; leave the cell empty if its "
+            "column allows that, else leave out the row"
+        )
+    return value
+
+
+def coordinate(text: str) -> float:
+    """Read a finite number that may be any: along a coordinate every number is a place."""
     if text == "":
         raise CellError("expected a number, the cell is empty; fill it in")
     if not _NUMBER.fullmatch(text):
@@ -80,6 +96,11 @@ def optional_positive(text: str) -> float | None:
     return None if text == "" else positive(text)
 
 
+def optional_not_negative(text: str) -> float | None:
+    """Read a number that is 0 or greater, or nothing from an empty cell."""
+    return None if text == "" else not_negative(text)
+
+
 def optional_word(text: str) -> str | None:
     """Read a short text, or nothing from an empty cell."""
     return None if text == "" else word(text)
@@ -105,8 +126,9 @@ def quantity(text: str) -> str:
 
 def status(text: str) -> str:
     """Read what is known of a reading."""
-    if text not in ("observed", "not_reached", "missing"):
-        raise CellError("expected 'observed', 'not_reached' or 'missing'; correct it")
+    if text not in STATUSES:
+        named = ", ".join(f"'{word}'" for word in STATUSES[:-1])
+        raise CellError(f"expected {named} or '{STATUSES[-1]}'; correct it")
     return text
 
 

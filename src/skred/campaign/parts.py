@@ -26,6 +26,7 @@ def of_events(campaign: Campaign, rows: Sequence[int]) -> Campaign:
         values=campaign.values[chosen],
         status=campaign.status[chosen],
         stated_sd=campaign.stated_sd[chosen],
+        values_to=campaign.values_to[chosen],
     )
 
 
@@ -38,4 +39,5 @@ def without_silent_sensors(campaign: Campaign) -> Campaign:
         values=campaign.values[:, speaking],
         status=campaign.status[:, speaking],
         stated_sd=campaign.stated_sd[:, speaking],
+        values_to=campaign.values_to[:, speaking],
     )

@@ -8,15 +8,18 @@ import numpy as np
 
 from skred.campaign import cells, rules
 from skred.campaign.description import Description, read_description
+from skred.campaign.order_rules import order_problems
 from skred.campaign.problems import CampaignError, Problem
 from skred.campaign.records import Campaign, Event, Quantity, Sensor, Status, Track
 from skred.campaign.tables import MOST_PROBLEMS, Column, ReadCell, Row, Table, read_table
+from skred.campaign.track_rules import TRACK as TRACK_FILE
+from skred.campaign.track_rules import track_problems
 
 # Events times sensors: the arrays of a campaign hold one number for each pair.
 MOST_READINGS = 5_000_000
 
 TRACK = (
-    Column("x_m", cells.number),
+    Column("x_m", cells.coordinate),
     Column("z_m", cells.number),
     Column("width_m", cells.positive, required=False),
 )
@@ -27,16 +30,20 @@ SENSORS = (
     Column("s_to_m", cells.optional_number),
     Column("relative_sd", cells.not_negative),
     Column("absolute_sd", cells.not_negative),
+    Column("place_sd_m", cells.optional_positive, required=False),
 )
 EVENTS = (
     Column("event", cells.word),
     Column("release_s_m", cells.number),
     Column("release_sd_m", cells.optional_positive, required=False),
+    Column("release_speed_m_s", cells.optional_not_negative, required=False),
+    Column("release_speed_sd_m_s", cells.optional_positive, required=False),
 )
 RECORDINGS = (
     Column("event", cells.word),
     Column("sensor", cells.word),
     Column("value", cells.optional_number),
+    Column("value_to", cells.optional_number, required=False),
     Column("sd", cells.optional_positive, required=False),
     Column("status", cells.status),
 )
@@ -64,16 +71,17 @@ def read_campaign(folder: Path) -> Campaign:
     folder = Path(folder)
     _require_folder(folder)
     description, reference_row, problems = read_description(folder)
-    track_table = read_table(folder, rules.TRACK, TRACK)
+    track_table = read_table(folder, TRACK_FILE, TRACK)
     sensor_table = read_table(folder, rules.SENSORS, SENSORS)
     event_table = read_table(folder, rules.EVENTS, EVENTS, _covariate_reader)
     recording_table = read_table(folder, rules.RECORDINGS, RECORDINGS)
 
-    track, track_problems = _track(track_table)
+    moving = any((row.number_or_none("release_speed_m_s") or 0.0) > 0 for row in event_table.rows)
+    track, of_track = _track(track_table, may_be_level=moving)
     length_m = track.length_m if track else None
     if description is not None:
         problems += rules.reference_problems(description.reference_s_m, reference_row, length_m)
-    problems += track_problems
+    problems += of_track
     problems += sensor_table.problems
     if sensor_table.is_usable:
         problems += rules.sensor_problems(sensor_table.rows, length_m)
@@ -86,7 +94,7 @@ def read_campaign(folder: Path) -> Campaign:
         by_id = {sensor.id: sensor for sensor in sensors}
         event_ids, sensor_ids = _ids(event_table, "event"), _ids(sensor_table, "sensor")
         problems += rules.recording_problems(recording_table.rows, event_ids, sensor_ids, by_id, length_m)
-        problems += rules.not_reached_problems(recording_table.rows, by_id)
+        problems += order_problems(recording_table.rows, by_id, _releases(event_table, length_m))
     problems += _too_many(event_table, sensor_table)
     if problems or description is None or track is None:
         raise CampaignError(_bounded(_in_order(problems)))
@@ -116,11 +124,18 @@ def _ids(table: Table, column: str) -> frozenset[str] | None:
     return frozenset(row.word(column) for row in table.rows if row.has(column))
 
 
-def _track(table: Table) -> tuple[Track | None, list[Problem]]:
+def _releases(table: Table, length_m: float | None) -> dict[str, Row]:
+    """Return the rows of events whose release lies on the track, by the events' ids."""
+    readable = [row for row in table.rows if row.has("event", "release_s_m")]
+    end_m = np.inf if length_m is None else length_m
+    return {row.word("event"): row for row in readable if 0.0 <= row.number("release_s_m") <= end_m}
+
+
+def _track(table: Table, *, may_be_level: bool) -> tuple[Track | None, list[Problem]]:
     """Build the track, or say why there is none."""
     problems = list(table.problems)
     if table.is_usable:
-        problems += rules.track_problems(table.rows)
+        problems += track_problems(table.rows, may_be_level=may_be_level)
     if problems:
         return None, problems
     columns = {name: np.array([row.number(name) for row in table.rows]) for name in table.columns}
@@ -131,7 +146,7 @@ def _sensors(rows: Sequence[Row]) -> tuple[Sensor, ...]:
     """Build the sensors whose cells could all be read and that have a place if they need one."""
     sensors = []
     for row in rows:
-        if not row.has(*(column.name for column in SENSORS)):
+        if not row.has(*(column.name for column in SENSORS if column.required)):
             continue
         s_from_m, s_to_m = row.number_or_none("s_from_m"), row.number_or_none("s_to_m")
         is_runout = row.word("quantity") == "runout"
@@ -145,6 +160,7 @@ def _sensors(rows: Sequence[Row]) -> tuple[Sensor, ...]:
                 s_to_m=np.nan if s_to_m is None else s_to_m,
                 relative_sd=row.number("relative_sd"),
                 absolute_sd=row.number("absolute_sd"),
+                place_sd_m=row.number_or_none("place_sd_m"),
             )
         )
     return tuple(sensors)
@@ -159,6 +175,8 @@ def _events(table: Table) -> tuple[Event, ...]:
             release_s_m=row.number("release_s_m"),
             release_sd_m=row.number_or_none("release_sd_m"),
             covariates={name: row.cells[name] for name in covariates},
+            release_speed_m_s=row.number_or_none("release_speed_m_s"),
+            release_speed_sd_m_s=row.number_or_none("release_speed_sd_m_s"),
         )
         for row in table.rows
     )
@@ -202,15 +220,15 @@ def _campaign(
 ) -> Campaign:
     """Put the parts together once nothing is wrong with any of them."""
     shape = (len(events), len(sensors))
-    values, stated_sd = np.full(shape, np.nan), np.full(shape, np.nan)
+    values, stated_sd, values_to = (np.full(shape, np.nan) for _ in range(3))
     status = np.full(shape, Status.MISSING, dtype=np.int8)
     event_index = {event.id: i for i, event in enumerate(events)}
     sensor_index = {sensor.id: j for j, sensor in enumerate(sensors)}
     for row in rows:
         place = event_index[row.word("event")], sensor_index[row.word("sensor")]
-        value, sd = row.number_or_none("value"), row.number_or_none("sd")
-        values[place] = np.nan if value is None else value
-        stated_sd[place] = np.nan if sd is None else sd
+        for column, into in (("value", values), ("sd", stated_sd), ("value_to", values_to)):
+            number = row.number_or_none(column)
+            into[place] = np.nan if number is None else number
         status[place] = Status[row.word("status").upper()]
     return Campaign(
         name=description.name,
@@ -224,4 +242,5 @@ def _campaign(
         values=values,
         status=status,
         stated_sd=stated_sd,
+        values_to=values_to,
     )

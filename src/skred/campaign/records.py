@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
 from typing import Literal
@@ -24,6 +24,18 @@ class Status(IntEnum):
     OBSERVED = 0
     NOT_REACHED = 1
     MISSING = 2
+    AT_LEAST = 3
+    AT_MOST = 4
+    BETWEEN = 5
+
+    @property
+    def is_bound(self) -> bool:
+        """Whether the reading is known by its bounds only."""
+        return self >= Status.AT_LEAST
+
+
+_READINGS = ("values", "stated_sd", "values_to")
+"""Arrays of a campaign with one number for each event and sensor."""
 
 
 def _frozen(values: ArrayLike, dtype: type[np.generic] = np.float64) -> NDArray[np.generic]:
@@ -88,6 +100,8 @@ class Sensor:
         Equal for a point, different for a mean velocity over that span, NaN for a runout.
     relative_sd, absolute_sd : float
         Standard deviation of a reading: a share of its value, and a part in the unit of the value.
+    place_sd_m : float or None
+        How well its place along the track is known, m; None where that was not stated. No model uses it yet.
     """
 
     id: str
@@ -96,6 +110,7 @@ class Sensor:
     s_to_m: float
     relative_sd: float
     absolute_sd: float
+    place_sd_m: float | None = None
 
     @property
     def is_runout(self) -> bool:
@@ -117,17 +132,22 @@ class Event:
     id : str
         Unique in the campaign.
     release_s_m : float
-        Where the front starts from rest, arc length in m.
+        Where the front starts, arc length in m.
     release_sd_m : float or None
         Standard deviation of that place, m, where one is stated.
     covariates : mapping of str to float, str or None
         Further properties; numbers have their unit in the name. None: not known.
+    release_speed_m_s, release_speed_sd_m_s : float or None
+        Speed of the front there, m/s, and its standard deviation; None where it starts from rest, and where
+        the speed is exact.
     """
 
     id: str
     release_s_m: float
     release_sd_m: float | None
     covariates: Mapping[str, Covariate]
+    release_speed_m_s: float | None = None
+    release_speed_sd_m_s: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,11 +171,13 @@ class Campaign:
     events : tuple of Event
         The rows of the arrays below.
     values : (n_events, n_sensors) array
-        Readings, m/s or m; NaN where there is none.
+        Readings, m/s or m; NaN where there is none. Where only bounds are known, the bound, or the lower one.
     status : (n_events, n_sensors) int8 array
         A `Status` for each reading.
     stated_sd : (n_events, n_sensors) array
         Standard deviation that overrides the sensor's; NaN where none is stated.
+    values_to : (n_events, n_sensors) array
+        Upper bounds of readings that lie between two, m/s or m; NaN elsewhere, and by default everywhere.
     """
 
     name: str
@@ -169,12 +191,16 @@ class Campaign:
     values: FloatArray
     status: NDArray[np.int8]
     stated_sd: FloatArray
+    values_to: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         """Take read-only copies and compare their shapes."""
         object.__setattr__(self, "sensors", tuple(self.sensors))
         object.__setattr__(self, "events", tuple(self.events))
-        for name, dtype in (("values", np.float64), ("status", np.int8), ("stated_sd", np.float64)):
+        if not np.isfinite(self.values_to).any():  # then it fits arrays of any shape
+            object.__setattr__(self, "values_to", np.full((self.n_events, self.n_sensors), np.nan))
+        for name in (*_READINGS, "status"):
+            dtype: type[np.generic] = np.int8 if name == "status" else np.float64
             object.__setattr__(self, name, _frozen(getattr(self, name), dtype))
             if getattr(self, name).shape != (self.n_events, self.n_sensors):
                 raise ValueError(f"{name} needs the shape {self.n_events, self.n_sensors}: events, sensors")
@@ -188,6 +214,17 @@ class Campaign:
     def n_sensors(self) -> int:
         """Number of sensors."""
         return len(self.sensors)
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Between what readings lie that are known by bounds only, (n_events, n_sensors) each.
+
+        Minus and plus infinity where there is no such bound, and for all other readings.
+        """
+        below = np.isin(self.status, (Status.AT_LEAST, Status.BETWEEN))
+        least = np.where(below, self.values, -np.inf)
+        most = np.where(self.status == Status.AT_MOST, self.values, np.inf)
+        return least, np.where(self.status == Status.BETWEEN, self.values_to, most)
 
     @property
     def event_ids(self) -> tuple[str, ...]:
@@ -231,11 +268,12 @@ class Campaign:
         sensors = {
             sensor.id: [sensor.quantity]
             + [_plain(v) for v in (sensor.s_from_m, sensor.s_to_m, sensor.relative_sd, sensor.absolute_sd)]
+            + ([] if sensor.place_sd_m is None else [_plain(sensor.place_sd_m)])
             for sensor in self.sensors
         }
         events = {
             event.id: {
-                "release": [_plain(event.release_s_m), _plain(event.release_sd_m)],
+                "release": _release(event),
                 "covariates": {k: _plain(v) for k, v in event.covariates.items() if _plain(v) is not None},
             }
             for event in self.events
@@ -244,6 +282,8 @@ class Campaign:
         for i, event_id in enumerate(self.event_ids):
             for j, sensor_id in enumerate(self.sensor_ids):
                 reading = [_plain(float(self.values[i, j])), _plain(float(self.stated_sd[i, j]))]
+                if np.isfinite(self.values_to[i, j]):
+                    reading.append(_plain(float(self.values_to[i, j])))
                 if self.status[i, j] != Status.MISSING or reading != [None, None]:
                     readings[event_id][sensor_id] = [int(self.status[i, j]), *reading]
         return {
@@ -255,6 +295,13 @@ class Campaign:
             "events": events,
             "readings": readings,
         }
+
+
+def _release(event: Event) -> list[Covariate]:
+    """Where and how an event starts; a campaign without speeds keeps the fingerprint that it always had."""
+    place = [_plain(event.release_s_m), _plain(event.release_sd_m)]
+    speed = [_plain(event.release_speed_m_s), _plain(event.release_speed_sd_m_s)]
+    return place if speed == [None, None] else [*place, *speed]
 
 
 def _plain(value: Covariate) -> Covariate:

@@ -13,7 +13,6 @@ from skred.campaign.tables import MOST_PROBLEMS, Row
 
 # Others compute the same arc length in another order of additions.
 ROUNDING_M = 1e-6
-FEWEST_TRACK_POINTS = 3
 FASTEST_M_S = 200.0
 """Greatest front velocity that is read, m/s.
 
@@ -27,32 +26,7 @@ recorded, of runouts as a share of the track's length.
 The likelihood takes it for what the model is right to as well. At a thousandth of this, fronts that miss
 their readings by metres a second are a million standard deviations off, and every number is lost to rounding.
 """
-TRACK, SENSORS, EVENTS, RECORDINGS = "track.csv", "sensors.csv", "events.csv", "recordings.csv"
-
-
-def track_problems(rows: Sequence[Row]) -> list[Problem]:
-    """Check that the track has enough points, in downhill order."""
-    if len(rows) < FEWEST_TRACK_POINTS:
-        message = f"the track has {len(rows)} points; give at least {FEWEST_TRACK_POINTS}"
-        return [Problem(TRACK, None, None, None, message)]
-    problems = []
-    points = [row for row in rows if row.has("x_m", "z_m")]
-    s_m = 0.0
-    for before, row in zip(points, points[1:], strict=False):
-        dx_m = row.number("x_m") - before.number("x_m")
-        step_m = hypot(dx_m, row.number("z_m") - before.number("z_m"))
-        if dx_m <= 0 or s_m + step_m == s_m:
-            message = (
-                f"x_m must be greater than in row {before.line} ({before.number('x_m'):g}); "
-                "order the points downhill and remove those that appear twice"
-            )
-            problems.append(_at(TRACK, row, "x_m", message))
-        s_m += max(step_m, 0.0)
-    if points and points[-1].number("z_m") >= points[0].number("z_m"):
-        start = f"{points[0].number('z_m'):g} m"
-        message = f"the track ends no lower than it starts ({start}); order the points downhill"
-        problems.append(_at(TRACK, points[-1], "z_m", message))
-    return problems
+SENSORS, EVENTS, RECORDINGS = "sensors.csv", "events.csv", "recordings.csv"
 
 
 def sensor_problems(rows: Sequence[Row], length_m: float | None) -> list[Problem]:
@@ -66,18 +40,18 @@ def sensor_problems(rows: Sequence[Row], length_m: float | None) -> list[Problem
             for column, s_m in places.items():
                 if s_m is not None:
                     message = "a runout sensor has no place; leave the cell empty"
-                    problems.append(_at(SENSORS, row, column, message))
+                    problems.append(problem_at(SENSORS, row, column, message))
             continue
         for column, s_m in places.items():
             if s_m is None:
                 message = "a velocity needs a place; write its arc length, for a point the same one twice"
-                problems.append(_at(SENSORS, row, column, message))
+                problems.append(problem_at(SENSORS, row, column, message))
             else:
                 problems += _off_track(SENSORS, row, column, s_m, length_m)
         s_from_m, s_to_m = places.values()
         if s_from_m is not None and s_to_m is not None and s_from_m > s_to_m:
             message = f"s_to_m lies above s_from_m ({s_from_m:g}); exchange them"
-            problems.append(_at(SENSORS, row, "s_to_m", message))
+            problems.append(problem_at(SENSORS, row, "s_to_m", message))
     return problems
 
 
@@ -87,6 +61,20 @@ def event_problems(rows: Sequence[Row], length_m: float | None) -> list[Problem]
     for row in rows:
         if row.has("release_s_m"):
             problems += _off_track(EVENTS, row, "release_s_m", row.number("release_s_m"), length_m)
+        problems += _release_speed_problems(row)
+    return problems
+
+
+def _release_speed_problems(row: Row) -> list[Problem]:
+    """Check the speed with which a front starts."""
+    speed, sd = (row.number_or_none(name) for name in ("release_speed_m_s", "release_speed_sd_m_s"))
+    problems = []
+    if speed is not None and speed > FASTEST_M_S:
+        message = f"expected a speed of at most {FASTEST_M_S:g} m/s; correct it, or write it in m/s"
+        problems.append(problem_at(EVENTS, row, "release_speed_m_s", message))
+    if sd is not None and speed is None and "release_speed_m_s" not in row.unreadable:
+        message = "the standard deviation of a speed that is not given; write release_speed_m_s, or remove it"
+        problems.append(problem_at(EVENTS, row, "release_speed_sd_m_s", message))
     return problems
 
 
@@ -123,12 +111,12 @@ def recording_problems(
         for column, known, file in (("event", event_ids, EVENTS), ("sensor", sensor_ids, SENSORS)):
             if known is not None and row.has(column) and row.word(column) not in known:
                 message = f"not an id of {file}; correct it or add it there"
-                problems.append(_at(RECORDINGS, row, column, message))
+                problems.append(problem_at(RECORDINGS, row, column, message))
         if row.has("event", "sensor"):
             key = (row.word("event"), row.word("sensor"))
             if key in first_line:
                 message = f"this event and sensor have a reading in row {first_line[key]}; remove one of them"
-                problems.append(_at(RECORDINGS, row, "sensor", message))
+                problems.append(problem_at(RECORDINGS, row, "sensor", message))
             first_line.setdefault(key, row.line)
         if row.has("value", "status"):
             sensor = sensors.get(row.word("sensor")) if row.has("sensor") else None
@@ -141,35 +129,65 @@ def _reading_problems(row: Row, sensor: Sensor | None, length_m: float | None) -
     value, status = row.number_or_none("value"), row.word("status")
     if status == "not_reached" and sensor is not None and sensor.is_runout:
         message = "every avalanche has a runout; write 'missing' if it is not known"
-        return [_at(RECORDINGS, row, "status", message)]
-    if status != "observed":
+        return [problem_at(RECORDINGS, row, "status", message)]
+    problems = _value_to_problems(row, status)
+    if status in ("not_reached", "missing"):
         if value is None:
-            return []
+            return problems
         message = f"a reading with status '{status}' carries no value; remove it or correct the status"
-        return [_at(RECORDINGS, row, "value", message)]
+        return [*problems, problem_at(RECORDINGS, row, "value", message)]
     if value is None:
-        message = "an observed reading needs a value; write it, or the status 'missing' or 'not_reached'"
-        return [_at(RECORDINGS, row, "value", message)]
+        what = "an observed reading needs a value" if status == "observed" else f"'{status}' needs a value"
+        message = f"{what}; write it, or the status 'missing' or 'not_reached'"
+        return [*problems, problem_at(RECORDINGS, row, "value", message)]
     if sensor is None:
-        return []
-    problems = []
-    if sensor.is_runout:
-        problems += _off_track(RECORDINGS, row, "value", value, length_m)
-    elif value < 0:
-        problems.append(_at(RECORDINGS, row, "value", "a front velocity is not negative; correct it"))
-    elif value > FASTEST_M_S:
-        message = f"expected a front velocity of at most {FASTEST_M_S:g} m/s; correct it, or write it in m/s"
-        problems.append(_at(RECORDINGS, row, "value", message))
+        return problems
+    for column in ("value", "value_to"):
+        number = row.number_or_none(column)
+        if number is not None:
+            problems += _size_problems(row, column, number, sensor, length_m)
     return problems
 
 
+def _value_to_problems(row: Row, status: str) -> list[Problem]:
+    """Check that an interval, and nothing else, has a second end below its first."""
+    value, value_to = row.number_or_none("value"), row.number_or_none("value_to")
+    if status != "between":
+        if value_to is None:
+            return []
+        message = f"a reading with status '{status}' has one value; remove value_to, or write 'between'"
+        return [problem_at(RECORDINGS, row, "value_to", message)]
+    if value_to is None:
+        if "value_to" in row.unreadable:
+            return []
+        message = "'between' needs both ends; write the upper one here, or the status 'at_least'"
+        return [Problem(RECORDINGS, row.line, "value_to", None, message)]
+    if value is not None and value_to <= value:
+        message = f"value_to must be greater than value ({value:g}); exchange or correct them"
+        return [problem_at(RECORDINGS, row, "value_to", message)]
+    return []
+
+
+def _size_problems(
+    row: Row, column: str, value: float, sensor: Sensor, length_m: float | None
+) -> list[Problem]:
+    """Check that a reading or a bound is a place on the track, or a speed that something can have."""
+    if sensor.is_runout:
+        return _off_track(RECORDINGS, row, column, value, length_m)
+    if value < 0:
+        return [problem_at(RECORDINGS, row, column, "a front velocity is not negative; correct it")]
+    if value > FASTEST_M_S:
+        message = f"expected a front velocity of at most {FASTEST_M_S:g} m/s; correct it, or write it in m/s"
+        return [problem_at(RECORDINGS, row, column, message)]
+    return []
+
+
 def _sd_problems(rows: Sequence[Row], sensors: Mapping[str, Sensor], length_m: float) -> list[Problem]:
-    """Check that standard deviations of observed readings are such as a model can be right to."""
+    """Check that standard deviations of readings and bounds are such as a model can be right to."""
     read = [
         (row, sensors[row.word("sensor")], row.number("value"))
         for row in rows
         if row.has("sensor", "value", "status")
-        and row.word("status") == "observed"
         and row.word("sensor") in sensors
         and row.number_or_none("value") is not None
         and "sd" not in row.unreadable
@@ -184,7 +202,7 @@ def _sd_problems(rows: Sequence[Row], sensors: Mapping[str, Sensor], length_m: f
 
 
 def _sd_problem(row: Row, sensor: Sensor, value: float, least: float) -> list[Problem]:
-    """Check the standard deviation of one observed reading."""
+    """Check the standard deviation of one reading or bound."""
     stated = row.number_or_none("sd")
     sd = hypot(sensor.relative_sd * value, sensor.absolute_sd) if stated is None else stated
     if sd >= least:
@@ -196,46 +214,9 @@ def _sd_problem(row: Row, sensor: Sensor, value: float, least: float) -> list[Pr
     )
     message = f"the reading's standard deviation is {sd:g}, expected at least {at_least}"
     if stated is not None:
-        return [_at(RECORDINGS, row, "sd", f"{message}; write how far readings of this kind are off")]
+        return [problem_at(RECORDINGS, row, "sd", f"{message}; write how far readings of this kind are off")]
     message += f"; state one, or give sensor '{sensor.id}' an absolute_sd"
     return [Problem(RECORDINGS, row.line, "sd", None, message)]
-
-
-def not_reached_problems(rows: Sequence[Row], sensors: Mapping[str, Sensor]) -> list[Problem]:
-    """Check that no event has a positive velocity below a sensor that it did not reach.
-
-    The front stopped above that sensor (a span: above its ``s_to_m``), so nothing that starts there or
-    further down can have seen it.
-    """
-    uppermost: dict[str, tuple[float, Row]] = {}
-    for row in rows:
-        sensor = _velocity_sensor(row, sensors)
-        if sensor is not None and row.word("status") == "not_reached":
-            known = uppermost.get(row.word("event"))
-            if known is None or sensor.s_to_m < known[0]:
-                uppermost[row.word("event")] = (sensor.s_to_m, row)
-    problems = []
-    for row in rows:
-        sensor = _velocity_sensor(row, sensors)
-        if sensor is None or row.word("event") not in uppermost or row.word("status") != "observed":
-            continue
-        stop_m, not_reached = uppermost[row.word("event")]
-        value = row.number_or_none("value") if row.has("value") else None
-        if value is not None and value > 0 and sensor.s_from_m >= stop_m:
-            message = (
-                f"event '{row.word('event')}' did not reach sensor '{not_reached.word('sensor')}' (row "
-                f"{not_reached.line}), so it has no speed here, further down; correct one of the two"
-            )
-            problems.append(_at(RECORDINGS, row, "value", message))
-    return problems
-
-
-def _velocity_sensor(row: Row, sensors: Mapping[str, Sensor]) -> Sensor | None:
-    """Return a reading's sensor if it records velocity and the reading's cells could be read."""
-    if not row.has("event", "sensor", "status"):
-        return None
-    sensor = sensors.get(row.word("sensor"))
-    return None if sensor is None or sensor.is_runout else sensor
 
 
 def reference_problems(reference_s_m: float | None, row: int | None, length_m: float | None) -> list[Problem]:
@@ -260,7 +241,7 @@ def _repeated(file: str, column: str, rows: Iterable[Row]) -> list[Problem]:
             line = first_line.setdefault(row.word(column), row.line)
             if line != row.line:
                 message = f"the id already stands in row {line}; give each its own"
-                problems.append(_at(file, row, column, message))
+                problems.append(problem_at(file, row, column, message))
     return problems
 
 
@@ -272,10 +253,14 @@ def _off_track(file: str, row: Row, column: str, s_m: float, length_m: float | N
     """Check that a place lies on the track."""
     if length_m is None or _is_on_track(s_m, length_m):
         return []
-    return [_at(file, row, column, f"expected an arc length on the track, 0 to {length_m:.2f} m; correct it")]
+    return [
+        problem_at(
+            file, row, column, f"expected an arc length on the track, 0 to {length_m:.2f} m; correct it"
+        )
+    ]
 
 
-def _at(file: str, row: Row, column: str, message: str) -> Problem:
+def problem_at(file: str, row: Row, column: str, message: str) -> Problem:
     """Return a problem with a cell that could be read."""
     value = row.cells[column]
     found = value if isinstance(value, str) else "" if value is None else repr(value)

@@ -18,6 +18,10 @@ def campaign_summary(campaign: Campaign) -> dict[str, Any]:
         "events": campaign.n_events,
         "sensors": campaign.n_sensors,
         "readings": {status.name.lower(): int((campaign.status == status).sum()) for status in Status},
+        "released_with_a_speed": sum(bool(event.release_speed_m_s) for event in campaign.events),
+        "places_known_to": {
+            sensor.id: sensor.place_sd_m for sensor in campaign.sensors if sensor.place_sd_m is not None
+        },
         "covariates": sorted({name for event in campaign.events for name in event.covariates}),
         "track_points": len(campaign.track.x_m),
         "track_length_m": campaign.track.length_m,
@@ -26,16 +30,33 @@ def campaign_summary(campaign: Campaign) -> dict[str, Any]:
     }
 
 
+def place_sentences(places_known_to: dict[str, float]) -> list[str]:
+    """How well the places of sensors are known, sensor by sensor; said, because no model uses it yet."""
+    return [
+        f"{sensor}: place known to ± {sd:g} m; not yet part of the models"
+        for sensor, sd in places_known_to.items()
+    ]
+
+
+def _events(summary: dict[str, Any]) -> str:
+    """How many events, and how many of them do not start from rest."""
+    moving = summary["released_with_a_speed"]
+    return f"{summary['events']}{f', {moving} released with a speed' if moving else ''}"
+
+
 def summary_table(summary: dict[str, Any]) -> Table:
     """Show a summary as a table."""
+    usual = [status.name.lower() for status in Status if not status.is_bound]
     readings = ", ".join(
-        f"{count} {status.replace('_', ' ')}" for status, count in summary["readings"].items()
+        f"{count} {status.replace('_', ' ')}"
+        for status, count in summary["readings"].items()
+        if count or status in usual
     )
     reference = summary["reference_s_m"]
     rows = {
         "campaign": f"{summary['name']} ({summary['origin']}): no problems",
-        "events": str(summary["events"]),
-        "sensors": str(summary["sensors"]),
+        "events": _events(summary),
+        "sensors": "\n".join([str(summary["sensors"]), *place_sentences(summary["places_known_to"])]),
         "readings": readings,
         "covariates": ", ".join(summary["covariates"]) or "none",
         "track": f"{summary['track_length_m']:.1f} m, {summary['track_points']} points",

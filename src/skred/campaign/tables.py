@@ -7,7 +7,7 @@ by its column (`skred.campaign.cells`). Every failure is a `Problem`.
 import csv
 import io
 import stat
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +20,8 @@ MOST_LINES = 2 * MOST_ROWS
 MOST_COLUMNS = 200
 # Checking a file stops here: nobody reads more, and a hostile file should not fill the memory.
 MOST_PROBLEMS = 1000
+FEWEST_OF_A_COLUMN = 3
+"""Cells that must be wrong alike for the column to be what is wrong."""
 
 Value = float | str | None
 ReadCell = Callable[[str], Value]
@@ -182,6 +184,7 @@ def read_table(
         name: known[name] if name in known or read_extra is None else read_extra(name) for name in header
     }
     rows, problems, is_complete = _read_rows(file, lines, readers)
+    problems = _by_column(problems, rows, line)
     if not is_complete:
         # Ids in the part that was not read would look unknown to the other tables.
         return Table((), (), tuple(problems))
@@ -202,12 +205,12 @@ class _CsvError(ValueError):
 
 
 def _split(text: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield each row's first line number and its cells without surrounding blanks, but no empty lines."""
+    """Yield each row's first line number and its cells without surrounding blanks, but no empty rows."""
     reader = csv.reader(io.StringIO(text, newline=""), strict=True, skipinitialspace=True)
     last_line = 0
     try:
         for cells in reader:
-            if len(cells) > 1 or any(cell.strip() for cell in cells):
+            if any(cell.strip() for cell in cells):
                 yield last_line + 1, [cell.strip() for cell in cells]
             last_line = reader.line_num
             if last_line > MOST_LINES:
@@ -267,6 +270,21 @@ def _read_rows(
         problems.append(error.problem(file))
         return rows, problems, False
     return rows, problems, True
+
+
+def _by_column(problems: Sequence[Problem], rows: Sequence[Row], header_line: int) -> list[Problem]:
+    """Tell a mistake in every cell of a column once, at its header: it is a mistake of the column."""
+    told: dict[tuple[str | None, str], list[Problem]] = {}
+    for problem in problems:
+        told.setdefault((problem.column, problem.message), []).append(problem)
+    result: list[Problem] = []
+    for (column, message), same in told.items():
+        if column is None or len(same) < FEWEST_OF_A_COLUMN or any(row.cells.get(column) for row in rows):
+            result += same
+            continue
+        text = f"in each of {len(same)} rows, first in row {same[0].row}: {message}"
+        result.append(Problem(same[0].file, header_line, column, same[0].found, text))
+    return result
 
 
 def _read_row(

@@ -129,35 +129,42 @@ def _track(campaign: Campaign) -> str:
 def _sensors(campaign: Campaign) -> str:
     """Return the text of sensors.csv."""
     header = ["sensor", "quantity", "s_from_m", "s_to_m", "relative_sd", "absolute_sd"]
-    rows = [(s.id, s.quantity, s.s_from_m, s.s_to_m, s.relative_sd, s.absolute_sd) for s in campaign.sensors]
+    rows: list[tuple[Cell, ...]] = [
+        (s.id, s.quantity, s.s_from_m, s.s_to_m, s.relative_sd, s.absolute_sd) for s in campaign.sensors
+    ]
+    if any(sensor.place_sd_m is not None for sensor in campaign.sensors):
+        header.append("place_sd_m")
+        rows = [(*row, s.place_sd_m) for row, s in zip(rows, campaign.sensors, strict=True)]
     return _table(header, rows)
 
 
 def _events(campaign: Campaign) -> str:
     """Return the text of events.csv."""
     covariates = list(dict.fromkeys(name for event in campaign.events for name in event.covariates))
-    has_sd = any(event.release_sd_m is not None for event in campaign.events)
-    header = ["event", "release_s_m", *(["release_sd_m"] if has_sd else []), *covariates]
-    rows = [
-        (event.id, event.release_s_m)
-        + ((event.release_sd_m,) if has_sd else ())
-        + tuple(event.covariates.get(name) for name in covariates)
+    optional = ("release_sd_m", "release_speed_m_s", "release_speed_sd_m_s")
+    used = [name for name in optional if any(getattr(event, name) is not None for event in campaign.events)]
+    rows: list[tuple[Cell, ...]] = [
+        (
+            event.id,
+            event.release_s_m,
+            *(getattr(event, name) for name in used),
+            *(event.covariates.get(name) for name in covariates),
+        )
         for event in campaign.events
     ]
-    return _table(header, rows)
+    return _table(["event", "release_s_m", *used, *covariates], rows)
 
 
 def _recordings(campaign: Campaign) -> str:
     """Return the text of recordings.csv."""
-    has_sd = bool(np.isfinite(campaign.stated_sd).any())
-    header = ["event", "sensor", "value", *(["sd"] if has_sd else []), "status"]
-    rows = []
+    numbers = {"value": campaign.values, "value_to": campaign.values_to, "sd": campaign.stated_sd}
+    used = {name: array for name, array in numbers.items() if name == "value" or np.isfinite(array).any()}
+    rows: list[tuple[Cell, ...]] = []
     for i, event_id in enumerate(campaign.event_ids):
         for j, sensor_id in enumerate(campaign.sensor_ids):
-            value, sd = float(campaign.values[i, j]), float(campaign.stated_sd[i, j])
             status = Status(campaign.status[i, j]).name.lower()
-            rows.append((event_id, sensor_id, value) + ((sd,) if has_sd else ()) + (status,))
-    return _table(header, rows)
+            rows.append((event_id, sensor_id, *(float(array[i, j]) for array in used.values()), status))
+    return _table(["event", "sensor", *used, "status"], rows)
 
 
 def _table(header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:

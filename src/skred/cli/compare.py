@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skred.cli.exit_codes import DONE, NOT_CONVERGED
+from skred.cli.hints import tell_hints
 from skred.cli.inputs import laws_of, pooled_or_reason, problem_of
 from skred.cli.options import LIKELIHOOD, SAMPLING, Campaigns, ExactLoo, Likelihood, Models, Sampling
 from skred.cli.output import OUTPUT, Output
@@ -30,6 +31,7 @@ def compare(
     """Calibrate several laws and say which one the recordings prefer, and by how much."""
     laws = laws_of(models)
     problem = problem_of(campaign, likelihood.likelihood, likelihood.errors, likelihood.smoothing)
+    tell_hints(problem, output.tell)
     with output.results("compare") as results:
         comparison = _compared(problem, laws, sampling, results.unfinished, output, exact=exact_loo)
         from skred.report.folders import write_reports

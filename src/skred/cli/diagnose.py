@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from skred.cli.exit_codes import DONE, NOT_CONVERGED
+from skred.cli.hints import tell_hints
 from skred.cli.inputs import campaign_of, hierarchical_of
 from skred.cli.options import (
     DIAGNOSING,
@@ -39,6 +40,7 @@ def diagnose(
         law = load_law(base_model)
         tell_refused_mechanisms()
         problem = hierarchical_of(recorded, likelihood.errors, likelihood.smoothing)
+        tell_hints(problem, output.tell)
         with output.results("diagnose") as results:
             from skred.diagnosis.run import diagnose_to
             from skred.report.diagnosis.report import diagnosis_table

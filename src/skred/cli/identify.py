@@ -4,6 +4,7 @@ Everything heavy is imported inside the function, so that ``--help`` is instant.
 """
 
 from skred.cli.exit_codes import DONE
+from skred.cli.hints import tell_hints
 from skred.cli.inputs import campaign_of, hierarchical_of
 from skred.cli.options import HIERARCHICAL, Campaigns, DiagnosedModel, Hierarchical, IdleSeed
 from skred.cli.output import OUTPUT, Output
@@ -25,6 +26,7 @@ def identify(
     law = load_law(base_model)
     tell_refused_mechanisms()
     problem = hierarchical_of(campaign_of(campaign), likelihood.errors, likelihood.smoothing)
+    tell_hints(problem, output.tell)
     with output.results("identify") as results:
         from skred.diagnosis.detect.run import identify_to
         from skred.report.diagnosis.identify import identify_table

@@ -32,7 +32,7 @@ def campaign_of(name: str) -> "Campaign":
 
 
 def problem_of(
-    campaign: str, likelihood: str, errors: str | None, smoothing: float
+    campaign: str, likelihood: str, errors: str | None, smoothing: float | None
 ) -> "PooledProblem | HierarchicalProblem":
     """The problem of a campaign, or what is wrong with it."""
     checked = campaign_of(campaign)
@@ -48,7 +48,9 @@ def problem_of(
     return problem
 
 
-def hierarchical_of(campaign: "Campaign", errors: str | None, smoothing: float) -> "HierarchicalProblem":
+def hierarchical_of(
+    campaign: "Campaign", errors: str | None, smoothing: float | None
+) -> "HierarchicalProblem":
     """The hierarchical problem of a campaign, or what is wrong with it."""
     from skred.inference.error_model import DEFAULT_ERRORS
     from skred.inference.hierarchical.problem import hierarchical_problem
@@ -59,7 +61,7 @@ def hierarchical_of(campaign: "Campaign", errors: str | None, smoothing: float) 
         raise InputError(f"campaign {campaign.name}: {error}") from error
 
 
-def pooled_or_reason(campaign: "Campaign", smoothing: float) -> "PooledProblem | str":
+def pooled_or_reason(campaign: "Campaign", smoothing: float | None) -> "PooledProblem | str":
     """The pooled problem of a campaign, or why there is none."""
     from skred.inference.pooled.problem import pooled_problem
 

@@ -101,8 +101,11 @@ IdleSeed = Annotated[
 ]
 Seed = Annotated[int, Parameter(validator=validators.Number(gte=0, lt=2**31), help="Seed of all randomness.")]
 Smoothing = Annotated[
-    float,
-    Parameter(validator=validators.Number(gte=0.0, lte=1000.0), help="Smoothing length of the terrain, m."),
+    float | None,
+    Parameter(
+        validator=validators.Number(gte=0.0, lte=1000.0),
+        help="Smoothing length of the terrain, m; by default 10, in proportion less on tracks below 600 m.",
+    ),
 ]
 Out = Annotated[
     Path | None,
@@ -151,7 +154,7 @@ class Hierarchical:
     """Options of a command for which every avalanche has its own parameters."""
 
     errors: Errors = None
-    smoothing: Smoothing = 10.0
+    smoothing: Smoothing = None
 
 
 @Parameter(name="*")
@@ -161,7 +164,7 @@ class Likelihood:
 
     likelihood: Likelihoods = "pooled"
     errors: Errors = None
-    smoothing: Smoothing = 10.0
+    smoothing: Smoothing = None
 
 
 @Parameter(name="*")

@@ -4,6 +4,7 @@ Everything heavy is imported inside the function, so that ``--help`` is instant.
 """
 
 from skred.cli.exit_codes import DONE, NOT_CONVERGED
+from skred.cli.hints import tell_hints, tell_track_hints
 from skred.cli.inputs import campaign_of, hierarchical_of
 from skred.cli.options import (
     HIERARCHICAL,
@@ -42,6 +43,8 @@ def predict(
     from skred.report.prediction.figures import prediction_table
 
     where = prediction_track(problem, track, release)
+    tell_hints(problem, output.tell)
+    tell_track_hints(where, track, output.tell)
     settings = sampling.settings("hierarchical")
     with output.results("predict") as results:
         output.tell(f"{law.id}: calibrating on {problem.campaign.name}")

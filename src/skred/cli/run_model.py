@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from cyclopts import App
 
 from skred.cli.exit_codes import DONE, NOT_CONVERGED
+from skred.cli.hints import tell_hints
 from skred.cli.inputs import problem_of
 from skred.cli.options import LIKELIHOOD, SAMPLING, Campaigns, Likelihood, Samplers, Sampling
 from skred.cli.output import OUTPUT, Output
@@ -58,6 +59,7 @@ def calibrate_law(
     from skred.physics.laws import load_law
 
     law = load_law(law_id)
+    tell_hints(problem, output.tell)
     with output.results("calibrate", law_id) as results:
         output.tell(f"{law_id}: sampling")
 

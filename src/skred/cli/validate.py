@@ -4,12 +4,13 @@ Everything heavy is imported inside the function, so that ``--help`` is instant.
 """
 
 from skred.cli.exit_codes import BAD_INPUT, DONE
+from skred.cli.hints import hints_of
 from skred.cli.options import Campaigns, Json, Quiet
 from skred.cli.output import write_json
 
 
 def validate(campaign: Campaigns, /, *, as_json: Json = False, quiet: Quiet = False) -> int:
-    """Check the files of a campaign and list every problem."""
+    """Check the files of a campaign and list every problem, and what is odd where there is none."""
     from skred.campaign import CampaignError, find_campaign, read_campaign
 
     try:
@@ -21,10 +22,16 @@ def validate(campaign: Campaigns, /, *, as_json: Json = False, quiet: Quiet = Fa
         return BAD_INPUT
     from skred.campaign.summary import campaign_summary, summary_table
 
+    hints = hints_of(checked)
     if as_json:
-        write_json({"valid": True, "problems": [], **campaign_summary(checked)})
+        warnings = [hint.as_dict() for hint in hints]
+        write_json({"valid": True, "problems": [], "warnings": warnings, **campaign_summary(checked)})
     elif not quiet:
         from rich.console import Console
+        from rich.text import Text
 
-        Console().print(summary_table(campaign_summary(checked)))
+        console = Console()
+        console.print(summary_table(campaign_summary(checked)))
+        for hint in hints:
+            console.print(Text(f"warning: {hint}"), soft_wrap=True)
     return DONE

@@ -74,7 +74,8 @@ def _of_mean_response(law: Law, problem: Problem, samples: dict[str, FloatArray]
     """Of the mean response, from the median of the releases."""
     releases = np.array([event.release_s_m for event in problem.campaign.events])
     rows = law.strength_rows(_evenly(samples, _MOST_RESPONSES))
-    speeds = problem.speeds(law.mechanisms, rows, float(np.median(releases)))
+    begin = np.median([event.release_speed_m_s or 0.0 for event in problem.campaign.events])
+    speeds = problem.speeds(law.mechanisms, rows, float(np.median(releases)), float(begin))
     return _dataset(problem, releases, speed=speeds)
 
 
@@ -82,24 +83,24 @@ def _of_new_avalanches(
     tree: xr.DataTree, law: Law, problem: Problem, samples: dict[str, FloatArray]
 ) -> xr.Dataset:
     """Of randomly chosen new avalanches, and of their median by draws of the population."""
-    strengths, releases = _avalanches(tree, law)
-    speeds = problem.speeds(law.mechanisms, strengths, releases)
-    medians = _median_speeds(law, problem, samples, releases)
+    strengths, releases, begin = _avalanches(tree, law)
+    speeds = problem.speeds(law.mechanisms, strengths, releases, begin)
+    medians = _median_speeds(law, problem, samples, releases, begin)
     return _dataset(problem, releases, speed=speeds, median_speed=medians)
 
 
-def _avalanches(tree: xr.DataTree, law: Law) -> tuple[FloatArray, FloatArray]:
-    """Strengths (n, n_strengths) and releases (n,) of randomly chosen new avalanches."""
+def _avalanches(tree: xr.DataTree, law: Law) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Strengths (n, n_strengths), releases and speeds there (n,) of randomly chosen new avalanches."""
     predictive = tree["posterior_predictive"].to_dataset()
-    names = [*(mechanism.strength.name for mechanism in law.mechanisms), "release"]
+    names = [*(mechanism.strength.name for mechanism in law.mechanisms), "release", "release_speed"]
     rows = [predictive[name].transpose("chain", "draw", "event").values.ravel() for name in names]
     chosen = np.random.default_rng(0).permutation(len(rows[0]))[:_MOST_AVALANCHES]
     table = np.column_stack(rows)[chosen]
-    return np.ascontiguousarray(table[:, :-1]), np.ascontiguousarray(table[:, -1])
+    return np.ascontiguousarray(table[:, :-2]), table[:, -2].copy(), table[:, -1].copy()
 
 
 def _median_speeds(
-    law: Law, problem: Problem, samples: dict[str, FloatArray], releases: FloatArray
+    law: Law, problem: Problem, samples: dict[str, FloatArray], releases: FloatArray, begin: FloatArray
 ) -> FloatArray:
     """Median speed across new avalanches for each of some draws of the population, (n_draws, n_edges).
 
@@ -110,9 +111,9 @@ def _median_speeds(
     rng, size = np.random.default_rng(0), _AVALANCHES_OF_A_MEDIAN
     ranks = np.column_stack([rng.permutation(size) for _ in law.mechanisms])
     deviations = ndtri((ranks + 0.5) / size)
-    places = np.resize(releases, size)
+    places, start = np.resize(releases, size), np.resize(begin, size)
     rows = [np.exp(mean + deviations @ factor.T) for mean, factor in zip(means, factors, strict=True)]
-    return np.array([np.median(problem.speeds(law.mechanisms, row, places), axis=0) for row in rows])
+    return np.array([np.median(problem.speeds(law.mechanisms, row, places, start), axis=0) for row in rows])
 
 
 def _median_strengths(posterior: xr.Dataset, law: Law, samples: dict[str, FloatArray]) -> xr.Dataset:

@@ -156,6 +156,8 @@ class EventReadings(NamedTuple):
         Lowest place that the front is known to have reached, -inf if none; highest that it is known not to
         have reached, inf if none.
     place_sd : float, m
+    least, most : (n_events, n_sensors) arrays, m/s or m
+        Bounds of readings that are known by these only; minus and plus infinity elsewhere.
     """
 
     values: FloatArray
@@ -167,6 +169,18 @@ class EventReadings(NamedTuple):
     reached: FloatArray
     not_reached: FloatArray
     place_sd: float
+    least: FloatArray
+    most: FloatArray
+
+    @property
+    def bounded(self) -> NDArray[np.bool_]:
+        """Of which readings bounds are all that is known, (n_events, n_sensors)."""
+        return np.isfinite(self.least) | np.isfinite(self.most)
+
+    def take(self, events: NDArray[np.int64]) -> EventReadings:
+        """Those of some events, in this order, perhaps repeated."""
+        own = ("values", "observed", "stated_sd", "least", "most", "reached", "not_reached")
+        return self._replace(**{name: getattr(self, name)[events] for name in own})
 
     def sd(self, event: int | NDArray[np.int64], predictions: FloatArray) -> FloatArray:
         """Stated standard deviations of events' readings: their own where they state one, else the sensor's.
@@ -192,16 +206,20 @@ def event_readings(campaign: Campaign, place_sd_m: float = PLACE_SD_M) -> EventR
     sensors = campaign.sensors
     is_velocity = np.array([not sensor.is_runout for sensor in sensors])
     ends = np.array([np.nan if sensor.is_runout else sensor.s_to_m for sensor in sensors], dtype=float)
-    moved = observed & is_velocity & (values > 0.0)
+    least, most = campaign.bounds
+    known = observed | np.isfinite(least) | np.isfinite(most)
+    moved = is_velocity & ((values > 0.0) | (least > 0.0))
     stopped = np.asarray(campaign.status == Status.NOT_REACHED) & is_velocity
     return EventReadings(
         values,
         observed,
-        np.nan_to_num(np.where(observed, campaign.stated_sd, 0.0), nan=0.0),
+        np.nan_to_num(np.where(known, campaign.stated_sd, 0.0), nan=0.0),
         np.array([sensor.relative_sd for sensor in sensors], dtype=float),
         np.array([sensor.absolute_sd for sensor in sensors], dtype=float),
         is_velocity,
         np.where(moved, ends, -np.inf).max(axis=1, initial=-np.inf),
         np.where(stopped, ends, np.inf).min(axis=1, initial=np.inf),
         float(place_sd_m),
+        least,
+        most,
     )

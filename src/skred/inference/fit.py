@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.campaign import Status
 from skred.inference.intervals import INTERVAL_PROBABILITY
 from skred.inference.problem import Problem
 
@@ -85,6 +86,7 @@ def fit_entries(problem: Problem, predicted: FloatArray) -> dict[str, Any]:
         "fit": [asdict(row) for row in rows],
         "fits": all(row.fits for row in rows),
         "fit_level": FIT_LEVEL,
+        "bounds_left_out": int((problem.campaign.status >= Status.AT_LEAST).sum()),
     }
 
 
@@ -152,6 +154,8 @@ def calibration_statement(entry: dict[str, Any]) -> list[str]:
         As `skred.inference.calibrate.Calibration.entry` makes it.
     """
     gate = entry["gate"]
+    aside = entry.get("bounds_left_out")
+    unseen = [f"Readings known by bounds only ({aside}) take no part in the check of fit."] if aside else []
     measured = f"r-hat at most {gate['r_hat_max']:.3f}, effective draws at least {gate['ess_bulk_min']:.0f}"
     if not gate["passed"]:
         return [f"THE CHAINS DID NOT CONVERGE: do not use this result ({measured})", *gate["problems"]]
@@ -160,10 +164,12 @@ def calibration_statement(entry: dict[str, Any]) -> list[str]:
             f"The chains converged ({measured}).",
             "The model fits: at no sensor do the mean or the standard deviation of the recordings lie beyond"
             f" what it predicts (level {100 * entry['fit_level']:g} % over all sensors).",
+            *unseen,
         ]
     return [
         f"The chains converged ({measured}), but the model misses the recordings at {missed_sensors(entry)}.",
         *fit_sentences(entry),
+        *unseen,
     ]
 
 

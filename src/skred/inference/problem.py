@@ -114,10 +114,15 @@ class Problem(ABC):
         return contributions_of(mechanisms, self.terrain)
 
     def speeds(
-        self, mechanisms: Sequence[Mechanism], strengths: FloatArray, release_s_m: float | FloatArray
+        self,
+        mechanisms: Sequence[Mechanism],
+        strengths: FloatArray,
+        release_s_m: float | FloatArray,
+        release_speed_m_s: float | FloatArray = 0.0,
     ) -> FloatArray:
         """Front speed [m/s] at the cell edges: (n, n_strengths) to (n, n_cells + 1)."""
         releases = np.full(len(strengths), release_s_m, dtype=float)
         law = self.contributions(mechanisms)
-        speeds: FloatArray = front_speeds(np.asarray(strengths, float), releases, self.path, law)
+        strengths = np.asarray(strengths, float)
+        speeds: FloatArray = front_speeds(strengths, releases, self.path, law, release_speed_m_s)
         return speeds

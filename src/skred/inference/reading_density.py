@@ -7,7 +7,20 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.inference.bounds import fill_log_bounds
 from skred.inference.error_model import OUTLIER_FACTOR, Errors, EventReadings
+from skred.inference.reading_table import (
+    ABSOLUTE,
+    OBSERVED,
+    RELATIVE,
+    VALUE,
+    VELOCITY,
+    bounded_events,
+    flatten,
+    is_bounded,
+    reading_sd,
+    tabled,
+)
 from skred.parallel.compile_cache import compiled, inner
 
 FloatArray = NDArray[np.float64]
@@ -21,33 +34,8 @@ _TINY, _SMALL = 1e-30, 1e-200
 _COMMON_STEPS, _COMMON_STEP = 28, 0.5
 """Trapezoids over an error that velocities share, in its standard deviations: from -14 to 14 in steps of a
 half."""
-OBSERVED, VELOCITY, VALUE, RELATIVE, ABSOLUTE = range(5)
-"""What is known of a reading, as `tabled` has it: two flags, and its error's parts."""
 _SCALE, _SHARE, _LOG_WEIGHT, _LOG_SCALE = range(4)
 """A case of the mixture, as `_cases_of` has it."""
-
-
-@inner()
-def tabled(readings):  # type: ignore[no-untyped-def]
-    """All readings in one array, (n_events, n_sensors, 5).
-
-    Reading an array out of a tuple counts a reference up and down; done for each reading of each front that
-    took about as long as the density itself.
-    """
-    values, observed, stated_sd = readings.values, readings.observed, readings.stated_sd
-    relative_sd, absolute_sd = readings.relative_sd, readings.absolute_sd
-    is_velocity = readings.is_velocity
-    n_events, n_sensors = values.shape
-    table = np.zeros((n_events, n_sensors, 5))
-    for event in range(n_events):
-        for j in range(n_sensors):
-            stated = stated_sd[event, j] > 0.0
-            table[event, j, OBSERVED] = 1.0 if observed[event, j] else 0.0
-            table[event, j, VELOCITY] = 1.0 if is_velocity[j] else 0.0
-            table[event, j, VALUE] = values[event, j]
-            table[event, j, RELATIVE] = 0.0 if stated else relative_sd[j]
-            table[event, j, ABSOLUTE] = stated_sd[event, j] if stated else absolute_sd[j]
-    return table
 
 
 @inner()
@@ -60,13 +48,6 @@ def _cases_of(errors):  # type: ignore[no-untyped-def]
         cases[k, _SCALE], cases[k, _SHARE] = scales[k], shares[k]
         cases[k, _LOG_WEIGHT], cases[k, _LOG_SCALE] = log_weights[k], log_scales[k]
     return cases
-
-
-@inner()
-def reading_sd(table, event, j, prediction):  # type: ignore[no-untyped-def]
-    """Standard deviation of a reading [m/s or m]."""
-    relative, absolute = table[event, j, RELATIVE] * prediction, table[event, j, ABSOLUTE]
-    return math.sqrt(relative * relative + absolute * absolute)
 
 
 @inner()
@@ -206,8 +187,11 @@ def _normal_sums(table, event, low, high, run):  # type: ignore[no-untyped-def]
 
 
 @inner()
-def _log_independent(table, event, low, high, run, cases, degrees):  # type: ignore[no-untyped-def]
-    """Log likelihood of the observed readings, independent within each case of the mixture."""
+def _log_independent(table, event, low, high, run, cases, degrees, bounds):  # type: ignore[no-untyped-def]
+    """Log likelihood of the observed readings, independent within each case of the mixture.
+
+    `bounds` are those of the bounds in each case.
+    """
     n_cases, outliers = cases.shape[0], False
     for case in range(n_cases):
         outliers |= cases[case, _SHARE] > 0.0
@@ -226,7 +210,7 @@ def _log_independent(table, event, low, high, run, cases, degrees):  # type: ign
             term, second = _log_two_cases(table, event, low, high, run, cases, case, other)
         else:
             term = second
-        term += cases[case, _LOG_WEIGHT]
+        term += cases[case, _LOG_WEIGHT] + bounds[case]
         if term > most:
             total = total * math.exp(most - term) + 1.0
             most = term
@@ -284,19 +268,24 @@ def _log_between(events, low, high, exact, readings, errors):  # type: ignore[no
     result = np.empty(events.size)
     table, cases, degrees, common = tabled(readings), _cases_of(errors), errors.degrees, errors.common
     reached, not_reached, place_sd = readings.reached, readings.not_reached, readings.place_sd
-    last = low.shape[1] - 1
+    last, bounds = low.shape[1] - 1, np.zeros(cases.shape[0])
+    bounded = bounded_events(table)
     for run in range(events.size):
         event = events[run]
         best = 0.5 * (reached[event] + not_reached[event])
         if reached[event] == -np.inf and not_reached[event] == np.inf:
             best = low[run, last]
         stop = min(max(best, low[run, last]), high[run, last])
-        if common == 0.0:
-            found = _log_independent(table, event, low, high, run, cases, degrees)
-        elif exact:
-            found = _log_correlated(table, event, low, run, common)
+        if bounded[event]:
+            fill_log_bounds(table, event, low, high, run, cases, degrees, bounds)
         else:
-            found = _bound_correlated(table, event, low, high, run, common)
+            bounds[:] = 0.0
+        if common == 0.0:
+            found = _log_independent(table, event, low, high, run, cases, degrees, bounds)
+        elif exact:
+            found = _log_correlated(table, event, low, run, common) + bounds[0]
+        else:
+            found = _bound_correlated(table, event, low, high, run, common) + bounds[0]
         result[run] = found + _log_stop(stop, reached[event], not_reached[event], place_sd)
     return result
 
@@ -369,14 +358,18 @@ def _fill_changes(events, predictions, low, high, readings, change):  # type: ig
     n_boxes, n_corners, n_columns = predictions.shape
     table, place_sd = tabled(readings), readings.place_sd
     reached, not_reached = readings.reached, readings.not_reached
-    sd = np.empty(n_columns)
+    sd, corners = np.empty(n_columns), np.empty((n_corners, n_columns))
     for box in range(n_boxes):
         event = events[box]
         uses_stop = reached[event] > -np.inf or not_reached[event] < np.inf
         sd[:] = np.inf
+        corners[:] = predictions[box]
         for j in range(n_columns - 1):
             if table[event, j, OBSERVED] > 0.0:
                 _, sd[j] = _nearest(table, event, j, low[box, j], high[box, j], 0.0)
+            elif is_bounded(table, event, j):
+                sd[j] = reading_sd(table, event, j, low[box, j])
+                flatten(table, event, j, sd[j], corners)
         if uses_stop:
             sd[n_columns - 1] = place_sd
         for axis in range(change.shape[1]):
@@ -386,6 +379,6 @@ def _fill_changes(events, predictions, low, high, readings, change):  # type: ig
                 if other != corner:
                     square = 0.0
                     for j in range(n_columns):
-                        square += ((predictions[box, other, j] - predictions[box, corner, j]) / sd[j]) ** 2
+                        square += ((corners[other, j] - corners[corner, j]) / sd[j]) ** 2
                     largest = max(largest, square)
             change[box, axis] = math.sqrt(largest)

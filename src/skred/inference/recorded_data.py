@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
+from skred.campaign import Status
 from skred.inference.problem import Problem
 
 
@@ -38,7 +40,10 @@ def _constant(problem: Problem) -> xr.Dataset:
             "status": (
                 ("event", "sensor"),
                 campaign.status,
-                {"flag_values": [0, 1, 2], "flag_meanings": "observed not_reached missing"},
+                {
+                    "flag_values": [int(status) for status in Status],
+                    "flag_meanings": " ".join(status.name.lower() for status in Status),
+                },
             ),
             "reading_sd": (("event", "sensor"), campaign.reading_sd(), reading),
             "quantity": ("sensor", [str(s.quantity) for s in campaign.sensors]),
@@ -46,7 +51,18 @@ def _constant(problem: Problem) -> xr.Dataset:
             "s_to": ("sensor", [s.s_to_m for s in campaign.sensors], {"units": "m"}),
             "relative_sd": ("sensor", [s.relative_sd for s in campaign.sensors], {"units": "1"}),
             "absolute_sd": ("sensor", [s.absolute_sd for s in campaign.sensors], reading),
+            **_bounds(problem),
+            "place_sd": (
+                "sensor",
+                [np.nan if s.place_sd_m is None else s.place_sd_m for s in campaign.sensors],
+                {"units": "m"},
+            ),
             "release_s": ("event", [e.release_s_m for e in campaign.events], {"units": "m"}),
+            "release_speed": (
+                "event",
+                [e.release_speed_m_s or 0.0 for e in campaign.events],
+                {"units": "m s-1"},
+            ),
             **_track(problem),
             "cell_edge": ("edge", terrain.edge_s_m, {"units": "m"}),
             "slope": ("cell", terrain.slope_rad, {"units": "rad"}),
@@ -56,6 +72,18 @@ def _constant(problem: Problem) -> xr.Dataset:
         coords={"event": problem.coords["event"], "sensor": sensor, "sensor_bis": sensor},
         attrs={} if reference is None else {"reference_s": float(reference)},
     )
+
+
+def _bounds(problem: Problem) -> dict[str, Any]:
+    """Between what readings lie of which only that is known; nothing where there are no such readings."""
+    least, most = problem.campaign.bounds
+    if not (np.isfinite(least) | np.isfinite(most)).any():
+        return {}
+    unit = {"units": "m s-1; m for the runout"}
+    return {
+        "reading_least": (("event", "sensor"), least, unit),
+        "reading_most": (("event", "sensor"), most, unit),
+    }
 
 
 def _track(problem: Problem) -> dict[str, Any]:

@@ -126,8 +126,9 @@ def run_front(
     *,
     weakening_speed: float = math.inf,
     barriers: Sequence[Barrier] = (),
+    release_speed: complex = 0.0,
 ) -> FrontRun:
-    """Send one front down the track from rest.
+    """Send one front down the track.
 
     Parameters
     ----------
@@ -136,11 +137,13 @@ def run_front(
     table : (5, n_cells) array, real or complex
         Coefficients in the order and units of ``Column``.
     release_s_m : float or complex, m
-        Place of the front at rest. A barrier at or above it is not met.
+        Where the front starts. A barrier above it is not met, nor is one there by a front at rest.
     weakening_speed : float, m/s
         U_c of weakening friction.
     barriers : sequence of (s [m], height [m], loss [J/kg]), sorted by s
         A front with v < 2 g height, or no more than 2 loss, stops; others go on with v - 2 loss.
+    release_speed : float or complex, m/s
+        How fast the front is where it starts; 0 from rest.
 
     Returns
     -------
@@ -154,13 +157,16 @@ def run_front(
 
     """
     coefficients = np.asarray(table)
-    dtype = np.result_type(coefficients, release_s_m, *(loss for _, _, loss in barriers), np.float64)
+    dtype = np.result_type(
+        coefficients, release_s_m, release_speed, *(loss for _, _, loss in barriers), np.float64
+    )
     edge_v = np.zeros(len(terrain.edge_s_m), dtype=complex)
-    s, v, moving = complex(release_s_m), 0j, False
+    s, v, moving = complex(release_s_m), complex(release_speed) ** 2, False
+    edge_v[terrain.edge_s_m == s.real] = v
     pieces: list[Piece] = []
-    for index, end_s, barrier in _sections(terrain.edge_s_m, s.real, barriers):
+    for index, end_s, barrier in _sections(terrain.edge_s_m, s.real, barriers, v.real > 0):
         cell = _cell(terrain, coefficients, index, weakening_speed)
-        if not pieces and _coefficients(cell, True, 0j)[0].real <= 0:
+        if not pieces and v == 0 and _coefficients(cell, True, 0j)[0].real <= 0:
             break
         pieces += _cross(cell, s, end_s, v)
         s, v = pieces[-1].end_s, pieces[-1].speed_squared(pieces[-1].end_s)
@@ -186,6 +192,7 @@ def read_front(
     *,
     weakening_speed: float = math.inf,
     barriers: Sequence[Barrier] = (),
+    release_speed: complex = 0.0,
 ) -> NDArray[Any]:
     """Run a front as `run_front` does and read it at the sensors.
 
@@ -195,7 +202,14 @@ def read_front(
         Speed at a point, mean speed over a span [m/s], or runout as s [m].
 
     """
-    run = run_front(terrain, table, release_s_m, weakening_speed=weakening_speed, barriers=barriers)
+    run = run_front(
+        terrain,
+        table,
+        release_s_m,
+        weakening_speed=weakening_speed,
+        barriers=barriers,
+        release_speed=release_speed,
+    )
     readings = np.zeros(len(sensors), dtype=complex)
     for index, (kind, s_from, s_to) in enumerate(sensors):
         if kind == "runout":
@@ -210,16 +224,18 @@ def read_front(
 
 
 def _sections(
-    edge_s: NDArray[np.float64], release_s: float, barriers: Sequence[Barrier]
+    edge_s: NDArray[np.float64], release_s: float, barriers: Sequence[Barrier], moving: bool
 ) -> Iterator[tuple[int, float, Barrier | None]]:
     """Cell, lower end [m] and the barrier there, for every stretch between edges and barriers."""
     if not edge_s[0] <= release_s <= edge_s[-1]:
         raise ValueError(f"release at {release_s} m, but the track runs from {edge_s[0]} to {edge_s[-1]} m")
     first = int(np.searchsorted(edge_s, release_s, side="right")) - 1
+    if moving:  # over the track's end as well
+        first = min(first, len(edge_s) - 2)
     for index in range(first, len(edge_s) - 1):
         upper, lower = max(release_s, edge_s[index]), float(edge_s[index + 1])
         for barrier in barriers:
-            if upper < barrier[0] <= lower:
+            if upper < barrier[0] <= lower or (moving and barrier[0] == release_s == upper):
                 yield index, barrier[0], barrier
         yield index, lower, None
 

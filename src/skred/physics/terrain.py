@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 SMOOTHING_M = 10.0
-"""Default smoothing length [m]; results of laws with curvature depend on it."""
+"""Default smoothing length [m] of a usual path; results of laws with curvature depend on it."""
 CELL_M = 6.0
-"""Default largest length of a cell [m]."""
+"""Default largest length of a cell [m] of a usual path."""
+USUAL_PATH_M = 600.0
+"""Length of a track [m] below which both become shorter in proportion, down to a chute in a laboratory."""
 MAX_CELLS = 100_000
 
 
@@ -70,12 +72,22 @@ class Terrain:
         return np.arctan2(self.sin_slope, self.cos_slope)
 
 
+def default_smoothing(length_m: float) -> float:
+    """Smoothing length [m] of a track of that length: 10 m, and in proportion less below 600 m."""
+    return SMOOTHING_M * min(1.0, float(length_m) / USUAL_PATH_M)
+
+
+def default_cell(length_m: float) -> float:
+    """Largest length of a cell [m] on a track of that length: 6 m, and in proportion less below 600 m."""
+    return CELL_M * min(1.0, float(length_m) / USUAL_PATH_M)
+
+
 def build_terrain(
     x_m: FloatArray,
     z_m: FloatArray,
     *,
-    smoothing_m: float = SMOOTHING_M,
-    cell_m: float = CELL_M,
+    smoothing_m: float | None = None,
+    cell_m: float | None = None,
 ) -> Terrain:
     """Terrain from a surveyed track by one cubic smoothing spline z(x).
 
@@ -87,10 +99,10 @@ def build_terrain(
     ----------
     x_m, z_m : (n_points,) array, m
         Horizontal distance (strictly increasing) and elevation, at least three points.
-    smoothing_m : float, m
-        Smoothing length; 0 interpolates.
-    cell_m : float, m
-        Largest length of a cell.
+    smoothing_m : float, m, optional
+        Smoothing length; 0 interpolates. By default `default_smoothing`.
+    cell_m : float, m, optional
+        Largest length of a cell. By default `default_cell`.
 
     Returns
     -------
@@ -103,9 +115,11 @@ def build_terrain(
         If a length is not positive or the track would need more than 100 000 cells.
 
     """
+    polyline_s = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x_m), np.diff(z_m)))])
+    smoothing_m = default_smoothing(polyline_s[-1]) if smoothing_m is None else smoothing_m
+    cell_m = default_cell(polyline_s[-1]) if cell_m is None else cell_m
     if not (cell_m > 0 and smoothing_m >= 0):
         raise ValueError("cell_m must be positive and smoothing_m not negative")
-    polyline_s = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x_m), np.diff(z_m)))])
     n_cells = int(np.ceil(polyline_s[-1] / cell_m))
     if n_cells > MAX_CELLS:
         raise ValueError(f"the track needs {n_cells} cells of {cell_m} m; choose longer cells")

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtri
 
-from skred.inference.hierarchical.bisection import Releases
+from skred.inference.hierarchical.releases import Releases
 from skred.physics.geometry import contributions_of, path_of, sensor_table
 from skred.physics.kernel.columns import GRAVITY
 from skred.physics.kernel.fronts import simulate
@@ -96,10 +96,10 @@ def new_fronts(
         raise ValueError(
             f"expected a power of 2 from 4 to {MOST_AVALANCHES} avalanches, found {n_avalanches}"
         )
-    normal, release = _draws(means.shape[1], releases, n_avalanches, seed)
+    normal, release, begin = _draws(means.shape[1], releases, n_avalanches, seed)
     path, contributions = path_of(terrain), contributions_of(law.mechanisms, terrain)
     sensors = sensor_table([*((s, s) for s in places.tolist()), None])
-    n, n_places, n_steps = len(means), len(places), _n_steps(terrain)
+    n, n_places, n_steps = len(means), len(places), _n_steps(terrain, begin)
     exceeding = np.empty((n, n_places, n_steps), dtype=np.uint16)
     by_half = np.zeros((HALVES, n_places, n_steps), dtype=np.int64)
     sums = np.empty((3, HALVES, n, n_places))
@@ -107,7 +107,7 @@ def new_fronts(
     started = release[:, None] <= places
     for k in range(n):
         strengths = np.exp(means[k] + normal @ factors[k].T)
-        readings = simulate(strengths, release, path, contributions, sensors)
+        readings = simulate(strengths, release, path, contributions, sensors, begin)
         speeds, runout[k] = readings[:, :-1], readings[:, -1]
         stop = runout[k][:, None]
         through = started & ((stop > places) | (stop >= terrain.length_m))
@@ -131,21 +131,21 @@ def _faster(speeds: FloatArray, n_steps: int) -> NDArray[np.int64]:
     return len(speeds) - counts.cumsum(axis=1)
 
 
-def _n_steps(terrain: Terrain) -> int:
-    """Steps up to the speed of a free fall down all that goes down."""
+def _n_steps(terrain: Terrain, begin: FloatArray) -> int:
+    """Steps up to the speed of a free fall down all that goes down, from the fastest start."""
     fall = float(np.maximum(terrain.sin_slope, 0.0) @ np.diff(terrain.edge_s_m))
-    return int(np.ceil(np.sqrt(2.0 * GRAVITY * fall) / SPEED_STEP_M_S)) + 2
+    return int(np.ceil(np.sqrt(2.0 * GRAVITY * fall + begin.max() ** 2) / SPEED_STEP_M_S)) + 2
 
 
 def _draws(
     n_strengths: int, releases: Releases, n_avalanches: int, seed: int
-) -> tuple[FloatArray, FloatArray]:
-    """Standard normal variables (n_avalanches, n_strengths) and releases (n_avalanches,)."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Standard normal variables (n_avalanches, n_strengths), releases and speeds there (n_avalanches,)."""
     # Here, because it takes a third of a second.
     from scipy.stats import qmc
 
-    same = np.ptp(releases.mean) == 0.0 and np.ptp(releases.sd) == 0.0
-    certain = not releases.sd.any()
+    each = releases.mean, releases.sd, releases.speed, releases.speed_sd
+    same, certain = all(np.ptp(values) == 0.0 for values in each), not releases.uncertain.any()
     rng = np.random.default_rng([seed, 7])
     n_axes = n_strengths + (not same) + (not certain)
     exponent = (n_avalanches // HALVES).bit_length() - 1
@@ -154,9 +154,7 @@ def _draws(
     event = np.zeros(n_avalanches, dtype=np.int64)
     if not same:
         event = (points[:, n_strengths] * len(releases.mean)).astype(np.int64)
-    place, sd = releases.mean[event], releases.sd[event]
-    if not certain:  # cut off where the track ends, as in the likelihood
-        wide = np.maximum(sd, 1e-9)
-        low, high = ndtr(-place / wide), ndtr((releases.length - place) / wide)
-        place = place + sd * ndtri(low + (high - low) * points[:, -1])
-    return ndtri(points[:, :n_strengths]), np.clip(place, 0.0, releases.length)
+    # Cut off at the same limits as in the likelihood.
+    deviation = np.zeros(n_avalanches) if certain else releases.drawn(event, points[:, -1])
+    begin = releases.places(event, deviation), releases.speeds(event, deviation)
+    return ndtri(points[:, :n_strengths]), *begin

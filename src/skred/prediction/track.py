@@ -11,12 +11,12 @@ import numpy as np
 from skred.campaign import CampaignError, Problem, Track
 from skred.campaign.problems import SHOWN_CHARACTERS
 from skred.campaign.reading import TRACK
-from skred.campaign.rules import track_problems
 from skred.campaign.tables import read_table
+from skred.campaign.track_rules import track_problems
 from skred.errors import InputError
-from skred.inference.hierarchical.bisection import Releases
 from skred.inference.hierarchical.problem import HierarchicalProblem
-from skred.physics.terrain import CELL_M, Terrain, build_terrain
+from skred.inference.hierarchical.releases import Releases, exact_release
+from skred.physics.terrain import Terrain, build_terrain
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ def prediction_track(
         return _own(problem, release_s_m)
     track = read_track(file)
     try:
-        terrain = build_terrain(track.x_m, track.z_m, smoothing_m=problem.terrain.smoothing_m, cell_m=CELL_M)
+        terrain = build_terrain(track.x_m, track.z_m, smoothing_m=problem.terrain.smoothing_m)
     except ValueError as error:
         raise InputError(f"--track {file}: {error}") from error
     place = 0.0 if release_s_m is None else release_s_m
@@ -113,16 +113,19 @@ def _single(release_s_m: float, length_m: float) -> Releases:
         raise InputError(
             f"--release {release_s_m:g}: expected a place on the track, from 0 to below {length_m:.1f} m"
         )
-    return Releases(np.array([release_s_m]), np.zeros(1), length_m)
+    return exact_release(release_s_m, length_m)
 
 
 def _release_text(releases: Releases) -> str:
     """The campaign's releases in words."""
     low, high = float(releases.mean.min()), float(releases.mean.max())
     which = f"s = {low:.0f} m" if low == high else f"the recorded releases, s = {low:.0f} to {high:.0f} m"
-    if not releases.sd.any():
-        return which
-    return f"{which}, known to {np.median(releases.sd[releases.sd > 0.0]):.0f} m"
+    if releases.sd.any():
+        which += f", known to {np.median(releases.sd[releases.sd > 0.0]):.0f} m"
+    if releases.speed.any():
+        slow, fast = float(releases.speed.min()), float(releases.speed.max())
+        which += f", at {slow:.1f} m/s" if slow == fast else f", at {slow:.1f} to {fast:.1f} m/s"
+    return which
 
 
 def read_track(file: Path) -> Track:

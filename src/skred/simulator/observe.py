@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign, Event, Sensor, Status, Track
+from skred.campaign.order_rules import LARGEST_SDS
 from skred.simulator.fitting import predict
 from skred.simulator.strength import Truth
 
@@ -78,6 +79,23 @@ def _events(truth: Truth) -> tuple[Event, ...]:
     )
 
 
+def _without_contradictions(
+    values: FloatArray, status: NDArray[np.int8], sensors: tuple[Sensor, ...]
+) -> NDArray[np.int8]:
+    """Statuses without runouts so far above a place where the front moved that no campaign may hold them.
+
+    Whoever records them sees that they are wrong, and writes that they are missing. They are rare: one in a
+    thousand outlying readings.
+    """
+    places = np.array([sensor.s_from_m for sensor in sensors[:-1]])
+    moving = (status[:, :-1] == Status.OBSERVED) & (values[:, :-1] > 0.0)
+    lowest = np.where(moving, places, -np.inf).max(axis=1)
+    sd = np.hypot(sensors[-1].relative_sd * values[:, -1], sensors[-1].absolute_sd)
+    kept = status.copy()
+    kept[values[:, -1] + LARGEST_SDS * sd < lowest, -1] = Status.MISSING
+    return kept
+
+
 def observe(rng: np.random.Generator, truth: Truth, nasty: str | None) -> tuple[Campaign, dict[str, Any]]:
     """Record a trial's avalanches.
 
@@ -107,6 +125,8 @@ def observe(rng: np.random.Generator, truth: Truth, nasty: str | None) -> tuple[
     values[:, -1] = np.round(np.clip(values[:, -1], 0.0, np.floor(ground.polyline_s_m[-1])), 1)
     status = np.where(reached, Status.OBSERVED, Status.NOT_REACHED)
     status = np.where(setting.recorded, status, Status.MISSING).astype(np.int8)
+    sensors = _sensors(truth)
+    status = _without_contradictions(values, status, sensors)
     values = np.where(status == Status.OBSERVED, values, np.nan)
     letters = "".join(rng.choice(list("abcdefghijklmnopqrstuvwxyz"), 6))
     n_speeds = exact.shape[1] - 1
@@ -117,7 +137,7 @@ def observe(rng: np.random.Generator, truth: Truth, nasty: str | None) -> tuple[
         origin="simulated",
         reference_s_m=None,
         track=Track(ground.track_x_m, ground.track_z_m),
-        sensors=_sensors(truth),
+        sensors=sensors,
         events=_events(truth),
         values=values,
         status=status,

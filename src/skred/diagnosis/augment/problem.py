@@ -22,7 +22,7 @@ from skred.diagnosis.augment.tables import Tables, build_tables, exact_nodes
 from skred.diagnosis.augment.tabulated_op import tabulated_log_densities
 from skred.diagnosis.augment.truncated_normal import truncated_normal
 from skred.diagnosis.evidence.coefficient import Base
-from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows, take_rows
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.extension import Extension
 from skred.inference.hierarchical.event_density import integrated_log_density
@@ -215,7 +215,7 @@ class AugmentedProblem(HierarchicalProblem):
         """
         base = self.base
         population = Population(means, np.einsum("nij,nkj->nik", factors, factors))
-        rows = Rows(chosen, np.zeros_like(chosen), take_rows(base.rows.readings, chosen), base.rows.errors)
+        rows = Rows(chosen, np.zeros_like(chosen), base.rows.readings.take(chosen), base.rows.errors)
         start = self.tables.modes[self.tables.grid.nearest(added)][:, chosen]
         given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
         more = 2 ** int(np.clip(np.log2(runs / (len(added) * len(chosen))), 0, 3))
@@ -230,7 +230,11 @@ class AugmentedProblem(HierarchicalProblem):
         return errors
 
     def speeds(
-        self, mechanisms: Sequence[Mechanism], strengths: FloatArray, release_s_m: float | FloatArray
+        self,
+        mechanisms: Sequence[Mechanism],
+        strengths: FloatArray,
+        release_s_m: float | FloatArray,
+        release_speed_m_s: float | FloatArray = 0.0,
     ) -> FloatArray:
         """Front speed [m/s] at the cell edges, what is added as strong as its posterior mean."""
         extension = self.extension
@@ -238,7 +242,8 @@ class AugmentedProblem(HierarchicalProblem):
         columns = np.repeat(added, [len(d.columns) for d in extension.directions])
         rows = np.column_stack([np.asarray(strengths, float), np.tile(columns, (len(strengths), 1))])
         releases = np.full(len(rows), release_s_m, dtype=float)  # where fronts start, an offset included
-        speeds: FloatArray = front_speeds(rows, releases, self.path, extension.contributions)
+        law = extension.contributions
+        speeds: FloatArray = front_speeds(rows, releases, self.path, law, release_speed_m_s)
         return speeds
 
     def finer(self, law: Law, posterior: xr.Dataset) -> AugmentedProblem | None:

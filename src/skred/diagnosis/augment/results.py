@@ -80,13 +80,24 @@ def _samples(problem: AugmentedProblem, law: Law, draws: xr.Dataset) -> dict[str
 def _predict(problem: AugmentedProblem, law: Law, draws: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
     samples = _samples(problem, law, draws)
     drawn = new_avalanches(problem, law, samples, rng)
-    mean, sd, _ = problem.releases
-    deviation = np.where(sd > 0.0, (drawn.releases - mean) / np.where(sd > 0.0, sd, 1.0), 0.0)
+    deviation = _deviations(problem, drawn)
     points = np.concatenate([np.log(drawn.strengths), deviation[..., None]], axis=-1)
     avalanches, fronts = fronts_of(problem, points, problem.added_rows(samples))
     dataset = avalanche_dataset(problem, law, draws, avalanches, fronts)
     add_readings(problem, dataset, fronts, rng)
     return dataset
+
+
+def _deviations(problem: AugmentedProblem, avalanches: Avalanches) -> FloatArray:
+    """How far releases are from what was noted, (n, n_events), in standard deviations."""
+    noted = problem.releases
+    deviation = np.zeros(avalanches.releases.shape)
+    for found, mean, sd in (
+        (avalanches.releases, noted.mean, noted.sd),
+        (avalanches.release_speeds, noted.speed, noted.speed_sd),
+    ):
+        deviation += np.where(sd > 0.0, (found - mean) / np.where(sd > 0.0, sd, 1.0), 0.0)
+    return deviation
 
 
 def recorded_points(
@@ -126,10 +137,10 @@ class _Instruments(Extension):
         self, events: NDArray[np.int64], points: FloatArray, strengths: FloatArray
     ) -> tuple[Avalanches, FloatArray]:
         """Strengths and releases with what is added, and readings without errors, runout last."""
-        rows, releases, factors = self._inputs(events, points, strengths)
+        rows, releases, begin, factors = self._inputs(events, points, strengths)
         table = sensor_table([*self.problem.sensor_places, None])
-        readings = simulate(rows, releases, self.problem.path, self.contributions, table)
-        return Avalanches(rows[:, : self.n_base], releases), readings * factors
+        readings = simulate(rows, releases, self.problem.path, self.contributions, table, begin)
+        return Avalanches(rows[:, : self.n_base], releases, begin), readings * factors
 
 
 def fronts_of(
@@ -155,7 +166,8 @@ def fronts_of(
     avalanches, fronts = instruments.read(
         np.tile(np.arange(n_events), n), points.reshape(n * n_events, -1), given
     )
+    strengths, *begin = avalanches
     shaped = Avalanches(
-        avalanches.strengths.reshape(n, n_events, -1), avalanches.releases.reshape(n, n_events)
+        strengths.reshape(n, n_events, -1), *(values.reshape(n, n_events) for values in begin)
     )
     return shaped, fronts.reshape(n, n_events, -1)

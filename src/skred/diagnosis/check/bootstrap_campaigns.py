@@ -26,7 +26,8 @@ def bootstrap_campaigns(
     """Simulated recordings, one campaign for each population.
 
     Where the real campaign has no reading by accident (`missing`) a replica has none; where its front stopped
-    above a sensor or passed it, the replica's own front decides.
+    above a sensor or passed it, the replica's own front decides. Where only bounds are known of a
+    reading, the replica's is drawn without them, and on which side it falls is what is known of it.
 
     Parameters
     ----------
@@ -66,7 +67,8 @@ def _read(
     readings = problem.readings
     n = len(event)
     status = np.asarray(problem.campaign.status)[event]
-    recorded = status != Status.MISSING
+    bounded = readings.bounded[event]
+    recorded = (status != Status.MISSING) & ~bounded
     velocity = readings.is_velocity
     stop = predictions[:, -1]
     seen_stop = stop + readings.place_sd * rng.standard_normal(n)
@@ -79,12 +81,26 @@ def _read(
     prediction = predictions[:, :-1]
     drawn = error_model.draw(prediction, readings.sd(event, prediction), velocity, rng)
     values = np.where(observed, drawn, 0.0)
-    moved = observed & velocity[None, :] & (values > 0.0)
+    least, most = _sides(np.where(passed, drawn, 0.0), readings.least[event], readings.most[event])
+    moved = velocity[None, :] & ((values > 0.0) | (least > 0.0))
     stopped = recorded & velocity[None, :] & ~passed
     return readings._replace(
         values=values,
         observed=observed,
-        stated_sd=np.where(observed, readings.stated_sd[event], 0.0),
+        stated_sd=np.where(observed | bounded, readings.stated_sd[event], 0.0),
+        least=least,
+        most=most,
         reached=np.where(moved, ends, -np.inf).max(axis=1, initial=-np.inf),
         not_reached=np.where(stopped, ends, np.inf).min(axis=1, initial=np.inf),
     )
+
+
+def _sides(drawn: FloatArray, least: FloatArray, most: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """On which side of what bounds readings lie: their own bounds, minus and plus infinity where none."""
+    # Of one bound there are two sides, of two there are three.
+    first = np.where(np.isfinite(least), least, most)
+    last = np.where(np.isfinite(most), most, least)
+    known = np.isfinite(first)
+    new_least = np.where(drawn >= last, last, np.where(drawn >= first, first, -np.inf))
+    new_most = np.where(drawn < first, first, np.where(drawn < last, last, np.inf))
+    return np.where(known, new_least, -np.inf), np.where(known, new_most, np.inf)

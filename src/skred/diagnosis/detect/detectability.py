@@ -227,6 +227,7 @@ def with_sensors(problem: HierarchicalProblem, places: FloatArray) -> Hierarchic
             values=np.column_stack([campaign.values, empty]),
             status=np.column_stack([campaign.status, np.full(empty.shape, int(Status.MISSING))]),
             stated_sd=np.column_stack([campaign.stated_sd, empty]),
+            values_to=np.column_stack([campaign.values_to, empty]),
         ),
     )
 

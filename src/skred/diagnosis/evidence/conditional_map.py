@@ -52,12 +52,12 @@ class Rows(NamedTuple):
 
     def take(self, chosen: IntArray) -> Rows:
         """Some of the rows, of the same groups."""
-        return Rows(self.event[chosen], self.group[chosen], take_rows(self.readings, chosen), self.errors)
+        return Rows(self.event[chosen], self.group[chosen], self.readings.take(chosen), self.errors)
 
     def repeated(self, n_groups: int) -> Rows:
         """The same rows, of one group, for each of several."""
         n = len(self.event)
-        readings = take_rows(self.readings, np.tile(np.arange(n), n_groups))
+        readings = self.readings.take(np.tile(np.arange(n), n_groups))
         return Rows(np.tile(self.event, n_groups), np.repeat(np.arange(n_groups), n), readings, self.errors)
 
     @property
@@ -268,7 +268,8 @@ def _lost(rows: Rows, predictions: FloatArray) -> IntArray:
     """Rows whose readings would be much likelier if they, and the range of the stop, were as predicted."""
     readings, at = rows.readings, np.arange(len(predictions))
     met = predictions.copy()
-    met[:, :-1] = np.where(readings.observed, readings.values, predictions[:, :-1])
+    inside = np.clip(predictions[:, :-1], readings.least, readings.most)
+    met[:, :-1] = np.where(readings.observed, readings.values, inside)
     met[:, -1] = np.clip(predictions[:, -1], readings.reached, readings.not_reached)
     heights = [log_likelihoods(at, one, readings, rows.errors) for one in (predictions, met)]
     # Half a nat a reading is what noise alone takes.
@@ -299,17 +300,6 @@ def _store(found: list[FloatArray], active: IntArray, around: Modes) -> None:
             found[k] = values.copy()
         else:
             found[k][active] = values
-
-
-def take_rows(readings: EventReadings, rows: IntArray) -> EventReadings:
-    """Recordings of some events, in this order, perhaps repeated."""
-    return readings._replace(
-        values=readings.values[rows],
-        observed=readings.observed[rows],
-        stated_sd=readings.stated_sd[rows],
-        reached=readings.reached[rows],
-        not_reached=readings.not_reached[rows],
-    )
 
 
 def campaign_rows(extension: Extension) -> Rows:

@@ -288,7 +288,7 @@ def on_a_line(
 def _axes(likelihood: EventLikelihood) -> int:
     """How many there are to integrate over: the base's strengths, and the release where it is uncertain."""
     extension = likelihood.extension
-    return extension.n_base + int((extension.problem.releases.sd[likelihood.rows.event] > 0.0).any())
+    return extension.n_base + int(extension.problem.releases.uncertain[likelihood.rows.event].any())
 
 
 def _covered(population: Population, reference: Population | None) -> list[Population]:

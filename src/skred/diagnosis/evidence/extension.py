@@ -137,8 +137,8 @@ class Extension:
 
     def _inputs(
         self, events: IntArray, points: FloatArray, strengths: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Strengths of all columns, releases, and factors of the readings."""
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Strengths of all columns, releases and the speeds there, and factors of the readings."""
         logs = points[:, : self.n_base].copy()
         logs[:, 0] += self._log_strength_shift(events, strengths)
         rows = np.column_stack([np.exp(logs), strengths[:, self._owner]])
@@ -149,7 +149,8 @@ class Extension:
             place = place + strengths[:, k] * direction.release
             if direction.log_readings is not None:
                 log_factor[:, :-1] += np.outer(strengths[:, k], direction.log_readings)
-        return rows, np.clip(place, 0.0, releases.length), np.exp(log_factor)
+        place = np.clip(place, 0.0, releases.length)
+        return rows, place, releases.speeds(events, points[:, -1]), np.exp(log_factor)
 
     def predict(self, events: IntArray, points: FloatArray, strengths: FloatArray) -> FloatArray:
         """Readings of fronts, (n, n_sensors + 1), the runout last; spans up to the stop.
@@ -161,16 +162,16 @@ class Extension:
         strengths : (n_directions,) or (n, n_directions) array
         """
         given = np.broadcast_to(strengths, (len(events), len(self.directions)))
-        rows, releases, factors = self._inputs(events, points, given)
+        rows, releases, begin, factors = self._inputs(events, points, given)
         path, sensors = self.problem.path, self.problem.sensors
-        readings: FloatArray = simulate(rows, releases, path, self.contributions, sensors)
+        readings: FloatArray = simulate(rows, releases, path, self.contributions, sensors, begin)
         return readings * factors
 
     def speeds(self, points: FloatArray, strengths: FloatArray) -> FloatArray:
         """Front speed of each event at the cells' edges [m/s], (n_events, n_cells + 1), at one point each."""
         given = np.broadcast_to(strengths, (len(points), len(self.directions)))
-        rows, releases, _ = self._inputs(np.arange(len(points)), points, given)
-        found: FloatArray = front_speeds(rows, releases, self.problem.path, self.contributions)
+        rows, releases, begin, _ = self._inputs(np.arange(len(points)), points, given)
+        found: FloatArray = front_speeds(rows, releases, self.problem.path, self.contributions, begin)
         return found
 
     def tangents(
@@ -185,19 +186,24 @@ class Extension:
         by_strengths : (n, n_sensors + 1, n_directions) array
         """
         given = np.broadcast_to(strengths, (len(events), len(self.directions)))
-        rows, releases, factors = self._inputs(events, points, given)
+        rows, releases, begin, factors = self._inputs(events, points, given)
+        noted = self.problem.releases
+        by_speed = bool(noted.speed_sd.any())
+        path, sensors = self.problem.path, self.problem.sensors
         readings, jacobian = simulate_with_jacobian(
-            rows, releases, self.problem.path, self.contributions, self.problem.sensors
+            rows, releases, path, self.contributions, sensors, begin, by_speed=by_speed
         )
         readings = readings * factors
         jacobian = jacobian * factors[:, :, None]
-        inside = (releases > 0.0) & (releases < self.problem.releases.length)
-        by_release = jacobian[:, :, -1] * inside[:, None]
+        inside = (releases > 0.0) & (releases < noted.length)
+        by_release = jacobian[:, :, rows.shape[1]] * inside[:, None]
         by_logs = jacobian[:, :, : self.n_base] * rows[:, None, : self.n_base]
-        sd = self.problem.releases.sd[events]
-        by_points = np.concatenate([by_logs, (by_release * sd[:, None])[:, :, None]], axis=2)
+        by_deviation = by_release * noted.sd[events][:, None]
+        if by_speed:
+            by_deviation += jacobian[:, :, -1] * noted.speed_sd[events][:, None]
+        by_points = np.concatenate([by_logs, by_deviation[:, :, None]], axis=2)
         by_strengths = np.zeros((*readings.shape, len(self.directions)))
-        added = jacobian[:, :, self.n_base : -1]
+        added = jacobian[:, :, self.n_base : rows.shape[1]]
         for k, direction in enumerate(self.directions):
             by_strengths[:, :, k] = added[:, :, self._owner == k].sum(axis=2) + by_release * direction.release
             if direction.log_strengths is not None:

@@ -10,12 +10,16 @@ import math
 
 import numpy as np
 
+from skred.inference.bounds import bound_slopes, log_bound
 from skred.inference.error_model import OUTLIER_FACTOR
-from skred.inference.reading_density import (
+from skred.inference.reading_table import (
+    LEAST,
+    MOST,
     OBSERVED,
     RELATIVE,
     VALUE,
     VELOCITY,
+    is_bounded,
     reading_sd,
     tabled,
 )
@@ -72,6 +76,25 @@ def _common_slopes(table, row, predictions, i, common, slope, curvature, shared)
         shared[i, j] = part * math.sqrt(taken) / (own * sd)
 
 
+@inner()
+def _fill_bound_slopes(  # type: ignore[no-untyped-def]
+    table, row, predictions, i, weights, scales, shares, degrees, slope, curvature
+):
+    """Fill slope and curvature of readings known by bounds only, over the cases by their weights."""
+    for j in range(table.shape[1]):
+        if not is_bounded(table, row, j):
+            continue
+        prediction = predictions[i, j]
+        width = reading_sd(table, row, j, prediction)
+        d_sd = table[row, j, RELATIVE] ** 2 * prediction / width
+        for case in range(weights.size):
+            wide = width * scales[case]
+            low, high = (table[row, j, LEAST] - prediction) / wide, (table[row, j, MOST] - prediction) / wide
+            own = bound_slopes(low, high, shares[case], d_sd * scales[case], degrees > 0.0)
+            slope[i, j] += weights[case] * own[0] / wide
+            curvature[i, j] += weights[case] * own[1] / (wide * wide)
+
+
 @compiled()
 def reading_slopes(rows, predictions, readings, errors):  # type: ignore[no-untyped-def]
     """Slope and curvature of the log likelihood by each prediction.
@@ -110,10 +133,18 @@ def reading_slopes(rows, predictions, readings, errors):  # type: ignore[no-unty
         slope[i, n_columns - 1], curvature[i, n_columns - 1] = at_stop, bend
         if common > 0.0:
             _common_slopes(table, row, predictions, i, common, slope, curvature, shared)
+            weights[0] = 1.0  # these errors are one case
+            _fill_bound_slopes(table, row, predictions, i, weights, scales, shares, degrees, slope, curvature)
             continue
         for case in range(n_cases):
             log_case[case] = log_weights[case]
         for j in range(n_columns - 1):
+            if is_bounded(table, row, j):
+                width = reading_sd(table, row, j, predictions[i, j])
+                low, high = table[row, j, LEAST] - predictions[i, j], table[row, j, MOST] - predictions[i, j]
+                for case in range(n_cases):
+                    wide = width * scales[case]
+                    log_case[case] += log_bound(low / wide, high / wide, shares[case], degrees > 0.0)
             if table[row, j, OBSERVED] == 0.0:
                 continue
             sd[j] = reading_sd(table, row, j, predictions[i, j])
@@ -133,6 +164,7 @@ def reading_slopes(rows, predictions, readings, errors):  # type: ignore[no-unty
             weights[case] = math.exp(log_case[case] - most)
             total += weights[case]
         weights /= total
+        _fill_bound_slopes(table, row, predictions, i, weights, scales, shares, degrees, slope, curvature)
         for j in range(n_columns - 1):
             if table[row, j, OBSERVED] == 0.0:
                 continue

@@ -158,7 +158,11 @@ class _Part:
         """The rows that are kept, without the readings that are not."""
         if self.left_out is not None:
             readings = rows.readings
-            left = readings._replace(observed=readings.observed & ~self.left_out)
+            left = readings._replace(
+                observed=readings.observed & ~self.left_out,
+                least=np.where(self.left_out, -np.inf, readings.least),
+                most=np.where(self.left_out, np.inf, readings.most),
+            )
             rows = rows._replace(readings=left)
         return rows.take(np.flatnonzero(self.kept))
 
@@ -247,7 +251,7 @@ def _kinds(base: Base) -> list[tuple[str, str | None, BoolArray]]:
     ]
     for j, sensor in enumerate(campaign.sensor_ids):
         own = np.zeros_like(observed)
-        own[:, j] = observed[:, j]
+        own[:, j] = observed[:, j] | readings.bounded[:, j]
         kinds.append(("sensor", sensor, own))
     return [one for one in kinds if one[2].any()]
 

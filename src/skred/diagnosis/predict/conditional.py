@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.evidence.conditional_map import EventLikelihood, Rows, take_rows
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Rows
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.predict.draws import Draws, LeftOut
 from skred.diagnosis.predict.event_proposal import Sample, Sizes, sample
@@ -159,7 +159,7 @@ def readings_of(problem: HierarchicalProblem, event: int, sets: BoolArray) -> Ev
     readings = problem.readings
     ends = np.array([np.nan if place is None else place[1] for place in problem.sensor_places])
     moved = sets & readings.is_velocity & (readings.values[event] > 0.0)
-    return take_rows(readings, np.full(len(sets), event))._replace(
+    return readings.take(np.full(len(sets), event))._replace(
         observed=sets,
         reached=np.where(moved, ends, -np.inf).max(axis=1, initial=-np.inf),
         not_reached=np.full(len(sets), np.inf),
@@ -217,7 +217,7 @@ def _together(
     if not common or not rows.readings.observed[before].any():
         return 0.0
     n = len(drawn)
-    readings = take_rows(rows.readings, np.full(n, before))
+    readings = rows.readings.take(np.full(n, before))
     values, alone = readings.values.copy(), np.zeros_like(readings.observed)
     values[:, sensor], alone[:, sensor] = drawn[:, sensor], True
     both, at = readings.observed | alone, np.arange(n)

@@ -96,6 +96,7 @@ def comparisons_of(found: Diagnosis) -> list[Comparison]:
 def _campaign(campaign: Campaign) -> dict[str, Any]:
     releases = [event.release_s_m for event in campaign.events]
     known = [event.release_sd_m for event in campaign.events if event.release_sd_m]
+    speeds = [event.release_speed_m_s for event in campaign.events if event.release_speed_m_s]
     track = campaign.track
     return {
         "name": campaign.name,
@@ -109,6 +110,8 @@ def _campaign(campaign: Campaign) -> dict[str, Any]:
         "release_s_m": [min(releases), max(releases)],
         "release_sd_m": float(np.median(known)) if known else None,
         "n_release_sd": len(known),
+        "release_speed_m_s": [min(speeds), max(speeds)] if speeds else [],
+        "n_release_speed": len(speeds),
         "track_length_m": track.length_m,
         "track_drop_m": float(np.ptp(track.z_m)),
         "covariates": sorted({name for event in campaign.events for name in event.covariates}),

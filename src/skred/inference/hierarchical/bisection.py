@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from skred.inference.error_model import Errors, EventReadings
+from skred.inference.hierarchical.releases import Releases
 from skred.inference.reading_density import assess, log_likelihoods
 from skred.physics.kernel.fronts import simulate
 from skred.physics.kernel.inputs import Contributions, Path
@@ -91,14 +92,6 @@ class Envelope(NamedTuple):
     whiten: FloatArray
 
 
-class Releases(NamedTuple):
-    """Release places of the events: mean and standard deviation [m], and the track's length [m]."""
-
-    mean: FloatArray
-    sd: FloatArray
-    length: float
-
-
 class Fronts(NamedTuple):
     """Everything that the likelihood of an event's readings depends on, for given coefficients.
 
@@ -144,21 +137,14 @@ class Bisection:
         self.n_strengths = len(fronts.law.columns)
         self.n_runs = 0
 
-    def release_of(self, events: IntArray, points: FloatArray) -> FloatArray:
-        """Release places [m] of points."""
-        mean = self.fronts.releases.mean[events]
-        if points.shape[1] == self.n_strengths:
-            return mean
-        return np.clip(
-            mean + self.fronts.releases.sd[events] * points[:, -1], 0.0, self.fronts.releases.length
-        )
-
     def predict(self, events: IntArray, points: FloatArray) -> FloatArray:
         """Readings of a front for each point, (n, n_sensors + 1)."""
         strengths = np.exp(points[:, : self.n_strengths])
         self.n_runs += len(points)
-        releases, fronts = self.release_of(events, points), self.fronts
-        result: FloatArray = simulate(strengths, releases, fronts.path, fronts.law, fronts.sensors)
+        fronts = self.fronts
+        deviation = points[:, -1] if points.shape[1] > self.n_strengths else np.zeros(len(points))
+        places, speeds = (one(events, deviation) for one in (fronts.releases.places, fronts.releases.speeds))
+        result: FloatArray = simulate(strengths, places, fronts.path, fronts.law, fronts.sensors, speeds)
         return result
 
     def log_envelope(self, points: FloatArray) -> FloatArray:
@@ -330,15 +316,13 @@ class Bisection:
         return event[kept], points[kept], log_weights[kept]
 
     def release_range(self) -> tuple[FloatArray, FloatArray]:
-        """Between which deviations each event's release is looked for: on the track."""
-        mean, sd, length = self.fronts.releases
-        wide = np.maximum(sd, 1e-12)
-        return np.maximum(-RELEASE_REACH, -mean / wide), np.minimum(RELEASE_REACH, (length - mean) / wide)
+        """Between which deviations each event's release is looked for: on the track, not moving up it."""
+        low, high = self.fronts.releases.limits
+        return np.maximum(-RELEASE_REACH, low), np.minimum(RELEASE_REACH, high)
 
     def log_release(self, events: IntArray, deviation: FloatArray) -> FloatArray:
-        """Log density of a release's deviation, cut off where the track ends."""
-        mean, sd = self.fronts.releases.mean[events], np.maximum(self.fronts.releases.sd[events], 1e-12)
-        low, high = -mean / sd, (self.fronts.releases.length - mean) / sd
+        """Log density of a release's deviation, cut off at its limits."""
+        low, high = (limit[events] for limit in self.fronts.releases.limits)
         return -0.5 * deviation**2 - 0.5 * math.log(2 * math.pi) - np.log(ndtr(high) - ndtr(low))
 
 

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
 
 from skred.inference.hierarchical.event_density import draw_nodes
 from skred.inference.hierarchical.population import population_of
@@ -26,10 +25,13 @@ class Avalanches(NamedTuple):
     ----------
     strengths : (n, n_events, n_strengths) array
     releases : (n, n_events) array, m
+    release_speeds : (n, n_events) array, m/s
+        How fast the fronts are there; 0 from rest.
     """
 
     strengths: FloatArray
     releases: FloatArray
+    release_speeds: FloatArray
 
 
 def recorded_avalanches(
@@ -45,7 +47,7 @@ def recorded_avalanches(
     spread = axes * np.sqrt(np.maximum(variance, 0.0))[:, None, :]
     noise = rng.standard_normal((*patch.shape, n_strengths + 1))
     points = surfaces.mean[patch] + np.einsum("neij,nej->nei", spread[patch], noise)
-    return Avalanches(np.exp(points[..., :n_strengths]), _on_track(problem, points[..., n_strengths]))
+    return _from(problem, np.exp(points[..., :n_strengths]), points[..., n_strengths])
 
 
 def new_avalanches(
@@ -56,25 +58,24 @@ def new_avalanches(
     n_events = problem.campaign.n_events
     noise = rng.standard_normal((len(means), n_events, means.shape[1]))
     logs = means[:, None, :] + np.einsum("nij,nej->nei", factors, noise)
-    mean, sd, length = problem.releases
-    wide = np.maximum(sd, 1e-9)  # cut off where the track ends, as in the likelihood
-    low, high = ndtr(-mean / wide), ndtr((length - mean) / wide)
-    deviation = ndtri(low + (high - low) * rng.random((len(means), n_events)))
+    # Cut off at the same limits as in the likelihood.
+    deviation = problem.releases.drawn(np.arange(n_events), rng.random((len(means), n_events)))
     # Where spreads are extremely wide a coefficient can exceed the largest number.
-    return Avalanches(np.exp(np.clip(logs, -_FARTHEST, _FARTHEST)), _on_track(problem, deviation))
+    return _from(problem, np.exp(np.clip(logs, -_FARTHEST, _FARTHEST)), deviation)
 
 
-def _on_track(problem: HierarchicalProblem, deviation: FloatArray) -> FloatArray:
-    """Releases [m] from deviations in standard deviations."""
-    mean, sd, length = problem.releases
-    return np.clip(mean + sd * deviation, 0.0, length)
+def _from(problem: HierarchicalProblem, strengths: FloatArray, deviation: FloatArray) -> Avalanches:
+    """Avalanches whose releases deviate from what was noted, (n, n_events), in standard deviations."""
+    events, releases = np.arange(problem.campaign.n_events), problem.releases
+    return Avalanches(strengths, releases.places(events, deviation), releases.speeds(events, deviation))
 
 
 def fronts_of(problem: HierarchicalProblem, law: Law, avalanches: Avalanches) -> FloatArray:
     """Readings of the fronts without errors, (n, n_events, n_sensors + 1), the runout last."""
     shape = avalanches.releases.shape
     strengths = avalanches.strengths.reshape(-1, avalanches.strengths.shape[-1])
-    rows = problem.predict(law.mechanisms, strengths, avalanches.releases.ravel())
+    begin = avalanches.releases.ravel(), avalanches.release_speeds.ravel()
+    rows = problem.predict(law.mechanisms, strengths, *begin)
     return rows.reshape(*shape, -1)
 
 

@@ -21,7 +21,7 @@ from skred.inference.error_model import (
     EventReadings,
     event_readings,
 )
-from skred.inference.hierarchical.bisection import COARSE, Envelope, Fronts, Releases, Resolution
+from skred.inference.hierarchical.bisection import COARSE, Envelope, Fronts, Resolution
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.population import (
     correlation_parameters,
@@ -29,6 +29,7 @@ from skred.inference.hierarchical.population import (
     population_variables,
     spread_parameters,
 )
+from skred.inference.hierarchical.releases import Releases, releases_of
 from skred.inference.hierarchical.rough_population import RoughPopulation, envelope_around, rough_population
 from skred.inference.hierarchical.surface import Surfaces, build_surfaces
 from skred.inference.problem import Problem
@@ -36,7 +37,7 @@ from skred.physics.geometry import sensor_table
 from skred.physics.kernel.fronts import simulate
 from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
-from skred.physics.terrain import CELL_M, SMOOTHING_M, build_terrain
+from skred.physics.terrain import build_terrain
 
 FloatArray = NDArray[np.float64]
 _BELOW_SCALE, _ABOVE_SCALE = 6.0, 7.0
@@ -180,7 +181,11 @@ class HierarchicalProblem(Problem):
 
     def constants(self) -> dict[str, Any]:
         """How well the releases are known."""
-        return {"release_sd": ("event", self.releases.sd, {"units": "m"})}
+        releases = self.releases
+        return {
+            "release_sd": ("event", releases.sd, {"units": "m"}),
+            "release_speed_sd": ("event", releases.speed_sd, {"units": "m s-1"}),
+        }
 
     @cached_property
     def readings(self) -> EventReadings:
@@ -194,11 +199,8 @@ class HierarchicalProblem(Problem):
 
     @cached_property
     def releases(self) -> Releases:
-        """Where the events start, and how well that is known."""
-        events = self.campaign.events
-        sd = [0.0 if event.release_sd_m is None else event.release_sd_m for event in events]
-        mean = np.array([event.release_s_m for event in events], dtype=float)
-        return Releases(mean, np.array(sd, dtype=float), self.terrain.length_m)
+        """Where the events start and how fast, and how well that is known."""
+        return releases_of(self.campaign.events, self.terrain.length_m)
 
     def fronts(self, mechanisms: Sequence[Mechanism]) -> Fronts:
         """Everything that the likelihood of an event's readings under a law depends on."""
@@ -206,16 +208,20 @@ class HierarchicalProblem(Problem):
         return Fronts(self.path, law, self.sensors, self.readings, errors, self.releases)
 
     def predict(
-        self, mechanisms: Sequence[Mechanism], strengths: FloatArray, releases: FloatArray
+        self,
+        mechanisms: Sequence[Mechanism],
+        strengths: FloatArray,
+        releases: FloatArray,
+        release_speeds: FloatArray | float = 0.0,
     ) -> FloatArray:
-        """Readings of fronts: (n, n_strengths) and (n,) to (n, n_sensors + 1), the runout last.
+        """Readings of fronts: (n, n_strengths), (n,) and (n,) to (n, n_sensors + 1), the runout last.
 
         0 where a front does not come; a span's mean speed where it covered the whole of it.
         """
         table = sensor_table([*self.sensor_places, None])
         law = self.contributions(mechanisms)
         strengths, releases = np.asarray(strengths, dtype=float), np.asarray(releases, dtype=float)
-        readings: FloatArray = simulate(strengths, releases, self.path, law, table)
+        readings: FloatArray = simulate(strengths, releases, self.path, law, table, release_speeds)
         return readings
 
     def surfaces(self, mechanisms: Sequence[Mechanism]) -> Surfaces:
@@ -290,16 +296,7 @@ class HierarchicalProblem(Problem):
         rng = np.random.default_rng([seed, 5])
         chosen = np.sort(rng.permutation(n_events)[:n_checked])
         fronts = self.fronts(law.mechanisms)
-        readings, releases = fronts.readings, fronts.releases
-        fronts = fronts._replace(
-            readings=readings._replace(
-                **{
-                    name: getattr(readings, name)[chosen]
-                    for name in ("values", "observed", "stated_sd", "reached", "not_reached")
-                }
-            ),
-            releases=releases._replace(mean=releases.mean[chosen], sd=releases.sd[chosen]),
-        )
+        fronts = fronts._replace(readings=fronts.readings.take(chosen), releases=fronts.releases.take(chosen))
         finer = self._resolve(law.mechanisms, fronts, self._next_fineness, envelope_around(means, factors))
         exact = self._log_likelihood(finer, law, samples)
         found = self.log_likelihood(law, samples)[:, chosen]
@@ -332,8 +329,8 @@ def hierarchical_problem(
     campaign: Campaign,
     *,
     error_model: str = DEFAULT_ERRORS,
-    smoothing_m: float = SMOOTHING_M,
-    cell_m: float = CELL_M,
+    smoothing_m: float | None = None,
+    cell_m: float | None = None,
 ) -> HierarchicalProblem:
     """Problem of a campaign.
 
@@ -344,6 +341,6 @@ def hierarchical_problem(
     """
     terrain = build_terrain(campaign.track.x_m, campaign.track.z_m, smoothing_m=smoothing_m, cell_m=cell_m)
     problem = HierarchicalProblem(campaign, terrain, ERROR_MODELS[error_model])
-    if not problem.observed.any():
+    if not (problem.observed | problem.readings.bounded).any():
         raise ValueError("no reading is observed: there is nothing to calibrate against")
     return problem

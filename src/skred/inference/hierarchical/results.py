@@ -34,11 +34,11 @@ def hierarchical_predictive(
 
     Groups
     ------
-    event_posterior : each strength by its name, ``release`` (chain, draw, event), and ``front``
-        (chain, draw, event, sensor): the recorded avalanches themselves, readings without errors
+    event_posterior : each strength by its name, ``release`` and ``release_speed`` (chain, draw, event), and
+        ``front`` (chain, draw, event, sensor): the recorded avalanches themselves, readings without errors
     posterior_predictive : of a new avalanche from each event's release, its strengths, ``release``,
-        ``front`` (readings without errors, 0 where it does not come), ``reading`` (with errors) and
-        ``reached`` (chain, draw, event, sensor)
+        ``release_speed``, ``front`` (readings without errors, 0 where it does not come), ``reading`` (with
+        errors) and ``reached`` (chain, draw, event, sensor)
     prior_predictive : the same from the prior
     """
     rng = np.random.default_rng([seed, 1])
@@ -98,6 +98,7 @@ def avalanche_dataset(
         for k, mechanism in enumerate(law.mechanisms)
     }
     variables["release"] = (dims, avalanches.releases.reshape(sizes), {"units": "m"})
+    variables["release_speed"] = (dims, avalanches.release_speeds.reshape(sizes), {"units": "m s-1"})
     variables["front"] = ((*dims, "sensor"), fronts[..., :-1].reshape(*sizes, -1), _READING)
     coords = {"chain": draws["chain"].values, "draw": draws["draw"].values, **problem.coords}
     return xr.Dataset(variables, coords=coords)
@@ -167,6 +168,8 @@ def event_rows(problem: HierarchicalProblem, law: Law, tree: xr.DataTree) -> lis
     """Each recorded avalanche's own strengths and release."""
     events = tree["event_posterior"].to_dataset()
     units = {m.strength.name: m.strength.unit for m in law.mechanisms} | {"release": "m"}
+    if problem.releases.speed.any():
+        units["release_speed"] = "m/s"
     rows = []
     for number, event in enumerate(problem.campaign.event_ids):
         row: dict[str, Any] = {"event": event}

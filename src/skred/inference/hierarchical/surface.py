@@ -125,7 +125,7 @@ def build_surfaces(
     tell : callable, optional
         Told the number of events done and of all.
     """
-    uncertain = fronts.releases.sd > 0.0
+    uncertain = fronts.releases.uncertain
     n_events = len(uncertain)
     steps = (box[:, 1] - box[:, 0]) / np.ceil((box[:, 1] - box[:, 0]) / _FIRST_WIDTH)
     cell = steps * 0.5 ** np.ceil(np.log2(steps / cell))  # halvings of a first box

@@ -26,6 +26,9 @@ _DATA = (
     ("stopped", 2, "int64"),
     ("regression", 3, "float64"),
     ("conditional", 3, "float64"),
+    ("sign", 2, "float64"),
+    ("cut", 2, "float64"),
+    ("width", 2, "float64"),
 )
 
 
@@ -69,12 +72,24 @@ class PooledLogDensityPullback(ArrayOp):
 def _funcify_density(op: PooledLogDensity, node: Any = None, **kwargs: Any) -> Any:
     @numba_njit
     def pooled_density(  # type: ignore[no-untyped-def]
-        response, release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional
+        response,
+        release_of_event,
+        readings,
+        whiten,
+        constant,
+        n_stopped,
+        stopped,
+        regression,
+        conditional,
+        sign,
+        cut,
+        width,
     ):
         # PyTensor passes the inputs of an Op one by one.
         data = PooledArrays(
-            release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional
-        )
+            release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional,
+            sign, cut, width,
+        )  # fmt: skip
         return pooled_log_density(response, data)
 
     return pooled_density, cache_key(pooled_log_density)
@@ -94,11 +109,15 @@ def _funcify_pullback(op: PooledLogDensityPullback, node: Any = None, **kwargs: 
         stopped,
         regression,
         conditional,
+        sign,
+        cut,
+        width,
     ):
         # PyTensor passes the inputs of an Op one by one.
         data = PooledArrays(
-            release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional
-        )
+            release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional,
+            sign, cut, width,
+        )  # fmt: skip
         return pooled_log_density_pullback(cotangent, response, data)
 
     return pooled_density_pullback, cache_key(pooled_log_density_pullback)

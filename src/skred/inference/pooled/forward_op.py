@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pytensor.tensor as pt
 from numpy.typing import NDArray
 from pytensor.gradient import DisconnectedType
 from pytensor.graph.basic import Variable
@@ -32,14 +33,15 @@ class _ForwardMap(ArrayOp):
         ("weakening_speed", 0, "float64"),
         ("speed_terms", 0, "bool"),
         ("sensors", 2, "float64"),
+        ("release_speeds", 1, "float64"),
     )
 
     @staticmethod
     def _arguments(inputs: Sequence[Any]) -> tuple[Any, ...]:
-        strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors = inputs
+        strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, *rest = inputs
         path = Path(edge, ground, barriers, limits)
         law = Contributions(columns, profiles, float(u_c), bool(terms))
-        return strengths, releases, path, law, sensors
+        return strengths, releases, path, law, *rest
 
 
 class FrontReadings(_ForwardMap):
@@ -52,7 +54,7 @@ class FrontReadings(_ForwardMap):
 
     def output_shape(self, shapes: Sequence[tuple[Any, ...]]) -> tuple[Any, ...]:
         """(n_runs, n_sensors)."""
-        return (shapes[0][0], shapes[-1][0])
+        return (shapes[0][0], shapes[-2][0])
 
     def evaluate(self, inputs: Sequence[Any]) -> Any:
         """Readings from numpy arrays."""
@@ -73,7 +75,7 @@ class FrontReadingsJacobian(_ForwardMap):
     def output_shape(self, shapes: Sequence[tuple[Any, ...]]) -> tuple[Any, ...]:
         """(n_runs, n_sensors, n_strengths + 1)."""
         n_strengths = shapes[0][1]
-        return (shapes[0][0], shapes[-1][0], None if n_strengths is None else n_strengths + 1)
+        return (shapes[0][0], shapes[-2][0], None if n_strengths is None else n_strengths + 1)
 
     def evaluate(self, inputs: Sequence[Any]) -> Any:
         """Jacobian from numpy arrays."""
@@ -84,14 +86,14 @@ class FrontReadingsJacobian(_ForwardMap):
 def _funcify_readings(op: FrontReadings, node: Any = None, **kwargs: Any) -> Any:
     @numba_njit
     def front_readings(  # type: ignore[no-untyped-def]
-        strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors
+        strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors, begin
     ):
         # PyTensor passes the inputs of an Op one by one.
         path = Path(edge, ground, barriers, limits)
         law = Contributions(columns, profiles, u_c.item(), terms.item())
         readings, none = np.empty((releases.size, sensors.shape[0])), np.empty((releases.size, 0))
         jacobian = np.empty((releases.size, sensors.shape[0], 0))
-        fill_readings(strengths, releases, path, law, sensors, readings, jacobian, none)
+        fill_readings(strengths, releases, begin * begin, path, law, sensors, readings, jacobian, none)
         return readings
 
     return front_readings, cache_key(fill_readings)
@@ -101,21 +103,26 @@ def _funcify_readings(op: FrontReadings, node: Any = None, **kwargs: Any) -> Any
 def _funcify_jacobian(op: FrontReadingsJacobian, node: Any = None, **kwargs: Any) -> Any:
     @numba_njit
     def front_readings_jacobian(  # type: ignore[no-untyped-def]
-        strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors
+        strengths, releases, edge, ground, barriers, limits, columns, profiles, u_c, terms, sensors, begin
     ):
         # PyTensor passes the inputs of an Op one by one.
         path = Path(edge, ground, barriers, limits)
         law = Contributions(columns, profiles, u_c.item(), terms.item())
         readings, none = np.empty((releases.size, sensors.shape[0])), np.empty((releases.size, 0))
         jacobian = np.empty((releases.size, sensors.shape[0], strengths.shape[1] + 1))
-        fill_readings(strengths, releases, path, law, sensors, readings, jacobian, none)
+        fill_readings(strengths, releases, begin * begin, path, law, sensors, readings, jacobian, none)
         return jacobian
 
     return front_readings_jacobian, cache_key(fill_readings)
 
 
 def front_readings(
-    strengths: Any, releases: Any, path: Path, law: Contributions, sensors: NDArray[np.float64]
+    strengths: Any,
+    releases: Any,
+    path: Path,
+    law: Contributions,
+    sensors: NDArray[np.float64],
+    release_speeds: Any = None,
 ) -> Variable:
     """Symbolic readings of fronts.
 
@@ -128,11 +135,15 @@ def front_readings(
     law : Contributions
     sensors : (n_sensors, 3) array
         See `skred.physics.geometry.sensor_table`.
+    release_speeds : (n_runs,) tensor, m/s, optional
+        How fast fronts are at their releases; by default they start from rest. No derivative goes by it.
 
     Returns
     -------
     (n_runs, n_sensors) tensor, m/s or m
     """
+    releases = pt.as_tensor_variable(releases)
+    begin = pt.zeros_like(releases, dtype="float64") if release_speeds is None else release_speeds
     result: Variable = FrontReadings()(
         strengths,
         releases,
@@ -145,5 +156,6 @@ def front_readings(
         np.float64(law.weakening_speed),
         np.bool_(law.speed_terms),
         sensors,
+        begin,
     )
     return result

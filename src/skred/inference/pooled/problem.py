@@ -18,7 +18,7 @@ from skred.physics.geometry import sensor_table
 from skred.physics.kernel.fronts import simulate
 from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
-from skred.physics.terrain import CELL_M, SMOOTHING_M, build_terrain
+from skred.physics.terrain import build_terrain
 
 FloatArray = NDArray[np.float64]
 
@@ -43,14 +43,20 @@ class PooledProblem(Problem):
 
     @cached_property
     def _unique_releases(self) -> tuple[FloatArray, NDArray[np.int64]]:
-        places = np.array([event.release_s_m for event in self.campaign.events])
-        releases, of_event = np.unique(places, return_inverse=True)
-        return releases, of_event
+        """Place and speed of the different releases, (n_releases, 2), and which each event has."""
+        begin = [(event.release_s_m, event.release_speed_m_s or 0.0) for event in self.campaign.events]
+        releases, of_event = np.unique(np.array(begin, dtype=float), axis=0, return_inverse=True)
+        return releases, of_event.ravel()
 
     @property
     def releases(self) -> FloatArray:
-        """The different release places [m]: one front each, however many events share it."""
-        return self._unique_releases[0]
+        """Places [m] of the different releases: one front each, however many events share it."""
+        return self._unique_releases[0][:, 0]
+
+    @property
+    def release_speeds(self) -> FloatArray:
+        """How fast fronts are at `releases` [m/s]; 0 from rest."""
+        return self._unique_releases[0][:, 1]
 
     @property
     def release_of_event(self) -> NDArray[np.int64]:
@@ -66,7 +72,12 @@ class PooledProblem(Problem):
     def arrays(self) -> PooledArrays:
         """The recordings as the log density reads them."""
         return pooled_arrays(
-            self.values, self.observed, self.not_reached, self.release_of_event, self.covariance
+            self.values,
+            self.observed,
+            self.not_reached,
+            self.release_of_event,
+            self.covariance,
+            *self.campaign.bounds,
         )
 
     def parameters(self, law: Law) -> tuple[Parameter, ...]:
@@ -90,7 +101,7 @@ class PooledProblem(Problem):
         Returns
         -------
         (n_releases, n_sensors) tensor, m/s or m
-            One row for each different release place of the campaign.
+            One row for each different release of the campaign.
         """
         import pytensor.tensor as pt
 
@@ -98,7 +109,7 @@ class PooledProblem(Problem):
 
         law = self.contributions(mechanisms)
         runs = pt.alloc(pt.stack(list(strengths)), len(self.releases), len(mechanisms))
-        return front_readings(runs, self.releases, self.path, law, self.sensors)
+        return front_readings(runs, self.releases, self.path, law, self.sensors, self.release_speeds)
 
     def observe_response(self, response: Any) -> Any:
         """Observed variable ``recordings``: y_e ~ N(response, Sigma), one log density per event.
@@ -153,12 +164,13 @@ class PooledProblem(Problem):
         n, n_releases = len(strengths), len(self.releases)
         runs = np.repeat(np.asarray(strengths, float), n_releases, axis=0)
         law = self.contributions(mechanisms)
-        readings: FloatArray = simulate(runs, np.tile(self.releases, n), self.path, law, self.sensors)
+        begin = np.tile(self.releases, n), np.tile(self.release_speeds, n)
+        readings: FloatArray = simulate(runs, begin[0], self.path, law, self.sensors, begin[1])
         return readings.reshape(n, n_releases, -1)
 
 
 def pooled_problem(
-    campaign: Campaign, *, smoothing_m: float = SMOOTHING_M, cell_m: float = CELL_M
+    campaign: Campaign, *, smoothing_m: float | None = None, cell_m: float | None = None
 ) -> PooledProblem:
     """Problem of a campaign, with the covariance of its recordings.
 
@@ -170,5 +182,5 @@ def pooled_problem(
     terrain = build_terrain(campaign.track.x_m, campaign.track.z_m, smoothing_m=smoothing_m, cell_m=cell_m)
     not_reached = campaign.status == Status.NOT_REACHED
     values = np.where(campaign.status == Status.OBSERVED, campaign.values, np.nan)
-    mean, covariance = recordings_covariance(values, not_reached)
+    mean, covariance = recordings_covariance(values, not_reached, campaign.sensor_ids)
     return PooledProblem(campaign, terrain, covariance, mean)

@@ -7,6 +7,8 @@ Dempster, Laird and Rubin (1977), doi:10.1111/j.2517-6161.1977.tb01600.x.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -21,11 +23,15 @@ MAX_ITERATIONS = 20_000
 """Steps of expectation-maximisation after which it is told that it does not converge."""
 SMALLEST_EIGENVALUE = 1e-8
 """Of the correlation matrix; below it some sensors are a fixed combination of others."""
+_MOST_NAMED = 5
+"""Sensors that a message names one by one."""
 LIKELIHOOD_SLACK = 1e-6
 """Fall of the log likelihood that the quadrature of censored readings may cause."""
 
 
-def recordings_covariance(values: ArrayLike, not_reached: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def recordings_covariance(
+    values: ArrayLike, not_reached: ArrayLike, sensors: Sequence[str] | None = None
+) -> tuple[FloatArray, FloatArray]:
     """Estimate the recordings' mean and covariance across events.
 
     The covariance is the maximum likelihood estimate (divisor: number of events) without any shrinkage:
@@ -37,6 +43,8 @@ def recordings_covariance(values: ArrayLike, not_reached: ArrayLike) -> tuple[Fl
         Readings, NaN where there is none or the sensor was not reached.
     not_reached : (n_events, n_sensors) array of bool
         Where the front stopped above the sensor: the latent reading is at most 0.
+    sensors : sequence of str, optional
+        Their ids, for what is said of them; by default their numbers from 1.
 
     Returns
     -------
@@ -48,7 +56,7 @@ def recordings_covariance(values: ArrayLike, not_reached: ArrayLike) -> tuple[Fl
     ValueError
         If the arrays contradict each other or the data cannot determine the covariance.
     """
-    values, not_reached = _checked(values, not_reached)
+    values, not_reached = _checked(values, not_reached, sensors)
     mean = np.nanmean(values, axis=0)
     covariance = np.diag(np.nanvar(values, axis=0))
     log_likelihood = -np.inf
@@ -144,7 +152,9 @@ def _condition(
     return float(log_density), (mean[censored] + whitened.T @ residual, conditional)
 
 
-def _checked(values: ArrayLike, not_reached: ArrayLike) -> tuple[FloatArray, BoolArray]:
+def _checked(
+    values: ArrayLike, not_reached: ArrayLike, sensors: Sequence[str] | None
+) -> tuple[FloatArray, BoolArray]:
     """Arrays of the events that have information; raises where they do not suffice."""
     values, not_reached = np.asarray(values, dtype=float), np.asarray(not_reached, dtype=bool)
     if values.ndim != 2 or values.shape != not_reached.shape:
@@ -153,9 +163,19 @@ def _checked(values: ArrayLike, not_reached: ArrayLike) -> tuple[FloatArray, Boo
         raise ValueError("a reading is a finite number, and there is none where a sensor was not reached")
     known = np.isfinite(values) | not_reached
     n_sensors = values.shape[1]
+    if known.any(axis=1).sum() < 2:
+        raise ValueError(
+            f"{known.any(axis=1).sum()} avalanche has readings, and the pooled likelihood compares"
+            f" avalanches: it needs at least {n_sensors + 1}; --likelihood hierarchical takes a single one"
+        )
     unseen = np.flatnonzero([len(np.unique(v[np.isfinite(v)])) < 2 for v in values.T])
     if len(unseen):
-        raise ValueError(f"sensor number {unseen.tolist()}: fewer than two different readings")
+        ids = [f"number {k + 1}" if sensors is None else f"'{sensors[k]}'" for k in unseen[:_MOST_NAMED]]
+        more = f" and {len(unseen) - _MOST_NAMED} more" if len(unseen) > _MOST_NAMED else ""
+        raise ValueError(
+            f"sensor {', '.join(ids)}{more}: fewer than two different readings; leave out such a sensor, or"
+            " take --likelihood hierarchical"
+        )
     complete = int(known.all(axis=1).sum())
     if complete < n_sensors + 1:
         raise ValueError(

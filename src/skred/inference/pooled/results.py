@@ -58,6 +58,7 @@ def _response(problem: PooledProblem, law: Law, parameters: xr.Dataset) -> xr.Da
         coords={
             **chain_and_draw(parameters),
             "release": problem.releases,
+            "release_speed": ("release", problem.release_speeds, {"units": "m s-1"}),
             "sensor": problem.coords["sensor"],
         },
         attrs={"units": "m s-1; m for the runout"},

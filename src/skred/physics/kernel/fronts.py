@@ -32,12 +32,13 @@ def _cells_of(sensors, edge):  # type: ignore[no-untyped-def]
 
 @compiled()
 def fill_readings(  # type: ignore[no-untyped-def]
-    strengths, releases, path, law, sensors, readings, jacobian, speeds
+    strengths, releases, start_v, path, law, sensors, readings, jacobian, speeds
 ):
     """Fill the readings of many fronts, run by run; see `simulate`.
 
-    Fill the jacobian (n_runs, n_sensors, n_strengths + 1) and the speeds (n_runs, n_cells + 1) as well,
-    unless their last axis is empty. One function for all three: with two the march would be compiled twice.
+    `start_v` (n_runs,) is U^2 at the release [m2 s-2]. Fill the jacobian (n_runs, n_sensors, n_strengths + 1,
+    or + 2 with the release's speed) and the speeds (n_runs, n_cells + 1) as well, unless their last axis is
+    empty. One function for all three: with two the march would be compiled twice.
     """
     # Unpacked once: reading an array out of a tuple costs as much as ten cells.
     edge, ground, barriers, limits = path.edge, path.ground, path.barriers, path.limits
@@ -66,14 +67,16 @@ def fill_readings(  # type: ignore[no-untyped-def]
             place = run % ABREAST
             if place == 0:
                 march_abreast(
-                    run, strengths, releases, edge, ground, scaled, barriers, limits, columns, profiles, u_c,
-                    own, work, rows, runouts, lasts, firsts,
+                    run, strengths, releases, start_v, edge, ground, scaled, barriers, limits, columns,
+                    profiles, u_c, own, work, rows, runouts, lasts, firsts,
                 )  # fmt: skip
             for i in range(n_cells + 1):
                 v[i] = rows[place, i]
             runout, last, first = runouts[place], lasts[place], firsts[place]
         else:
-            runout, last, first = march(release, edge, ground, barriers, limits, table, keep, gain, v)
+            runout, last, first = march(
+                release, start_v[run], edge, ground, barriers, limits, table, keep, gain, v
+            )
         read(
             run, sensors, cells, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms,
             table, v, readings,
@@ -93,11 +96,16 @@ def fill_readings(  # type: ignore[no-untyped-def]
             )  # fmt: skip
         if speeds.shape[1] > 0:
             for i in range(n_cells + 1):
-                speeds[run, i] = np.sqrt(v[i])
+                speeds[run, i] = np.sqrt(v[i]) if edge[i] >= release else 0.0
 
 
 def simulate(
-    strengths: FloatArray, releases: FloatArray, path: Path, law: Contributions, sensors: FloatArray
+    strengths: FloatArray,
+    releases: FloatArray,
+    path: Path,
+    law: Contributions,
+    sensors: FloatArray,
+    release_speeds: FloatArray | float = 0.0,
 ) -> FloatArray:
     """Readings of many fronts.
 
@@ -106,11 +114,13 @@ def simulate(
     strengths : (n_runs, n_strengths) array
         Strength of each contribution in its own unit.
     releases : (n_runs,) array, m
-        Where each front starts from rest.
+        Where each front starts.
     path : Path
     law : Contributions
     sensors : (n_sensors, 3) array
         Quantity (FRONT_VELOCITY or RUNOUT), s_from and s_to [m]; equal for a point.
+    release_speeds : (n_runs,) array or float, m/s
+        How fast each front is there; 0 for one that starts from rest.
 
     Returns
     -------
@@ -118,31 +128,49 @@ def simulate(
         0 for a front velocity where the front does not come.
 
     """
-    return _filled(strengths, releases, path, law, sensors)[0]
+    return _filled(strengths, releases, release_speeds, path, law, sensors)[0]
 
 
 def simulate_with_jacobian(
-    strengths: FloatArray, releases: FloatArray, path: Path, law: Contributions, sensors: FloatArray
+    strengths: FloatArray,
+    releases: FloatArray,
+    path: Path,
+    law: Contributions,
+    sensors: FloatArray,
+    release_speeds: FloatArray | float = 0.0,
+    *,
+    by_speed: bool = False,
 ) -> tuple[FloatArray, FloatArray]:
-    """As `simulate`, with the derivatives by every strength and, last, by the release place.
+    """As `simulate`, with the derivatives by every strength, then by the release place.
+
+    With `by_speed` also, last, by the speed at the release; it is 0 for a front that starts from rest.
 
     Returns
     -------
     readings : (n_runs, n_sensors) array
-    jacobian : (n_runs, n_sensors, n_strengths + 1) array
+    jacobian : (n_runs, n_sensors, n_strengths + 1) array, or + 2
 
     """
-    return _filled(strengths, releases, path, law, sensors, n_tangents=strengths.shape[1] + 1)[:2]
+    n_tangents = strengths.shape[1] + (2 if by_speed else 1)
+    return _filled(strengths, releases, release_speeds, path, law, sensors, n_tangents)[:2]
 
 
-def front_speeds(strengths: FloatArray, releases: FloatArray, path: Path, law: Contributions) -> FloatArray:
+def front_speeds(
+    strengths: FloatArray,
+    releases: FloatArray,
+    path: Path,
+    law: Contributions,
+    release_speeds: FloatArray | float = 0.0,
+) -> FloatArray:
     """Front speed U [m/s] at every cell edge, (n_runs, n_cells + 1); parameters as `simulate`."""
-    return _filled(strengths, releases, path, law, np.empty((0, 3)), n_edges=len(path.edge))[2]
+    none = np.empty((0, 3))
+    return _filled(strengths, releases, release_speeds, path, law, none, n_edges=len(path.edge))[2]
 
 
 def _filled(
     strengths: FloatArray,
     releases: FloatArray,
+    release_speeds: FloatArray | float,
     path: Path,
     law: Contributions,
     sensors: FloatArray,
@@ -153,7 +181,9 @@ def _filled(
     readings = np.empty((len(releases), len(sensors)))
     jacobian = np.empty((*readings.shape, n_tangents))
     speeds = np.empty((len(releases), n_edges))
+    squares = np.empty(len(releases))
+    squares[:] = np.square(release_speeds)
     # In this order in memory: of any other the kernel would be compiled once more.
     runs = np.ascontiguousarray(strengths), np.ascontiguousarray(releases)
-    fill_readings(*runs, path, law, np.ascontiguousarray(sensors), readings, jacobian, speeds)
+    fill_readings(*runs, squares, path, law, np.ascontiguousarray(sensors), readings, jacobian, speeds)
     return readings, jacobian, speeds

@@ -198,15 +198,17 @@ def contact_law(i, ground, table):  # type: ignore[no-untyped-def]
 
 
 @inner()
-def march(release, edge, ground, barriers, limits, table, keep, gain, v):  # type: ignore[no-untyped-def]
+def march(release, start_v, edge, ground, barriers, limits, table, keep, gain, v):  # type: ignore[no-untyped-def]
     """Fill v at every edge; returns (runout [m], last cell entered, cell of the release).
 
-    Without terms in U; for these see `march_abreast`.
+    Without terms in U; for these see `march_abreast`. `start_v` is U^2 at the release [m2 s-2]; v at the
+    upper edge of the release's cell holds it, wherever in the cell the front starts.
     """
     n_cells = keep.size
     first = cell_of(edge, release)
-    for edge_above in range(first + 1):
+    for edge_above in range(first):
         v[edge_above] = 0.0
+    v[first] = start_v
     i, start, stopped, s = first, release, False, release
     while not stopped and i < n_cells:
         at_edge = i > first or release == edge[i]
@@ -324,14 +326,19 @@ def _recur_tangent(k, first, last, keep, increment, dv):  # type: ignore[no-unty
 
 
 @inner()
-def start_tangents(i, first, release, edge, dv, step, shift):  # type: ignore[no-untyped-def]
-    """Tangents of v and of the place at which a front enters cell i; returns that place."""
+def start_tangents(i, first, release, n_strengths, v, edge, dv, step, shift):  # type: ignore[no-untyped-def]
+    """Tangents of v and of the place at which a front enters cell i; returns that place.
+
+    By each strength, then by the place of the release and, where there is one more, by the speed there.
+    """
     for k in range(step.size):
         step[k] = 0.0 if i == first else dv[k, i]
         shift[k] = 0.0
     if i > first:
         return edge[i]
-    shift[-1] = 1.0
+    shift[n_strengths] = 1.0
+    if step.size > n_strengths + 1:
+        step[n_strengths + 1] = 2.0 * np.sqrt(v[first])
     return release
 
 
@@ -340,7 +347,7 @@ def march_tangents(  # type: ignore[no-untyped-def]
     release, last, first, edge, ground, barriers, limits, columns, profiles, u_c, speed_terms,
     table, carry, v, increment, dv, step, shift, d_time, d_runout,
 ):  # fmt: skip
-    """Fill dv (n_tangents, n_cells + 1) and d_runout: by each strength and, last, by the release.
+    """Fill dv (n_tangents, n_cells + 1) and d_runout: by each strength, then by the release.
 
     `carry` (n_cells) and `increment` (n_tangents, n_cells) hold what regular cells keep and add; edges
     above the release or below the stop are left alone.
@@ -355,7 +362,7 @@ def march_tangents(  # type: ignore[no-untyped-def]
                 _recur_tangent(k, i, regular_to, carry, increment, dv)
             i = regular_to
             continue
-        start = start_tangents(i, first, release, edge, dv, step, shift)
+        start = start_tangents(i, first, release, columns.size, v, edge, dv, step, shift)
         cell, end = cell_at(i, ground, table, u_c, speed_terms), edge[i + 1]
         _, s, stopped = travel_tangents(
             v[i], start, end, end, np.inf, cell, barriers, columns, profiles, i, step, shift, d_time
@@ -365,7 +372,7 @@ def march_tangents(  # type: ignore[no-untyped-def]
                 d_runout[k] = shift[k]
             if s <= release:
                 d_runout[:] = 0.0
-                d_runout[-1] = 1.0
+                d_runout[columns.size] = 1.0
             return
         for k in range(n_tangents):
             dv[k, i + 1] = step[k]

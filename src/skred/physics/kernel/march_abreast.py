@@ -100,13 +100,14 @@ def _cell_of_front(i, j, ground, u_c, work):  # type: ignore[no-untyped-def]
 
 @inner()
 def march_abreast(  # type: ignore[no-untyped-def]
-    run, strengths, releases, edge, ground, scaled, barriers, limits, columns, profiles, u_c,
+    run, strengths, releases, start_v, edge, ground, scaled, barriers, limits, columns, profiles, u_c,
     own, work, v, runout, last, first,
 ):  # fmt: skip
     """The fronts from `run` on, as many as go abreast or are left.
 
     Fills v (ABREAST, n_cells + 1) at every edge and, (ABREAST,) each, the runout [m], the last cell entered
-    and the cell of the release; `own` (n_strengths, ABREAST) and `work` are for its own use, see `room`.
+    and the cell of the release, at whose upper edge v is what the front starts with; `own`
+    (n_strengths, ABREAST) and `work` are for its own use, see `room`.
     """
     n, n_cells = min(ABREAST, releases.size - run), ground.shape[1]
     weakens, per_scale = False, 1.0 / u_c
@@ -121,6 +122,8 @@ def march_abreast(  # type: ignore[no-untyped-def]
     begin = n_cells
     for j in range(n):
         first[j], last[j], runout[j] = cell_of(edge, releases[run + j]), n_cells - 1, edge[n_cells]
+        v[j, first[j]] = work[_V + j] = start_v[run + j]
+        work[_U + j] = np.sqrt(start_v[run + j])
         begin = min(begin, first[j])
     under_way = n
     for i in range(begin, n_cells):

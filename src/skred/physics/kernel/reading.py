@@ -26,7 +26,7 @@ def speed_at(  # type: ignore[no-untyped-def]
     place, i, release, runout, first, edge, ground, barriers, u_c, speed_terms, table, v
 ):
     """Front speed [m/s] on arrival at a place in cell i; 0 where the front does not come."""
-    if not release < place <= runout:
+    if not release <= place <= runout:
         return 0.0
     cell = cell_at(i, ground, table, u_c, speed_terms)
     start = release if i == first else edge[i]
@@ -169,7 +169,7 @@ def _span_tangents(  # type: ignore[no-untyped-def]
             _time_tangents(i, last, edge, v, dv, d_time)
             i = last
             continue
-        start = start_tangents(i, first, release, edge, dv, step, shift)
+        start = start_tangents(i, first, release, columns.size, v, edge, dv, step, shift)
         cell, ahead = cell_at(i, ground, table, u_c, speed_terms), min(edge[i + 1], s_to)
         travel_tangents(
             v[i], start, ahead, edge[i + 1], s_from, cell, barriers, columns, profiles, i,
@@ -205,7 +205,7 @@ def read_tangents(  # type: ignore[no-untyped-def]
                 speed, s_from - edge[i], i, ground, table, columns, profiles, v, dv, tangents
             )
         else:
-            start = start_tangents(i, first, release, edge, dv, step, shift)
+            start = start_tangents(i, first, release, columns.size, v, edge, dv, step, shift)
             cell = cell_at(i, ground, table, u_c, speed_terms)
             travel_tangents(
                 v[i], start, s_from, edge[i + 1], np.inf, cell, barriers, columns, profiles, i,

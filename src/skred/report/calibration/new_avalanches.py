@@ -102,7 +102,8 @@ def _predicted(axes: Axes, draws: NewAvalanche, grid: FloatArray, colour: str) -
 def reached_text(draws: NewAvalanche, end_m: float) -> str:
     """How likely a new avalanche is to get to a sensor, beside how many of the recorded ones did."""
     n_read, zeros = len(draws.recorded), int(np.sum(draws.recorded + draws.offset == 0))
-    missing = f", {draws.n_missing} missing" if draws.n_missing else ""
+    missing = f", {draws.n_bounds} known by bounds" if draws.n_bounds else ""
+    missing += f", {draws.n_missing} missing" if draws.n_missing else ""
     if draws.sensor.is_runout:
         beyond = float(np.mean(draws.front + draws.offset >= end_m - 0.5)) if len(draws.front) else 0.0
         leaves = f"{_percent(beyond)} of new avalanches leave the track\n" if beyond > 0 else ""

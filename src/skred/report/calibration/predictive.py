@@ -112,6 +112,8 @@ def _counts(draws: SensorDraws) -> str:
         parts[0] += f" ({zeros} of them 0)"
     if draws.n_not_reached:
         parts.append(f"{draws.n_not_reached} not reached")
+    if draws.n_bounds:
+        parts.append(f"{draws.n_bounds} known by bounds, not drawn")
     if draws.n_missing:
         parts.append(f"{draws.n_missing} missing")
     return ", ".join(parts)

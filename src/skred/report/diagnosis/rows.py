@@ -33,7 +33,7 @@ def sensor_rows(tree: xr.DataTree) -> Rows:
     recordings = recordings_of(tree)
     rows = []
     for column, sensor in enumerate(recordings.sensors):
-        observed, not_reached = recordings.observed[:, column], recordings.not_reached[:, column]
+        observed = recordings.observed[:, column]
         seen = recordings.values[observed, column]
         zero = (recordings.reference_s_m or 0.0) if sensor.is_runout else 0.0
         decimals = 0 if sensor.is_runout else 1
@@ -48,8 +48,10 @@ def sensor_rows(tree: xr.DataTree) -> Rows:
                 "relative": f"{100.0 * sensor.relative_sd:.0f} %",
                 "absolute": rounded(sensor.absolute_sd, None),
                 "observed": int(observed.sum()),
-                "not_reached": int(not_reached.sum()),
-                "missing": int((~observed & ~not_reached).sum()),
+                "not_reached": int(recordings.not_reached[:, column].sum()),
+                "bounds": int(recordings.bounded[:, column].sum()),
+                "missing": int(recordings.missing[:, column].sum()),
+                "place_sd": "" if sensor.place_sd_m is None else rounded(sensor.place_sd_m, None),
                 "range": " to ".join(ends) or "-",
             }
         )

@@ -107,7 +107,7 @@ class Recorded:
     offset : float
         Subtracted from the values [m]: the campaign's reference, for a runout.
     recorded : (n_recorded,) array
-    n_not_reached, n_missing : int
+    n_not_reached, n_missing, n_bounds : int
     """
 
     sensor: Sensor
@@ -115,6 +115,7 @@ class Recorded:
     recorded: FloatArray
     n_not_reached: int
     n_missing: int
+    n_bounds: int
 
     @property
     def axis_label(self) -> str:
@@ -171,13 +172,14 @@ def recorded_at(recordings: Recordings, sensor: Sensor) -> dict[str, Any]:
     """The fields of `Recorded` of one sensor."""
     column = recordings.sensors.index(sensor)
     offset = recordings.reference_s_m or 0.0 if sensor.is_runout else 0.0
-    observed, not_reached = recordings.observed[:, column], recordings.not_reached[:, column]
+    observed = recordings.observed[:, column]
     return {
         "sensor": sensor,
         "offset": offset,
         "recorded": recordings.values[observed, column] - offset,
-        "n_not_reached": int(not_reached.sum()),
-        "n_missing": int((~observed & ~not_reached).sum()),
+        "n_not_reached": int(recordings.not_reached[:, column].sum()),
+        "n_missing": int(recordings.missing[:, column].sum()),
+        "n_bounds": int(recordings.bounded[:, column].sum()),
     }
 
 
@@ -187,7 +189,8 @@ def sensor_draws(tree: xr.DataTree, recordings: Recordings, sensor: Sensor) -> S
     column = recordings.sensors.index(sensor)
     predictive = tree["posterior_predictive"].to_dataset()
     response = predictive["mean_response"].transpose("chain", "draw", "release", "sensor").values[..., column]
-    _, events_per_release = np.unique(recordings.release_s_m, return_counts=True)
+    begin = np.column_stack([recordings.release_s_m, recordings.release_speed_m_s])
+    _, events_per_release = np.unique(begin, axis=0, return_counts=True)
     reading = predictive["reading"].transpose("chain", "draw", "event", "sensor").values[..., column]
     return SensorDraws(
         **recorded,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, cast
 
@@ -30,7 +30,8 @@ class Recordings:
         Readings and their standard deviations, NaN where there is none.
     status : (n_events, n_sensors) array
         A `Status` for each.
-    release_s_m : (n_events,) array
+    release_s_m, release_speed_m_s : (n_events,) arrays
+        Where fronts start, and how fast; 0 from rest.
     track_s_m, track_z_m : (n_points,) arrays
     edge_s_m : (n_cells + 1,) array
         Ends of the terrain's cells.
@@ -44,6 +45,7 @@ class Recordings:
     reading_sd: FloatArray
     status: NDArray[np.int8]
     release_s_m: FloatArray
+    release_speed_m_s: FloatArray
     track_s_m: FloatArray
     track_z_m: FloatArray
     edge_s_m: FloatArray
@@ -68,6 +70,16 @@ class Recordings:
     def not_reached(self) -> NDArray[np.bool_]:
         """Where the front stopped above the sensor, (n_events, n_sensors)."""
         return np.asarray(self.status == Status.NOT_REACHED)
+
+    @cached_property
+    def bounded(self) -> NDArray[np.bool_]:
+        """Of which readings only bounds are known, (n_events, n_sensors)."""
+        return np.asarray(self.status >= Status.AT_LEAST)
+
+    @cached_property
+    def missing(self) -> NDArray[np.bool_]:
+        """Of which readings nothing is known, (n_events, n_sensors)."""
+        return np.asarray(self.status == Status.MISSING)
 
     @property
     def is_runout(self) -> NDArray[np.bool_]:
@@ -100,16 +112,24 @@ def recordings_of(tree: xr.DataTree) -> Recordings:
     observed, constant = tree["observed_data"].to_dataset(), tree["constant_data"].to_dataset()
     columns = ("quantity", "s_from", "s_to", "relative_sd", "absolute_sd")
     sensors = zip(constant["sensor"].values, *(constant[name].values for name in columns), strict=True)
+    places = {}
+    if "place_sd" in constant:
+        known = zip(constant["sensor"].values, constant["place_sd"].values, strict=True)
+        places = {str(name): float(sd) for name, sd in known if np.isfinite(sd)}
     return Recordings(
         event_ids=tuple(map(str, constant["event"].values)),
         sensors=tuple(
-            Sensor(str(name), cast(Quantity, str(quantity)), *map(float, numbers))
+            replace(
+                Sensor(str(name), cast(Quantity, str(quantity)), *map(float, numbers)),
+                place_sd_m=places.get(str(name)),
+            )
             for name, quantity, *numbers in sensors
         ),
         values=_floats(observed["reading"].transpose("event", "sensor")),
         reading_sd=_floats(constant["reading_sd"].transpose("event", "sensor")),
         status=np.asarray(constant["status"].transpose("event", "sensor").values, dtype=np.int8),
         release_s_m=_floats(constant["release_s"]),
+        release_speed_m_s=_floats(constant.get("release_speed", 0.0 * constant["release_s"])),
         track_s_m=_floats(constant["track_s"]),
         track_z_m=_floats(constant["track_z"]),
         edge_s_m=_floats(constant["cell_edge"]),

@@ -1,0 +1,62 @@
+"""What is odd about a campaign that breaks no rule: it is read, and its owner is told."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skred.campaign.problems import Problem
+from skred.campaign.records import Campaign, Status, Track
+from skred.campaign.rules import EVENTS
+from skred.campaign.track_rules import TRACK
+
+
+def campaign_hints(campaign: Campaign) -> list[Problem]:
+    """What is odd about a campaign, without any model of its terrain."""
+    return [*start_hints(campaign.track), *_short_track(campaign), *_two_unknowns(campaign)]
+
+
+def start_hints(track: Track) -> list[Problem]:
+    """Whether the first point of a track lies where distances begin."""
+    first = float(track.x_m[0])
+    if first == 0.0:
+        return []
+    message = (
+        "x_m does not begin at 0; places s count from this first point, so check that those of sensors, "
+        "releases and runouts do too"
+    )
+    return [Problem(TRACK, 2, "x_m", f"{first:g}", message)]
+
+
+def _short_track(campaign: Campaign) -> list[Problem]:
+    """Whether the track goes on below the farthest runout by at least how well that is known."""
+    runouts = np.array([sensor.is_runout for sensor in campaign.sensors], dtype=bool)
+    known = runouts & (campaign.status != Status.MISSING) & np.isfinite(campaign.values)
+    if not known.any():
+        return []
+    stops = np.where(known, np.fmax(campaign.values, campaign.values_to), -np.inf)
+    event, sensor = np.unravel_index(int(stops.argmax()), stops.shape)
+    one, stop = campaign.sensors[sensor], float(stops[event, sensor])
+    stated = float(campaign.stated_sd[event, sensor])
+    sd = stated if np.isfinite(stated) else float(np.hypot(one.relative_sd * stop, one.absolute_sd))
+    below = campaign.track.length_m - stop
+    if below >= sd:
+        return []
+    message = (
+        f"the track ends {below:.4g} m below the farthest runout (event '{campaign.event_ids[event]}', s = "
+        f"{stop:.4g} m, known to {sd:.3g} m); a front that comes to the end counts as stopped there: add"
+        " points further down"
+    )
+    return [Problem(TRACK, len(campaign.track.x_m) + 1, None, None, message)]
+
+
+def _two_unknowns(campaign: Campaign) -> list[Problem]:
+    """Whether an event states how well both its release's place and its speed are known."""
+    both = [e.id for e in campaign.events if e.release_sd_m and e.release_speed_sd_m_s]
+    if not both:
+        return []
+    message = (
+        f"{len(both)} events have a release_sd_m too (first '{both[0]}'); the models vary one of"
+        " the two, the place, and take the speed as exact: leave release_sd_m empty where the speed is"
+        " what is uncertain"
+    )
+    return [Problem(EVENTS, None, "release_speed_sd_m_s", None, message)]

@@ -1,0 +1,95 @@
+"""Where the events' fronts start, how fast they are there, and how well that is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr, ndtri
+
+from skred.campaign import Event
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+_LEAST_SD = 1e-12
+"""Standard deviation that an exact release counts with where something is divided by it."""
+
+
+class Releases(NamedTuple):
+    """Releases of the events. What is not known of one is one number: its deviation, in sds.
+
+    The deviation moves the place where that is uncertain, else the speed. It is standard normal, cut off
+    where the track ends and where a speed would fall below 0.
+
+    Attributes
+    ----------
+    mean, sd : (n_events,) arrays, m
+        Place of each release, and its standard deviation; 0 where it is exact.
+    length : float, m
+        Of the track.
+    speed, speed_sd : (n_events,) arrays, m/s
+        How fast the front is there, 0 from rest, and the standard deviation of that; 0 where it is exact, and
+        where the place is not.
+    """
+
+    mean: FloatArray
+    sd: FloatArray
+    length: float
+    speed: FloatArray
+    speed_sd: FloatArray
+
+    @property
+    def uncertain(self) -> NDArray[np.bool_]:
+        """Of which something is not known, (n_events,)."""
+        return (self.sd > 0.0) | (self.speed_sd > 0.0)
+
+    def take(self, events: IntArray) -> Releases:
+        """Those of some events."""
+        return self._replace(
+            **{name: getattr(self, name)[events] for name in ("mean", "sd", "speed", "speed_sd")}
+        )
+
+    def places(self, events: IntArray, deviation: FloatArray) -> FloatArray:
+        """Places [m] of events' releases, on the track; both (..., n)."""
+        return np.clip(self.mean[events] + self.sd[events] * deviation, 0.0, self.length)
+
+    def speeds(self, events: IntArray, deviation: FloatArray) -> FloatArray:
+        """Speeds [m/s] of events' fronts at their releases; both (..., n)."""
+        return np.maximum(self.speed[events] + self.speed_sd[events] * deviation, 0.0)
+
+    @property
+    def limits(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest deviation of each event."""
+        wide, fast = np.maximum(self.sd, _LEAST_SD), np.maximum(self.speed_sd, _LEAST_SD)
+        of_speed = self.speed_sd > 0.0
+        low = np.where(of_speed, -self.speed / fast, -self.mean / wide)
+        return low, np.where(of_speed, np.inf, (self.length - self.mean) / wide)
+
+    def drawn(self, events: IntArray, uniforms: FloatArray) -> FloatArray:
+        """Deviations from uniform numbers; both (..., n). 0 where the release is exact."""
+        low, high = (ndtr(limit[events]) for limit in self.limits)
+        with np.errstate(invalid="ignore"):
+            deviation = ndtri(low + (high - low) * uniforms)
+        return np.where(self.uncertain[events], deviation, 0.0)
+
+
+def releases_of(events: Sequence[Event], length_m: float) -> Releases:
+    """Releases of a campaign's events on a track of that length [m].
+
+    An event that states how well it knows both place and speed counts with the place alone.
+    """
+
+    def numbers(name: str) -> FloatArray:
+        return np.array([getattr(event, name) or 0.0 for event in events], dtype=float)
+
+    sd = numbers("release_sd_m")
+    speed_sd = np.where(sd > 0.0, 0.0, numbers("release_speed_sd_m_s"))
+    return Releases(numbers("release_s_m"), sd, float(length_m), numbers("release_speed_m_s"), speed_sd)
+
+
+def exact_release(place_m: float, length_m: float) -> Releases:
+    """One release from rest, at a place that is known exactly."""
+    none = np.zeros(1)
+    return Releases(np.array([float(place_m)]), none, float(length_m), none, none)

@@ -1,0 +1,106 @@
+"""What smoothing makes of a track: whether the ground that fronts run on is the one that was surveyed."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.campaign import Campaign, Problem, Track
+from skred.physics.terrain import Terrain
+
+FloatArray = NDArray[np.float64]
+TRACK = "track.csv"
+MOST_LONGER = 0.01
+"""Share by which the given polyline may be longer than the smoothed track: more is noise of the survey."""
+MOST_LOST = 0.02
+"""Share of the fall between two places that smoothing may change."""
+_LEAST_OF_DROP = 0.002
+"""Share of the track's whole drop below which a change of fall is no loss: level ground has none to lose."""
+_LEAST_ANGLE = np.radians(2.0)
+"""How much steeper than anything surveyed the smoothed track may be, uphill or down [rad]."""
+
+
+def terrain_hints(track: Track, terrain: Terrain, places_m: FloatArray, file: str = TRACK) -> list[Problem]:
+    """What is odd about a smoothed track.
+
+    Parameters
+    ----------
+    track : Track
+    terrain : Terrain
+        Made from it.
+    places_m : (n,) array, m
+        Places between which the fall counts: sensors and releases.
+    file : str
+        The track's file, for the messages.
+    """
+    return [
+        *_longer(track, terrain, file),
+        *_lost_fall(track, terrain, places_m, file),
+        *_overshoot(track, terrain, file),
+    ]
+
+
+def campaign_places(campaign: Campaign) -> FloatArray:
+    """Places of a campaign between which the fall of the track counts [m], increasing."""
+    sensors = [s for s in campaign.sensors if not s.is_runout]
+    places = [event.release_s_m for event in campaign.events]
+    places += [place for sensor in sensors for place in (sensor.s_from_m, sensor.s_to_m)]
+    return np.unique(np.array(places, dtype=float))
+
+
+def _longer(track: Track, terrain: Terrain, file: str) -> list[Problem]:
+    """Whether the polyline zigzags about the smoothed track."""
+    length = np.diff(terrain.edge_s_m)
+    x = np.interp(terrain.edge_s_m, track.s_m, track.x_m)
+    smooth = float(np.hypot(np.diff(x), terrain.sin_slope * length).sum())
+    if track.length_m <= (1.0 + MOST_LONGER) * smooth:
+        return []
+    more = 100.0 * (track.length_m / smooth - 1.0)
+    message = (
+        f"the polyline is {more:.1f} % longer than the track smoothed over {terrain.smoothing_m:.3g} m:"
+        " places s are too large by that; give fewer points, or smoother ones"
+    )
+    return [Problem(file, None, None, None, message)]
+
+
+def _lost_fall(track: Track, terrain: Terrain, places_m: FloatArray, file: str) -> list[Problem]:
+    """Whether fronts fall as far between two places as the survey says; the worst pair."""
+    given = np.interp(places_m, track.s_m, track.z_m)
+    fallen = np.concatenate([[0.0], np.cumsum(terrain.sin_slope * np.diff(terrain.edge_s_m))])
+    smoothed = -np.interp(places_m, terrain.edge_s_m, fallen)
+    fall, change = np.subtract.outer(given, given), np.subtract.outer(smoothed, smoothed)
+    change = np.abs(change - fall)
+    lost = change - np.maximum(MOST_LOST * np.abs(fall), _LEAST_OF_DROP * np.ptp(track.z_m))
+    if lost.size == 0 or lost.max() <= 0.0:
+        return []
+    first, last = sorted(divmod(int(lost.argmax()), len(places_m)))
+    message = (
+        f"between s = {places_m[first]:.4g} m and s = {places_m[last]:.4g} m the track"
+        f" falls {fall[first, last]:.3g} m, but smoothed over {terrain.smoothing_m:.3g} m "
+        f"{fall[first, last] + _signed(smoothed, fall, first, last):.3g} m: forces will be found there that"
+        " are none; take a smaller --smoothing, and compare"
+    )
+    return [Problem(file, None, None, None, message)]
+
+
+def _signed(smoothed: FloatArray, fall: FloatArray, first: int, last: int) -> float:
+    """Change of the fall from one place to another."""
+    return float(smoothed[first] - smoothed[last] - fall[first, last])
+
+
+def _overshoot(track: Track, terrain: Terrain, file: str) -> list[Problem]:
+    """Whether the smoothed track has slopes that nobody surveyed."""
+    given = -np.arctan2(np.diff(track.z_m), np.diff(track.x_m))
+    found = terrain.slope_rad
+    beyond = np.maximum(given.min() - found, found - given.max())
+    worst = int(beyond.argmax())
+    if beyond[worst] <= _LEAST_ANGLE:
+        return []
+    middle = 0.5 * (terrain.edge_s_m[worst] + terrain.edge_s_m[worst + 1])
+    message = (
+        f"smoothed over {terrain.smoothing_m:.3g} m the track slopes {np.degrees(found[worst]):.1f} degrees"
+        f" at s = {middle:.4g} m; the given points slope {np.degrees(given.min()):.1f} to"
+        f" {np.degrees(given.max()):.1f}: the curve overshoots"
+        " at a bend; round the bend with a few points, and compare values of --smoothing"
+    )
+    return [Problem(file, None, None, None, message)]
