@@ -59,14 +59,16 @@ def test_verdict_has_every_key(which: str, request: pytest.FixtureRequest) -> No
 
 @pytest.mark.parametrize("which", ["clean", "biased"])
 def test_a_program_can_follow_the_probabilities(which: str, request: pytest.FixtureRequest) -> None:
-    """From the verdict alone: prior odds of the format, the factors, and the power that it says."""
+    """From the verdict alone: the prior odds, in groups those of the format, the factors, and the power."""
     document = verdict(request.getfixturevalue(which))
     factors, power = document["log_bayes_factors"], document["calibration"]["power"]
-    assert document["calibration"]["version"] == 1 and 0.5 < power < 1.0
-    faults = [name for name in factors if name in ("sensor_bias", "release_offset")]
-    physics = [name for name in factors if name not in ("nothing", "unlisted", *faults)]
-    prior = {"nothing": 0.5, "unlisted": 0.05}
-    prior |= {name: 0.1 / len(faults) for name in faults} | {name: 0.35 / len(physics) for name in physics}
+    assert document["calibration"]["version"] == 2 and 0.5 < power < 1.0
+    prior = document["calibration"]["prior"]
+    faults = ("sensor_bias", "release_offset")
+    assert prior["nothing"] == pytest.approx(0.5) and prior["unlisted"] == pytest.approx(0.05)
+    assert [prior[name] for name in faults] == pytest.approx([0.05, 0.05])
+    physics = [share for name, share in prior.items() if name not in ("nothing", "unlisted", *faults)]
+    assert sum(physics) == pytest.approx(0.35) and set(prior) == set(factors)
     full = {name: share * np.exp(factors[name]) for name, share in prior.items()}
     nothing = full["nothing"] / sum(full.values())
     among = {

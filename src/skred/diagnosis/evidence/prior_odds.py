@@ -14,8 +14,8 @@ NOTHING, UNLISTED = "nothing", "unlisted"
 SHARES = {NOTHING: 0.5, Group.PHYSICS: 0.35, Group.INSTRUMENT: 0.1, UNLISTED: 0.05}
 """Prior probability of each group, shared equally by its members."""
 
-CALIBRATION_VERSION = 1
-"""Of how evidence becomes probability; it changes with `SHARES` and `POWER`."""
+CALIBRATION_VERSION = 2
+"""Of how evidence becomes probability; it changes with `prior_odds` and `POWER`."""
 POWER = 0.75
 """Tempering exponent of Bayes factors between whatever may be missing. Every model is wrong in edges and
 exponents, and evidence says more for the less wrong one than trials bear out. Frozen from opened trials, by

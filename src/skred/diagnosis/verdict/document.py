@@ -209,7 +209,7 @@ def _more(found: Outcome) -> dict[str, Any]:
             "alarm": found.alarm_by is not None,
             "alarm_by": found.alarm_by,
             "log_bayes_factors": found.comparison.log_factors,
-            "calibration": {"version": CALIBRATION_VERSION, "power": POWER},
+            "calibration": {"version": CALIBRATION_VERSION, "power": POWER, "prior": found.comparison.odds},
             "error_models": [under_errors.error_model for under_errors in found.comparison.under_each],
             "candidates": candidate_documents(found, found.comparison),
             "influence": _influence(found.influence),
