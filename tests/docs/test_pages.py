@@ -122,8 +122,8 @@ def test_rules_on_the_page_are_the_codes() -> None:
 
 
 PAGES = (
-    "campaign-format", "reading-a-verdict", "laws-and-likelihoods", "method", "own-mechanism", "own-law",
-    "ryggfonn", "proof", "reliability", "glossary",
+    "campaign-format", "tracks", "reading-a-verdict", "laws-and-likelihoods", "method", "own-mechanism",
+    "own-law", "ryggfonn", "proof", "reliability", "glossary",
 )  # fmt: skip
 WORDS = """
     model comparison; comparison under one error model; candidate; added; linearised screening; local

@@ -180,7 +180,7 @@ def test_what_the_commands_see_is_their_own_terrain(tmp_path: Path) -> None:
     made = make_track(Wanted(dem, write_line(tmp_path / "l.gpkg", [(60, 60), (480, 480)])))
     terrain = build_terrain(np.array(made["profile"]["x_m"]), np.array(made["profile"]["z_m"]))
     fall = float(terrain.sin_slope @ np.diff(terrain.edge_s_m))
-    told = made["smoothing"]["as_calibrated"]
+    told = made["smoothing"]["as_read"]
     assert told["fall_m"] == pytest.approx(fall, abs=0.01)
     assert told["steepest_deg"] == pytest.approx(math.degrees(terrain.slope_rad.max()), abs=0.3)
 

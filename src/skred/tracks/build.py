@@ -77,8 +77,9 @@ def make_track(wanted: Wanted) -> dict[str, Any]:
     -------
     dict
         The content of the document beside ``track.csv``. Its ``profile`` has, for each point, the arc
-        length ``s_m`` and horizontal distance ``x_m``, the elevation ``z_m`` as written and ``z_sampled_m``
-        as in the terrain model, and ``east_m`` and ``north_m`` on the map.
+        length ``s_m`` and horizontal distance ``x_m``, the elevation ``z_m`` as written, ``z_sampled_m`` as
+        in the terrain model and ``z_read_m`` as commands smooth it when they read it, and ``east_m`` and
+        ``north_m`` on the map.
 
     Raises
     ------
@@ -134,7 +135,15 @@ def _profile(along: Any, points: Plan, z: Any, smoothing_m: float) -> dict[str, 
     x_m = np.round(along, DECIMALS)
     z_m = np.round(smoothed(along, z, smoothing_m), DECIMALS)
     s_m = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x_m), np.diff(z_m)))])
-    columns = {"s_m": s_m, "x_m": x_m, "z_m": z_m, "z_sampled_m": z, "east_m": points.x, "north_m": points.y}
+    columns = {
+        "s_m": s_m,
+        "x_m": x_m,
+        "z_m": z_m,
+        "z_sampled_m": z,
+        "z_read_m": smoothed(x_m, z_m, SMOOTHING_M),
+        "east_m": points.x,
+        "north_m": points.y,
+    }
     return {name: np.round(values, DECIMALS).tolist() for name, values in columns.items()}
 
 
@@ -178,12 +187,12 @@ def _of_extension(
 def _smoothing(profile: dict[str, list[float]], smoothing_m: float) -> dict[str, Any]:
     """What smoothing changed, here and once more in the commands that read the track."""
     x, written, before = (np.array(profile[name]) for name in ("x_m", "z_m", "z_sampled_m"))
-    again = smoothed(x, written, SMOOTHING_M)
+    again = np.array(profile["z_read_m"])
     return {
         "smoothing_m": smoothing_m,
         "sampled": asdict(shape(x, before)),
         "written": asdict(shape(x, written)),
-        "as_calibrated": asdict(shape(x, again)),
+        "as_read": asdict(shape(x, again)),
         "largest_shift_m": float(np.abs(written - before).max()),
         "with_the_commands_m": smoothed_twice_as_m(smoothing_m, SMOOTHING_M),
     }

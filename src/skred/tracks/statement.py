@@ -44,7 +44,7 @@ def _smoothing(document: Mapping[str, Any]) -> Iterator[str]:
         changes = " and ".join(_change(smoothing, what) for what in ("fall", "length"))
         shift = smoothing["largest_shift_m"]
         yield f"Smoothing by {length:g} m changes {changes}. It moves the ground by up to {shift:.1f} m."
-    together, later = smoothing["with_the_commands_m"], smoothing["as_calibrated"]
+    together, later = smoothing["with_the_commands_m"], smoothing["as_read"]
     yield (
         f"Commands that read the track smooth it by {SMOOTHING_M:g} m themselves; both together are as once "
         f"by {together:.1f} m. The steepest slope is then {later['steepest_deg']:.1f} degrees, the fall "

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from rich.table import Table
 
-_SAMPLED, _WRITTEN, _EXTENSION, _RELEASE = "#9a9a9a", PALETTE[0], PALETTE[1], PALETTE[3]
+_SAMPLED, _WRITTEN, _READ, _EXTENSION, _RELEASE = "#9a9a9a", PALETTE[0], PALETTE[2], PALETTE[1], PALETTE[3]
+_AS_READ = "as other commands smooth it when they read it"
 
 
 @styled
@@ -43,7 +44,7 @@ def track_figure(document: Mapping[str, Any]) -> Figure:
     _mark_releases(panels[0], document["releases"], profile)
     panels[2].set_xlabel("s along the track [m]")
     figure.align_ylabels(panels)
-    legend_below(figure, panels, columns=3)
+    legend_below(figure, panels, columns=2)
     return figure
 
 
@@ -58,7 +59,7 @@ def _elevation(axes: Axes, profile: Mapping[str, Any]) -> None:
     low = z_m.min() - 0.06 * float(np.ptp(z_m))
     axes.fill_between(s_m, z_m, low, color="#ececec", linewidth=0)
     axes.plot(s_m, profile["z_sampled_m"], color=_SAMPLED, linewidth=2.2, label="as in the terrain model")
-    axes.plot(s_m, z_m, color=_WRITTEN, linewidth=1.1, label="as written, smoothed")
+    axes.plot(s_m, z_m, color=_WRITTEN, linewidth=1.1, label="as written")
     axes.set_ylim(low, z_m.max() + 0.08 * float(np.ptp(z_m)))
     axes.set_ylabel("elevation [m]")
     axes.set_title("Terrain")
@@ -67,9 +68,14 @@ def _elevation(axes: Axes, profile: Mapping[str, Any]) -> None:
 def _slope(axes: Axes, profile: Mapping[str, Any]) -> None:
     s_m, x_m = profile["s_m"], profile["x_m"]
     middle = 0.5 * (s_m[1:] + s_m[:-1])
-    for name, colour, width in (("z_sampled_m", _SAMPLED, 1.0), ("z_m", _WRITTEN, 1.3)):
+    looks: dict[str, dict[str, Any]] = {
+        "z_sampled_m": {"color": _SAMPLED, "linewidth": 1.0},
+        "z_m": {"color": _WRITTEN, "linewidth": 1.3},
+        "z_read_m": {"color": _READ, "linewidth": 1.1, "linestyle": "--", "label": _AS_READ},
+    }
+    for name, look in looks.items():
         slope = np.degrees(np.arctan2(-np.diff(profile[name]), np.diff(x_m)))
-        axes.plot(middle, slope, color=colour, linewidth=width)
+        axes.plot(middle, slope, **look)
     axes.axhline(0.0, color=INK, linewidth=0.6)
     axes.set_ylabel("degrees")
     axes.set_title("Slope angle, downhill above 0")
