@@ -189,6 +189,33 @@ def test_an_avaframe_folder_that_is_not_clear_is_told(
     assert "no terrain model (.asc or .tif); put one there, or give it by --dem" in capsys.readouterr().err
 
 
+def test_names_of_a_file_do_not_steer_the_terminal(
+    inputs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    area = shapely.Polygon(on_map([(150, 450), (300, 450), (300, 550), (150, 550)]))
+    write_shapes(inputs / "REL" / "relArea.shp", [area], names=["\x1b[31mred"])
+    write_line(inputs / "LINES" / "pathAB.shp", [(100.0, 500.0), (900.0, 500.0)], names=["\x1b[2J"])
+    assert run(["track", "--avaframe", str(inputs), "--out", str(tmp_path / "track.csv")]) == 0
+    told = capsys.readouterr()
+    assert "\x1b[31m" not in told.out + told.err and "\x1b[2J" not in told.out + told.err
+
+
+def test_the_example_of_the_page_runs(tmp_path: Path) -> None:
+    """As docs/tracks.md says; the numbers it names come from there."""
+    script = [sys.executable, str(ROOT / "scripts" / "example_track.py"), str(tmp_path)]
+    subprocess.run(script, check=True, capture_output=True)
+    maps = ["--dem", str(tmp_path / "dem.tif"), "--line", str(tmp_path / "line.geojson")]
+    out = tmp_path / "track.csv"
+    assert run(["track", *maps, "--extend", "300", "--out", str(out), "--quiet"]) == 0
+    document = json.loads(out.with_suffix(".json").read_text())
+    steepest = [document["smoothing"][state]["steepest_deg"] for state in ("sampled", "as_read")]
+    page = (ROOT / "docs" / "tracks.md").read_text(encoding="utf-8")
+    assert "of {:.0f} degrees is {:.0f} degrees after both".format(*steepest) in page
+    assert f"{document['smoothing']['with_the_commands_m']:.1f} m by default" in page
+    quoted = " ".join(f'"{one}"' for one in REQUIREMENTS)
+    assert f"python -m pip install {quoted}\n" in page
+
+
 BLOCKED = """
 import sys
 class Blocker:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.campaign.problems import shown
 from skred.errors import InputError
 
 if TYPE_CHECKING:
@@ -179,7 +180,9 @@ class Elevations:
         try:
             raw = self._dataset.read(1, window=Window(left, above, right - left, below - above), masked=True)
         except RasterioIOError as error:
-            raise InputError(f"{self.file}: cannot be read here ({error}); is the file whole?") from error
+            raise InputError(
+                f"{self.file}: cannot be read here ({shown(str(error), 200)}); is the file whole?"
+            ) from error
         values = np.ma.filled(raw.astype(float), np.nan) * self._dataset.scales[0] + self._dataset.offsets[0]
         tile = np.full((size, size), np.nan)
         inside = np.where((values >= LOWEST_M) & (values <= HIGHEST_M), values, np.nan)
@@ -214,7 +217,9 @@ def open_elevations(file: Path) -> Iterator[Elevations]:
             warnings.simplefilter("ignore", NotGeoreferencedWarning)  # refused below
             dataset = rasterio.open(file, driver=driver)
     except RasterioIOError as error:
-        raise InputError(f"{file}: not a terrain model that can be read as {driver} ({error})") from error
+        raise InputError(
+            f"{file}: not a terrain model that can be read as {driver} ({shown(str(error), 200)})"
+        ) from error
     with dataset:
         _check(dataset, file)
         yield Elevations(dataset, file)

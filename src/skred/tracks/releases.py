@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.campaign.problems import shown
 from skred.tracks.lines import Feature, read_features
 from skred.tracks.plan import Plan
 from skred.tracks.reference_system import moved_into
@@ -79,7 +80,7 @@ def release_sentences(releases: Iterable[dict[str, Any]]) -> Iterator[str]:
         As `releases_on` returns them.
     """
     for one in releases:
-        what = f"Release {one['file']}" + (f" ({one['name']})" if one["name"] else "")
+        what = f"Release {shown(one['file'])}" + (f" ({shown(one['name'])})" if one["name"] else "")
         s_from, s_to, distance = one["s_from_m"], one["s_to_m"], one["distance_m"]
         if s_to is None:
             yield f"{what}: the track does not cross it, {distance:.0f} m away."
