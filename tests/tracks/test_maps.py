@@ -57,6 +57,31 @@ def test_a_line_of_another_zone_is_brought_into_the_terrains(dem: Path, tmp_path
     assert any("into the terrain's EPSG:32632" in one for one in made["notices"])
 
 
+def test_how_well_two_reference_systems_are_related_is_told(tmp_path: Path) -> None:
+    """UTM on WGS 84 is exact; the Austrian one to 1.5 m; of an ellipsoid without a datum nothing is."""
+    unknown = "+proj=tmerc +lon_0=12 +k=1 +x_0=0 +y_0=0 +ellps=bessel +units=m +type=crs"
+    told = {}
+    for crs in (UTM, "EPSG:31287", unknown):
+        to = Transformer.from_crs(GEOGRAPHIC, crs, always_xy=True)
+        x, y = to.transform(12.5, 47.3)
+        dem = write_dem(tmp_path / "dem.tif", plane, crs=crs, corner=(x - 500.0, y - 500.0))
+        points = [to.transform(*point, direction="INVERSE") for point in ((x, y), (x + 300.0, y))]
+        file = tmp_path / "line.geojson"
+        file.unlink(missing_ok=True)
+        write_shapes(file, [shapely.LineString(points)], crs=GEOGRAPHIC)
+        told[crs] = make_track(Wanted(dem, file))["notices"][0]
+    assert told[UTM].endswith("zone 32N)")
+    assert told["EPSG:31287"].endswith("EPSG:31287 (MGI / Austria Lambert), known to 1.5 m")
+    assert told[unknown].endswith("it may be off by 100 m, so look at it on a map")
+
+
+def test_a_way_that_does_not_exist_is_told(tmp_path: Path) -> None:
+    line = write_shapes(tmp_path / "l.geojson", [shapely.LineString(on_globe(DOWN))], crs=GEOGRAPHIC)
+    odd = "+proj=tmerc +lon_0=9 +k=0.9996 +x_0=500000 +R=6378137 +units=m +type=crs"
+    with pytest.raises(InputError, match="bring line and terrain into the same reference system"):
+        make_track(Wanted(write_dem(tmp_path / "d.asc", plane), line, crs=odd))
+
+
 def test_terrain_without_reference_system_is_taken_to_be_in_the_lines(tmp_path: Path) -> None:
     made = make_track(Wanted(write_dem(tmp_path / "d.asc", plane), write_line(tmp_path / "l.gpkg", DOWN)))
     assert made["notices"] == [

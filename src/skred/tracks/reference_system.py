@@ -13,7 +13,7 @@ from skred.tracks.elevations import Elevations
 from skred.tracks.plan import Plan, plan_of
 
 if TYPE_CHECKING:
-    from pyproj import CRS
+    from pyproj import CRS, Transformer
 
     from skred.tracks.lines import MapLine
 
@@ -91,8 +91,10 @@ def in_the_terrains(
             f"{named(terrain)}"
         )
     elif not _same(of_line, terrain):
-        plan = _transformed(line, terrain)
-        notices.append(f"line brought from {named(of_line)} into the terrain's {named(terrain)}")
+        moved = _transformed(line, terrain)
+        known = _known_to(plan, of_line, terrain)
+        notices.append(f"line brought from {named(of_line)} into the terrain's {named(terrain)}{known}")
+        plan = moved
     _require_metres(terrain, plan, elevations)
     return plan, terrain, notices
 
@@ -108,10 +110,37 @@ def _require_no_degrees(elevations: Elevations) -> None:
 
 
 def transformed(x: FloatArray, y: FloatArray, source: CRS, target: CRS) -> tuple[FloatArray, FloatArray]:
-    """Coordinates in another reference system; infinite where they have none there."""
-    from pyproj import Transformer
+    """Coordinates in another reference system; infinite where they have none there.
 
-    return Transformer.from_crs(source, target, always_xy=True).transform(x, y)
+    Raises
+    ------
+    InputError
+        If no way leads from the one to the other.
+    """
+    return _transformer(source, target).transform(x, y)
+
+
+def _transformer(source: CRS, target: CRS) -> Transformer:
+    from pyproj import Transformer
+    from pyproj.exceptions import ProjError
+
+    try:
+        return Transformer.from_crs(source, target, always_xy=True)
+    except ProjError as error:
+        raise InputError(
+            f"coordinates cannot be brought from {named(source)} into {named(target)} "
+            f"({shown(str(error), 200)}); bring line and terrain into the same reference system"
+        ) from error
+
+
+def _known_to(plan: Plan, source: CRS, target: CRS) -> str:
+    """How well the relation of two reference systems is known, in words; nothing where that is exact."""
+    transformer = _transformer(source, target)
+    transformer.transform(plan.x[0], plan.y[0])
+    used = transformer.get_last_used_operation()
+    if "ballpark" in used.description.lower():
+        return ", without the shift between their data: it may be off by 100 m, so look at it on a map"
+    return f", known to {used.accuracy:g} m" if used.accuracy > 0 else ""
 
 
 def named(crs: CRS) -> str:
