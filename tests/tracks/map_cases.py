@@ -1,4 +1,7 @@
-"""Terrain models whose elevations are formulas, and lines on them, as files."""
+"""Terrain models whose elevations are formulas, and lines on them, as files.
+
+Tests take the packages of the extra `gis` from here: without it they are skipped.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyogrio
-import rasterio
-import shapely
+import pytest
+
+pyogrio = pytest.importorskip("pyogrio")
+pyproj = pytest.importorskip("pyproj")
+rasterio = pytest.importorskip("rasterio")
+shapely = pytest.importorskip("shapely")
 
 UTM = "EPSG:32632"
 EAST, NORTH = 400_000.0, 5_200_000.0

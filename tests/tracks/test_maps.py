@@ -7,10 +7,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import rasterio
-import shapely
-from map_cases import EAST, NORTH, UTM, on_map, plane, write_dem, write_line, write_shapes
-from pyproj import Transformer
+from map_cases import (
+    EAST,
+    NORTH,
+    UTM,
+    on_map,
+    plane,
+    pyproj,
+    rasterio,
+    shapely,
+    write_dem,
+    write_line,
+    write_shapes,
+)
 
 from skred.errors import InputError
 from skred.tracks.build import Wanted, make_track
@@ -27,7 +36,7 @@ def dem(tmp_path: Path) -> Path:
 
 def on_globe(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """Distances from the corner as longitude and latitude."""
-    to = Transformer.from_crs(UTM, GEOGRAPHIC, always_xy=True)
+    to = pyproj.Transformer.from_crs(UTM, GEOGRAPHIC, always_xy=True)
     return [to.transform(*point) for point in on_map(points)]
 
 
@@ -49,7 +58,7 @@ def test_every_kind_of_file_gives_the_same_track(dem: Path, tmp_path: Path, suff
 
 
 def test_a_line_of_another_zone_is_brought_into_the_terrains(dem: Path, tmp_path: Path) -> None:
-    to = Transformer.from_crs(UTM, "EPSG:3035", always_xy=True)
+    to = pyproj.Transformer.from_crs(UTM, "EPSG:3035", always_xy=True)
     points = [to.transform(*point) for point in on_map([(100.0, 100.0), (500.0, 400.0)])]
     file = write_shapes(tmp_path / "other.gpkg", [shapely.LineString(points)], crs="EPSG:3035")
     made = make_track(Wanted(dem, file))
@@ -62,7 +71,7 @@ def test_how_well_two_reference_systems_are_related_is_told(tmp_path: Path) -> N
     unknown = "+proj=tmerc +lon_0=12 +k=1 +x_0=0 +y_0=0 +ellps=bessel +units=m +type=crs"
     told = {}
     for crs in (UTM, "EPSG:31287", unknown):
-        to = Transformer.from_crs(GEOGRAPHIC, crs, always_xy=True)
+        to = pyproj.Transformer.from_crs(GEOGRAPHIC, crs, always_xy=True)
         x, y = to.transform(12.5, 47.3)
         dem = write_dem(tmp_path / "dem.tif", plane, crs=crs, corner=(x - 500.0, y - 500.0))
         points = [to.transform(*point, direction="INVERSE") for point in ((x, y), (x + 300.0, y))]

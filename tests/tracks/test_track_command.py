@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-import shapely
-from map_cases import on_map, plane, write_dem, write_line, write_shapes
+from map_cases import on_map, plane, shapely, write_dem, write_line, write_shapes
 
 from skred.cli.main import run
 from skred.prediction.track import read_track
