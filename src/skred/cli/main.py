@@ -15,6 +15,7 @@ from skred.cli.predict import predict
 from skred.cli.program import new_program, run_program
 from skred.cli.prove import prove_app
 from skred.cli.report import report
+from skred.cli.track import track
 from skred.cli.validate import validate
 
 app = new_program(
@@ -23,6 +24,7 @@ app = new_program(
 app.command(validate)
 app.command(calibrate)
 app.command(compare)
+app.command(track)
 app.command(predict)
 app.command(diagnose)
 app.command(identify)

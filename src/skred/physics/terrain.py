@@ -125,7 +125,7 @@ def build_terrain(
         raise ValueError(f"the track needs {n_cells} cells of {cell_m} m; choose longer cells")
     edge_s = np.linspace(0.0, polyline_s[-1], n_cells + 1)
     edge_x = np.interp(edge_s, polyline_s, x_m)
-    spline, derivative = _smoothing_spline(np.asarray(x_m, float), np.asarray(z_m, float), smoothing_m)
+    spline, derivative = smoothing_spline(np.asarray(x_m, float), np.asarray(z_m, float), smoothing_m)
     elevation, gradient = spline(edge_x), derivative(edge_x)
     length = np.diff(edge_s)
     sin_slope = np.clip(-np.diff(elevation) / length, -1.0, 1.0)
@@ -138,10 +138,18 @@ def build_terrain(
     )
 
 
-def _smoothing_spline(
+def smoothing_spline(
     x: FloatArray, z: FloatArray, smoothing_m: float
 ) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Natural cubic spline minimising sum (z - f)^2 + smoothing^4 / spacing * int f''^2, and f'."""
+    """Natural cubic spline minimising sum (z - f)^2 + smoothing^4 / spacing * int f''^2, and f'.
+
+    Parameters
+    ----------
+    x, z : (n_points,) array, m
+        Horizontal distance (strictly increasing) and elevation.
+    smoothing_m : float, m
+        Undulations of wavelength ``2 pi smoothing_m`` lose half their amplitude; 0 interpolates.
+    """
     # Here, because laws and their command lines import this module and scipy takes half a second.
     from scipy.interpolate import make_smoothing_spline
 

@@ -1,0 +1,165 @@
+"""Elevations along a line: sampled, turned downhill, smoothed, and what the smoothing costs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skred.errors import InputError
+from skred.physics.terrain import smoothing_spline
+from skred.tracks.elevations import Elevations
+from skred.tracks.plan import Plan
+
+FloatArray = NDArray[np.float64]
+_SHOWN_STRETCHES = 3
+_RISES_M = 0.5
+"""A rise that is told of is higher."""
+
+
+def sampled(elevations: Elevations, plan: Plan) -> FloatArray:
+    """Elevation of the terrain at the points of a line [m].
+
+    Raises
+    ------
+    InputError
+        If some points lie off the raster or where it has no data; each stretch with its coordinates.
+    """
+    z = elevations.heights(plan.x, plan.y)
+    bad = ~np.isfinite(z)
+    if not bad.any():
+        return z
+    off = ~elevations.contains(plan.x, plan.y)
+    stretches = list(_stretches(bad, off, plan))
+    shown = stretches[:_SHOWN_STRETCHES]
+    if len(stretches) > len(shown):
+        shown.append(f"and {len(stretches) - len(shown)} stretches more")
+    left, low, right, high = elevations.bounds
+    covers = f"the raster covers x {left:.1f} to {right:.1f}, y {low:.1f} to {high:.1f}"
+    raise InputError(
+        f"{elevations.file}: no elevation at {bad.sum()} of {len(bad)} points of the line: "
+        f"{'; '.join(shown)}; {covers}. Move or shorten the line, or take a terrain model that covers it"
+    )
+
+
+def _stretches(bad: NDArray[np.bool_], off: NDArray[np.bool_], plan: Plan) -> Iterator[str]:
+    """Stretches without elevations in words, in the order of the line."""
+    along = plan.along
+    kind = np.where(bad, np.where(off, 2, 1), 0)
+    starts = np.flatnonzero(np.diff(kind, prepend=0) != 0)
+    for start, end in zip(starts, [*starts[1:], len(kind)], strict=True):
+        if kind[start] == 0:
+            continue
+        last = end - 1
+        what = "off the raster" if kind[start] == 2 else "no data"
+        places = [f"({plan.x[k]:.1f}, {plan.y[k]:.1f})" for k in (start, last)]
+        if start == last:
+            yield f"{what} at {places[0]}, {along[start]:.0f} m along the line"
+        else:
+            ends = f"{along[start]:.0f} to {along[last]:.0f} m along the line"
+            yield f"{what} from {places[0]} to {places[1]}, {ends}"
+
+
+def goes_uphill(z: FloatArray) -> bool:
+    """Whether a line has to be turned.
+
+    Parameters
+    ----------
+    z : (n,) array, m
+        Elevations along it.
+
+    Raises
+    ------
+    InputError
+        If it has no fall.
+    """
+    if z[0] == z[-1]:
+        raise InputError(f"the line begins and ends at the same elevation, {z[0]:.1f} m; draw it downhill")
+    return bool(z[0] < z[-1])
+
+
+def rise_notice(s_m: FloatArray, z: FloatArray) -> list[str]:
+    """Tell of the highest rise on the way down, if there is one to speak of.
+
+    Parameters
+    ----------
+    s_m : (n,) array, m
+        Arc length.
+    z : (n,) array, m
+        Elevations, downhill as a whole.
+    """
+    rise = z - np.minimum.accumulate(z)
+    top = int(rise.argmax())
+    if rise[top] < _RISES_M:
+        return []
+    foot = int(z[: top + 1].argmin())
+    return [
+        f"the track rises by {rise[top]:.1f} m from s = {s_m[foot]:.0f} to {s_m[top]:.0f} m: a dam, a "
+        "counter-slope, or a line that leaves the gully"
+    ]
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What a profile amounts to.
+
+    Attributes
+    ----------
+    fall_m : float
+        Elevation of the first point above the last [m].
+    length_m : float
+        Arc length, following the slope [m].
+    steepest_deg : float
+        Largest slope angle between neighbouring points, downhill [degrees].
+    steepest_uphill_deg : float
+        The same uphill; 0 where it only falls.
+    """
+
+    fall_m: float
+    length_m: float
+    steepest_deg: float
+    steepest_uphill_deg: float
+
+
+def shape(along: FloatArray, z: FloatArray) -> Shape:
+    """What a profile amounts to.
+
+    Parameters
+    ----------
+    along, z : (n,) array, m
+        Horizontal distance and elevation.
+    """
+    dx, dz = np.diff(along), np.diff(z)
+    slope = np.degrees(np.arctan2(-dz, dx))
+    steepest, uphill = float(slope.max()), max(0.0, float(-slope.min()))
+    return Shape(float(z[0] - z[-1]), float(np.hypot(dx, dz).sum()), steepest, uphill)
+
+
+def smoothed(along: FloatArray, z: FloatArray, smoothing_m: float) -> FloatArray:
+    """Elevations smoothed as every command smooths the terrain of a track; see `skred.physics.terrain`.
+
+    Parameters
+    ----------
+    along, z : (n,) array, m
+        Horizontal distance and elevation.
+    smoothing_m : float, m
+        Waves of ``2 pi smoothing_m`` lose half their height; 0 changes nothing.
+    """
+    if smoothing_m == 0.0:
+        return z.copy()
+    return np.asarray(smoothing_spline(along, z, smoothing_m)[0](along), dtype=float)
+
+
+def smoothed_twice_as_m(first_m: float, second_m: float) -> float:
+    """Length of the one smoothing [m] after which the same wave keeps half its height as after two.
+
+    A smoothing of length l leaves 1 / (1 + (q l)^4) of a wave of wave number q.
+    """
+    a, b = first_m**4, second_m**4
+    if a == 0.0 or b == 0.0:
+        return max(first_m, second_m)
+    # (1 + a p)(1 + b p) = 2 for p = q^4
+    p = (-(a + b) + ((a + b) ** 2 + 4 * a * b) ** 0.5) / (2 * a * b)
+    return float(p**-0.25)

@@ -1,0 +1,58 @@
+"""What is said of a track that was made."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from skred.physics.terrain import SMOOTHING_M
+from skred.tracks.releases import release_sentences
+
+
+def track_statement(document: Mapping[str, Any]) -> list[str]:
+    """Sentences on a track, for people.
+
+    Parameters
+    ----------
+    document : mapping
+        As `skred.tracks.build.make_track` returns it.
+    """
+    notices = [f"Notice: {notice}." for notice in document["notices"]]
+    return [*notices, *_extension(document), *_smoothing(document), *release_sentences(document["releases"])]
+
+
+def _extension(document: Mapping[str, Any]) -> Iterator[str]:
+    extension = document["extension"]
+    if extension is None:
+        return
+    asked, got, stopped = (extension[name] for name in ("asked_m", "horizontal_length_m", "stopped"))
+    place = f"s = {extension['s_from_m']:.0f} to {extension['s_to_m']:.0f} m"
+    if stopped is None:
+        yield f"Extended along the fall line by {got:.0f} m: {place}."
+    elif got == 0:
+        yield f"Not extended along the fall line: {stopped}."
+    else:
+        yield f"Extended along the fall line by {got:.0f} of {asked:.0f} m, {place}; stopped: {stopped}."
+
+
+def _smoothing(document: Mapping[str, Any]) -> Iterator[str]:
+    smoothing = document["smoothing"]
+    length = smoothing["smoothing_m"]
+    if length == 0:
+        yield "The elevations are written as sampled."
+    else:
+        changes = " and ".join(_change(smoothing, what) for what in ("fall", "length"))
+        shift = smoothing["largest_shift_m"]
+        yield f"Smoothing by {length:g} m changes {changes}. It moves the ground by up to {shift:.1f} m."
+    together, later = smoothing["with_the_commands_m"], smoothing["as_read"]
+    yield (
+        f"Commands that read the track smooth it by {SMOOTHING_M:g} m themselves; both together are as once "
+        f"by {together:.1f} m. The steepest slope is then {later['steepest_deg']:.1f} degrees, the fall "
+        f"{later['fall_m']:.1f} m."
+    )
+
+
+def _change(smoothing: Mapping[str, Any], what: str) -> str:
+    """How much longer or higher something became."""
+    before, after = (smoothing[state][f"{what}_m"] for state in ("sampled", "written"))
+    return f"the {what} by {after - before:+.1f} m ({100 * (after / before - 1):+.2f} %)"
