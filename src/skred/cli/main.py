@@ -10,6 +10,7 @@ from skred.cli.calibrate import calibrate
 from skred.cli.compare import compare
 from skred.cli.diagnose import diagnose
 from skred.cli.identify import identify
+from skred.cli.import_tables import import_
 from skred.cli.mechanisms import mechanisms
 from skred.cli.predict import predict
 from skred.cli.program import new_program, run_program
@@ -20,6 +21,7 @@ from skred.cli.validate import validate
 app = new_program(
     "skred", "Calibrate avalanche models against recordings, and find the physics that they miss."
 )
+app.command(import_, name="import")
 app.command(validate)
 app.command(calibrate)
 app.command(compare)
