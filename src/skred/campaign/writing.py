@@ -76,7 +76,7 @@ def write_files(
         Where the folder is in use.
     """
     target = Path(folder).resolve()
-    _require_free(target, force)
+    require_free(target, force)
     made = [parent for parent in target.parents if not parent.exists()]
     temporary = target.parent / f".{target.name[:100]}.{uuid.uuid4().hex}"
     try:
@@ -94,8 +94,21 @@ def write_files(
                     parent.rmdir()
 
 
-def _require_free(target: Path, force: bool) -> None:
-    """Refuse to write over what is there, unless it is a campaign and that is wanted."""
+def require_free(target: Path, force: bool) -> None:
+    """Refuse to write over what is there, unless it is a campaign and that is wanted.
+
+    Parameters
+    ----------
+    target : Path
+        Where a campaign is to go.
+    force : bool
+        Whether it may replace another.
+
+    Raises
+    ------
+    CampaignError
+        Where it must not.
+    """
     if not target.exists() or (target.is_dir() and not any(target.iterdir())):
         return
     if not (target / "campaign.toml").is_file():

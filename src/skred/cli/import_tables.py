@@ -4,6 +4,7 @@ Everything heavy is imported inside the functions, so that ``--help`` is instant
 """
 
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -11,12 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from skred.cli.exit_codes import DONE
-from skred.cli.options import Force, Json, Quiet
+from skred.cli.options import Json, Quiet, ReplaceCampaign
 from skred.cli.output import write_json
 from skred.errors import InputError
 
 if TYPE_CHECKING:
-    from skred.importing import Files, Imported, Mapping, Unclear
+    from skred.importing import Files, Imported, Mapping, Question, Unclear
 
 Silences = Literal["missing", "not_reached"]
 
@@ -39,6 +40,7 @@ class Declared:
         tuple[str, ...],
         Parameter(
             negative="",
+            show_default=False,
             help="NAME=MEANING of a column, such as 'v1=front_velocity at=1650 unit=km/h'. Meanings: event, "
             "release, release_sd, front_velocity, runout, sd, covariate, ignore. May be repeated.",
         ),
@@ -47,7 +49,7 @@ class Declared:
     dash: Annotated[Silences | None, Parameter(help="What a dash says of a velocity.")] = None
     word: Annotated[
         tuple[str, ...],
-        Parameter(negative="", help="WORD=missing or WORD=not_reached. May be repeated."),
+        Parameter(negative="", show_default=False, help="WORD=missing or WORD=not_reached. May be repeated."),
     ] = ()
     runout: Annotated[
         Literal["s", "x", "altitude", "reference"] | None,
@@ -66,6 +68,7 @@ class Declared:
         Parameter(
             name="--set",
             negative="",
+            show_default=False,
             help="KEY=VALUE of the mapping file, such as velocity.absolute_sd=1. May be repeated.",
         ),
     ] = ()
@@ -107,7 +110,7 @@ def import_(
     yes: Annotated[
         bool, Parameter(name=["--yes", "-y"], negative="", help="Write what is shown, without asking.")
     ] = False,
-    force: Force = False,
+    force: ReplaceCampaign = False,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> int:
@@ -116,10 +119,13 @@ def import_(
     A wide table has a row for each avalanche and a column for each sensor. Beside the campaign a mapping file
     is written: with --mapping the next table imports without questions.
     """
+    from skred.campaign.writing import require_free
     from skred.importing import Files, write_imported
 
     if not files:
         raise InputError("no files; give a table, or a folder with files of the campaign format")
+    if out is not None:
+        require_free(out.resolve(), force)  # before anybody is asked anything
     imported = _answered(Files(files, declared.track, declared.sensors, declared.mapping), declared)
     if as_json:
         from skred.campaign.summary import campaign_summary
@@ -181,36 +187,50 @@ def _can_ask() -> bool:
 
 
 def _asked(unclear: "Unclear", declared: "Mapping") -> "Mapping":
-    """Ask every question; an answer that cannot be used is asked for again."""
+    """Ask every question."""
+    for question in unclear.questions:
+        declared = _asked_one(question, declared)
+    return declared
+
+
+def _asked_one(question: "Question", declared: "Mapping") -> "Mapping":
+    """Ask until there is an answer that can be used."""
     from rich.console import Console
     from rich.prompt import Prompt
     from rich.text import Text
 
     console = Console(stderr=True)
-    for question in unclear.questions:
-        while True:
-            console.print(Text(f"{question.where}: {question.text}"))
-            if question.example:
-                console.print(Text(f"  for example: {question.example.strip(chr(34))}"))
-            answer = Prompt.ask("  answer", console=console, choices=list(question.choices) or None)
-            try:
-                declared = declared.with_values({question.key: answer})
-                break
-            except InputError as error:
-                console.print(Text(f"  {error}"))
-    return declared
+    choices = list(question.choices) or None
+    while True:
+        console.print(Text(f"{question.where}: {question.text}"))
+        if question.example:
+            console.print(Text(f"  for example: {question.example.strip(chr(34))}"))
+        answer = _answer(lambda: Prompt.ask("  answer", console=console, choices=choices))
+        try:
+            return declared.with_values({question.key: answer})
+        except InputError as error:
+            console.print(Text(f"  {error}"))
+
+
+def _answer[T](ask: Callable[[], T]) -> T:
+    """An answer of a person; where the input ends instead, nothing goes on."""
+    try:
+        return ask()
+    except EOFError:
+        raise InputError("no answer; nothing was written") from None
 
 
 def _require_yes(imported: "Imported") -> None:
     """Have somebody look at what was only taken from names."""
     names = ", ".join(f"'{column.column}'" for column in imported.understanding.guessed)
+    options = dict.fromkeys(column.declaration for column in imported.understanding.guessed)
     if not _can_ask():
         raise InputError(
             f"the meaning of {names} was only taken from their names (see above); add --yes if it is right, "
-            "or say otherwise with --column 'NAME=MEANING'; nothing was written"
+            f"or say what is ({', '.join(options)}); nothing was written"
         )
     from rich.console import Console
     from rich.prompt import Confirm
 
-    if not Confirm.ask("Is this right?", console=Console(stderr=True), default=False):
-        raise InputError("nothing was written; say what is otherwise with --column 'NAME=MEANING'")
+    if not _answer(lambda: Confirm.ask("Is this right?", console=Console(stderr=True), default=False)):
+        raise InputError(f"nothing was written; say what is otherwise: {', '.join(options)}")

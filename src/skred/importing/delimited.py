@@ -81,9 +81,9 @@ def _decoded(source: Source, encoding: str | None, section: Section) -> tuple[st
 
 def _separator(file: str, text: str, section: Section) -> str:
     """The only separator that the first row can have."""
-    first = next((line for line in text.splitlines() if line.strip()), "")
-    outside = re.sub(r'"[^"]*"', "", first)
-    candidates = [sign for sign in SEPARATORS if sign in outside]
+    # A title above the table has none; which row is the header is asked later.
+    with_any = ([sign for sign in SEPARATORS if sign in _unquoted(line)] for line in text.splitlines())
+    candidates = next(filter(None, with_any), [])
     if len(candidates) > 1:
         fitting = [sign for sign in candidates if _fits(text, sign)]
         candidates = fitting if len(fitting) == 1 else candidates
@@ -93,6 +93,11 @@ def _separator(file: str, text: str, section: Section) -> str:
     question = f"what separates the columns is not clear from the first row (found {found})"
     option = "--separator" if section == "table" else ""
     raise Unclear([Question((section, "separator"), file, question, (), '";"', option)])
+
+
+def _unquoted(line: str) -> str:
+    """A line without its quoted parts."""
+    return re.sub(r'"[^"]*"', "", line)
 
 
 def _fits(text: str, separator: str) -> bool:

@@ -54,8 +54,11 @@ class Question:
         return f'[{".".join(table)}] {key} = "{answer}"'
 
     def __str__(self) -> str:
-        """Where, what, and how to answer, in one line."""
-        return f"{self.where}: {self.text}; add {self.option_line} (in a mapping file: {self.mapping_line})"
+        """Where and what, and below it how to answer."""
+        return (
+            f"{self.where}: {self.text}\n      add {self.option_line}\n      or, in a mapping file, "
+            f"{self.mapping_line}"
+        )
 
 
 def inline_table(meaning: str) -> str:
@@ -80,7 +83,7 @@ class Unclear(InputError):
         super().__init__(self.questions)
 
     def __str__(self) -> str:
-        """The questions, one a line."""
+        """The questions, each with its answer's form."""
         count = len(self.questions)
         head = f"{count} {'thing is' if count == 1 else 'things are'} not clear from the files:"
         return "\n  ".join([head, *map(str, self.questions)])

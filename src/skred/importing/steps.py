@@ -215,7 +215,7 @@ def _description(source: Source | None, declared: Mapping, name: str, sheets: di
     """The text of campaign.toml: as given, with what was declared otherwise."""
     own = declared.campaign.model_dump(exclude_none=True)
     if source is None:
-        files = ", ".join(dict.fromkeys(sheet.file for sheet in sheets.values()))
+        files = ", ".join(dict.fromkeys(sheets[key].file for key in sorted(sheets)))
         default = {"name": name, "description": "", "source": f"Imported from {files}.", "origin": "measured"}
         return description_text(default | own)
     try:
@@ -233,9 +233,16 @@ def _track_columns(sheet: Sheet, track: TrackRead) -> tuple[ShownColumn, ...]:
     """The track's columns as they were understood."""
     kinds = {track.x: "track: horizontal distance x", track.z: "track: elevation z"}
     kinds |= dict.fromkeys(track.ignored, "left out")
+    options = {track.x: f"--set track.x={track.x}", track.z: f"--set track.z={track.z}"}
     return tuple(
         ShownColumn(
-            sheet.file, name, kinds.get(name, f"track: {name}"), "m", filled(sheet, name), track.declared
+            sheet.file,
+            name,
+            kinds.get(name, f"track: {name}"),
+            "" if name in track.ignored else "m",
+            filled(sheet, name),
+            track.declared or name not in options,
+            options.get(name, ""),
         )
         for name in sheet.columns
     )

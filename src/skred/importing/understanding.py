@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+from skred.campaign.cells import has_unit
 from skred.campaign.problems import shown
 from skred.importing.draft import Draft, DraftTable
 from skred.importing.mapping import Column
@@ -134,7 +135,7 @@ def _in_words(name: str, column: Column) -> tuple[str, str]:
             column.unit or "m"
         )
     if column.is_ == "covariate":
-        unit = (column.name or "").rpartition("_")[2] if column.name else ""
+        unit = str(column.name).rpartition("_")[2] if has_unit(column.name or "") else "words"
         return f"covariate {column.name}", unit
     simple = {
         "event": ("the avalanche's id", ""),

@@ -134,7 +134,8 @@ def _questions(sheet: Sheet, found: Mapping[str, Meaning | None], declared: Decl
         key: tuple[str, ...], column: str, text: str, example: str, choices: tuple[str, ...] = ()
     ) -> None:
         where = f"{sheet.file}, column {shown(column)}" if column else sheet.file
-        questions.append(Question(key, where, text, choices, example))
+        option = "--runout" if key == ("runout", "place") else ""
+        questions.append(Question(key, where, text, choices, example, option))
 
     kinds = {one.column.is_ for one in found.values() if one is not None}
     for name, one in found.items():
@@ -152,7 +153,10 @@ def _questions(sheet: Sheet, found: Mapping[str, Meaning | None], declared: Decl
             if column.at is None and column.from_ is None:
                 unit = f" unit={column.unit}" if column.unit else ""
                 form = f"front_velocity at=PLACE{unit}"
-                text = "a front velocity: where is its sensor? Arc length s [m], for a span from=S to=S"
+                text = (
+                    "a front velocity: where is its sensor? Arc length s [m], for a span from=S to=S "
+                    "(or give --sensors FILE with an id for each column)"
+                )
                 ask(("columns", name), name, text, form)
             elif column.unit is None and declared.velocity.unit is None:
                 ask(("velocity", "unit"), name, "the unit of velocities", "", ("m/s", "km/h"))
