@@ -8,7 +8,7 @@ import re
 from skred.campaign.problems import shown
 from skred.campaign.tables import MOST_LINES
 from skred.importing.questions import Question, Unclear
-from skred.importing.sheet import Grid, Section
+from skred.importing.sheet import Grid, Section, in_one_line
 from skred.importing.sources import Source, refuse
 
 ENCODINGS = ("utf-8", "latin-1", "cp1252", "cp1250", "mac-roman", "cp850")
@@ -71,8 +71,9 @@ def _decoded(source: Source, encoding: str | None, section: Section) -> tuple[st
             except UnicodeDecodeError:
                 raise refuse(source.name, f"the text is not {encoding}; declare another") from None
         row = content[: error.start].count(b"\n") + 1
-        line = content.split(b"\n")[row - 1][:60].decode("latin-1")
-        text = f"byte 0x{content[error.start]:02x} is not UTF-8; in latin-1 the row reads '{shown(line)}'"
+        start = max(content.rfind(b"\n", 0, error.start) + 1, error.start - 25)
+        around = content[start : error.start + 25].splitlines()[0].decode("latin-1")
+        text = f"byte 0x{content[error.start]:02x} is not UTF-8; as latin-1 it reads '{shown(around)}'"
         where = f"{source.name}, row {row}"
         option = "--encoding" if section == "table" else ""
         question = Question((section, "encoding"), where, text, ENCODINGS[1:], "latin-1", option)
@@ -122,7 +123,7 @@ def _split(file: str, text: str, separator: str, skipped: int) -> list[tuple[int
     last = skipped
     try:
         for row in reader:
-            cells = tuple(" ".join(cell.split()) for cell in row)
+            cells = tuple(in_one_line(cell) for cell in row)
             if any(cells):
                 lines.append((last + 1, cells))
             last = reader.line_num + skipped

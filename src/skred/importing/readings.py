@@ -18,7 +18,7 @@ _BOUNDS = (
     (AT_MOST, r"<=|=<|<|≤|⩽|at most|at-most|max\.?|höchstens|maks\.?|au plus|al massimo"),
 )
 _BOUND = re.compile(
-    "|".join(f"(?P<{name}>{words})" for name, words in _BOUNDS) + r"(?=[\s\d])", re.IGNORECASE
+    f"(?:{'|'.join(f'(?P<{name}>{words})' for name, words in _BOUNDS)})" + r"(?=[\s\d])", re.IGNORECASE
 )
 _WITH_SD = re.compile(r"\s*(?:±|\+/-|\+-)\s*")
 _NUMBER_LIKE = re.compile(r"\d")

@@ -15,6 +15,11 @@ Section = Literal["table", "track"]
 _UNITS = re.compile(r"[\[(].*[\])]|m|km|m/s|km/h|m\^?[23]|m[²³]|°\s?C|degC|%|kg/m3|kg/m³|masl|m a\.?s\.?l\.?")
 
 
+def in_one_line(text: str) -> str:
+    """A cell's text without blanks around it and without line breaks in it."""
+    return re.sub(r"\s*[\r\n]+\s*", " ", text.strip())
+
+
 class NumberText(str):
     """A number that a workbook holds as a number: its text always has a decimal point."""
 

@@ -11,7 +11,7 @@ from typing import Any
 from skred.campaign.problems import CampaignError, Problem
 from skred.campaign.tables import MOST_COLUMNS, MOST_LINES, MOST_PROBLEMS
 from skred.importing.questions import Question, Unclear
-from skred.importing.sheet import Grid, NumberText, Section
+from skred.importing.sheet import Grid, NumberText, Section, in_one_line
 from skred.importing.sources import Source, refuse
 
 LARGEST_UNPACKED_BYTES = 200_000_000
@@ -162,4 +162,4 @@ def _text(cell: object) -> str:
         return cell.date().isoformat() if cell.time() == time() else cell.isoformat(sep=" ")
     if isinstance(cell, date | time):
         return cell.isoformat()
-    return " ".join(str(cell).split())
+    return in_one_line(str(cell))
