@@ -17,15 +17,13 @@ from import_cases import COLUMNS, in_dialect, options, skred, wide_file, without
 from small_campaign import TEXTS, write_texts
 
 from skred.campaign import read_campaign
+from skred.campaign.writing import write_files
 
 ANSWERS = (
-    "front_velocity at=here",
-    "front_velocity at=100 unit=m/s",
-    "0.1",
-    "1",
-    "front_velocity at=250 unit=m/s",
+    *("front_velocity at=here", "front_velocity at=100 unit=m/s", "front_velocity at=250 unit=m/s"),
+    *("0.1", "1", "10", "0", "not_reached", "missing"),
 )
-ANSWERS += ("10", "0", "missing", "not_reached", "y")
+"""In the order of the questions; the first cannot be used."""
 
 
 class Terminal:
@@ -57,7 +55,7 @@ class Terminal:
         os.write(self.end, f"{text}\n".encode())
 
     def close(self) -> int:
-        """Its exit code."""
+        """Its exit code, once it has said everything."""
         while True:
             try:
                 content = os.read(self.end, 65536)
@@ -74,7 +72,7 @@ class Terminal:
 def test_everything_is_asked_at_a_terminal(tmp_path: Path, track: Path) -> None:
     out = tmp_path / "out"
     terminal = Terminal("import", wide_file(tmp_path, without_bounds()), "--track", track, "--out", out)
-    for text in ANSWERS[:-1]:
+    for text in ANSWERS:
         terminal.wait_for("answer")
         terminal.answer(text)
     terminal.wait_for("Is this right?")
@@ -167,12 +165,25 @@ def test_what_is_there_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert code == 2 and [file.name for file in other.iterdir()] == ["thesis.doc"]
 
 
+def test_an_interruption_while_writing_leaves_nothing(tmp_path: Path) -> None:
+    def interrupted(folder: Path) -> None:
+        assert (folder / "campaign.toml").is_file()
+        raise KeyboardInterrupt
+
+    write_texts(tmp_path / "old", TEXTS)
+    for target in (tmp_path / "deep" / "new", tmp_path / "old"):
+        with pytest.raises(KeyboardInterrupt):
+            write_files({"campaign.toml": "new"}, target, force=True, check=interrupted)
+    assert [file.name for file in tmp_path.iterdir()] == ["old"]
+    assert (tmp_path / "old" / "campaign.toml").read_text() == TEXTS["campaign.toml"]
+
+
 def test_json_tells_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = in_dialect(TEXTS, tmp_path / "in")
     code, out, _ = skred(capsys, "import", folder, "--json")
     document = json.loads(out)
     assert code == 0 and document["out"] is None and document["campaign"]["events"] == 3
-    assert {"column": "value", "cells": 7}.items() <= next(
+    assert {"column": "value", "cells": 6}.items() <= next(
         column for column in document["columns"] if column["column"] == "value"
     ).items()
 

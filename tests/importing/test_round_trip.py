@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from import_cases import in_dialect
+from import_cases import TRACK, in_dialect, written
 
 from skred.campaign import Campaign, Event, Sensor, Status, Track, read_campaign, write_campaign
+from skred.errors import InputError
 from skred.importing import Files, Mapping, Unclear, import_tables, write_imported
 
 WORDS = st.text(
@@ -86,3 +87,44 @@ def answered(files: Files, answers: dict[str, str]) -> Any:
             asked = {question.key: answers[question.key[1]] for question in unclear.questions}
             declared = declared.with_values(asked)
     raise AssertionError("asked for ever")
+
+
+CELLS = st.one_of(
+    st.sampled_from(
+        ["", "-", "30,5", "30.5", "1,234", ">= 3", "5 ± 2", "n/a", "1e999", "NaN", "\u0661", "2\n3", "=1"]
+    ),
+    st.text(max_size=8),
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    rows=st.lists(st.lists(CELLS, min_size=1, max_size=4), min_size=1, max_size=5),
+    separator=st.sampled_from([";", ",", "\t"]),
+    prefix=st.sampled_from([b"", b"\xef\xbb\xbf", b"\xff\xfe", b"PK\x03\x04", b"\xe4"]),
+)
+def test_any_table_is_read_or_told(rows: list[list[str]], separator: str, prefix: bytes) -> None:
+    header = ["event", "v [m/s]", "runout", "volume"]
+    with tempfile.TemporaryDirectory() as name:
+        file, track = Path(name) / "table.csv", Path(name) / "track.csv"
+        file.write_bytes(prefix + written([header, *rows], separator).encode("utf-8", "replace"))
+        track.write_text(TRACK)
+        declared = Mapping.model_validate(
+            {
+                "columns": {
+                    "v [m/s]": {"is": "front_velocity", "at": 100, "relative_sd": 0.1, "absolute_sd": 1},
+                    "volume": {"is": "covariate", "name": "volume_m3"},
+                },
+                "velocity": {"unit": "m/s"},
+                "runout": {"place": "altitude", "absolute_sd": 10},
+                "release": {"s_m": 0},
+                "cells": {"blank": "missing", "dash": "not_reached", "words": {"n/a": "missing"}},
+            }
+        )
+        try:
+            imported = import_tables(Files([file], track=track), declared)
+        except InputError as error:
+            assert str(error).isprintable() or "\n" in str(error)
+            assert str(error)
+        else:
+            assert imported.campaign.n_events == len(imported.draft.events.rows)

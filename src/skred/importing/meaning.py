@@ -70,7 +70,7 @@ def recognised(name: str, cells: Iterable[str], sensors: Iterable[str] = ()) -> 
     speed = _VELOCITY_UNITS.get(unit.casefold())
     if speed is not None:
         return Column.model_validate({"is": "front_velocity", "sensor": base, "unit": speed})
-    place = _place(name)
+    place = place_in(name)
     if name in ("release_s_m", "release_sd_m"):
         return Column.model_validate(
             {"is": "release", "place": "s"} if name[8:] == "s_m" else {"is": "release_sd"}
@@ -88,8 +88,8 @@ def recognised(name: str, cells: Iterable[str], sensors: Iterable[str] = ()) -> 
     return _covariate(name, base, unit, cells)
 
 
-def _place(name: str) -> dict[str, str]:
-    """How a name says that its places are given."""
+def place_in(name: str) -> dict[str, str]:
+    """How a name says that its places are given, as ``{"place": ...}``; empty where it does not."""
     if _ALTITUDE.search(name) or re.search(r"[_ ]z([_ \[(]|$)", name):
         return {"place": "altitude"}
     if re.search(r"[_ ]s([_ \[(]|$)", name):

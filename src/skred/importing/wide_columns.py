@@ -9,7 +9,7 @@ from skred.campaign.problems import shown
 from skred.importing.draft import DraftTable
 from skred.importing.mapping import Column, Runout, Velocity
 from skred.importing.mapping import Mapping as Declared
-from skred.importing.meaning import base_and_unit, recognised
+from skred.importing.meaning import base_and_unit, place_in, recognised
 from skred.importing.questions import Question, Unclear
 from skred.importing.sheet import Sheet
 
@@ -96,16 +96,30 @@ def _meaning(
         return Meaning(declared.columns[name], True)
     cells = [text for _, text in sheet.cells(name)]
     by_name = recognised(name, cells, ids)
-    sensor = known.get(name) or known.get(base_and_unit(name)[0])
-    if sensor is not None:
+    sensor, is_exact = _sensor_of(name, known)
+    if sensor is not None and (by_name is None or by_name.is_ in (sensor.is_, "event")):
         # The unit and the kind of place are not in the sensors' table: they stand in the column's name.
-        extra: dict[str, Any] = {} if by_name is None or by_name.is_ != sensor.is_ else {"unit": by_name.unit}
-        if sensor.is_ == "runout" and by_name is not None and by_name.is_ == "runout":
-            extra["place"] = by_name.place
-        return Meaning(sensor.model_copy(update={k: v for k, v in extra.items() if v is not None}), True)
+        extra: dict[str, Any] = place_in(name) if sensor.is_ == "runout" else {}
+        if by_name is not None and by_name.unit is not None:
+            extra["unit"] = by_name.unit
+        return Meaning(sensor.model_copy(update=extra), is_exact)
     if by_name is None:
         return None
     return Meaning(by_name, name in ("event", "release_s_m", "release_sd_m") or by_name.name == name)
+
+
+def _sensor_of(name: str, known: Mapping[str, Column]) -> tuple[Column | None, bool]:
+    """The sensor that a column is named for, and whether it has just that name, but for a unit."""
+    for same in (name, base_and_unit(name)[0]):
+        if same in known:
+            return known[same], True
+    for sensor, column in known.items():
+        # Such as "stop altitude [m]" for a runout of the sensor "stop".
+        if column.is_ == "runout" and name.casefold().startswith(
+            (f"{sensor} ".casefold(), f"{sensor}_".casefold())
+        ):
+            return column, False
+    return None, False
 
 
 def _require_declared(sheet: Sheet, declared: Declared) -> None:
@@ -145,7 +159,7 @@ def _questions(sheet: Sheet, found: Mapping[str, Meaning | None], declared: Decl
                 ("columns", name),
                 name,
                 f"what is it? (first cell: '{shown(sample, 30)}'; one of: {FORMS})",
-                "ignore",
+                "MEANING",
             )
             continue
         column = one.column
