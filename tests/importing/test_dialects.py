@@ -138,6 +138,10 @@ def test_latin_1_is_asked_about_and_declared(
         (b"Date,v [m/s],\n1,2,3\n", "column 3 has cells (row 2) and no name"),
         (b"Date,v,w\n,[m/s],[m/s]\n1,2,3\n", "row 2: the row holds units only"),
         (b"\xff\xfe\x00\xd8", "UTF-16"),
+        (b"Date," + b"v" * 300 + b"\n1,2\n", "more than 200 characters"),
+        (b"Date,v [m/s]\n1," + b"1" * 100_000 + b"x\n", "not clear"),
+        (b"Date,v [m/s]\n1," + b"1" * 200_000 + b"\n", "cannot be read (field larger"),
+        (b"Date,v [m/s]\n1,a" + b" " * 100_000 + b"b\n", "not clear"),
     ],
 )
 def test_what_is_no_table_is_refused(

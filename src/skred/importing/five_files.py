@@ -20,7 +20,7 @@ TEXT = frozenset(("sensor", "quantity", "event", "status"))
 COLUMNS = {"sensors": SENSORS, "events": EVENTS, "recordings": RECORDINGS}
 FACTORS = {"km/h": 1 / 3.6, "km": 1000.0}
 """What turns a unit into the format's."""
-_HAS_DIGIT_ONLY = re.compile(r"[+-]?[\d.,' ]*\d[\d.,' ]*")
+_LIKE_NUMBER = re.compile(r"[+-]?[\d.,' ]+")
 
 
 def read_five_files(
@@ -131,7 +131,7 @@ def _covariates(sheet: Sheet, declared: Declared, questions: list[Question]) -> 
         meant = declared.columns.get(name)
         if meant is not None and meant.is_ in ("covariate", "ignore"):
             names[name] = "" if meant.is_ == "ignore" else meant.name or name
-        elif not has_unit(name) and any(_HAS_DIGIT_ONLY.fullmatch(text) for _, text in sheet.cells(name)):
+        elif not has_unit(name) and any(_LIKE_NUMBER.fullmatch(text) for _, text in sheet.cells(name)):
             text = "a covariate with numbers and without a unit: what is its unit? (_1 for a pure number)"
             where = f"{sheet.file}, column {name}"
             example = f"covariate name={re.sub(r'\W+', '_', name)}_UNIT"

@@ -109,7 +109,7 @@ _KEYS: dict[str, frozenset[str]] = {
     "release": frozenset({"place"}),
     "release_sd": frozenset(),
     "front_velocity": frozenset(
-        {"sensor", "at", "from_", "to", "place", "unit", "relative_sd", "absolute_sd"}
+        {"sensor", "at", "from_", "to", "place", "place_sd_m", "unit", "relative_sd", "absolute_sd"}
     ),
     "runout": frozenset({"sensor", "place", "unit", "relative_sd", "absolute_sd"}),
     "sd": frozenset({"of"}),
@@ -130,6 +130,8 @@ class Column(_Part):
     at, from_, to : float or None
         Place of a point sensor, or of the two ends of a span, as `place` says, m.
     place : {"s", "x", "altitude", "reference"} or None
+    place_sd_m : float or None
+        How well the place is known, along the track, m.
     unit : {"m/s", "km/h", "m", "km"} or None
     relative_sd, absolute_sd : float or None
         Of a reading: a share of its value, and m/s or m along the track.
@@ -145,6 +147,7 @@ class Column(_Part):
     from_: Annotated[Finite | None, Field(alias="from")] = None
     to: Finite | None = None
     place: Place | None = None
+    place_sd_m: NotNegative | None = None
     unit: Literal["m/s", "km/h", "m", "km"] | None = None
     relative_sd: NotNegative | None = None
     absolute_sd: NotNegative | None = None

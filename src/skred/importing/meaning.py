@@ -34,7 +34,6 @@ _RUNOUT = re.compile(r"run-?\s?out|auslauf|stopp?(ed)?( at)?|utløp|arr[eê]t", 
 _RELEASE = re.compile(r"release|anriss|start(ing)?( point)?|d[eé]part|utløsning", re.IGNORECASE)
 _ALTITUDE = re.compile(r"altitude|elevation|height|m ?a\.? ?s\.? ?l\.?|masl|höhe|h\.? ?ü\.? ?m\.?|moh", re.I)
 _SD = re.compile(r"(?:sd|σ|std|sigma)[\s_]+(?P<a>.+)|(?P<b>.+?)[\s_]+(?:sd|σ|std|sigma)", re.IGNORECASE)
-_NUMBER = re.compile(r"[^A-Za-z]*\d[\d.,' ]*")
 
 
 def base_and_unit(name: str) -> tuple[str, str]:
@@ -106,9 +105,14 @@ def _covariate(name: str, base: str, unit: str, cells: Iterable[str]) -> Column 
     known = _COVARIATE_UNITS.get(unit.casefold())
     if known is not None:
         return Column(is_="covariate", name=f"{_plain(base)}_{known}")
-    if unit == "" and not any(_NUMBER.fullmatch(cell) for cell in cells) and not has_unit(_plain(name)):
+    if unit == "" and not any(map(_is_like_a_number, cells)) and not has_unit(_plain(name)):
         return Column(is_="covariate", name=_plain(name))
     return None
+
+
+def _is_like_a_number(text: str) -> bool:
+    """Whether a cell holds digits and no letters."""
+    return any(one.isdigit() for one in text) and not any(one.isalpha() for one in text)
 
 
 def _plain(name: str) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
+from skred.campaign.cells import LONGEST_WORD
 from skred.campaign.problems import CampaignError, Problem
 from skred.campaign.tables import MOST_COLUMNS, MOST_ROWS
 from skred.importing.questions import Question, Unclear
@@ -17,7 +18,7 @@ _UNITS = re.compile(r"[\[(].*[\])]|m|km|m/s|km/h|m\^?[23]|m[²³]|°\s?C|degC|%|
 
 def in_one_line(text: str) -> str:
     """A cell's text without blanks around it and without line breaks in it."""
-    return re.sub(r"\s*[\r\n]+\s*", " ", text.strip())
+    return " ".join(part.strip() for part in text.strip().splitlines() if part.strip())
 
 
 class NumberText(str):
@@ -172,6 +173,8 @@ def _name_problems(
             )
         elif name in header[:k]:
             message = f"the name also stands in column {header.index(name) + 1}; give each column its own"
+        elif len(name) > LONGEST_WORD:
+            message = f"the name has more than {LONGEST_WORD} characters; shorten it"
         else:
             continue
         problems.append(Problem(file, line, name or f"number {k + 1}", None, message))

@@ -79,7 +79,7 @@ def _of_sensors(sensors: DraftTable | None) -> dict[str, Column]:
         if kind not in ("front_velocity", "runout"):
             continue
         content: dict[str, Any] = {"is": kind, "sensor": name}
-        content |= {key: row[key] for key in ("relative_sd", "absolute_sd") if row.get(key)}
+        content |= {key: row[key] for key in ("relative_sd", "absolute_sd", "place_sd_m") if row.get(key)}
         start, end = row.get("s_from_m", ""), row.get("s_to_m", "")
         if kind == "front_velocity" and start and end:
             content |= {"at": start} if float(start) == float(end) else {"from": start, "to": end}

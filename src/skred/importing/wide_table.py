@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from skred.campaign import CampaignError, Problem
 from skred.campaign.cells import CellError, has_unit, number
 from skred.campaign.problems import shown
+from skred.campaign.tables import MOST_ROWS
 from skred.importing.draft import DraftTable, Where
 from skred.importing.five_files import FACTORS
 from skred.importing.mapping import Column
@@ -15,9 +16,10 @@ from skred.importing.places import Places
 from skred.importing.questions import Question, Unclear
 from skred.importing.readings import DASHES, MISSING, OBSERVED, number_of, silence
 from skred.importing.sheet import Sheet
+from skred.importing.sources import refuse
 from skred.importing.wide_columns import Meaning, sensor_id
 
-SENSORS = ("sensor", "quantity", "s_from_m", "s_to_m", "relative_sd", "absolute_sd")
+SENSORS = ("sensor", "quantity", "s_from_m", "s_to_m", "relative_sd", "absolute_sd", "place_sd_m")
 RECORDINGS = ("event", "sensor", "value", "sd", "status")
 NUMERIC = ("release", "release_sd", "front_velocity", "runout", "sd")
 
@@ -83,6 +85,9 @@ def read_wide_table(
     Unclear
         With every word and blank whose meaning is open.
     """
+    readings = sum(one.column.is_ in ("front_velocity", "runout") for one in meanings.values())
+    if readings * len(sheet.lines) > MOST_ROWS:
+        raise refuse(sheet.file, f"more than {MOST_ROWS} readings; split the table")
     numeric = [name for name, one in meanings.items() if _holds_numbers(one.column)]
     cells = ((line, name, text) for name in numeric for line, text in sheet.cells(name))
     writing = (declared.table.decimal, declared.table.thousands)
@@ -104,6 +109,7 @@ def _sensors(wide: _Wide) -> DraftTable:
     for name, column in wide.of_kind("front_velocity", "runout").items():
         row = {"sensor": sensor_id(name, column), "quantity": column.is_}
         row |= {"relative_sd": repr(column.relative_sd), "absolute_sd": repr(column.absolute_sd)}
+        row["place_sd_m"] = "" if column.place_sd_m is None else repr(column.place_sd_m)
         if column.is_ == "front_velocity":
             ends = (column.at, column.at) if column.at is not None else (column.from_, column.to)
             for key, end in zip(("s_from_m", "s_to_m"), ends, strict=True):
@@ -113,7 +119,8 @@ def _sensors(wide: _Wide) -> DraftTable:
                     wide.fail(wide.sheet.header_line, name, repr(end), error)
         where = Where(wide.sheet.file, wide.sheet.header_line, dict.fromkeys(SENSORS, name))
         rows.append((where, row))
-    return DraftTable(SENSORS, tuple(rows))
+    used = SENSORS if any(row["place_sd_m"] for _, row in rows) else SENSORS[:-1]
+    return DraftTable(used, tuple(rows))
 
 
 def _events(wide: _Wide) -> DraftTable:

@@ -14,8 +14,8 @@ from skred.importing.questions import Question, Unclear
 from skred.importing.sheet import Grid, NumberText, Section, in_one_line
 from skred.importing.sources import Source, refuse
 
-LARGEST_UNPACKED_BYTES = 200_000_000
-"""Ten times the largest file: tables of text shrink so much when packed, bombs far more."""
+LARGEST_UNPACKED_BYTES = 100_000_000
+"""Five times the largest file: tables of text shrink so much when packed, bombs far more."""
 MOST_PARTS = 1000
 MOST_CELLS = 5_000_000
 
@@ -123,7 +123,11 @@ def _cells(source: Source, name: str, *, values: bool) -> Iterator[tuple[int, tu
                 row = row[:-1]
             count += len(row)
             if line > MOST_LINES or count > MOST_CELLS or len(row) > 10 * MOST_COLUMNS:
-                raise refuse(source.name, "the sheet has more rows, columns or cells than are read; split it")
+                raise refuse(
+                    source.name,
+                    "the sheet has more rows, columns or cells than are read; delete empty rows "
+                    "at its end, or split it",
+                )
             yield line, row
     except CampaignError:
         raise
