@@ -152,10 +152,10 @@ def test_covariates_without_a_unit_are_asked_about_once(
     ("change", "told"),
     [
         ({(1, 1): "ca. 30"}, "row 2, column v upper [m/s]: found 'ca. 30'"),
-        ({(1, 3): "900"}, "row 2, column Runout s [m]: found '900.0': expected an arc length on the track"),
+        ({(1, 3): "900"}, "row 2, column Runout s [m]: found '900': expected an arc length on the track"),
         ({(2, 0): "1999-02-03"}, "row 3, column Date: found '1999-02-03': the id already stands in row 2"),
         ({(2, 0): ""}, "row 3, column Date: found '': the cell is empty"),
-        ({(1, 1): "-30"}, "row 2, column v upper [m/s]: found '-30.0': a front velocity is not negative"),
+        ({(1, 1): "-30"}, "row 2, column v upper [m/s]: found '-30': a front velocity is not negative"),
         ({(0, 5): "Date"}, "column Date: the name also stands in column 1"),
         ({(1, 1): "30±2±3"}, "row 2, column v upper [m/s]: found '30±2±3'"),
         ({(1, 4): "many"}, "row 2, column Volume [m3]: found 'many'"),

@@ -11,17 +11,30 @@ from pathlib import Path
 
 from skred.campaign import Campaign, CampaignError, Problem, Status, read_campaign
 from skred.importing.readings import OBSERVED, STATUSES
+from skred.importing.sheet import Sheet
 
 _ROW = re.compile(r"\brow (\d+)")
 
 
 @dataclass(frozen=True)
 class Where:
-    """Where a row of a draft came from: file, row, and for each column the one that it was taken from."""
+    """Where a row of a draft came from.
+
+    Attributes
+    ----------
+    file : str
+    line : int
+        Row in the file.
+    columns : mapping
+        For each column of the draft, the one that it was taken from.
+    texts : mapping
+        The row's cells as they stand in the file, by its columns.
+    """
 
     file: str
     line: int
     columns: Mapping[str, str] = field(default_factory=dict)
+    texts: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -118,11 +131,12 @@ class Draft:
         first = table.rows[0][0] if table.rows else None
         if where is None:
             return problem if first is None else replace(problem, file=first.file)
-        column = problem.column
+        column, found = problem.column, problem.found
         if column is not None:
             column = where.columns.get(column, column)
+            found = where.texts.get(column, found) if found is not None else None
         message = _ROW.sub(other_row, problem.message)
-        return Problem(where.file, where.line, column, problem.found, message)
+        return Problem(where.file, where.line, column, found, message)
 
 
 def description_text(values: Mapping[str, str | float | None]) -> str:
@@ -136,7 +150,8 @@ def description_text(values: Mapping[str, str | float | None]) -> str:
 
 
 def with_where(
-    file: str, rows: Sequence[tuple[int, dict[str, str]]], columns: Mapping[str, str]
+    sheet: Sheet, rows: Sequence[tuple[int, dict[str, str]]], columns: Mapping[str, str]
 ) -> tuple[tuple[Where, dict[str, str]], ...]:
-    """Rows with the file and row that they came from."""
-    return tuple((Where(file, line, columns), cells) for line, cells in rows)
+    """Rows, one for each of a sheet's, with where they came from."""
+    pairs = zip(rows, sheet.rows(), strict=True)
+    return tuple((Where(sheet.file, line, columns, texts), cells) for (line, cells), (_, texts) in pairs)

@@ -67,7 +67,7 @@ def read_five_files(
             problems += error.problems
             continue
         rows = rows_with_points(sheet, written, numeric, notations[table], problems)
-        tables[table] = DraftTable(tuple(written), with_where(sheet.file, rows, written))
+        tables[table] = DraftTable(tuple(written), with_where(sheet, rows, written))
     if problems:
         raise CampaignError(problems)
     if questions:

@@ -263,7 +263,7 @@ def _sensor_table(sheet: Sheet) -> DraftTable:
     rows = rows_with_points(sheet, names, numeric, notation, problems)
     if problems:
         raise CampaignError(problems)
-    return DraftTable(sheet.columns, with_where(sheet.file, rows, names))
+    return DraftTable(sheet.columns, with_where(sheet, rows, names))
 
 
 def _wide(

@@ -71,7 +71,7 @@ def read_track_table(sheet: Sheet, writing: TrackWriting) -> TrackRead:
                 read[names.get(name, name)] = notation.with_point(row[name])
             except CellError as error:
                 problems.append(Problem(sheet.file, line, name, row[name], str(error)))
-        rows.append((Where(sheet.file, line, sources), read))
+        rows.append((Where(sheet.file, line, sources, row), read))
     if problems:
         raise CampaignError(problems)
     table = DraftTable(tuple(sources), tuple(rows))

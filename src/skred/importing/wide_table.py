@@ -141,7 +141,7 @@ def _events(wide: _Wide) -> DraftTable:
             row |= _release(wide, line, cells, name, column, release_sd)
         for name, new in covariates.items():
             row[new] = _covariate(wide, line, name, cells[name], has_unit(new))
-        rows.append((Where(wide.sheet.file, line, sources), row))
+        rows.append((Where(wide.sheet.file, line, sources, cells), row))
     return DraftTable(columns, tuple(rows))
 
 
@@ -197,7 +197,7 @@ def _recordings(wide: _Wide) -> DraftTable:
             sources = {"event": event, "sensor": name, "value": name, "sd": sd_name or name, "status": name}
             row = {"event": cells[event], "sensor": sensor}
             row |= _reading(wide, line, (name, cells[name]), column, (sd_name or name, sd_text))
-            rows.append((Where(wide.sheet.file, line, sources), row))
+            rows.append((Where(wide.sheet.file, line, sources, cells), row))
     used = tuple(key for key in RECORDINGS if key != "sd" or any(row.get("sd") for _, row in rows))
     return DraftTable(used, tuple(rows))
 
