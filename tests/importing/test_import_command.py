@@ -54,17 +54,28 @@ class Terminal:
     def answer(self, text: str) -> None:
         os.write(self.end, f"{text}\n".encode())
 
-    def close(self) -> int:
-        """Its exit code, once it has said everything."""
-        while True:
-            try:
-                content = os.read(self.end, 65536)
-            except OSError:
-                break
-            if not content:
-                break
-            self.said += content.decode(errors="replace")
-        code = self.process.wait(60)
+    def close(self, seconds: float = 60, sending: signal.Signals | None = None) -> int:
+        """Its exit code, once it has said everything; a signal is repeated, as a person repeats it.
+
+        One that comes between a prompt and the reading of its answer is seen only after that reading.
+        """
+        until = time.monotonic() + seconds
+        again = time.monotonic()
+        while time.monotonic() < until:
+            if sending is not None and time.monotonic() >= again and self.process.poll() is None:
+                self.process.send_signal(sending)
+                again += 5
+            if select.select([self.end], [], [], 0.5)[0]:
+                try:
+                    content = os.read(self.end, 65536)
+                except OSError:
+                    break
+                if not content:
+                    break
+                self.said += content.decode(errors="replace")
+        if time.monotonic() >= until:
+            self.process.kill()
+        code = self.process.wait(seconds)
         os.close(self.end)
         return code
 
@@ -92,11 +103,11 @@ def test_without_a_yes_nothing_is_written(how: str, tmp_path: Path, track: Path)
     rest = [one for one in options() if one not in ("--yes", "--quiet")]
     terminal = Terminal("import", file, "--track", track, *rest, "--out", tmp_path / "deep" / "out")
     terminal.wait_for("Is this right?")
-    if how == "ctrl-c":
-        terminal.process.send_signal(signal.SIGINT)
-    else:
+    if how != "ctrl-c":
         terminal.answer("n" if how == "no" else "\x04")
-    assert terminal.close() == (130 if how == "ctrl-c" else 2), terminal.said
+    assert terminal.close(sending=signal.SIGINT if how == "ctrl-c" else None) == (
+        130 if how == "ctrl-c" else 2
+    ), terminal.said
     assert "Traceback" not in terminal.said
     assert sorted(tmp_path.iterdir()) == sorted([*before, file])
 
