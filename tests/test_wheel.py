@@ -53,6 +53,11 @@ def test_templates_travel_along(installed: Path) -> None:
     assert list((installed / "skred" / "report" / "templates").glob("*.jinja"))
 
 
+def test_the_example_of_init_travels_along(installed: Path, tmp_path: Path) -> None:
+    run(installed, "-m", "skred.cli", "init", str(tmp_path / "new"))
+    assert "no problems" in run(installed, "-m", "skred.cli", "validate", str(tmp_path / "new"))
+
+
 def test_laws_are_registered(installed: Path) -> None:
     code = "from skred.physics.laws import *; print(*[load_law(law).id for law in law_ids()])"
     assert run(installed, "-c", code).split() == ["constant", "coulomb", "pcm", "voellmy"]

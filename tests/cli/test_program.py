@@ -13,7 +13,9 @@ import pytest
 
 LAWS = ("coulomb", "pcm", "constant", "voellmy")
 COMMANDS = [["-m", f"models.{law}"] for law in LAWS]
-COMMANDS += [["-m", "skred.cli", *command] for command in ([], ["validate"], ["compare"], ["diagnose"])]
+COMMANDS += [
+    ["-m", "skred.cli", *command] for command in ([], ["validate"], ["compare"], ["diagnose"], ["import"])
+]
 HELP_SECONDS = 3.0
 """The bar is 1 s on a quiet machine (measured: 0.40 to 0.68 s); this leaves room for a busy one."""
 

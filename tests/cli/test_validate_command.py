@@ -74,7 +74,10 @@ def test_bad_use_ends_with_2(arguments):
     assert done.stderr
 
 
-@pytest.mark.parametrize("arguments", [("--help",), ("validate", "--help"), ("--version",), ()])
+@pytest.mark.parametrize(
+    "arguments",
+    [("--help",), ("validate", "--help"), ("import", "--help"), ("init", "--help"), ("--version",), ()],
+)
 def test_help_needs_no_heavy_imports(arguments):
     code = (
         "import sys; from skred.cli.main import run; code = run(sys.argv[1:]); "

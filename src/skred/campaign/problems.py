@@ -70,7 +70,7 @@ class Problem:
         if self.row is not None:
             place.append(f"row {self.row}")
         if self.column is not None:
-            place.append(f"column {self.column}" if self.file.endswith(".csv") else f"key {self.column}")
+            place.append(f"key {self.column}" if self.file.endswith(".toml") else f"column {self.column}")
         found = "" if self.found is None else f"found '{self.found}': "
         return f"{', '.join(place)}: {found}{self.message}"
 

@@ -6,7 +6,8 @@ import json
 import math
 import shutil
 import uuid
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -40,30 +41,80 @@ def write_campaign(campaign: Campaign, folder: Path, *, force: bool = False) -> 
     CampaignError
         Where the campaign breaks a rule of the format or the folder is in use.
     """
-    target = Path(folder).resolve()
-    _require_free(target, force)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    temporary = target.parent / f".{target.name[:100]}.{uuid.uuid4().hex}"
-    temporary.mkdir()
-    try:
-        for file, text in zip(_FILES, _texts(campaign), strict=True):
-            (temporary / file).write_bytes(text.encode("utf-8", "backslashreplace"))
+
+    def check(temporary: Path) -> None:
         if read_campaign(temporary).fingerprint() != campaign.fingerprint():
             message = "the campaign would not be read back as it is; remove blanks around texts"
             raise CampaignError([Problem(str(folder), None, None, None, message)])
+
+    write_files(dict(zip(_FILES, _texts(campaign), strict=True)), folder, force=force, check=check)
+
+
+def write_files(
+    texts: Mapping[str, str],
+    folder: Path,
+    *,
+    force: bool = False,
+    check: Callable[[Path], None] | None = None,
+) -> None:
+    """Write the texts of a campaign's files, and of files beside them, all at once.
+
+    Parameters
+    ----------
+    texts : mapping
+        From names of files to texts; `write_campaign` makes those of a campaign.
+    folder : Path
+        Where to; must not exist, or be empty.
+    force : bool
+        Replace the campaign that the folder holds. Other files in it are kept.
+    check : callable, optional
+        Looks at the folder with the files before it is moved into place; what it raises leaves all as it was.
+
+    Raises
+    ------
+    CampaignError
+        Where the folder is in use.
+    """
+    target = Path(folder).resolve()
+    require_free(target, force)
+    made = [parent for parent in target.parents if not parent.exists()]
+    temporary = target.parent / f".{target.name[:100]}.{uuid.uuid4().hex}"
+    try:
+        temporary.mkdir(parents=True)
+        for file, text in texts.items():
+            (temporary / file).write_bytes(text.encode("utf-8", "backslashreplace"))
+        if check is not None:
+            check(temporary)
         _move_into_place(temporary, target)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+        if not target.exists():
+            with suppress(OSError):  # of these, those that are empty
+                for parent in made:
+                    parent.rmdir()
 
 
-def _require_free(target: Path, force: bool) -> None:
-    """Refuse to write over what is there, unless it is a campaign and that is wanted."""
+def require_free(target: Path, force: bool) -> None:
+    """Refuse to write over what is there, unless it is a campaign and that is wanted.
+
+    Parameters
+    ----------
+    target : Path
+        Where a campaign is to go.
+    force : bool
+        Whether it may replace another.
+
+    Raises
+    ------
+    CampaignError
+        Where it must not.
+    """
     if not target.exists() or (target.is_dir() and not any(target.iterdir())):
         return
     if not (target / "campaign.toml").is_file():
         message = "something other than a campaign is there; choose another folder"
     elif not force:
-        message = "a campaign is there already; choose another folder, or replace it with force"
+        message = "a campaign is there already; choose another folder, or replace it with --force"
     else:
         return
     raise CampaignError([Problem(str(target), None, None, None, message)])
@@ -75,7 +126,7 @@ def _move_into_place(temporary: Path, target: Path) -> None:
         temporary.rename(target)
         return
     for entry in target.iterdir():
-        if entry.name not in _FILES:
+        if entry.name not in _FILES and not (temporary / entry.name).exists():
             _copy(entry, temporary / entry.name)
     replaced = temporary.with_name(temporary.name + ".old")
     target.rename(replaced)

@@ -10,6 +10,8 @@ from skred.cli.calibrate import calibrate
 from skred.cli.compare import compare
 from skred.cli.diagnose import diagnose
 from skred.cli.identify import identify
+from skred.cli.import_tables import import_
+from skred.cli.init import init
 from skred.cli.mechanisms import mechanisms
 from skred.cli.predict import predict
 from skred.cli.program import new_program, run_program
@@ -21,6 +23,8 @@ from skred.cli.validate import validate
 app = new_program(
     "skred", "Calibrate avalanche models against recordings, and find the physics that they miss."
 )
+app.command(init)
+app.command(import_, name="import")
 app.command(validate)
 app.command(calibrate)
 app.command(compare)

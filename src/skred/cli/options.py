@@ -122,6 +122,14 @@ Force = Annotated[
         "The earlier results stay until the run is done.",
     ),
 ]
+ReplaceCampaign = Annotated[
+    bool,
+    Parameter(
+        name="--force",
+        negative="",
+        help="Replace the campaign that the folder holds; other files in it are kept.",
+    ),
+]
 Quiet = Annotated[bool, Parameter(name="--quiet", negative="", help="Write nothing but errors.")]
 Json = Annotated[bool, Parameter(name="--json", negative="", help="Write the result as JSON to stdout.")]
 

@@ -1,0 +1,120 @@
+"""What the name of a column says. Only what can hardly be meant otherwise; the rest is asked about."""
+
+import re
+from collections.abc import Iterable
+
+from skred.campaign.cells import has_unit
+from skred.importing.mapping import Column
+
+_BRACKETS = re.compile(r"(.*?)[\s_]*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*")
+_TRAILING = re.compile(r"(.+?)[\s_]+(m/s|km/h|kmh|m s-1|km h-1)", re.IGNORECASE)
+_VELOCITY_UNITS = {
+    "m/s": "m/s", "m s-1": "m/s", "m s^-1": "m/s", "ms-1": "m/s", "m s⁻¹": "m/s",
+    "km/h": "km/h", "kmh": "km/h", "kph": "km/h", "km h-1": "km/h", "km/t": "km/h", "km h⁻¹": "km/h",
+}  # fmt: skip
+_COVARIATE_UNITS = {
+    "m3": "m3", "m³": "m3", "m^3": "m3", "m2": "m2", "m²": "m2", "m": "m", "km": "km", "cm": "cm", "mm": "mm",
+    "°c": "degC", "degc": "degC", "° c": "degC", "c": "degC", "%": "percent", "kg/m3": "kg_m3",
+    "kg/m³": "kg_m3", "kg m-3": "kg_m3", "kpa": "kPa", "pa": "Pa", "°": "deg", "h": "h", "s": "s",
+    "kg": "kg",
+}  # fmt: skip
+_EVENT = (
+    "event",
+    "avalanche",
+    "avalanche id",
+    "event id",
+    "id",
+    "date",
+    "lawine",
+    "ereignis",
+    "datum",
+    "dato",
+)
+_RUNOUT = re.compile(r"run-?\s?out|auslauf|stopp?(ed)?( at)?|utløp|arr[eê]t", re.IGNORECASE)
+_RELEASE = re.compile(r"release|anriss|start(ing)?( point)?|d[eé]part|utløsning", re.IGNORECASE)
+_ALTITUDE = re.compile(r"altitude|elevation|height|m ?a\.? ?s\.? ?l\.?|masl|höhe|h\.? ?ü\.? ?m\.?|moh", re.I)
+_SD = re.compile(r"(?:sd|σ|std|sigma)[\s_]+(?P<a>.+)|(?P<b>.+?)[\s_]+(?:sd|σ|std|sigma)", re.IGNORECASE)
+
+
+def base_and_unit(name: str) -> tuple[str, str]:
+    """A column's name without its unit, and the unit as it stands there; empty where there is none."""
+    for pattern in (_BRACKETS, _TRAILING):
+        found = pattern.fullmatch(name)
+        if found is not None and found.group(1):
+            return found.group(1).strip(), found.group(2)
+    return name, ""
+
+
+def recognised(name: str, cells: Iterable[str], sensors: Iterable[str] = ()) -> Column | None:
+    """What a column probably is, by its name; None where that is not clear.
+
+    Parameters
+    ----------
+    name : str
+    cells : iterable of str
+        Only used to tell a covariate of words from one of numbers.
+    sensors : iterable of str
+        Ids that a column of standard deviations may name.
+    """
+    base, unit = base_and_unit(name)
+    word = base.casefold().replace("_", " ")
+    if word in _EVENT:
+        return Column(is_="event")
+    for_sensor = _SD.fullmatch(base)
+    if for_sensor is not None:
+        of = for_sensor.group("a") or for_sensor.group("b")
+        known = {sensor.casefold(): sensor for sensor in sensors}
+        if of.casefold() in known:
+            return Column(is_="sd", of=known[of.casefold()])
+    speed = _VELOCITY_UNITS.get(unit.casefold())
+    if speed is not None:
+        return Column.model_validate({"is": "front_velocity", "sensor": base, "unit": speed})
+    place = place_in(name)
+    if name in ("release_s_m", "release_sd_m"):
+        return Column.model_validate(
+            {"is": "release", "place": "s"} if name[8:] == "s_m" else {"is": "release_sd"}
+        )
+    if (
+        _RELEASE.match(word)
+        and not has_unit(name.removesuffix("_m"))
+        and unit.casefold() in ("", "m", "m a.s.l.")
+    ):
+        if re.fullmatch(rf"({_RELEASE.pattern})([ _](s|x|z|m|altitude|elevation|höhe))*", word, re.I):
+            return Column.model_validate({"is": "release"} | place)
+    if _RUNOUT.match(word):
+        kilometres = {"unit": "km"} if unit.casefold() == "km" else {}
+        return Column.model_validate({"is": "runout", "sensor": "runout"} | place | kilometres)
+    return _covariate(name, base, unit, cells)
+
+
+def place_in(name: str) -> dict[str, str]:
+    """How a name says that its places are given, as ``{"place": ...}``; empty where it does not."""
+    if _ALTITUDE.search(name) or re.search(r"[_ ]z([_ \[(]|$)", name):
+        return {"place": "altitude"}
+    if re.search(r"[_ ]s([_ \[(]|$)", name):
+        return {"place": "s"}
+    if re.search(r"[_ ]x([_ \[(]|$)|horizontal", name):
+        return {"place": "x"}
+    return {}
+
+
+def _covariate(name: str, base: str, unit: str, cells: Iterable[str]) -> Column | None:
+    """A property of the avalanche, where its name has a unit or its cells are words."""
+    if has_unit(name):
+        return Column(is_="covariate", name=name)
+    known = _COVARIATE_UNITS.get(unit.casefold())
+    if known is not None:
+        return Column(is_="covariate", name=f"{_plain(base)}_{known}")
+    if unit == "" and not any(map(_is_like_a_number, cells)) and not has_unit(_plain(name)):
+        return Column(is_="covariate", name=_plain(name))
+    return None
+
+
+def _is_like_a_number(text: str) -> bool:
+    """Whether a cell holds digits and no letters."""
+    return any(one.isdigit() for one in text) and not any(one.isalpha() for one in text)
+
+
+def _plain(name: str) -> str:
+    """A name as the format's columns have theirs: small letters and underscores."""
+    return re.sub(r"\W+", "_", name.strip().lower()).strip("_") or "covariate"

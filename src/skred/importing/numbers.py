@@ -1,0 +1,139 @@
+"""Numbers as people write them: which sign is the decimal sign, and a number's text with a point."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from skred.campaign.cells import CellError, number
+from skred.campaign.problems import CampaignError, Problem
+from skred.importing.questions import Question, Unclear
+from skred.importing.sheet import NumberText, Section
+
+THOUSANDS = (".", ",", "'", " ")
+_WITH_SIGN = re.compile(r"(?<![\d.,])\d*([.,])\d+(?![\d.,])")
+_LIKE_THOUSANDS = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
+_BOTH = {sign: re.compile(rf"\d{{1,3}}(?:[{other}]\d{{3}})+[{sign}]\d+") for sign, other in (".,", ",.")}
+_TYPOGRAPHIC = str.maketrans({"\u2212": "-", "\u00a0": " ", "\u202f": " ", "\u2019": "'"})
+
+
+@dataclass(frozen=True)
+class Notation:
+    """How numbers are written: the decimal sign, and what stands between thousands (empty for nothing)."""
+
+    decimal: str = "."
+    thousands: str = ""
+
+    def __str__(self) -> str:
+        """In words."""
+        return "decimal comma" if self.decimal == "," else "decimal point"
+
+    def with_point(self, text: str) -> str:
+        """A number's text with a decimal point and nothing between thousands.
+
+        Raises
+        ------
+        CellError
+            If it is not a number in this notation; the message says what to declare.
+        """
+        if isinstance(text, NumberText):
+            number(text)
+            return str(text)
+        plain = text.translate(_TYPOGRAPHIC)
+        if self.thousands:
+            plain = self._without_thousands(plain)
+        elif re.search(r"\d[' ]\d{3}", plain):
+            raise CellError("expected a number without signs between thousands; or declare table.thousands")
+        other = "." if self.decimal == "," else ","
+        if other in plain and re.search(r"\d", plain):
+            sign, words = ("point", "commas") if other == "." else ("comma", "points")
+            raise CellError(
+                f"a {sign} in a table with decimal {words}; write all numbers one way, or declare "
+                f'--set table.thousands="{other}" if it stands between thousands'
+            )
+        plain = plain.replace(self.decimal, ".")
+        number(plain)
+        return plain
+
+    def _without_thousands(self, text: str) -> str:
+        """Take the signs between thousands out; elsewhere they are refused."""
+        whole, sign, rest = text.partition(self.decimal)
+        groups = whole.split(self.thousands)
+        if len(groups) > 1 and not (
+            re.fullmatch(r"[+-]?\d{1,3}", groups[0])
+            and all(re.fullmatch(r"\d{3}", one) for one in groups[1:])
+        ):
+            raise CellError("signs between thousands are not after every third digit; correct the number")
+        return "".join(groups) + sign + rest
+
+
+def notation_of(
+    cells: Iterable[tuple[int, str, str]],
+    file: str,
+    separator: str | None,
+    declared: tuple[str | None, str | None],
+    section: Section,
+) -> Notation:
+    """Find the decimal sign of a table from the cells that are to hold numbers.
+
+    Parameters
+    ----------
+    cells : iterable of (int, str, str)
+        Row, column, text.
+    file : str
+    separator : str or None
+        Between cells; None for a workbook.
+    declared : (str or None, str or None)
+        Decimal sign and sign between thousands, where they were declared.
+    section : {"table", "track"}
+        Of the mapping file, for questions.
+
+    Raises
+    ------
+    CampaignError
+        If points and commas are mixed; names row and column of both.
+    Unclear
+        If every sign found could stand between thousands.
+    """
+    decimal, thousands = declared
+    if decimal is not None:
+        return Notation(decimal, thousands or "")
+    first = dict[str, tuple[int, str, str]]()
+    sure = set[str]()
+    for line, column, text in cells:
+        if isinstance(text, NumberText):
+            continue
+        found = [(match.group(1), match.group()) for match in _WITH_SIGN.finditer(text)]
+        found += [(sign, "") for sign, pattern in _BOTH.items() if pattern.search(text)]
+        for sign, digits in found:
+            if sign == thousands:
+                continue
+            first.setdefault(sign, (line, column, text))
+            if not _LIKE_THOUSANDS.fullmatch(digits):
+                sure.add(sign)
+    if len(first) == 2:
+        raise CampaignError(_mixed(file, first))
+    if not first:
+        return Notation("," if thousands == "." else ".", thousands or "")
+    (sign, (line, column, text)) = next(iter(first.items()))
+    if sign in sure or (sign == "." and separator == ","):
+        return Notation(sign, thousands or "")
+    where = f"{file}, row {line}, column {column}"
+    doubt = (
+        f"'{text}' can be a decimal number or thousands, and no other number tells which: the decimal sign is"
+    )
+    option = "--decimal" if section == "table" else ""
+    raise Unclear([Question((section, "decimal"), where, doubt, (".", ","), f'"{sign}"', option)])
+
+
+def _mixed(file: str, first: dict[str, tuple[int, str, str]]) -> list[Problem]:
+    """Both decimal signs in one table: where each is."""
+    problems = []
+    for sign, other in ((",", "."), (".", ",")):
+        line, column, text = first[sign]
+        word, elsewhere = ("comma", "points") if sign == "," else ("point", "commas")
+        message = (
+            f"a decimal {word} here, decimal {elsewhere} elsewhere (row {first[other][0]}); write all "
+            f'numbers one way, or declare --set table.thousands="{sign}" if it stands between thousands'
+        )
+        problems.append(Problem(file, line, column, text, message))
+    return problems

@@ -1,0 +1,349 @@
+"""An import from files to a checked draft, and its writing; nothing is asked, nothing printed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+
+from skred.campaign import Campaign, CampaignError, Problem
+from skred.campaign.writing import write_files
+from skred.importing.delimited import read_delimited
+from skred.importing.draft import Draft, DraftTable, description_text, with_where
+from skred.importing.five_files import COLUMNS, read_five_files, rows_with_points
+from skred.importing.mapping import FILE, Column, Mapping, split_column
+from skred.importing.mapping_text import mapping_text
+from skred.importing.numbers import Notation, notation_of
+from skred.importing.places import Places
+from skred.importing.sheet import Grid, Section, Sheet, sheet_of
+from skred.importing.sources import CAMPAIGN, TABLES, Source, Sources, open_source, refuse, sort_out
+from skred.importing.track_table import TrackRead, read_track_table
+from skred.importing.understanding import (
+    ShownColumn,
+    Understanding,
+    filled,
+    how_written,
+    preview_of,
+    wide_columns_shown,
+)
+from skred.importing.wide_columns import meanings
+from skred.importing.wide_table import read_wide_table
+from skred.importing.workbook import read_workbook, sheet_names
+
+
+@dataclass(frozen=True)
+class Imported:
+    """An import before it is written.
+
+    Attributes
+    ----------
+    draft : Draft
+    campaign : Campaign
+        The draft as it was read; bounds count as observed where this version's reader does not know them.
+    understanding : Understanding
+    mapping : Mapping
+        With what the tables' names said declared too, for the next table.
+    """
+
+    draft: Draft
+    campaign: Campaign
+    understanding: Understanding
+    mapping: Mapping
+
+
+@dataclass(frozen=True)
+class Files:
+    """What is imported.
+
+    Attributes
+    ----------
+    tables : sequence of Path
+        One wide table, or the campaign format's files, or a folder of these.
+    track, sensors : Path or None
+        Tables that go with a wide one.
+    mapping : Path or None
+        The mapping file; a track that it names lies beside it.
+    """
+
+    tables: Sequence[Path]
+    track: Path | None = None
+    sensors: Path | None = None
+    mapping: Path | None = None
+
+
+def import_tables(files: Files, declared: Mapping, columns: Sequence[str] = ()) -> Imported:
+    """Read tables, and check the campaign that they make; nothing is written.
+
+    Parameters
+    ----------
+    files : Files
+    declared : Mapping
+        Everything that was declared.
+    columns : sequence of str
+        More of it, as ``NAME=MEANING``.
+
+    Raises
+    ------
+    CampaignError
+        With every problem, by file, row and column.
+    Unclear
+        With what must be declared or asked about.
+    InputError
+        If a declaration names what is not there.
+    """
+    sources = sort_out(files.tables)
+    given = {"track": files.track, "sensors": files.sensors}
+    of_format = dict(sources.of_format)
+    for key, path in given.items():
+        if path is not None:
+            of_format[key] = open_source(path)
+    if files.mapping is not None and declared.track.file is not None and "track" not in of_format:
+        folder = files.mapping.resolve().parent
+        of_format["track"] = open_source(folder / declared.track.file, folder)
+    sheets = _sheets(Sources(of_format, sources.others), declared)
+    names = [name for key in ("", "events") if key in sheets for name in sheets[key].columns]
+    if columns:
+        pairs = (split_column(text, names) for text in columns)
+        declared = declared.with_values({("columns", name): value for name, value in pairs})
+    track = _track(sheets, declared)
+    places = Places(track.track, _reference(of_format.get(CAMPAIGN), declared))
+    name = _name(files)
+    description = _description(of_format.get(CAMPAIGN), declared, name, sheets)
+    if "" in sheets:
+        return _wide(sheets, declared, track, places, description)
+    return _five(sheets, declared, track, places, description)
+
+
+def write_imported(imported: Imported, folder: Path, *, force: bool = False) -> None:
+    """Write the campaign and, beside it, the mapping file; all of it or nothing.
+
+    Parameters
+    ----------
+    imported : Imported
+    folder : Path
+        Must not exist, or be empty.
+    force : bool
+        Replace the campaign that the folder holds.
+
+    Raises
+    ------
+    CampaignError
+        If the folder is in use.
+    """
+    texts = imported.draft.texts() | {FILE: mapping_text(imported.mapping)}
+    write_files(texts, folder, force=force)
+
+
+def _sheets(sources: Sources, declared: Mapping) -> dict[str, Sheet]:
+    """The sheets by the format's table; the wide table's key is empty."""
+    of_format = {key: source for key, source in sources.of_format.items() if key in TABLES}
+    if len(sources.others) > 1:
+        names = ", ".join(source.name for source in sources.others)
+        raise refuse(
+            sources.others[1].name, f"several tables ({names}); import one at a time, each to its folder"
+        )
+    grids = {key: _grid(source, declared, key) for key, source in of_format.items()}
+    for other in sources.others:
+        parts = _parts_of_workbook(other)
+        if parts and declared.table.sheet is None:
+            grids |= {
+                key: read_workbook(other, sheet, "table") for key, sheet in parts.items() if key not in grids
+            }
+        else:
+            grids[""] = _grid(other, declared, "")
+    needed = ("track",) if "" in grids else TABLES
+    for key in needed:
+        if key not in grids:
+            what = "--track FILE" if key == "track" else f"{key}.csv, or one wide table"
+            raise refuse(f"{key}.csv", f"the {key} table was not given; add {what}")
+    if "" in grids and {"events", "recordings"} & set(grids):
+        raise refuse(grids[""].file, "a wide table beside events or recordings; import one of the two")
+    rows = {key: _writing(declared, key).header_row if key in ("", "track") else None for key in grids}
+    return {key: sheet_of(grid, rows[key], _section(key)) for key, grid in grids.items()}
+
+
+def _parts_of_workbook(source: Source) -> dict[str, str]:
+    """Sheets of a workbook that are named as the format's tables, if it holds recordings so."""
+    if not source.is_workbook:
+        return {}
+    parts = {name.lower(): name for name in sheet_names(source) if name.lower() in TABLES}
+    return parts if "recordings" in parts else {}
+
+
+def _section(key: str) -> Section:
+    return "track" if key == "track" else "table"
+
+
+def _writing(declared: Mapping, key: str) -> Any:
+    return declared.track if key == "track" else declared.table
+
+
+def _grid(source: Source, declared: Mapping, key: str) -> Grid:
+    """Cells of one file."""
+    section, writing = _section(key), _writing(declared, key)
+    if source.is_workbook:
+        return read_workbook(source, writing.sheet if key in ("", "track") else None, section)
+    return read_delimited(source, writing.encoding, writing.separator, section)
+
+
+def _track(sheets: dict[str, Sheet], declared: Mapping) -> TrackRead:
+    writing = declared.track
+    if "" not in sheets and declared.table.decimal is not None and writing.decimal is None:
+        # Of five files that were declared to be written one way, the track is one.
+        writing = writing.model_copy(update={"decimal": declared.table.decimal})
+    return read_track_table(sheets["track"], writing)
+
+
+def _reference(description: Source | None, declared: Mapping) -> float | None:
+    """The campaign's zero, if it has one."""
+    if declared.campaign.reference_s_m is not None or description is None:
+        return declared.campaign.reference_s_m
+    try:
+        value = tomlkit.parse(description.content.decode("utf-8-sig")).get("reference_s_m")
+    except (ValueError, RecursionError):
+        return None  # the check of the draft says what is wrong
+    return float(value) if isinstance(value, int | float) else None
+
+
+def _name(files: Files) -> str:
+    """A campaign's name where none is declared: that of its first table."""
+    return files.tables[0].resolve().stem if files.tables else "campaign"
+
+
+def _description(source: Source | None, declared: Mapping, name: str, sheets: dict[str, Sheet]) -> str:
+    """The text of campaign.toml: as given, with what was declared otherwise."""
+    own = declared.campaign.model_dump(exclude_none=True)
+    if source is None:
+        files = ", ".join(dict.fromkeys(sheets[key].file for key in sorted(sheets)))
+        default = {"name": name, "description": "", "source": f"Imported from {files}.", "origin": "measured"}
+        return description_text(default | own)
+    try:
+        text = source.content.decode("utf-8-sig")
+        if not own:
+            return text
+        document = tomlkit.parse(text)
+    except (ValueError, RecursionError) as error:
+        raise refuse(source.name, f"not valid TOML in UTF-8 ({str(error)[:100]}); correct it") from None
+    document.update(own)
+    return tomlkit.dumps(document)
+
+
+def _track_columns(sheet: Sheet, track: TrackRead) -> tuple[ShownColumn, ...]:
+    """The track's columns as they were understood."""
+    kinds = {track.x: "track: horizontal distance x", track.z: "track: elevation z"}
+    kinds |= dict.fromkeys(track.ignored, "left out")
+    options = {track.x: f"--set track.x={track.x}", track.z: f"--set track.z={track.z}"}
+    return tuple(
+        ShownColumn(
+            sheet.file,
+            name,
+            kinds.get(name, f"track: {name}"),
+            "" if name in track.ignored else "m",
+            filled(sheet, name),
+            track.declared or name not in options,
+            options.get(name, ""),
+        )
+        for name in sheet.columns
+    )
+
+
+def _sensor_table(sheet: Sheet) -> DraftTable:
+    """The sensors that go with a wide table, as the format's sensors.csv."""
+    numeric = [name for name in sheet.columns if name not in ("sensor", "quantity")]
+    cells = ((line, name, text) for name in numeric for line, text in sheet.cells(name))
+    notation = notation_of(cells, sheet.file, sheet.separator, (None, None), "table")
+    missing = [
+        column.name for column in COLUMNS["sensors"] if column.required and column.name not in sheet.columns
+    ]
+    if missing:
+        raise refuse(sheet.file, f"the columns {', '.join(missing)} are missing; add them", sheet.header_line)
+    names = {name: name for name in sheet.columns}
+    problems = list[Problem]()
+    rows = rows_with_points(sheet, names, numeric, notation, problems)
+    if problems:
+        raise CampaignError(problems)
+    return DraftTable(sheet.columns, with_where(sheet, rows, names))
+
+
+def _wide(
+    sheets: dict[str, Sheet], declared: Mapping, track: TrackRead, places: Places, description: str
+) -> Imported:
+    """Import a wide table."""
+    sheet = sheets[""]
+    sensors = _sensor_table(sheets["sensors"]) if "sensors" in sheets else None
+    found = meanings(sheet, declared, sensors)
+    tables, notation = read_wide_table(sheet, found, declared, places)
+    draft = Draft(description, track.table, **tables)
+    campaign = draft.check()
+    columns = wide_columns_shown(sheet, found) + _track_columns(sheets["track"], track)
+    written = [how_written(sheet, notation), how_written(sheets["track"], track.notation)]
+    understanding = Understanding(tuple(written), columns, preview_of(draft))
+    complete = {name: one.column for name, one in found.items()}
+    mapping = _for_the_next(declared, complete, notation, track, is_wide=True)
+    return Imported(draft, campaign, understanding, mapping)
+
+
+def _five(
+    sheets: dict[str, Sheet], declared: Mapping, track: TrackRead, places: Places, description: str
+) -> Imported:
+    """Import the campaign format's own tables."""
+    own = {key: sheets[key] for key in COLUMNS}
+    tables, notations = read_five_files(own, declared, places)
+    draft = Draft(description, track.table, **tables)
+    campaign = draft.check()
+    written = [how_written(sheets["track"], track.notation)]
+    written += [how_written(own[key], notations[key]) for key in own]
+    columns = list(_track_columns(sheets["track"], track))
+    for key, sheet in own.items():
+        origin = (
+            {name: new for new, name in tables[key].rows[0][0].columns.items()} if tables[key].rows else {}
+        )
+        for name in sheet.columns:
+            new = origin.get(name)
+            meaning = "left out" if new is None else f"{key}: {new}{_turned(new, declared)}"
+            unit = new.rpartition("_")[2] if new is not None and new.endswith(("_m", "_m_s")) else ""
+            columns.append(ShownColumn(sheet.file, name, meaning, unit, filled(sheet, name), True))
+    understanding = Understanding(tuple(written), tuple(columns), preview_of(draft))
+    mapping = _for_the_next(declared, dict(declared.columns), notations["recordings"], track, is_wide=False)
+    return Imported(draft, campaign, understanding, mapping)
+
+
+def _turned(column: str, declared: Mapping) -> str:
+    """In words, how a column of the format is given otherwise than the format has it."""
+    said = []
+    if column == "value":
+        if declared.velocity.unit == "km/h":
+            said.append("velocities in km/h")
+        if declared.runout.unit == "km":
+            said.append("runouts in km")
+        if declared.runout.place not in (None, "s"):
+            said.append(f"runouts as {declared.runout.place}")
+    elif column in ("s_from_m", "s_to_m") and declared.velocity.place not in (None, "s"):
+        said.append(f"as {declared.velocity.place}")
+    elif column == "release_s_m" and declared.release.place not in (None, "s"):
+        said.append(f"as {declared.release.place}")
+    return f", {', '.join(said)}" if said else ""
+
+
+def _for_the_next(
+    declared: Mapping, columns: dict[str, Column], notation: Notation, track: TrackRead, *, is_wide: bool
+) -> Mapping:
+    """Everything that was declared and understood, as the next table of the kind needs it."""
+    campaign = declared.campaign.model_copy(update={"name": None})
+    table = declared.table
+    if notation.decimal == ",":
+        table = table.model_copy(update={"decimal": ","})
+    own = {} if track.x == "x_m" and track.z == "z_m" else {"x": track.x, "z": track.z}
+    if is_wide:
+        own["file"] = "track.csv"  # the campaign's own, which lies beside the mapping file
+    content = {
+        **declared.content(),
+        "campaign": campaign.model_dump(exclude_none=True),
+        "table": table.model_dump(exclude_none=True),
+        "track": own,
+        "columns": {
+            name: column.model_dump(by_alias=True, exclude_none=True) for name, column in columns.items()
+        },
+    }
+    return Mapping.model_validate(content)

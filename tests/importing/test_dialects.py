@@ -1,0 +1,190 @@
+"""Text tables in every European dialect; what is in doubt is asked about, what is mixed is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from import_cases import (
+    COLUMNS,
+    WIDE,
+    in_dialect,
+    options,
+    skred,
+    wide_file,
+    with_decimal,
+    without_bounds,
+    written,
+)
+from small_campaign import TEXTS, write_texts
+
+from skred.campaign import read_campaign
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(";", ","), ("\t", ","), (",", ","), (";", "."), ("|", ",")]
+)
+def test_the_five_files_need_no_question(
+    separator: str,
+    decimal: str,
+    encoding: str,
+    newline: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    plain = read_campaign(write_texts(tmp_path / "plain", TEXTS))
+    how = {"separator": separator, "decimal": decimal, "encoding": encoding, "newline": newline}
+    folder = in_dialect(TEXTS, tmp_path / "other", **how)
+    code, out, err = skred(capsys, "import", folder, "--out", tmp_path / "out")
+    assert code == 0, err
+    assert read_campaign(tmp_path / "out").fingerprint() == plain.fingerprint()
+    assert "-3.5" not in err and "decimal" in out
+
+
+def test_the_embedded_campaign_as_a_european_spreadsheet_saves_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from skred.campaign import find_campaign
+
+    own = find_campaign("ryggfonn")
+    texts = {file: (own / file).read_text(encoding="utf-8") for file in TEXTS}
+    folder = in_dialect(texts, tmp_path / "de")
+    code, _, err = skred(capsys, "import", folder, "--out", tmp_path / "out")
+    assert (code, err) == (0, "")
+    assert read_campaign(tmp_path / "out").fingerprint() == read_campaign(own).fingerprint()
+
+
+def test_mixed_decimal_signs_are_refused_with_row_and_column(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [row[:] for row in with_decimal(WIDE, ",")]
+    rows[2][1] = "20.1"
+    file = wide_file(tmp_path, rows, separator=";")
+    code, _, err = skred(capsys, "import", file, "--track", track, *options(), "--out", tmp_path / "out")
+    assert code == 2
+    assert "table.csv, row 3, column v upper [m/s]: found '20.1': a decimal point here" in err
+    assert "table.csv, row 2, column v upper [m/s]: found '30,5': a decimal comma here" in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_declared_decimal_sign_refuses_the_other(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = wide_file(tmp_path)
+    arguments = ["import", file, "--track", track, *options(), "--decimal", ",", "--out", tmp_path / "out"]
+    code, _, err = skred(capsys, *arguments)
+    assert code == 2 and "row 2, column v upper [m/s]: found '30.5'" in err and "table.thousands" in err
+
+
+def test_what_can_be_thousands_is_asked_about(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [["Date", "Runout s [m]"], ["a", "1,234"], ["b", "2,000"]]
+    text = "x_m;z_m\n0;2000\n1000;1000\n4000;0\n"
+    track.write_text(text)
+    file = wide_file(tmp_path, rows, separator=";")
+    arguments = ["import", file, "--track", track, *options("Date=event"), "--out", tmp_path / "out"]
+    code, _, err = skred(capsys, *arguments)
+    assert code == 2 and "'1,234' can be a decimal number or thousands" in err and "--decimal" in err
+    code, _, err = skred(capsys, *arguments, "--set", "table.thousands=,")
+    assert code == 0, err
+    assert read_campaign(tmp_path / "out").values[:, 0].tolist() == [1234.0, 2000.0]
+
+
+def test_thousands_with_decimals(tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = [["Date", "Runout s [m]"], ["a", "1.234,5"]]
+    track.write_text("x_m;z_m\n0;2000\n1000;1000\n4000;0\n")
+    file = wide_file(tmp_path, rows, separator=";")
+    arguments = ["import", file, "--track", track, *options("Date=event"), "--out", tmp_path / "out"]
+    code, _, err = skred(capsys, *arguments)
+    assert code == 2 and "row 2, column Runout s [m]" in err and "table.thousands" in err
+    code, _, err = skred(capsys, *arguments, "--set", "table.thousands=.")
+    assert code == 0, err
+    assert read_campaign(tmp_path / "out").values.tolist() == [[1234.5]]
+
+
+def test_latin_1_is_asked_about_and_declared(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [
+        [cell.replace("Snow", "Schneehöhe").replace("dry", "für") for cell in row] for row in without_bounds()
+    ]
+    file = tmp_path / "table.csv"
+    file.write_bytes(written(rows).encode("latin-1"))
+    arguments = ["import", file, "--track", track, *options(), "--out", tmp_path / "out"]
+    code, _, err = skred(capsys, *arguments)
+    assert code == 2 and "table.csv, row 1: byte 0xf6 is not UTF-8" in err and "Schneehöhe" in err
+    assert "--encoding latin-1" in err and '[table] encoding = "latin-1"' in err
+    code, _, err = skred(capsys, *arguments, "--encoding", "latin-1")
+    assert code == 0, err
+    assert read_campaign(tmp_path / "out").events[0].covariates["schneehöhe"] == "für"
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (b"", "empty"),
+        (b"a,b\0\n1,2\n", "NUL"),
+        (b"\xd0\xcf\x11\xe0rest", "save it as .xlsx"),
+        (b"PK\x03\x04nothing", "not a workbook"),
+        (b"Date\n1999\n", "what separates the columns"),
+        (b'Date,"v\n', "cannot be read"),
+        (b"Date,v [m/s]\n1999,30,5\n", "row 2: the row has 3 cells, the header has 2"),
+        (b"Date,v [m/s]\n1999\n", "row 2: the row has 1 cells, the header has 2"),
+        (b"Date,v [m/s]\n", "no rows under the header"),
+        (b"Date,v,v\n1,2,3\n", "column v: the name also stands in column 2"),
+        (b"Date,v [m/s],\n1,2,3\n", "column 3 has cells (row 2) and no name"),
+        (b"Date,v,w\n,[m/s],[m/s]\n1,2,3\n", "row 2: the row holds units only"),
+        (b"\xff\xfe\x00\xd8", "UTF-16"),
+        (b"Date," + b"v" * 300 + b"\n1,2\n", "more than 200 characters"),
+        (b"Date,v [m/s]\n1," + b"1" * 100_000 + b"x\n", "not clear"),
+        (b"Date,v [m/s]\n1," + b"1" * 200_000 + b"\n", "cannot be read (field larger"),
+        (b"Date,v [m/s]\n1,a" + b" " * 100_000 + b"b\n", "not clear"),
+    ],
+)
+def test_what_is_no_table_is_refused(
+    content: bytes, told: str, tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "table.csv"
+    file.write_bytes(content)
+    code, _, err = skred(capsys, "import", file, "--track", track, "--out", tmp_path / "out")
+    assert code == 2 and told in err and "table.csv" in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_title_above_the_table_is_asked_about(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "table.csv"
+    for title in ("Table 1\n\n", "Table 1,,,,,\n"):
+        file.write_text(title + written(without_bounds()))
+        arguments = ["import", file, "--track", track, *options(), "--out", tmp_path / "out", "--force"]
+        code, _, err = skred(capsys, *arguments)
+        row = 3 if "\n\n" in title else 2
+        assert code == 2 and f"--set table.header_row={row}" in err
+        code, _, err = skred(capsys, *arguments, "--set", f"table.header_row={row}")
+        assert code == 0, err
+
+
+def test_empty_rows_and_columns_are_skipped(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = without_bounds()
+    spread = [[*row, "", ""] for row in (*rows[:2], [""] * 6, *rows[2:], [""] * 6)]
+    for number, content in enumerate((rows, spread)):
+        file = wide_file(tmp_path, content, separator=";")
+        out = tmp_path / str(number)
+        code, _, err = skred(capsys, "import", file, "--track", track, *options(), "--out", out)
+        assert code == 0, err
+    texts = [(tmp_path / name / "recordings.csv").read_text() for name in "01"]
+    assert texts[0] == texts[1] and len(COLUMNS) == 2
+
+
+def test_excel_hint_of_the_separator(tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "table.csv"
+    file.write_text("sep=;\n" + written(with_decimal(without_bounds(), ","), ";"))
+    code, _, err = skred(capsys, "import", file, "--track", track, *options(), "--out", tmp_path / "out")
+    assert code == 0, err
+    assert read_campaign(tmp_path / "out").values[0, 0] == 30.5
