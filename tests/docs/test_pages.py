@@ -63,7 +63,7 @@ def in_code(text: str) -> set[str]:
     return {word for name in re.findall(r"`([^`\n]+)`", text) for word in re.findall(r"\w+", name)}
 
 
-BY_ID = ("probability", "detection_limits", "log_bayes_factors", "seconds", "constants")
+BY_ID = ("probability", "prior", "detection_limits", "log_bayes_factors", "seconds", "constants")
 """Keys whose own keys are ids and names, not words of the format."""
 
 
