@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skred.inference.leave_one_out import ExactLoo, exact_leave_one_out, samples_of
+from skred.inference.leave_one_out import REFIT_DRAWS, ExactLoo, exact_leave_one_out, samples_of
 
 
 @pytest.fixture(scope="module")
@@ -72,15 +72,15 @@ class ChainsApart:
 
     n_terms = 2
 
-    def __init__(self) -> None:
-        self.chains = itertools.count()
+    def __init__(self, until: float = np.inf) -> None:
+        self.chains, self.until = itertools.count(), until
 
     def adapt(self, *_: Any) -> None: ...
 
     def run(
         self, q: np.ndarray, n: int, rng: np.random.Generator, weights: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        far = 5.0 * next(self.chains) if weights[0] == 0.0 else 0.0
+        far = 5.0 * next(self.chains) if weights[0] == 0.0 and n < self.until else 0.0
         return far + rng.standard_normal((n, len(q))), np.zeros((n, self.n_terms))
 
 
@@ -88,6 +88,13 @@ def test_a_refit_that_does_not_converge_is_named(calibration: Any) -> None:
     apart: Any = ChainsApart()
     result = exact_leave_one_out(calibration.model, apart, ["bad", "good"], 0)
     assert result.failed == ("bad",)
+
+
+def test_a_refit_that_does_not_converge_is_run_longer(calibration: Any) -> None:
+    slow: Any = ChainsApart(until=3 * REFIT_DRAWS * max(1, len(calibration.step.vars) // 2))
+    result = exact_leave_one_out(calibration.model, slow, ["slow", "good"], 0)
+    assert result.failed == () and abs(result.draws[0].mean()) < 0.1
+    assert result.draws[0].shape == result.draws[1].shape
 
 
 def test_draws_of_a_refit_are_those_of_the_weighted_posterior(exact: ExactLoo, calibration: Any) -> None:

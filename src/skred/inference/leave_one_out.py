@@ -24,6 +24,8 @@ REFIT_CHAINS, REFIT_DRAWS, REFIT_BURN = 4, 500, 100
 """Draws of models of one or two parameters; chains of more are longer."""
 _ADAPTATION = 500
 """Draws in which proposals adapt to the posterior of all events, before any is left out."""
+_LONGER = 4
+"""How many times as long chains are that are run once more, because they had not converged."""
 _BATCHES = 5
 """Batches of each chain from whose means the Monte Carlo error is taken."""
 
@@ -84,14 +86,13 @@ def exact_leave_one_out(
     rng = np.random.default_rng([seed, 2])
     start = DictToArrayBijection.map(model.initial_point()).data.astype(float)
     step.adapt(start, _ADAPTATION, rng)
-    numbers = np.repeat(left_out, REFIT_CHAINS)
-    jobs = list(zip(numbers.tolist(), rng.spawn(len(numbers)), strict=True))
-    refits = side_by_side(lambda job: _refit(step, start.copy(), *job), jobs)
-    draws, densities = (np.array(parts) for parts in zip(*refits, strict=True))
-    draws, densities = (
-        one.reshape(len(left_out), REFIT_CHAINS, *one.shape[1:]) for one in (draws, densities)
-    )
+    draws, densities = _refits(step, start, left_out, rng, 1)
     r_hat = _r_hat(draws)
+    again = np.flatnonzero(~(r_hat <= R_HAT_LIMIT))
+    if len(again):
+        longer = _refits(step, start, [left_out[k] for k in again], rng, _LONGER)
+        r_hat[again] = _r_hat(longer[0])
+        draws[again], densities[again] = (values[:, :, ::_LONGER] for values in longer)
     failed = tuple(events[k] for k, value in zip(left_out, r_hat, strict=True) if not value <= R_HAT_LIMIT)
     pointwise = logsumexp(densities, axis=(1, 2)) - np.log(densities[0].size)
     return ExactLoo(pointwise, float(np.sqrt(np.sum(_mcse(densities) ** 2))), failed, draws)
@@ -116,14 +117,26 @@ def samples_of(model: pm.Model, step: JointMetropolis, draws: FloatArray) -> tup
     return tuple(result)
 
 
+def _refits(
+    step: JointMetropolis, start: FloatArray, left_out: Sequence[int], rng: np.random.Generator, longer: int
+) -> tuple[FloatArray, FloatArray]:
+    """Draws without each event, (n, n_chains, n_draws, n_q), and its log density there."""
+    numbers = np.repeat(left_out, REFIT_CHAINS)
+    jobs = list(zip(numbers.tolist(), rng.spawn(len(numbers)), strict=True))
+    chains = side_by_side(lambda job: _refit(step, start.copy(), *job, longer), jobs)
+    draws, densities = (np.array(parts) for parts in zip(*chains, strict=True))
+    shape = len(left_out), REFIT_CHAINS
+    return draws.reshape(*shape, *draws.shape[1:]), densities.reshape(*shape, *densities.shape[1:])
+
+
 def _refit(
-    step: JointMetropolis, q: FloatArray, number: int, rng: np.random.Generator
+    step: JointMetropolis, q: FloatArray, number: int, rng: np.random.Generator, longer: int
 ) -> tuple[FloatArray, FloatArray]:
     """A chain without an event: its draws, and the event's log density there."""
     weights = np.ones(step.n_terms)
     weights[number] = 0.0
-    step.run(q, REFIT_BURN, rng, weights)
-    draws, terms = step.run(q, REFIT_DRAWS * max(1, (len(q) + 1) // 2), rng, weights)
+    step.run(q, longer * REFIT_BURN, rng, weights)
+    draws, terms = step.run(q, longer * REFIT_DRAWS * max(1, (len(q) + 1) // 2), rng, weights)
     return draws, terms[:, number].copy()  # a view would keep the terms of all events
 
 
