@@ -15,25 +15,38 @@ RAMP_M, LEVEL_M, RELEASE_M = 100.0, 900.0, 20.0
 PLACES_M = (140.0, 290.0, 440.0, 590.0, 740.0, 840.0)
 
 
-def speed(s: float, release: float, friction: float, drag: float) -> float:
-    """Front speed [m/s]: dv/ds = 2 g (sin(phi) - friction cos(phi)) - 2 drag v on ramp and level ground."""
+WAVE_M = 400.0
+"""Length of the waves of the level ground, if there are any."""
+
+
+def speed(s: float, release: float, friction: float, drag: float, waves: float = 0.0) -> float:
+    """Front speed [m/s]: dv/ds = 2 g (sin(phi) - friction cos(phi)) - 2 drag v on ramp and level ground.
+
+    Level ground that has waves adds -2 waves sin(2 pi x / 400 m), x from its beginning.
+    """
 
     def after(v: float, length: float, force: float) -> float:
         end = force / drag
         return end + (v - end) * np.exp(-2.0 * drag * length)
 
     v = after(0.0, RAMP_M - release, G_M_S2 * (np.sin(STEEP) - friction * np.cos(STEEP)))
-    return float(np.sqrt(max(after(v, s - RAMP_M, -G_M_S2 * friction), 0.0)))
+    x, decay, turn = s - RAMP_M, 2.0 * drag, 2.0 * np.pi / WAVE_M
+    by_waves = (decay * np.sin(turn * x) - turn * np.cos(turn * x) + turn * np.exp(-decay * x)) * (
+        -2.0 * waves / (decay**2 + turn**2)
+    )
+    return float(np.sqrt(max(after(v, x, -G_M_S2 * friction) + by_waves, 0.0)))
 
 
-def rolling(drag: float, n_events: int = 20, friction: float = 0.006, seed: int = 1) -> Campaign:
+def rolling(
+    drag: float, n_events: int = 20, friction: float = 0.006, seed: int = 1, waves: float = 0.0
+) -> Campaign:
     """Runs of bodies whose friction and releases vary, read at six places to 0.1 m/s."""
     rng = np.random.default_rng(seed)
     frictions = friction * np.exp(0.1 * rng.standard_normal(n_events))
     releases = RELEASE_M + 2.0 * rng.standard_normal(n_events)
     values = np.array(
         [
-            [speed(s, release, mu, drag) for s in PLACES_M]
+            [speed(s, release, mu, drag, waves) for s in PLACES_M]
             for mu, release in zip(frictions, releases, strict=True)
         ]
     )

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import refine
+from skred.diagnosis.compare.residue import with_residues
 from skred.diagnosis.compare.restarts import better_modes
 from skred.diagnosis.compare.screening import Tell, screened, screening_budget
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
@@ -204,6 +205,7 @@ def _under_errors(
         candidates = refine(base.setting, curves, near, pool)
         profiles = list(pool.map(partial(free_force, base, candidates=candidates), KINDS))
         candidates, profiles = recomputed(base, candidates, profiles, pool, best)
+        candidates = with_residues(base, candidates, profiles, pool)
     return ComparisonUnderErrors(error_model, base, candidates, profiles, curves)
 
 

@@ -21,7 +21,7 @@ from skred.diagnosis.check.bootstrap_test import LIMIT
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.discrepancy.fit import fit_profile
-from skred.diagnosis.discrepancy.profile import Profile, most_probable
+from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of, most_probable
 from skred.diagnosis.evidence.coefficient import Base, curve_at
 from skred.diagnosis.evidence.conditional_map import Rows
 from skred.diagnosis.evidence.event_quadrature import USUAL
@@ -117,7 +117,9 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray) -> Influe
     parts = [_Part(everything, chosen) for _, _, chosen in kinds]
     whole, *found = side_by_side(lambda part: again(base, part), [_Part(everything), *parts])
     # By the same, quicker method on both sides; only the difference is taken from it.
-    stated = under_errors.log_factors[answer]
+    stated = log_evidence_of(under_errors.profiles)
+    if answer != UNLISTED:
+        stated = under_errors.candidates[answer].alone
     without_each = stated - gained
     needed = math.log((1.0 - LIMIT) / LIMIT * comparison.odds[NOTHING] / comparison.odds[answer])
     order = np.argsort(without_each)

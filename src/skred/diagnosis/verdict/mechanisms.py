@@ -108,4 +108,5 @@ def _candidate(comparison: Comparison, name: str) -> dict[str, Any]:
         "covariate": shape.covariate,
         "sensor": shape.sensor,
         "estimators_differ_by": candidate.disagreement,
+        "residue": candidate.residue,
     }

@@ -1,0 +1,71 @@
+"""A named effect with a small one beside it, on bodies that roll out: drag, and ground not quite level."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+from diagnosis_cases import base_of
+from rolling_cases import rolling, speed
+
+from skred.campaign import Campaign
+from skred.diagnosis.compare.candidate import BESIDE, Candidate, log_gain
+from skred.diagnosis.compare.comparison import free_force
+from skred.diagnosis.compare.residue import with_residues
+from skred.diagnosis.compare.screening import curve, screening_budget
+from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_evidence_of
+from skred.diagnosis.evidence.coefficient import Base, curve_near
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.spec import Shape
+
+DRAG = mechanisms()["turbulent_drag"]
+
+
+def fitted(campaign: Campaign) -> tuple[Base, Candidate, list[Profile]]:
+    """The base law, drag along the track, and the force that is not in the list."""
+    base = base_of(campaign, "coulomb")
+    budget = screening_budget(base)
+    found = curve_near(base, DRAG, Shape(), curve(base, DRAG, Shape(), budget), budget)
+    candidate = Candidate(DRAG, (found,), np.zeros(1))
+    return base, candidate, [*map(partial(free_force, base, candidates={DRAG.id: candidate}), KINDS)]
+
+
+def test_waves_in_closed_form() -> None:
+    """Against small steps along the ground."""
+    s, v = 100.0, speed(100.0, 20.0, 0.006, 2.4e-4) ** 2
+    while s < 740.0:
+        mid = s - 100.0 + 0.05
+        v += 0.1 * (-2.0 * 9.81 * 0.006 - 2.0 * 2.4e-4 * v - 2.0 * 0.05 * np.sin(2.0 * np.pi * mid / 400.0))
+        s += 0.1
+    assert speed(740.0, 20.0, 0.006, 2.4e-4, 0.05) == pytest.approx(np.sqrt(v), rel=1e-4)
+
+
+def test_a_force_that_takes_both_effects_does_not_win_over_the_first() -> None:
+    base, drag, profiles = fitted(rolling(2.4e-4, waves=0.05))
+    force = log_evidence_of(profiles)
+    assert drag.alone > 10.0 and force > drag.alone + 2.0
+    with ThreadPoolExecutor(2) as pool:
+        found = with_residues(base, {DRAG.id: drag}, profiles, pool)[DRAG.id]
+    assert found.residue is not None and 0.0 < found.residue < drag.alone
+    assert found.alone == drag.alone
+    assert found.log_bayes_factor == pytest.approx(drag.alone + log_gain(found.residue))
+    assert found.log_bayes_factor > force
+
+
+def test_without_a_second_effect_nothing_is_looked_for() -> None:
+    base, drag, profiles = fitted(rolling(2.4e-4))
+    assert log_evidence_of(profiles) < drag.alone
+    with ThreadPoolExecutor(2) as pool:
+        assert with_residues(base, {DRAG.id: drag}, profiles, pool)[DRAG.id] is drag
+        # A mechanism that explains less than half of what the force does is no first effect.
+        weak = replace(drag, correction=0.3 * log_evidence_of(profiles) - drag.alone)
+        assert with_residues(base, {DRAG.id: weak}, profiles, pool)[DRAG.id].residue is None
+
+
+def test_what_a_force_beside_adds() -> None:
+    assert BESIDE == pytest.approx(0.1)
+    assert log_gain(-50.0) == pytest.approx(np.log(0.9)) and log_gain(0.0) == pytest.approx(0.0)
+    assert log_gain(50.0) == pytest.approx(50.0 + np.log(0.1))
