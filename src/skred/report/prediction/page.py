@@ -10,7 +10,7 @@ from skred.report.prediction.figures import FIGURES as ALONG_TRACK
 from skred.report.prediction.places import has_places, places_figure
 from skred.report.shared import document as doc
 from skred.report.shared.html import environment, picture
-from skred.report.shared.numbers import is_number, three_digits
+from skred.report.shared.numbers import fixed, is_number, three_digits
 from skred.report.shared.style import write_png, write_svg
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def render_prediction(document: doc.Document, figures: Mapping[str, Path]) -> st
             figures={name: picture(file) for name, file in figures.items()},
             lead=_lead(document) if valid else list(doc.listed(document, "statement")),
             caveats=[line for line in doc.listed(document, "statement") if is_caveat(line)],
-            banded=banded,
+            left_out=_left_out(document),
             percent=percent,
             period=period,
         )
@@ -126,19 +126,24 @@ def _period(place: doc.Document) -> str:
     )
 
 
-def banded(band: Any) -> str:
-    """A number with its interval: 34.6 (32.4 to 37.4)."""
-    value, low, high = (three_digits(doc.get(band, key)) for key in ("value", "low", "high"))
-    return f"{value} ({low} to {high})"
+def _left_out(document: doc.Document) -> list[doc.Document]:
+    """What does not act here, each once: a force in no list has a row for each of its knots."""
+    rows = [row for row in doc.listed(document, "added") if row["used"] is False]
+    return list({str(row["title"]): row for row in rows}.values())
 
 
 def period(band: Any) -> str:
     """A return period with its interval; one without an end is said in words."""
     value, low, high = (doc.get(band, key) for key in ("value", "low", "high"))
     if not is_number(value):
-        return "more than was simulated" if not is_number(low) else f"more than {three_digits(low)}"
-    end = f"to {three_digits(high)}" if is_number(high) else "or more"
-    return f"{three_digits(value)} ({three_digits(low)} {end})"
+        return "longer than can be said" if not is_number(low) else f"more than {_years(low)}"
+    end = f"to {_years(high)}" if is_number(high) else "or more"
+    return f"{_years(value)} ({_years(low)} {end})"
+
+
+def _years(value: float) -> str:
+    """Two significant digits: a return period is never known better."""
+    return fixed(float(f"{value:.1e}"), 0 if value >= 10 else 1)
 
 
 def percent(value: Any) -> str:
