@@ -358,7 +358,8 @@ def test_files(problem: HierarchicalProblem, tmp_path: Path) -> None:
     assert prediction_table(document).row_count == 3 + 6 * 4
     figures = write_reports(tmp_path)
     drawn = {file.name: file.read_bytes() for file in figures}
-    assert set(drawn) == {"prediction.png", "uncertainty.png"}
+    names = {f"{name}.{kind}" for name in ("prediction", "uncertainty", "places") for kind in ("png", "svg")}
+    assert set(drawn) == {*names, "report.html"}
     for file in figures:
         file.unlink()
     assert run(["report", str(tmp_path)]) == 0

@@ -105,6 +105,7 @@ def profile_draws(found: Diagnosis, law: ProfileLaw) -> xr.DataTree:
     strengths = draws.strengths[:, -len(knots) :]
     population = population_group(found.law, draws.means, draws.factors)
     population["added_strengths"] = (("draw", GROUP), strengths, {"units": kind.unit})
+    population = population.assign_coords({GROUP: [term.name for term in terms]})
     groups = {POPULATION: population, GROUP: added_group(terms), **recorded_groups(found.problem)}
     tree = xr.DataTree.from_dict(groups)
     tree.attrs = {**found.calibration.tree.attrs, "error_model": law.error_model}
