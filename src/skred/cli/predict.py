@@ -58,13 +58,20 @@ def predict(
         problem = hierarchical_of(checked, likelihood.errors, likelihood.smoothing)
 
     from skred.prediction.predict import predict as predict_avalanches
+    from skred.prediction.statement import source_sentences
+    from skred.prediction.terms import added_rows
     from skred.prediction.track import prediction_track
     from skred.report.folders import write_reports
     from skred.report.prediction.figures import prediction_table
 
     where = prediction_track(problem, track, scenarios)
     wanted.check_on(where.length_m)
-    tell_hints(problem, output.tell) if source is None else output.tell(source.told)
+    if source is None:
+        tell_hints(problem, output.tell)
+    else:
+        added = added_rows(source.stored.added, where)
+        for line in source_sentences({"from": source.as_dict(), "added": added}):
+            output.tell(line)
     tell_track_hints(where, track, output.tell)
     with output.results("predict") as results:
         if source is None:

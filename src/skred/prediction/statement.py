@@ -12,7 +12,7 @@ def prediction_statement(document: dict[str, Any]) -> list[str]:
         problems = "; ".join(document["gate"]["problems"])
         return [f"The chains did not converge, so nothing is predicted: {problems}."]
     return [
-        *_source(document),
+        *source_sentences(document),
         *_distances(document),
         *_at_places(document),
         _parts(document),
@@ -20,7 +20,7 @@ def prediction_statement(document: dict[str, Any]) -> list[str]:
     ]
 
 
-def _source(document: dict[str, Any]) -> list[str]:
+def source_sentences(document: dict[str, Any]) -> list[str]:
     """Which calibration this is, and what of it is left out here: before everything else."""
     told = [] if document["from"] is None else [document["from"]["told"]]
     apart: dict[str, list[dict[str, Any]]] = {}
