@@ -121,8 +121,8 @@ def test_rules_on_the_page_are_the_codes() -> None:
 
 
 PAGES = (
-    "own-data", "campaign-format", "tracks", "reading-a-verdict", "laws-and-likelihoods", "method",
-    "own-mechanism", "own-law", "ryggfonn", "proof", "reliability", "glossary",
+    "own-data", "campaign-format", "tracks", "predictions", "reading-a-verdict", "laws-and-likelihoods",
+    "method", "own-mechanism", "own-law", "ryggfonn", "proof", "reliability", "glossary",
 )  # fmt: skip
 WORDS = """
     model comparison; comparison under one error model; candidate; added; linearised screening; local
@@ -164,7 +164,7 @@ def test_the_first_page_lists_all_pages() -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        *("index", "own-data", "campaign-format", "tracks", "reading-a-verdict"),
+        *("index", "own-data", "campaign-format", "tracks", "predictions", "reading-a-verdict"),
         *("laws-and-likelihoods", "own-law", "glossary"),
     ],
 )

@@ -27,7 +27,7 @@ from skred.inference.sampling import SamplerSettings
 from skred.physics.kernel.columns import GRAVITY
 from skred.physics.laws import load_law
 from skred.prediction.document import prediction_document
-from skred.prediction.files import FILES
+from skred.prediction.files import AT_TABLE, FILES
 from skred.prediction.predict import Simulation, predict, prediction_of
 from skred.prediction.probabilities import PARTS, SHARES
 from skred.prediction.reading_errors import reading_error
@@ -355,10 +355,11 @@ def test_files(problem: HierarchicalProblem, tmp_path: Path) -> None:
     assert data["mean_speed"].attrs["units"] == "m s-1" and data["x"].attrs["units"] == "m"
     for name in ("campaign_fingerprint", "seed", "versions", "settings", "law", "gate", "release"):
         assert name in data.attrs
-    assert prediction_table(document).row_count == 3 + 3 * 4
+    assert prediction_table(document).row_count == 3 + 6 * 4
     figures = write_reports(tmp_path)
     drawn = {file.name: file.read_bytes() for file in figures}
-    assert set(drawn) == {"prediction.png", "uncertainty.png"}
+    names = {f"{name}.{kind}" for name in ("prediction", "uncertainty", "places") for kind in ("png", "svg")}
+    assert set(drawn) == {*names, "report.html"}
     for file in figures:
         file.unlink()
     assert run(["report", str(tmp_path)]) == 0
@@ -370,7 +371,7 @@ def test_another_track(problem: HierarchicalProblem, tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()
     document = predict(made(problem, "constant"), out, track, simulation=Simulation(30, 64))
-    assert {file.name for file in out.iterdir()} == {*FILES, "posterior.nc"}
+    assert {file.name for file in out.iterdir()} == {*FILES, "posterior.nc"} - {AT_TABLE}
     assert document["places"] == [] and document["track"]["name"] == "other.csv"
     assert any("because no --release was given" in line for line in document["statement"])
     assert track.terrain.smoothing_m == problem.terrain.smoothing_m

@@ -262,7 +262,9 @@ def _steps(problem, comparison, names, clean, *, second):
         candidate = its_comparison.under_each[0].candidates[name]
         best = candidate.best
         strength = best.mechanism.strength.name
-        added += (SimpleNamespace(name=strength, mechanism=best.mechanism, shape=best.shape),)
+        added += (
+            SimpleNamespace(name=strength, mechanism=best.mechanism, shape=best.shape, direction=Direction()),
+        )
         steps.append(
             Step(
                 candidate, tuple(tied), its_comparison, calibration(problem, added), BootstrapTest(0.1, clean)

@@ -1,20 +1,30 @@
 """One number for one thing: verdict, table, sentences, page and draws say the same of what was added."""
 
+import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from diagnosis_report_cases import diagnosis, document_of, with_finding
+from diagnosis_report_cases import GATE, diagnosis, document_of, with_finding
 from test_report_html import Page
 
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.detect.detectability import Identifiability
+from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.outcome import NotDiagnosed
+from skred.diagnosis.predict.draws import Draws
 from skred.diagnosis.verdict.document import verdict
-from skred.diagnosis.verdict.draws import augmented_draws
+from skred.diagnosis.verdict.draws import FORCE, augmented_draws, profile_draws
 from skred.diagnosis.verdict.figure_data import figure_data
 from skred.diagnosis.verdict.improvement import improvement
+from skred.inference.added_terms import added_terms
+from skred.inference.results import save
+from skred.output import write_json
+from skred.prediction.predict import Simulation, prediction_of
+from skred.prediction.source import source_of
+from skred.prediction.track import prediction_track
 from skred.report.diagnosis.report import render_diagnosis
 
 
@@ -78,6 +88,53 @@ def test_draws_hold_the_interval_of_the_verdict():
     draws = tree["posterior"][strength["parameter"]]
     assert float(draws.std()) < strength["sd"]
     assert np.isnan(augmented_draws(diagnosis("sensor"))["added"]["s_from"].values).all()
+
+
+def test_draws_of_a_force_in_no_list_can_be_predicted_with(tmp_path):
+    """Written beside an `unexplained` verdict, and read again without the diagnosis."""
+    found = diagnosis("unexplained")
+    law = found.finding.law
+    n, n_knots = 30, len(law.profile.knots_m)
+    rng = np.random.default_rng(2)
+    draws = Draws(
+        np.log(0.45) + 0.05 * rng.standard_normal((n, 1)),
+        np.full((n, 1, 1), 0.2),
+        np.tile(law.profile.mean, (n, 1)),
+    )
+    setting = setting_of(found.problem, found.law)
+    base = SimpleNamespace(base=SimpleNamespace(setting=setting))
+    stub = replace(found, comparison=SimpleNamespace(leading=lambda name: base))
+    tree = profile_draws(stub, replace(law, draws_after=draws))
+    tree.attrs |= {
+        "format": 1,
+        "law": found.law.id,
+        "campaign": "ryggfonn",
+        "campaign_fingerprint": "",
+        "smoothing_m": found.problem.terrain.smoothing_m,
+        "settings": "{}",
+        "seed": 1,
+        "versions": "{}",
+        "gate": json.dumps(GATE.as_dict()),
+    }
+    assert tree["population"]["added_strengths"].shape == (n, n_knots)
+    terms = added_terms(tree)
+    assert len(terms) == n_knots and not any(term.transfers for term in terms)
+    # At the knots the force is what was drawn there.
+    profile = sum(s * term.direction.profiles[0] for s, term in zip(law.profile.mean, terms, strict=True))
+    edge = found.problem.terrain.edge_s_m
+    at = np.interp(law.profile.knots_m[5:15], 0.5 * (edge[1:] + edge[:-1]), profile)
+    np.testing.assert_allclose(at, law.profile.mean[5:15], atol=0.03)
+    save(tree, tmp_path / "profile.nc")
+    write_json(tmp_path / "verdict.json", {"format": 1, "verdict": "unexplained"})
+    source = source_of(tmp_path)
+    assert source.file == "profile.nc" and FORCE in source.told
+    stored = source.stored
+    track, size = prediction_track(stored.problem), Simulation(20, 64)
+    ends = [
+        prediction_of(stored.problem, found.law, stored.calibration.tree, track, size, added=added)
+        for added in ((), stored.added)
+    ]
+    assert float(ends[1]["runout_quantile"][0]) < float(ends[0]["runout_quantile"][0])  # it brakes
 
 
 def test_refits_that_did_not_converge_are_told_first():

@@ -9,10 +9,15 @@ from cyclopts import Parameter, validators
 if TYPE_CHECKING:
     from skred.diagnosis.effort import Effort
     from skred.inference.sampling import SamplerSettings
+    from skred.prediction.wanted import Wanted
 
 Campaigns = Annotated[str, Parameter(help="A folder, or the name of an embedded campaign.")]
 Models = Annotated[str, Parameter(help="Laws, separated by commas.")]
-BaseModel = Annotated[str, Parameter(help="The law to predict with.")]
+BaseModel = Annotated[str | None, Parameter(help="The law to predict with; by default pcm.")]
+PredictedCampaign = Annotated[
+    str | None,
+    Parameter(help="A folder, or the name of an embedded campaign; by default ryggfonn. Not with --from."),
+]
 DiagnosedModel = Annotated[str, Parameter(help="The law that something may be missing from.")]
 MechanismIds = Annotated[
     str | None, Parameter(name="mechanism", help="Id of the one to show in full; by default all, in a table.")
@@ -36,9 +41,52 @@ TrackFile = Annotated[
     Path | None,
     Parameter(help="Track to predict on: a table like a campaign's track.csv; by default the campaign's."),
 ]
-Release = Annotated[
-    float | None,
-    Parameter(help="Where fronts start, m; by default as recorded, on another track its first point."),
+From = Annotated[
+    Path | None,
+    Parameter(
+        name="--from",
+        help="Folder of skred calibrate, predict or diagnose: predict with that, and sample nothing.",
+    ),
+]
+Releases = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--release",
+        negative="",
+        help="Where fronts start, S or S:WEIGHT, m; repeat it for several. By default as recorded, on another"
+        " track its first point.",
+    ),
+]
+Places = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--at",
+        negative="",
+        help="A place to predict at, NAME=S, m; repeat it. By default the sensors and the reference.",
+    ),
+]
+SpeedThresholds = Annotated[
+    list[float] | None,
+    Parameter(
+        name="--speed", negative="", help="Front speed to exceed, m/s; repeat it. By default 10, 20 and 30."
+    ),
+]
+PressureThresholds = Annotated[
+    list[float] | None,
+    Parameter(name="--pressure", negative="", help="Impact pressure to exceed, kPa; repeat it."),
+]
+Density = Annotated[
+    str, Parameter(help="LOW,HIGH of the density of the flow, kg/m3; each value in between as likely.")
+]
+DragCoefficient = Annotated[
+    str, Parameter(help="LOW,HIGH of the obstacle's drag coefficient; each value in between as likely.")
+]
+PerYear = Annotated[
+    str | None,
+    Parameter(
+        help="RATE or RATE,SD of avalanches like those recorded, per year: adds probabilities in a year and"
+        " return periods."
+    ),
 ]
 Samplers = Annotated[
     Literal["metropolis", "nuts", "smc"],
@@ -205,3 +253,40 @@ class Diagnosing:
 
 HIERARCHICAL, LIKELIHOOD, DIAGNOSING = Hierarchical(), Likelihood(), Diagnosing()
 """What a command does unless told otherwise."""
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What is asked of a prediction."""
+
+    at: Places = None
+    speed: SpeedThresholds = None
+    pressure: PressureThresholds = None
+    density: Density = "100,300"
+    drag_coefficient: DragCoefficient = "1,2"
+    per_year: PerYear = None
+
+    def wanted(self) -> "Wanted":
+        """The same, checked."""
+        from skred.prediction.wanted import Rate, Wanted, numbers_of, place_of
+
+        low_high = [
+            numbers_of(option, text, 2)
+            for option, text in (("--density", self.density), ("--drag-coefficient", self.drag_coefficient))
+        ]
+        density, drag = ((values[0], values[-1]) for values in low_high)
+        rate = None if self.per_year is None else Rate(*numbers_of("--per-year", self.per_year, 2))
+        speeds = {} if self.speed is None else {"speeds_m_s": tuple(self.speed)}
+        return Wanted(
+            places=tuple(place_of(text) for text in self.at or ()),
+            pressures_kpa=tuple(self.pressure or ()),
+            density_kg_m3=density,
+            drag_coefficient=drag,
+            rate=rate,
+            **speeds,
+        )
+
+
+ASKED = Asked()
+"""What is asked unless told otherwise."""

@@ -1,55 +1,108 @@
 """``skred predict``: how fast and how far the next avalanche goes.
 
-Everything heavy is imported inside the function, so that ``--help`` is instant.
+Everything heavy is imported inside the functions, so that ``--help`` is instant.
 """
+
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from skred.cli.exit_codes import DONE, NOT_CONVERGED
 from skred.cli.hints import tell_hints, tell_track_hints
 from skred.cli.inputs import campaign_of, hierarchical_of
 from skred.cli.options import (
+    ASKED,
     HIERARCHICAL,
     SAMPLING,
+    Asked,
     BaseModel,
-    Campaigns,
+    From,
     Hierarchical,
-    Release,
+    PredictedCampaign,
+    Releases,
     Sampling,
     TrackFile,
 )
 from skred.cli.output import OUTPUT, Output
+from skred.errors import InputError
+
+if TYPE_CHECKING:
+    from skred.prediction.source import Source
 
 
 def predict(
-    campaign: Campaigns = "ryggfonn",
+    campaign: PredictedCampaign = None,
     /,
     *,
-    base_model: BaseModel = "pcm",
+    from_: From = None,
+    base_model: BaseModel = None,
     track: TrackFile = None,
-    release: Release = None,
+    release: Releases = None,
+    asked: Asked = ASKED,
     likelihood: Hierarchical = HIERARCHICAL,
     sampling: Sampling = SAMPLING,
     output: Output = OUTPUT,
 ) -> int:
     """Say how fast and how far the next avalanche goes, and how sure that is, along a track."""
-    from skred.physics.laws import load_law
+    from skred.prediction.wanted import release_of
 
-    law = load_law(base_model)
-    problem = hierarchical_of(campaign_of(campaign), likelihood.errors, likelihood.smoothing)
+    wanted, scenarios = asked.wanted(), [release_of(text) for text in release or ()]
+    source = None
+    if from_ is not None:
+        source = _source(from_, campaign, base_model, likelihood, sampling)
+        law, problem = source.stored.calibration.law, source.stored.problem
+    else:
+        from skred.physics.laws import load_law
 
-    from skred.inference.calibrate import calibrate
+        law = load_law(base_model or "pcm")
+        checked = campaign_of(campaign or "ryggfonn")
+        problem = hierarchical_of(checked, likelihood.errors, likelihood.smoothing)
+
     from skred.prediction.predict import predict as predict_avalanches
+    from skred.prediction.statement import source_sentences
+    from skred.prediction.terms import added_rows
     from skred.prediction.track import prediction_track
     from skred.report.folders import write_reports
     from skred.report.prediction.figures import prediction_table
 
-    where = prediction_track(problem, track, release)
-    tell_hints(problem, output.tell)
+    where = prediction_track(problem, track, scenarios)
+    wanted.check_on(where.length_m)
+    if source is None:
+        tell_hints(problem, output.tell)
+    else:
+        added = added_rows(source.stored.added, where)
+        for line in source_sentences({"from": source.as_dict(), "added": added}):
+            output.tell(line)
     tell_track_hints(where, track, output.tell)
-    settings = sampling.settings("hierarchical")
     with output.results("predict") as results:
-        output.tell(f"{law.id}: calibrating on {problem.campaign.name}")
-        calibration = calibrate(problem, law, settings, progress=output.progress)
-        prediction = predict_avalanches(calibration, results.unfinished, where, output.tell)
+        if source is None:
+            from skred.inference.calibrate import calibrate
+
+            output.tell(f"{law.id}: calibrating on {problem.campaign.name}")
+            settings = sampling.settings("hierarchical")
+            calibration = calibrate(problem, law, settings, progress=output.progress)
+        else:
+            calibration = source.stored.calibration
+        prediction = predict_avalanches(
+            calibration, results.unfinished, where, output.tell, wanted=wanted, source=source
+        )
         write_reports(results.unfinished)
     output.show(prediction, prediction_table, prediction["statement"], results.path)
     return DONE if prediction["gate"]["passed"] else NOT_CONVERGED
+
+
+def _source(
+    folder: Path, campaign: str | None, base_model: str | None, likelihood: Hierarchical, sampling: Sampling
+) -> "Source":
+    """The calibration of a folder; what would calibrate otherwise is refused beside it."""
+    from skred.prediction.source import source_of
+
+    beside = {
+        "a campaign": campaign is not None,
+        "--base-model": base_model is not None,
+        "--errors or --smoothing": likelihood != HIERARCHICAL,
+        "--draws, --tune, --chains or --seed": sampling != SAMPLING,
+    }
+    for what, is_given in beside.items():
+        if is_given:
+            raise InputError(f"--from {folder}: the calibration is made already; leave out {what}")
+    return source_of(folder)

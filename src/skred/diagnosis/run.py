@@ -12,10 +12,10 @@ import xarray as xr
 
 from skred.diagnosis.diagnose import diagnose
 from skred.diagnosis.effort import Effort
-from skred.diagnosis.outcome import NotDiagnosed, Outcome
+from skred.diagnosis.outcome import NotDiagnosed, Outcome, ProfileAdded
 from skred.diagnosis.repeated import folds_of, open_locked, outer_folds, set_aside
 from skred.diagnosis.verdict.document import verdict
-from skred.diagnosis.verdict.draws import augmented_draws
+from skred.diagnosis.verdict.draws import augmented_draws, profile_draws
 from skred.diagnosis.verdict.figure_data import figure_data
 from skred.diagnosis.verdict.report_facts import report_facts
 from skred.inference.hierarchical.problem import HierarchicalProblem
@@ -26,8 +26,9 @@ from skred.parallel.processes import meanwhile
 from skred.physics.law import Law
 
 Tell = Callable[[str], None]
-DRAWS = ("base.nc", "base_same_errors.nc", "augmented.nc")
-"""Of the base law, of it under the errors of what was added, and of the law with that."""
+DRAWS = ("base.nc", "base_same_errors.nc", "augmented.nc", "profile.nc")
+"""Of the base law, of it under the errors of what was added, of the law with that, and of the law with a
+force that is in no list."""
 CURVES = "diagnosis.nc"
 """What the figures show, see `skred.diagnosis.verdict.figure_data`."""
 
@@ -86,7 +87,8 @@ def write_trees(found: Outcome, folder: Path) -> None:
     """Write draws of every calibration and what the figures show, each whatever becomes of the others.
 
     ``diagnosis.nc`` is always there, ``base.nc`` where the base law was calibrated, ``augmented.nc`` where
-    mechanisms were added, ``base_same_errors.nc`` where that was under other errors than those of the base.
+    mechanisms were added, ``base_same_errors.nc`` where that was under other errors than those of the base,
+    ``profile.nc`` where a force was added that is in no list.
     """
     with ExitStack() as saved:
         for name, tree in (_draws_of(found) | {CURVES: figure_data(found)}).items():
@@ -100,4 +102,6 @@ def _draws_of(found: Outcome) -> dict[str, xr.DataTree]:
         if found.reference is not found.calibration:
             trees["base_same_errors.nc"] = found.reference.tree
         trees["augmented.nc"] = augmented_draws(found)
+    if not isinstance(found, NotDiagnosed) and isinstance(found.finding, ProfileAdded):
+        trees["profile.nc"] = profile_draws(found, found.finding.law)
     return trees

@@ -46,6 +46,7 @@ def _constant(problem: Problem) -> xr.Dataset:
                 },
             ),
             "reading_sd": (("event", "sensor"), campaign.reading_sd(), reading),
+            "stated_sd": (("event", "sensor"), campaign.stated_sd, reading),
             "quantity": ("sensor", [str(s.quantity) for s in campaign.sensors]),
             "s_from": ("sensor", [s.s_from_m for s in campaign.sensors], {"units": "m"}),
             "s_to": ("sensor", [s.s_to_m for s in campaign.sensors], {"units": "m"}),

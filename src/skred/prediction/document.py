@@ -12,8 +12,11 @@ from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY
 from skred.prediction.probabilities import PARTS
+from skred.prediction.source import Source
 from skred.prediction.statement import prediction_statement
+from skred.prediction.terms import added_rows
 from skred.prediction.track import PredictionTrack
+from skred.prediction.wanted import MOST_PLACES, Wanted
 
 _MOST_SENSORS = 30
 
@@ -29,8 +32,21 @@ def named_places(problem: HierarchicalProblem, track: PredictionTrack) -> list[t
     return sorted(((name, min(s, track.length_m)) for name, s in named), key=lambda place: place[1])
 
 
+def shown_places(
+    problem: HierarchicalProblem, track: PredictionTrack, wanted: Wanted
+) -> list[tuple[str, float]]:
+    """Places of the table: those asked for, else the sensors and the reference of the campaign's track."""
+    if wanted.places:
+        return sorted(wanted.places, key=lambda place: place[1])
+    return named_places(problem, track)[:MOST_PLACES]
+
+
 def prediction_document(
-    calibration: Calibration, track: PredictionTrack, data: xr.Dataset | None
+    calibration: Calibration,
+    track: PredictionTrack,
+    data: xr.Dataset | None,
+    wanted: Wanted | None = None,
+    source: Source | None = None,
 ) -> dict[str, Any]:
     """Summary of a prediction as plain data; without `data` it is marked as failed and has no numbers.
 
@@ -43,7 +59,7 @@ def prediction_document(
         "valid": data is not None,
         "campaign": {
             "name": campaign.name,
-            "fingerprint": campaign.fingerprint(),
+            "fingerprint": calibration.tree.attrs["campaign_fingerprint"],
             "n_events": campaign.n_events,
         },
         "law": {"id": law.id, "title": law.title, "equation": law.equation},
@@ -63,7 +79,10 @@ def prediction_document(
         "gate": calibration.gate.as_dict(),
         "interval": {"kind": INTERVAL_KIND, "probability": INTERVAL_PROBABILITY},
     }
-    empty = ("simulation", "reading_errors", "runout", "places")
+    document |= {"from": None if source is None else source.as_dict(), **(wanted or Wanted()).as_dict()}
+    added = () if source is None else source.stored.added
+    document["added"] = added_rows(added, track)
+    empty = ("simulation", "reading_errors", "runout", "places", "at")
     document |= dict.fromkeys(empty) if data is None else _numbers(problem, track, data)
     document["statement"] = prediction_statement(document)
     return document
@@ -102,6 +121,7 @@ def _numbers(problem: HierarchicalProblem, track: PredictionTrack, data: xr.Data
             "all": _runout_parts(data, "runout"),
             "beyond_shortest_recorded": _runout_parts(data, "long_runout"),
         },
+        "at": json.loads(data.attrs["at"]),
         "places": [_place(data, name, s) for name, s in named_places(problem, track)],
     }
 

@@ -13,12 +13,14 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.recorded_data import recorded_groups
 from skred.inference.results import save
 from skred.output import write_json, write_text
+from skred.prediction.places_table import BYTE_ORDER_MARK, places_table
 from skred.prediction.probabilities import PARTS
 
 FloatArray = NDArray[np.float64]
 TABLES = ("exceedance.csv", "runout.csv", "uncertainty.csv")
-FILES = (*TABLES, "prediction.nc", "prediction.json")
-"""What a prediction writes beside the posterior, the last one last."""
+AT_TABLE = "places.csv"
+FILES = (*TABLES, AT_TABLE, "prediction.nc", "prediction.json")
+"""What a prediction writes beside the posterior, the last one last; `AT_TABLE` where there are places."""
 
 
 def write_prediction(
@@ -37,6 +39,8 @@ def write_prediction(
     if data is not None:
         for name, text in zip(TABLES, tables(data), strict=True):
             write_text(folder / name, text)
+        if document["at"]:
+            write_text(folder / AT_TABLE, BYTE_ORDER_MARK + places_table(document))
         groups = {"/": data, **recorded_groups(problem)}
         save(xr.DataTree.from_dict(groups), folder / "prediction.nc")
     write_json(folder / "prediction.json", document)

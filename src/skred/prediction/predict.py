@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,18 +17,23 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from skred.inference.added_terms import AddedTerm
 from skred.inference.calibrate import Calibration
-from skred.inference.hierarchical.population import population_of
+from skred.inference.hierarchical.population import POPULATION, population_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY
 from skred.inference.results import FORMAT, save
 from skred.physics.law import Law
-from skred.prediction.document import named_places, prediction_document, recorded_runouts
+from skred.prediction.at_places import at_places
+from skred.prediction.document import named_places, prediction_document, recorded_runouts, shown_places
 from skred.prediction.files import write_prediction
 from skred.prediction.fronts import new_fronts
 from skred.prediction.probabilities import prediction_dataset, simulation_errors
 from skred.prediction.reading_errors import reading_error
+from skred.prediction.source import Source
+from skred.prediction.terms import moved
 from skred.prediction.track import PredictionTrack, prediction_track
+from skred.prediction.wanted import Wanted
 
 FloatArray = NDArray[np.float64]
 Tell = Callable[[str], None]
@@ -59,6 +64,8 @@ def predict(
     tell: Tell = lambda line: None,
     *,
     simulation: Simulation | None = None,
+    wanted: Wanted | None = None,
+    source: Source | None = None,
 ) -> dict[str, Any]:
     """Predict with a calibrated law.
 
@@ -73,6 +80,10 @@ def predict(
     tell : callable
         Takes one line for each stage.
     simulation : Simulation, optional
+    wanted : Wanted, optional
+        Named places, thresholds and frequency.
+    source : Source, optional
+        Where the calibration was read from, with what was added to its law.
 
     Returns
     -------
@@ -83,14 +94,18 @@ def predict(
     problem, law = calibration.problem, calibration.law
     assert isinstance(problem, HierarchicalProblem)
     track = prediction_track(problem) if track is None else track
+    wanted = wanted or Wanted()
+    wanted.check_on(track.length_m)
     save(calibration.tree, folder / "posterior.nc")
-    data = None
+    data, added = None, () if source is None else source.stored.added
     if calibration.gate.passed:
         tell(f"{law.id}: predicting on {track.name}")
-        data = prediction_of(problem, law, calibration.tree, track, simulation or Simulation())
+        data = prediction_of(
+            problem, law, calibration.tree, track, simulation or Simulation(), added=added, wanted=wanted
+        )
     else:
         tell(f"{law.id}: the chains did not converge: {'; '.join(calibration.gate.problems)}")
-    document = prediction_document(calibration, track, data)
+    document = prediction_document(calibration, track, data, wanted, source)
     document["seconds"] = time.monotonic() - started
     tell("writing the results")
     write_prediction(document, data, problem, folder)
@@ -103,6 +118,9 @@ def prediction_of(
     tree: xr.DataTree,
     track: PredictionTrack,
     simulation: Simulation,
+    *,
+    added: Sequence[AddedTerm] = (),
+    wanted: Wanted | None = None,
 ) -> xr.Dataset:
     """Avalanches of a calibration's populations on a track.
 
@@ -115,26 +133,44 @@ def prediction_of(
         As `skred.inference.results.assemble` makes it: its posterior and attributes are read.
     track : PredictionTrack
     simulation : Simulation
+    added : sequence of AddedTerm
+        What was added to the law; of it is used what acts on this track.
+    wanted : Wanted, optional
 
     Returns
     -------
     Dataset
-        See `skred.prediction.probabilities.prediction_dataset`; with elevation and distance, and attributes.
+        See `skred.prediction.probabilities.prediction_dataset`; with elevation and distance, curves of
+        `skred.prediction.at_places`, and attributes: ``at`` has the rows of the named places as JSON.
     """
-    samples = _thinned(problem, law, tree, simulation.populations)
-    populations = population_of(law, samples)
-    places = _places(problem, track)
-    seed = int(tree.attrs["seed"])
-    fronts = new_fronts(law, populations, track.terrain, track.releases, places, simulation.avalanches, seed)
+    wanted = wanted or Wanted()
+    populations, chosen = _populations(problem, law, tree, simulation.populations)
+    named = shown_places(problem, track, wanted)
+    places, seed = _places(problem, track, named), int(tree.attrs["seed"])
+    draws = tree[POPULATION if POPULATION in tree.children else "posterior"].to_dataset()
+    law_here = moved(law, added, draws, track, chosen)
+    fronts = new_fronts(
+        law_here.motion,
+        populations,
+        track.terrain,
+        law_here.releases,
+        places,
+        simulation.avalanches,
+        seed,
+        weights=law_here.weights,
+        kept=[int(np.abs(places - s_m).argmin()) for _, s_m in named],
+    )
     campaign, errors = problem.campaign, problem.error_model
     velocity, runout = (reading_error(campaign, errors, runout=which) for which in (False, True))
     recorded = recorded_runouts(problem, track)
     shortest = recorded[0] if recorded else None
     data = prediction_dataset(fronts, velocity, runout, shortest)
+    rows, curves = at_places(fronts, named, wanted, seed)
+    data = data if curves is None else data.merge(curves)
     points = track.track
     for name, values, what in (("x", points.x_m, "horizontal distance"), ("z", points.z_m, "elevation")):
-        at_places = np.interp(places, points.s_m, values)
-        data = data.assign_coords({name: ("s", at_places, {"units": "m", "long_name": what})})
+        along = np.interp(places, points.s_m, values)
+        data = data.assign_coords({name: ("s", along, {"units": "m", "long_name": what})})
     stays = float((fronts.runout <= fronts.release).mean())
     data.attrs = _attributes(problem, law, tree, track) | {
         "simulation": json.dumps(
@@ -145,6 +181,8 @@ def prediction_of(
             }
         ),
         "share_that_does_not_start": stays,
+        "at": json.dumps(rows),
+        "added": json.dumps(law_here.added),
         **({} if shortest is None else {"shortest_recorded_runout_m": shortest}),
         "reading_error_velocity": json.dumps(_plain_error(velocity._asdict())),
         "reading_error_runout": json.dumps(_plain_error(runout._asdict())),
@@ -157,21 +195,35 @@ def _plain_error(error: Mapping[str, Any]) -> dict[str, Any]:
     return {k: None if isinstance(v, float) and np.isnan(v) else v for k, v in error.items()}
 
 
-def _thinned(problem: HierarchicalProblem, law: Law, tree: xr.DataTree, most: int) -> dict[str, FloatArray]:
+def _populations(
+    problem: HierarchicalProblem, law: Law, tree: xr.DataTree, most: int
+) -> tuple[tuple[FloatArray, FloatArray], NDArray[np.int64]]:
+    """Means and factors of evenly thinned draws, and their numbers, chain after chain."""
+    if POPULATION in tree.children:
+        group = tree[POPULATION].to_dataset()
+        chosen = _evenly(group.sizes["draw"], most)
+        return (group["mean"].values[chosen], group["factor"].values[chosen]), chosen
     posterior = tree["posterior"].to_dataset()
-    samples = {p.name: posterior[p.name].values.ravel() for p in problem.parameters(law)}
-    size = len(next(iter(samples.values())))
-    chosen = np.unique(np.linspace(0, size - 1, min(size, most)).astype(int))
-    return {name: values[chosen] for name, values in samples.items()}
+    samples = {
+        p.name: posterior[p.name].transpose("chain", "draw").values.ravel() for p in problem.parameters(law)
+    }
+    chosen = _evenly(len(next(iter(samples.values()))), most)
+    return population_of(law, {name: values[chosen] for name, values in samples.items()}), chosen
 
 
-def _places(problem: HierarchicalProblem, track: PredictionTrack) -> FloatArray:
-    """Places of the predictions: at even steps, at the sensors and the reference, and at the end."""
+def _evenly(size: int, most: int) -> NDArray[np.int64]:
+    return np.unique(np.linspace(0, size - 1, min(size, most)).astype(np.int64))
+
+
+def _places(
+    problem: HierarchicalProblem, track: PredictionTrack, named: Sequence[tuple[str, float]]
+) -> FloatArray:
+    """Places of the predictions: at even steps, at sensors, reference and named ones, at the end."""
     length = track.length_m
     fitting = (step for step in _STEPS_M if length <= _MOST_STEPS * step)
     step = next(fitting, length / _MOST_STEPS)
     regular = np.arange(0.0, length, step)
-    own = [place for _, place in named_places(problem, track)]
+    own = [place for _, place in (*named_places(problem, track), *named)]
     within = [s for s in (*regular, *own, *recorded_runouts(problem, track)) if 0.0 <= s < length]
     return np.array([*sorted(set(within)), length])
 

@@ -11,7 +11,32 @@ def prediction_statement(document: dict[str, Any]) -> list[str]:
     if not document["valid"]:
         problems = "; ".join(document["gate"]["problems"])
         return [f"The chains did not converge, so nothing is predicted: {problems}."]
-    return [*_distances(document), *_at_places(document), _parts(document), *_conditions(document)]
+    return [
+        *source_sentences(document),
+        *_distances(document),
+        *_at_places(document),
+        _parts(document),
+        *_conditions(document),
+    ]
+
+
+def source_sentences(document: dict[str, Any]) -> list[str]:
+    """Which calibration this is, and what of it is left out here: before everything else."""
+    told = [] if document["from"] is None else [document["from"]["told"]]
+    apart: dict[str, list[dict[str, Any]]] = {}
+    for row in document["added"]:
+        apart.setdefault(row["title"], []).append(row)
+    for title, rows in apart.items():
+        ends = [end for row in rows for end in row["place_m"] or ()]
+        where = f" (s = {min(ends):.0f} to {max(ends):.0f} m)" if ends else ""
+        if not rows[0]["used"]:
+            told.append(f"Left out: {title}{where}: {rows[0]['why']}.")
+        elif ends:
+            told.append(
+                f"Used: {title}{where}, at the most probable place; how uncertain the place is does not widen"
+                " the intervals."
+            )
+    return told
 
 
 def _distances(document: dict[str, Any]) -> list[str]:
@@ -42,13 +67,36 @@ def _distances(document: dict[str, Any]) -> list[str]:
 
 
 def _at_places(document: dict[str, Any]) -> list[str]:
-    sentences = []
-    for place in document["places"]:
-        fast = next((row for row in place["faster"] if row["speed_m_s"] == 10.0), None)
-        speed = "" if fast is None else f"; {_chance(fast)} are faster than 10 m/s there"
-        name = "the reference" if place["name"] == "reference" else place["name"]
-        sentences.append(f"{_chance(place['beyond'])} pass {name} (s = {place['s_m']:.0f} m){speed}.")
-    return sentences
+    return [_at(place) for place in document["at"]]
+
+
+def _at(place: dict[str, Any]) -> str:
+    """A named place in a sentence."""
+    name = "the reference" if place["name"] == "reference" else place["name"]
+    told = f"{_chance(place['reached'])} reach {name} (s = {place['s_m']:.0f} m)"
+    if "annual" in place["reached"]:
+        told += f", a year {_chance(place['reached']['annual'])}"
+    for quantity, words in (("speed", "faster than"), ("pressure", "with an impact pressure above")):
+        unit, above = place[quantity]["unit"], place[quantity]["above"]
+        told += "".join(f"; {_chance(row)} {words} {row['threshold']:g} {unit}" for row in above)
+    return f"{told}."
+
+
+def _frequency(document: dict[str, Any]) -> str:
+    """What makes probabilities for an avalanche into those for a year."""
+    rate = document["rate"]
+    if rate is None:
+        return (
+            "Probabilities are per avalanche like those recorded, not per year: the recordings do not say how"
+            " often avalanches occur."
+        )
+    sd = f" with a standard deviation of {rate['sd_per_year']:g}" if rate["sd_per_year"] else ""
+    return (
+        f"Probabilities in a year take your frequency of {rate['per_year']:g} avalanches a year{sd}; the"
+        " recordings do not know it. It must be that of avalanches like those recorded, which are a"
+        " selection: with a frequency of all avalanches, the small ones included, return periods come out"
+        " too short."
+    )
 
 
 def _parts(document: dict[str, Any]) -> str:
@@ -73,8 +121,7 @@ def _parts(document: dict[str, Any]) -> str:
 def _conditions(document: dict[str, Any]) -> list[str]:
     campaign, track = document["campaign"], document["track"]
     sentences = [
-        "Probabilities are per avalanche like those recorded, not per year: the recordings do not say how"
-        " often avalanches occur.",
+        _frequency(document),
         "Recorded avalanches are a selection: they went far enough to reach the instruments. The prediction"
         f" does not correct for that.{_outside(document)}",
         f"Probabilities below about {_percent(1.0 / campaign['n_events'])} (1 in {campaign['n_events']}) and"
@@ -84,6 +131,13 @@ def _conditions(document: dict[str, Any]) -> list[str]:
         f" {100 * document['interval']['probability']:.0f} % of the posterior probability if the law is"
         " right. They do not allow for an error of the law itself.",
     ]
+    if document["at"]:
+        (light, heavy), (low, high) = (document["pressure"][k] for k in ("density_kg_m3", "drag_coefficient"))
+        sentences.append(
+            f"Impact pressure is {document['pressure']['formula']}, with a density of {light:g} to {heavy:g}"
+            f" kg/m3 and a drag coefficient of {low:g} to {high:g}, each value as likely. The recordings"
+            " hold no pressure: these ranges are assumptions, and an engineer chooses them for the obstacle."
+        )
     if not track["is_own"]:
         sentences.append(
             f"The population is that of {campaign['name']}. The prediction assumes that avalanches on"

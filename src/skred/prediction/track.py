@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skred.campaign import CampaignError, Problem, Track
 from skred.campaign.problems import SHOWN_CHARACTERS
@@ -15,8 +17,12 @@ from skred.campaign.tables import read_table
 from skred.campaign.track_rules import track_problems
 from skred.errors import InputError
 from skred.inference.hierarchical.problem import HierarchicalProblem
-from skred.inference.hierarchical.releases import Releases, exact_release
+from skred.inference.hierarchical.releases import Releases
 from skred.physics.terrain import Terrain, build_terrain
+
+FloatArray = NDArray[np.float64]
+Scenarios = Sequence[tuple[float, float]]
+"""Releases [m] with their weights."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,13 +37,17 @@ class PredictionTrack:
     terrain : Terrain
         Made with the smoothing length of the calibration.
     releases : Releases
-        A new avalanche starts from any of them, each as likely.
+        A new avalanche starts from any of them.
     release_text : str
         The same in words.
     is_own : bool
         Whether it is the campaign's own track.
     reference_s_m : float or None
         The campaign's zero for reports, where the track is its own.
+    weights : (n_releases,) array or None
+        How likely each release is; None where all are as likely.
+    as_recorded : bool
+        Whether the releases are the recorded ones, in their order.
     """
 
     name: str
@@ -47,6 +57,8 @@ class PredictionTrack:
     release_text: str
     is_own: bool
     reference_s_m: float | None
+    weights: FloatArray | None = None
+    as_recorded: bool = False
 
     @property
     def length_m(self) -> float:
@@ -60,7 +72,7 @@ class PredictionTrack:
 
 
 def prediction_track(
-    problem: HierarchicalProblem, file: Path | None = None, release_s_m: float | None = None
+    problem: HierarchicalProblem, file: Path | None = None, release: Scenarios | float | None = None
 ) -> PredictionTrack:
     """The track to predict on.
 
@@ -69,9 +81,9 @@ def prediction_track(
     problem : HierarchicalProblem
     file : Path, optional
         A table of the columns x_m and z_m, as a campaign's track.csv; by default the campaign's own track.
-    release_s_m : float, optional
-        Where all fronts start; by default the campaign's releases on its own track, on another its
-        first point.
+    release : float or sequence of (float, float), optional
+        Where fronts start [m]: one place, or several, each with its weight; by default the campaign's
+        releases on its own track, on another its first point.
 
     Raises
     ------
@@ -80,40 +92,59 @@ def prediction_track(
     InputError
         If the release is not on the track, or the track is too long.
     """
+    scenarios = [(float(release), 1.0)] if isinstance(release, (int, float)) else list(release or ())
     if file is None:
-        return _own(problem, release_s_m)
+        return _own(problem, scenarios)
     track = read_track(file)
     try:
         terrain = build_terrain(track.x_m, track.z_m, smoothing_m=problem.terrain.smoothing_m)
     except ValueError as error:
         raise InputError(f"--track {file}: {error}") from error
-    place = 0.0 if release_s_m is None else release_s_m
-    releases = _single(place, terrain.length_m)
-    default = ", the first point of the track, because no --release was given" if release_s_m is None else ""
-    text = f"s = {place:.0f} m{default}"
-    return PredictionTrack(file.name, track, terrain, releases, text, is_own=False, reference_s_m=None)
-
-
-def _own(problem: HierarchicalProblem, release_s_m: float | None) -> PredictionTrack:
-    campaign, terrain = problem.campaign, problem.terrain
-    if release_s_m is None:
-        releases = problem.releases
-        text = _release_text(releases)
-    else:
-        releases = _single(release_s_m, terrain.length_m)
-        text = f"s = {release_s_m:.0f} m"
-    zero = campaign.reference_s_m
+    releases, weights, text = _given(scenarios or [(0.0, 1.0)], terrain.length_m)
+    if not scenarios:
+        text += ", the first point of the track, because no --release was given"
     return PredictionTrack(
-        campaign.name, campaign.track, terrain, releases, text, is_own=True, reference_s_m=zero
+        file.name, track, terrain, releases, text, is_own=False, reference_s_m=None, weights=weights
     )
 
 
-def _single(release_s_m: float, length_m: float) -> Releases:
-    if not 0.0 <= release_s_m < length_m:
-        raise InputError(
-            f"--release {release_s_m:g}: expected a place on the track, from 0 to below {length_m:.1f} m"
-        )
-    return exact_release(release_s_m, length_m)
+def _own(problem: HierarchicalProblem, scenarios: Scenarios) -> PredictionTrack:
+    campaign, terrain = problem.campaign, problem.terrain
+    if scenarios:
+        releases, weights, text = _given(scenarios, terrain.length_m)
+    else:
+        releases, weights, text = problem.releases, None, _release_text(problem.releases)
+    return PredictionTrack(
+        campaign.name,
+        campaign.track,
+        terrain,
+        releases,
+        text,
+        is_own=True,
+        reference_s_m=campaign.reference_s_m,
+        weights=weights,
+        as_recorded=not scenarios,
+    )
+
+
+def _given(scenarios: Scenarios, length_m: float) -> tuple[Releases, FloatArray | None, str]:
+    """Releases that were asked for, from rest; their weights, None where they are alike; and in words."""
+    for place, weight in scenarios:
+        if not 0.0 <= place < length_m:
+            raise InputError(
+                f"--release {place:g}: expected a place on the track, from 0 to below {length_m:.1f} m"
+            )
+        if not 0.0 < weight < np.inf:
+            raise InputError(f"--release {place:g}:{weight:g}: expected a weight above 0")
+    places, weights = np.array(scenarios, dtype=float).T
+    none = np.zeros(len(places))
+    releases = Releases(places, none, float(length_m), none, none)
+    if np.ptp(weights) == 0.0:
+        named = " or ".join(f"{place:.0f}" for place in places)
+        return releases, None, f"s = {named} m" + (", each as likely" if len(places) > 1 else "")
+    shares = weights / weights.sum()
+    named = " or ".join(f"{place:.0f} m ({100 * w:.0f} %)" for place, w in zip(places, shares, strict=True))
+    return releases, weights, f"s = {named}"
 
 
 def _release_text(releases: Releases) -> str:

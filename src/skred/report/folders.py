@@ -130,15 +130,15 @@ def _possible_of_a_model() -> list[str]:
 
 
 def _prediction(folder: Path, beside: Path) -> list[str]:
-    from skred.report.prediction.figures import FIGURES
-    from skred.report.shared.style import write_png
+    from skred.report.prediction.page import FIGURES, render_prediction, save_prediction_figures
 
     document = _read_document(folder / "prediction.json", "format")
+    figures: dict[str, Path] = {}
     if document.get("valid") is True:
         with _opened(folder / "prediction.nc") as tree:
-            for name, make in FIGURES.items():
-                write_png(make(document, tree), beside / f"{name}.png")
-    return [f"{name}.png" for name in FIGURES]
+            figures = save_prediction_figures(document, tree, beside)
+    write_text(beside / "report.html", render_prediction(document, figures))
+    return [f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")]
 
 
 def _scorecard(folder: Path, beside: Path) -> list[str]:

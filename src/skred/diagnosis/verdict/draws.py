@@ -6,8 +6,17 @@ import numpy as np
 import xarray as xr
 
 from skred.diagnosis.augment.coefficient import augmented_of, strength_of
+from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.outcome import Diagnosis
+from skred.diagnosis.predict.profile_law import ProfileLaw
+from skred.diagnosis.predict.unseen import ProfileTerm
 from skred.diagnosis.verdict.mechanisms import INTERVAL
+from skred.inference.added_terms import GROUP, AddedTerm, added_group
+from skred.inference.hierarchical.population import POPULATION, population_group
+from skred.inference.recorded_data import recorded_groups
+from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism, Shape
+
+FORCE = "a force that is in no list"
 
 
 def augmented_draws(found: Diagnosis) -> xr.DataTree:
@@ -15,7 +24,8 @@ def augmented_draws(found: Diagnosis) -> xr.DataTree:
 
     The chains hold the place at the best one, so that their spread of a strength is too narrow; the group has
     its mean and standard deviation over all places, and quantiles of both ends of the place, (added,) and
-    (added, quantile), NaN where it is not local.
+    (added, quantile), NaN where it is not local; and what `skred.inference.added_terms` needs to use the law
+    again, at the best place.
 
     Raises
     ------
@@ -44,5 +54,59 @@ def augmented_draws(found: Diagnosis) -> xr.DataTree:
         coords={"added": names, "quantile": list(quantiles)},
         attrs={"comment": "over all places, with the allowance for the form of the term; as in verdict.json"},
     )
+    terms = [
+        AddedTerm(
+            one.name,
+            one.mechanism.id,
+            one.mechanism.title,
+            one.mechanism.group,
+            _bound_to(one.mechanism),
+            one.shape,
+            one.direction,
+        )
+        for one in augmented_of(calibration).added
+    ]
     groups = {path: node.to_dataset() for path, node in calibration.tree.subtree_with_keys}
-    return xr.DataTree.from_dict({**groups, "added": group})
+    return xr.DataTree.from_dict({**groups, GROUP: group.merge(added_group(terms))})
+
+
+def _bound_to(mechanism: Mechanism) -> BoundTo:
+    assert mechanism.added is not None
+    return mechanism.added.bound_to
+
+
+def profile_draws(found: Diagnosis, law: ProfileLaw) -> xr.DataTree:
+    """The law with a force that is in no list: a group of populations, and one of the force's values.
+
+    Groups
+    ------
+    population : see `skred.inference.hierarchical.population.population_group`; ``added_strengths``
+        (draw, added) are the force's values at its knots
+    added : see `skred.inference.added_terms.added_group`, a term for each knot
+    observed_data, constant_data : as of any calibration
+    """
+    setting = found.comparison.leading(UNLISTED).base.setting
+    knots, kind = law.profile.knots_m, law.profile.kind
+    directions = ProfileTerm.of(law.profile, setting).directions(setting)
+    ends = [*knots[:1], *knots, *knots[-1:]]
+    terms = [
+        AddedTerm(
+            f"force_at_{knot:.0f}_m",
+            UNLISTED,
+            FORCE,
+            Group.PHYSICS,
+            BoundTo.PLACE,
+            Shape(float(ends[k]), float(ends[k + 2])),
+            direction,
+        )
+        for k, (knot, direction) in enumerate(zip(knots, directions, strict=True))
+    ]
+    draws = law.draws_after
+    strengths = draws.strengths[:, -len(knots) :]
+    population = population_group(found.law, draws.means, draws.factors)
+    population["added_strengths"] = (("draw", GROUP), strengths, {"units": kind.unit})
+    population = population.assign_coords({GROUP: [term.name for term in terms]})
+    groups = {POPULATION: population, GROUP: added_group(terms), **recorded_groups(found.problem)}
+    tree = xr.DataTree.from_dict(groups)
+    tree.attrs = {**found.calibration.tree.attrs, "error_model": law.error_model}
+    return tree

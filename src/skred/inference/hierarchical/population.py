@@ -13,6 +13,7 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
@@ -20,6 +21,8 @@ from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
 
 FloatArray = NDArray[np.float64]
+POPULATION = "population"
+"""Name of a group of populations, where they are not computed from parameters."""
 LKJ_SHAPE = 2.0
 """Of the prior of the correlations (Lewandowski, Kurowicka and Joe): mildly against strong ones."""
 _LEAST = 1e-6
@@ -90,6 +93,18 @@ def population_of(law: Law, samples: Mapping[str, Any]) -> tuple[FloatArray, Flo
         for j, value in enumerate(row):
             factors[:, i, j] = value
     return means, factors
+
+
+def population_group(law: Law, means: FloatArray, factors: FloatArray) -> xr.Dataset:
+    """Populations as a dataset that netCDF can hold: ``mean`` and ``factor`` of the logarithms, by draw."""
+    names = [mechanism.strength.name for mechanism in law.mechanisms]
+    return xr.Dataset(
+        {
+            "mean": (("draw", "strength"), means),
+            "factor": (("draw", "strength", "strength_bis"), factors),
+        },
+        coords={"strength": names, "strength_bis": names},
+    )
 
 
 def population_samples(law: Law, coordinates: FloatArray) -> dict[str, FloatArray]:

@@ -180,9 +180,10 @@ class HierarchicalProblem(Problem):
         }
 
     def constants(self) -> dict[str, Any]:
-        """How well the releases are known."""
+        """How well the releases are known, and the error model by its id."""
         releases = self.releases
         return {
+            "error_model": ((), self.error_model.id),
             "release_sd": ("event", releases.sd, {"units": "m"}),
             "release_speed_sd": ("event", releases.speed_sd, {"units": "m s-1"}),
         }

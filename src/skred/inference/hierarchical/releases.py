@@ -87,9 +87,3 @@ def releases_of(events: Sequence[Event], length_m: float) -> Releases:
     sd = numbers("release_sd_m")
     speed_sd = np.where(sd > 0.0, 0.0, numbers("release_speed_sd_m_s"))
     return Releases(numbers("release_s_m"), sd, float(length_m), numbers("release_speed_m_s"), speed_sd)
-
-
-def exact_release(place_m: float, length_m: float) -> Releases:
-    """One release from rest, at a place that is known exactly."""
-    none = np.zeros(1)
-    return Releases(np.array([float(place_m)]), none, float(length_m), none, none)

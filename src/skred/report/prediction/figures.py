@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from skred.report.shared.document import get
 from skred.report.shared.labels import figure_text, printable, shortened, unit_text
-from skred.report.shared.numbers import fixed, share, whole
+from skred.report.shared.numbers import share, three_digits, whole
 from skred.report.shared.recordings import recordings_of
 from skred.report.shared.style import (
     GREY,
@@ -354,18 +354,29 @@ def prediction_table(document: dict[str, Any]) -> Table:
         what = f"runout exceeded by {100 * row['share']:g} %"
         bound = "≥ " if row["at_least"] else ""
         table.add_row(what, bound + whole(row["value"]), f"{whole(row['low'])} to {whole(row['high'])}", "m")
-    for place in document["places"]:
-        where = f"{shortened(place['name'], 20)} (s = {place['s_m']:.0f} m)"
-        table.add_row(Text(f"{where}: runout beyond"), *_chance(place["beyond"]), "-")
-        for row in place["faster"]:
-            if row["speed_m_s"] == 10.0:
-                table.add_row(Text(f"{where}: faster than 10 m/s"), *_chance(row), "-")
-        tenth = next(row for row in place["speed_exceeded_by"] if row["share"] == 0.1)
-        low, high = fixed(tenth["low"], 1), fixed(tenth["high"], 1)
-        table.add_row(
-            Text(f"{where}: speed exceeded by 10 %"), fixed(tenth["value"], 1), f"{low} to {high}", "m/s"
-        )
+    for place in document["at"]:
+        _place_rows(table, place)
     return table
+
+
+def _place_rows(table: Table, place: dict[str, Any]) -> None:
+    """Arrival, thresholds, and what a tenth of all avalanches exceed, at one place."""
+    from rich.text import Text
+
+    where = f"{shortened(place['name'], 20)} (s = {place['s_m']:.0f} m)"
+    table.add_row(Text(f"{where}: reached"), *_chance(place["reached"]), "-")
+    for name, words in (("speed", "speed"), ("pressure", "impact pressure")):
+        unit = place[name]["unit"]
+        for row in place[name]["above"]:
+            what = f"{where}: {words} above {row['threshold']:g} {unit}"
+            table.add_row(Text(what), *_chance(row), "-")
+        tenth = next(row for row in place[name]["exceeded_by"] if row["share"] == 0.1)
+        value, low, high = (three_digits(tenth[key]) for key in ("value", "low", "high"))
+        table.add_row(Text(f"{where}: {words} exceeded by 10 %"), value, f"{low} to {high}", unit)
+    period = place["reached"].get("return_period_years")
+    if period is not None:
+        value, low, high = (three_digits(period[key]) for key in ("value", "low", "high"))
+        table.add_row(Text(f"{where}: return period of arrival"), value, f"{low} to {high}", "years")
 
 
 def _chance(band: dict[str, float]) -> tuple[str, str]:

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 from skred.report.shared import document as doc
 from skred.report.shared.labels import name_text, population_role, printable, symbol_text, unit_text
-from skred.report.shared.numbers import decimals_for, fixed, is_number, odds, rounded, share, whole
+from skred.report.shared.numbers import (
+    decimals_for,
+    fixed,
+    is_number,
+    odds,
+    rounded,
+    share,
+    three_digits,
+    whole,
+)
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -17,7 +26,8 @@ if TYPE_CHECKING:
 
 def picture(file: Path) -> str:
     """A picture as a data URI."""
-    return "data:image/png;base64," + base64.b64encode(file.read_bytes()).decode("ascii")
+    kind = "svg+xml" if file.suffix == ".svg" else "png"
+    return f"data:image/{kind};base64," + base64.b64encode(file.read_bytes()).decode("ascii")
 
 
 @cache
@@ -44,6 +54,7 @@ def environment() -> Environment:
         name=name_text,
         role=population_role,
         two_digits=two_digits,
+        three_digits=three_digits,
     )
     environment.globals.update(get=doc.get, listed=doc.listed, decimals_for=decimals_for, is_number=is_number)
     return environment

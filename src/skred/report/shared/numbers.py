@@ -39,6 +39,14 @@ def whole(value: Any) -> str:
     return fixed(value, 0)
 
 
+def three_digits(value: Any) -> str:
+    """A number to act on, with three significant digits and no exponent; ``n/a`` where there is none."""
+    if not is_number(value) or value == 0:
+        return fixed(value, 0)
+    places = 2 - _magnitude(value)
+    return fixed(round(float(value), places), max(0, min(places, 4)))
+
+
 def share(value: Any) -> str:
     """Format a share between 0 and 1 with two decimals, never rounded to an exact 0 or 1."""
     if not is_number(value):

@@ -173,6 +173,19 @@ def _legend_width(labels: list[str], columns: int) -> int:
 
 
 @styled
+def write_svg(figure: Figure, file: Path) -> Path:
+    """Write a figure as SVG, whole or not at all; the same figure gives the same file."""
+    import matplotlib
+
+    partial = file.with_name(f".{file.name}.partial")
+    with warnings.catch_warnings(), matplotlib.rc_context({"svg.hashsalt": "skred"}):
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        figure.savefig(partial, format="svg", metadata={"Date": None, "Creator": "skred"})
+    os.replace(partial, file)
+    return file
+
+
+@styled
 def write_png(figure: Figure, file: Path) -> Path:
     """Write a figure as PNG, whole or not at all."""
     partial = file.with_name(f".{file.name}.partial")

@@ -1,0 +1,115 @@
+"""What a prediction is made from, when it is made from a folder of results: which of its calibrations."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from skred.errors import InputError
+from skred.inference.stored import Stored, read_stored
+
+_KINDS = {"verdict.json": "diagnosis", "prediction.json": "prediction", "summary.json": "calibration"}
+_FORMAT = 1
+_NO_PROFILE = (
+    "the verdict is `unexplained`: a force that is in no list is missing, and the folder has no draws of it"
+    " (profile.nc); diagnose again"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A calibration from a folder.
+
+    Attributes
+    ----------
+    stored : Stored
+    kind : str
+        ``calibration``, ``prediction`` or ``diagnosis``.
+    folder, file : str
+        Where it is from.
+    verdict : str or None
+        Of a diagnosis.
+    """
+
+    stored: Stored
+    kind: str
+    folder: str
+    file: str
+    verdict: str | None = None
+
+    @property
+    def told(self) -> str:
+        """Which calibration this is, in a sentence."""
+        law = self.stored.calibration.law.id
+        added = sorted({term.title for term in self.stored.added})
+        what = f"the law {law} with {' and '.join(added)}" if added else f"the law {law}, nothing added"
+        verdict = f" (verdict: {self.verdict})" if self.verdict else ""
+        return f"Nothing was sampled again: from the {self.kind}{verdict} in {self.folder}, {what}."
+
+    def as_dict(self) -> dict[str, Any]:
+        """As plain data."""
+        named = {"kind": self.kind, "folder": self.folder, "file": self.file, "verdict": self.verdict}
+        return named | {"told": self.told}
+
+
+def source_of(folder: Path) -> Source:
+    """The calibration that a folder's answer rests on.
+
+    Of a diagnosis the law with what was added to it; where nothing was, its base law.
+
+    Raises
+    ------
+    InputError
+        If the folder is not of ``skred calibrate``, ``predict`` or ``diagnose``, or of another version.
+    """
+    if not folder.is_dir():
+        raise InputError(f"--from {folder}: no such folder")
+    for document, kind in _KINDS.items():
+        if (folder / document).is_file():
+            return _source(folder, document, kind)
+    if (folder / "compare.json").is_file():
+        raise InputError(f"--from {folder}: a comparison of laws; give the folder of one of them inside it")
+    raise InputError(
+        f"--from {folder}: expected a folder written by skred calibrate, predict or diagnose:"
+        f" it holds none of {', '.join(_KINDS)}"
+    )
+
+
+def _source(folder: Path, document: str, kind: str) -> Source:
+    content = _read(folder / document)
+    file, verdict = "posterior.nc", None
+    if kind == "diagnosis":
+        verdict = str(content.get("verdict"))
+        file = _file_of_diagnosis(folder, verdict)
+    try:
+        stored = read_stored(folder / file)
+    except InputError as error:
+        raise InputError(f"--from {error}") from error
+    return Source(stored, kind, folder.name or str(folder), file, verdict)
+
+
+def _file_of_diagnosis(folder: Path, verdict: str) -> str:
+    for file in ("augmented.nc", "profile.nc"):
+        if (folder / file).is_file():
+            return file
+    if verdict == "unexplained":
+        raise InputError(f"--from {folder}: {_NO_PROFILE}")
+    if not (folder / "base.nc").is_file():
+        raise InputError(f"--from {folder}: this diagnosis has no calibration: it ended before one")
+    return "base.nc"
+
+
+def _read(file: Path) -> dict[str, Any]:
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"--from {file}: not a JSON document ({error})") from error
+    found = content.get("format") if isinstance(content, dict) else None
+    if found != _FORMAT:
+        raise InputError(
+            f"--from {file}: written by another version of skred, format {found!r:.20} instead of {_FORMAT};"
+            " run the command that wrote it again"
+        )
+    return dict(content)

@@ -1,0 +1,206 @@
+"""What an engineer asks of a prediction: named places, thresholds, impact pressure, and how often.
+
+Impact pressure is p = 0.5 C_d rho U^2 with the density rho of the flow and the drag coefficient C_d of the
+obstacle. The recordings know neither, so both are ranges with the same probability everywhere in them. The
+density differs from avalanche to avalanche; the drag coefficient is the obstacle's, one unknown number.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import gamma
+
+from skred.errors import InputError
+
+FloatArray = NDArray[np.float64]
+DENSITY_KG_M3 = (100.0, 300.0)
+"""Range of the density of flowing dry snow: from the denser fluidised fronts to a dense core."""
+DRAG_COEFFICIENT = (1.0, 2.0)
+"""Range of the drag coefficient: from a round mast to a flat one."""
+FORMULA = "p = 0.5 C_d rho U^2"
+SOURCES = (
+    "Formula and measured pressures: McClung and Schaerer (1985), Annals of Glaciology 6, 9-14,"
+    " doi 10.3189/1985AoG6-1-9-14.",
+    "Density: 35 to 100 kg/m3 in fluidised fronts, Issler, Gauer, Schaer and Keller (2020), Geosciences 10,"
+    " 2, doi 10.3390/geosciences10010002; about 300 kg/m3 in a dense core, Johannesson, Gauer, Issler and"
+    " Lied, eds (2009), The design of avalanche protection dams, European Commission, EUR 23339.",
+    "Drag coefficient: 1 for a round mast to 2 for a flat one, Salm, Burkard and Gubler (1990), Berechnung"
+    " von Fliesslawinen, Mitteilungen des SLF 47. Slow, wet snow loads narrow obstacles several times as"
+    " much.",
+)
+_KPA = 1e-3
+MOST_PLACES = 20
+_NAME = re.compile(r"\w[\w .-]{0,39}")
+_LARGEST_DENSITY, _LARGEST_DRAG, _LARGEST_RATE, _LARGEST = 917.0, 20.0, 1000.0, 1e5
+
+
+@dataclass(frozen=True)
+class Rate:
+    """How often avalanches like those recorded start on the track, per year.
+
+    Attributes
+    ----------
+    mean, sd : float, 1/year
+        A gamma distribution; without an sd the rate is exact.
+    """
+
+    mean: float
+    sd: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no rate."""
+        if not 0.0 < self.mean <= _LARGEST_RATE:
+            raise InputError(f"--per-year {self.mean:g}: expected above 0, at most {_LARGEST_RATE:g} a year")
+        if not 0.0 <= self.sd <= 10.0 * self.mean:
+            raise InputError(
+                f"--per-year {self.mean:g},{self.sd:g}: expected an SD from 0 to 10 times the rate"
+            )
+
+    def drawn(self, uniform: FloatArray) -> FloatArray:
+        """Rates from uniform numbers."""
+        if self.sd == 0.0:
+            return np.full(len(uniform), self.mean)
+        shape = (self.mean / self.sd) ** 2
+        return np.asarray(gamma.ppf(uniform, shape, scale=self.mean / shape))
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Named places, thresholds and frequency.
+
+    Attributes
+    ----------
+    places : tuple of (str, float)
+        Names with arc lengths [m]; empty for the campaign's own sensors of speed and its reference.
+    speeds_m_s, pressures_kpa : tuple of float
+        Thresholds whose probability of exceedance is wanted.
+    density_kg_m3, drag_coefficient : (float, float)
+        Lowest and highest; in between all are as likely.
+    rate : Rate or None
+    """
+
+    places: tuple[tuple[str, float], ...] = ()
+    speeds_m_s: tuple[float, ...] = (10.0, 20.0, 30.0)
+    pressures_kpa: tuple[float, ...] = ()
+    density_kg_m3: tuple[float, float] = DENSITY_KG_M3
+    drag_coefficient: tuple[float, float] = DRAG_COEFFICIENT
+    rate: Rate | None = field(default=None)
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be meant."""
+        names = [name for name, _ in self.places]
+        for name in names:
+            if not _NAME.fullmatch(name):
+                raise InputError(
+                    f"--at {name[:60]!r}: expected a name of at most 40 letters, digits, spaces, dots, dashes"
+                )
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise InputError(f"--at {twice[0]}: given twice; each place needs a name of its own")
+        if len(names) > MOST_PLACES:
+            raise InputError(f"--at: at most {MOST_PLACES} places, found {len(names)}")
+        for option, values in (("--speed", self.speeds_m_s), ("--pressure", self.pressures_kpa)):
+            for value in values:
+                if not 0.0 <= value <= _LARGEST:
+                    raise InputError(f"{option} {value:g}: expected a number from 0 to {_LARGEST:g}")
+        _check_range("--density", self.density_kg_m3, _LARGEST_DENSITY)
+        _check_range("--drag-coefficient", self.drag_coefficient, _LARGEST_DRAG)
+
+    def check_on(self, length_m: float) -> None:
+        """Refuse places that are not on a track.
+
+        Raises
+        ------
+        InputError
+            If one lies outside.
+        """
+        for name, s_m in self.places:
+            if not 0.0 <= s_m <= length_m:
+                raise InputError(f"--at {name}={s_m:g}: expected a place on the track, 0 to {length_m:.1f} m")
+
+    def as_dict(self) -> dict[str, Any]:
+        """What was asked for besides places, as plain data."""
+        rate = None
+        if self.rate is not None:
+            kind = "gamma" if self.rate.sd else "exact"
+            rate = {"per_year": self.rate.mean, "sd_per_year": self.rate.sd, "distribution": kind}
+        return {
+            "pressure": {
+                "formula": FORMULA,
+                "density_kg_m3": list(self.density_kg_m3),
+                "drag_coefficient": list(self.drag_coefficient),
+                "distribution": "uniform over each range",
+                "sources": list(SOURCES),
+            },
+            "rate": rate,
+        }
+
+
+def _check_range(option: str, limits: tuple[float, float], largest: float) -> None:
+    low, high = limits
+    if not 0.0 < low <= high <= largest:
+        raise InputError(f"{option} {low:g},{high:g}: expected LOW,HIGH, 0 < LOW <= HIGH <= {largest:g}")
+
+
+def impact_pressure_kpa(speed_m_s: Any, density_kg_m3: Any, drag_coefficient: Any) -> Any:
+    """Impact pressure [kPa] p = 0.5 C_d rho U^2 of snow on an obstacle (McClung and Schaerer, 1985).
+
+    Parameters
+    ----------
+    speed_m_s, density_kg_m3, drag_coefficient : float or array
+    """
+    return _KPA * 0.5 * drag_coefficient * density_kg_m3 * np.square(speed_m_s)
+
+
+def numbers_of(option: str, text: str, most: int) -> tuple[float, ...]:
+    """Numbers separated by commas, as many as there may be.
+
+    Raises
+    ------
+    InputError
+        If they are not finite numbers, or too many.
+    """
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        values = ()
+    if not 1 <= len(values) <= most or not all(math.isfinite(value) for value in values):
+        raise InputError(
+            f"{option} {text[:60]}: expected {'a number, or two with a comma' if most == 2 else 'a number'}"
+        )
+    return values
+
+
+def place_of(text: str) -> tuple[str, float]:
+    """Name and place [m] of ``NAME=S``.
+
+    Raises
+    ------
+    InputError
+        If it is something else.
+    """
+    name, equals, place = text.rpartition("=")
+    if not equals or not name.strip():
+        raise InputError(f"--at {text[:60]}: expected NAME=S, as house=1830: a name and its place in m")
+    return name.strip(), numbers_of(f"--at {name.strip()[:40]}:", place, 1)[0]
+
+
+def release_of(text: str) -> tuple[float, float]:
+    """Place [m] and weight of ``S`` or ``S:WEIGHT``.
+
+    Raises
+    ------
+    InputError
+        If it is something else.
+    """
+    place, colon, weight = text.partition(":")
+    try:
+        return float(place), float(weight) if colon else 1.0
+    except ValueError:
+        raise InputError(f"--release {text[:60]}: expected S or S:WEIGHT, as 120 or 120:2 (m)") from None

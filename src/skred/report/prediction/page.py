@@ -1,0 +1,158 @@
+"""The page of a prediction: one HTML file that needs nothing else, made from its documents."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from skred.report.prediction.figures import FIGURES as ALONG_TRACK
+from skred.report.prediction.places import has_places, places_figure
+from skred.report.shared import document as doc
+from skred.report.shared.html import environment, picture
+from skred.report.shared.numbers import fixed, is_number, three_digits
+from skred.report.shared.style import write_png, write_svg
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FIGURES = {**ALONG_TRACK, "places": places_figure}
+"""Makers of all figures by their names."""
+_SECTIONS = {
+    "places": "At the named places",
+    "years": "How often in a year",
+    "track": "Along the track",
+    "pressure": "Impact pressure",
+    "uncertainty": "Where the uncertainty comes from",
+    "trust": "What this rests on",
+    "made": "How it was made",
+}
+
+
+def save_prediction_figures(document: doc.Document, tree: xr.DataTree, folder: Path) -> dict[str, Path]:
+    """Draw all figures as PNG, and as SVG for the page; the SVG files by name."""
+    drawn = {}
+    for name, make in FIGURES.items():
+        if name == "places" and not has_places(document):
+            continue
+        figure = make(document, tree)
+        write_png(figure, folder / f"{name}.png")
+        drawn[name] = write_svg(figure, folder / f"{name}.svg")
+    return drawn
+
+
+def render_prediction(document: doc.Document, figures: Mapping[str, Path]) -> str:
+    """Render the page of a prediction.
+
+    Parameters
+    ----------
+    document : mapping
+        The content of ``prediction.json``.
+    figures : mapping of str to Path
+        Figures by name, see `save_prediction_figures`.
+
+    Returns
+    -------
+    str
+        A self-contained page: style inside, pictures as data URIs.
+    """
+    has = {
+        "places": has_places(document),
+        "years": has_places(document) and doc.get(document, "rate") is not None,
+        "pressure": has_places(document),
+    }
+    valid = doc.get(document, "valid") is True
+    sections = {name: title for name, title in _SECTIONS.items() if has.get(name, valid or name == "made")}
+    return (
+        environment()
+        .get_template("prediction.html.jinja")
+        .render(
+            d=document,
+            valid=valid,
+            sections=sections,
+            number={name: k for k, name in enumerate(sections, 1)},
+            figures={name: picture(file) for name, file in figures.items()},
+            lead=_lead(document) if valid else list(doc.listed(document, "statement")),
+            caveats=[line for line in doc.listed(document, "statement") if is_caveat(line)],
+            left_out=_left_out(document),
+            percent=percent,
+            period=period,
+        )
+    )
+
+
+_CAVEATS = ("Probabilities ", "Recorded avalanches ", "Intervals ", "Impact pressure ", "The population ")
+
+
+def is_caveat(line: Any) -> bool:
+    """Whether a sentence of the statement is a condition of the prediction."""
+    return str(line).startswith(_CAVEATS)
+
+
+def _lead(document: doc.Document) -> list[str]:
+    """The answer for someone who reads nothing else."""
+    told = []
+    for place in doc.listed(document, "at"):
+        chance = percent(doc.get(place, "reached", "value"))
+        low, high = (percent(doc.get(place, "reached", end)) for end in ("low", "high"))
+        name = "The reference" if place["name"] == "reference" else str(place["name"])
+        told.append(
+            f"{name} (s = {place['s_m']:.0f} m): {chance} of avalanches like those recorded come here"
+            f" (90 % interval {low} to {high}).{_fast(place)}{_period(place)}"
+        )
+    if not told:
+        rows = doc.listed(document, "runout", "exceeded_by")
+        said = "; ".join(f"{100 * row['share']:g} % run beyond s = {row['value']:.0f} m" for row in rows)
+        told.append(f"Of avalanches like those recorded, {said}.")
+    return told
+
+
+def _fast(place: doc.Document) -> str:
+    """How fast, and with which pressure, the usual one of those that come is."""
+    rows = [doc.listed(place, name, "given_reached") for name in ("speed", "pressure")]
+    if not all(rows):
+        return " Too few come to say how fast."
+    speed, pressure = rows[0][1]["value"], rows[1][1]["value"]
+    return (
+        f" One in ten of these is faster than {three_digits(speed)} m/s,"
+        f" and one in ten presses with more than {three_digits(pressure)} kPa."
+    )
+
+
+def _period(place: doc.Document) -> str:
+    band = doc.get(place, "reached", "return_period_years")
+    return (
+        "" if band is None else f" With the given frequency one comes every {period(band)} years on average."
+    )
+
+
+def _left_out(document: doc.Document) -> list[doc.Document]:
+    """What does not act here, each once: a force in no list has a row for each of its knots."""
+    rows = [row for row in doc.listed(document, "added") if row["used"] is False]
+    return list({str(row["title"]): row for row in rows}.values())
+
+
+def period(band: Any) -> str:
+    """A return period with its interval; one without an end is said in words."""
+    value, low, high = (doc.get(band, key) for key in ("value", "low", "high"))
+    if not is_number(value):
+        return "longer than can be said" if not is_number(low) else f"more than {_years(low)}"
+    end = f"to {_years(high)}" if is_number(high) else "or more"
+    return f"{_years(value)} ({_years(low)} {end})"
+
+
+def _years(value: float) -> str:
+    """Two significant digits: a return period is never known better."""
+    return fixed(float(f"{value:.1e}"), 0 if value >= 10 else 1)
+
+
+def percent(value: Any) -> str:
+    """A probability in percent, never rounded to an exact 0 or 100."""
+    if not is_number(value):
+        return "n/a"
+    if 0.0 < value < 0.0005:
+        return "<0.1 %"
+    if 0.9995 < value < 1.0:
+        return ">99.9 %"
+    text = f"{100 * value:.{1 if value < 0.0995 or value > 0.9005 else 0}f} %"
+    return text.replace(".0 %", " %")

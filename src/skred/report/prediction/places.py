@@ -1,0 +1,83 @@
+"""Figure of the named places: how often which speed and which impact pressure is exceeded."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from skred.report.shared.document import get, listed
+from skred.report.shared.labels import figure_text, unit_text
+from skred.report.shared.style import GREY, PALETTE, legend_below, new_figure, styled
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from skred.report.shared.document import Document
+
+MOST_SHOWN = 7
+"""Places drawn at most: more lines are not told apart."""
+_FLOOR, _LEAST = 0.0005, 0.005
+_TICKS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005)
+_DASHES = ("-", (0, (6, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
+
+
+@styled
+def places_figure(document: Document, tree: xr.DataTree) -> Figure:
+    """Probability that an avalanche exceeds a speed, and an impact pressure, at each named place.
+
+    Parameters
+    ----------
+    document : mapping
+        The content of ``prediction.json``.
+    tree : DataTree
+        The content of ``prediction.nc``.
+    """
+    data = tree.to_dataset()
+    title = f"At the named places of {figure_text(data.attrs['track'], 40)}"
+    figure = new_figure(3.9, f"{title}\nlines: of all avalanches; bands: 90 % credible")
+    speed, pressure = figure.subplots(1, 2, sharey=True)
+    for axes, name, words in ((speed, "speed", "front speed"), (pressure, "pressure", "impact pressure")):
+        _curves(axes, data, name)
+        unit = data[f"{name}_threshold"].attrs["units"]
+        axes.set_xlabel(f"{words} U [{unit_text(unit)}]" if name == "speed" else f"{words} p [{unit}]")
+        axes.set_title(f"Share of avalanches that exceed the {words}")
+        for row in _thresholds(document, name):
+            axes.axvline(row, color=GREY, linewidth=0.7, linestyle=(0, (2, 2)))
+    speed.set_ylabel("probability for an avalanche")
+    speed.set_yscale("log")
+    speed.set_ylim(_LEAST, 1.15)
+    speed.set_yticks(_TICKS, [f"{100 * tick:g} %" for tick in _TICKS])
+    speed.minorticks_off()
+    legend_below(figure, (speed,), columns=3)
+    return figure
+
+
+def _thresholds(document: Document, name: str) -> list[float]:
+    """Thresholds that were asked for."""
+    places = listed(document, "at")
+    return [float(row["threshold"]) for row in listed(places[0], name, "above")] if places else []
+
+
+def _curves(axes: Axes, data: xr.Dataset, name: str) -> None:
+    """One line and band for each place."""
+    at = data[f"{name}_threshold"].values
+    for k, place in enumerate(data["at"].values[:MOST_SHOWN]):
+        value, low, high = (
+            np.maximum(data[f"{name}_exceedance{end}"].values[k], _FLOOR) for end in ("", "_low", "_high")
+        )
+        colour, dashes = PALETTE[k % len(PALETTE)], _DASHES[k % len(_DASHES)]
+        axes.fill_between(at, low, high, color=colour, alpha=0.16, linewidth=0)
+        label = figure_text(place, 30)
+        axes.plot(at, value, color=colour, linestyle=dashes, linewidth=1.6, label=label)
+    least = [data[f"{name}_exceedance_high"].values[k] for k in range(len(data["at"]))]
+    seen = np.flatnonzero(np.max(least, axis=0) >= _LEAST)
+    axes.set_xlim(0, float(at[min(len(at) - 1, seen[-1] + 1)]) if len(seen) else float(at[-1]))
+    axes.grid(axis="y")
+
+
+def has_places(document: Document) -> bool:
+    """Whether there is anything to draw."""
+    return bool(listed(document, "at")) and get(document, "valid") is True
