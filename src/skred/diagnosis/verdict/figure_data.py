@@ -19,8 +19,9 @@ from skred.diagnosis.evidence.coefficient import Curve
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, NothingAdded, Outcome
 from skred.diagnosis.verdict.conditional import conditional_dataset
 from skred.diagnosis.verdict.mechanisms import candidates_of
-from skred.diagnosis.verdict.report_facts import FORMAT, checks_of, comparisons_of
+from skred.diagnosis.verdict.report_facts import checks_of, comparisons_of
 from skred.inference.recorded_data import recorded_groups
+from skred.inference.results import FORMAT
 from skred.physics.mechanisms.stretches import is_opposed
 
 FloatArray = NDArray[np.float64]
