@@ -154,6 +154,7 @@ def law_attributes(problem: Problem, law: Law) -> dict[str, Any]:
         "strengths": _json([parameter_of(mechanism.strength) for mechanism in law.mechanisms]),
         "equation": law.equation,
         "likelihood": problem.likelihood,
+        "changed_priors": json.dumps(dict(law.changed_priors)),
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -69,6 +70,7 @@ def figure_data(found: Outcome) -> xr.DataTree:
         "title": f"What {found.law.title} leaves out, {found.problem.campaign.name}",
         "format": FORMAT,
         "law": found.law.id,
+        "changed_priors": json.dumps(dict(found.law.changed_priors)),
         "campaign": found.problem.campaign.name,
         "campaign_fingerprint": found.problem.campaign.fingerprint(),
     }
