@@ -63,7 +63,7 @@ def test_a_calibration_is_that_of_the_command(calibrated: Result, tmp_path: Path
 def test_a_changed_prior_is_told(calibrated: Result) -> None:
     assert calibrated.document["changed_priors"] == {"dry_friction": 0.3}
     assert calibrated.statement[0] == "Priors were changed: of coulomb the scale of dry_friction 0.3."
-    assert "the scale of dry_friction 0.3" in calibrated._repr_html_()
+    assert "the scale of dry_friction 0.3" in calibrated.html()
     assert skred.calibrate("coulomb", **SHORT).document["changed_priors"] == {}
 
 
@@ -79,7 +79,8 @@ def test_names_are_escaped_and_the_folder_goes_with_the_result() -> None:
     row = {"name": "<b>", "unit": "&", "mean": 1.0, "sd": 1.0, "low": 1.0, "high": 1.0}
     document = {"statement": "<script>", "parameters": [row]}
     result = Result("calibrate", "<img>", document, None, folder)
-    page = result._repr_html_()
+    page = result.html()
+    assert hasattr(result, "_repr_html_")
     assert "<script>" not in page and "<img>" not in page and "<b>" not in page and "&lt;b&gt;" in page
     assert repr(result) == "<skred calibrate: <img>>" and folder.is_dir()
     del result

@@ -102,7 +102,11 @@ class Result:
         return f"<skred {self.command}: {self.subject}>"
 
     def _repr_html_(self) -> str:
-        """For notebooks: what was asked and what came out."""
+        """For notebooks."""
+        return self.html()
+
+    def html(self) -> str:
+        """What was asked and what came out, as a piece of HTML with all names escaped."""
         said = "".join(f"<p>{escape(sentence)}</p>" for sentence in self.statement)
         table = parameter_table(self.document.get("parameters", ()))
         return f"<div><h3>{escape(self.command)}: {escape(self.subject)}</h3>{said}{table}</div>"
