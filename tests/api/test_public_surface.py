@@ -80,7 +80,6 @@ def test_names_are_escaped_and_the_folder_goes_with_the_result() -> None:
     document = {"statement": "<script>", "parameters": [row]}
     result = Result("calibrate", "<img>", document, None, folder)
     page = result.html()
-    assert hasattr(result, "_repr_html_")
     assert "<script>" not in page and "<img>" not in page and "<b>" not in page and "&lt;b&gt;" in page
     assert repr(result) == "<skred calibrate: <img>>" and folder.is_dir()
     del result

@@ -101,7 +101,7 @@ def _build(build: Callable[[Any], Any], scales: Sequence[tuple[str, float]], pro
 
 
 def rescaled_model(model: Any, scales: Mapping[str, float]) -> Any:
-    """A copy of a PyMC model whose priors have other scales.
+    """Give the priors of a PyMC model other scales, in place; returns the model.
 
     Parameters
     ----------
@@ -116,11 +116,9 @@ def rescaled_model(model: Any, scales: Mapping[str, float]) -> Any:
     """
     import numpy as np
     import pytensor.tensor as pt
-    from pymc.model.fgraph import fgraph_from_model, model_from_fgraph
 
-    graph, copies = fgraph_from_model(model)
     for name, scale in scales.items():
-        node = copies[model[name]].owner.inputs[0].owner
+        node = model[name].owner
         kind = type(node.op).__name__
         if kind == "HalfNormalRV":
             place, value = 1, scale
@@ -132,5 +130,6 @@ def rescaled_model(model: Any, scales: Mapping[str, float]) -> Any:
                 f" prior, found {kind.removesuffix('RV')}"
             )
         before = node.op.dist_params(node)[place]
-        graph.change_node_input(node, node.inputs.index(before), pt.constant(value, dtype=before.dtype))
-    return model_from_fgraph(graph, mutate_fgraph=True)
+        # In place: a copy of the model would lose variables that a diagnosis adds.
+        node.inputs[node.inputs.index(before)] = pt.constant(value, dtype=before.dtype)
+    return model
