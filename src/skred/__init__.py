@@ -1,5 +1,54 @@
-"""Bayesian calibration and comparison of avalanche block models against recordings."""
+"""Bayesian calibration and comparison of avalanche block models against recordings.
+
+`calibrate`, `compare`, `identify`, `diagnose` and `predict` do what the commands of these names do, and
+return a `Result`. See ``docs/python.md``. Nothing heavy is imported before it is used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from skred.parallel.folders import let_pytensor_write
 
+if TYPE_CHECKING:
+    from skred.api.fronts import front_readings
+    from skred.api.problems import laws, mechanisms, read_campaign
+    from skred.api.results import Result
+    from skred.api.work import calibrate, compare, diagnose, identify, predict
+
 let_pytensor_write()  # before anything imports it
+
+__all__ = [
+    "Result",
+    "calibrate",
+    "compare",
+    "diagnose",
+    "front_readings",
+    "identify",
+    "laws",
+    "mechanisms",
+    "predict",
+    "read_campaign",
+]
+_ROOMS = {
+    "fronts": ("front_readings",),
+    "problems": ("laws", "mechanisms", "read_campaign"),
+    "results": ("Result",),
+    "work": ("calibrate", "compare", "diagnose", "identify", "predict"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import what is asked for the first time."""
+    for room, names in _ROOMS.items():
+        if name in names:
+            found = getattr(import_module(f"skred.api.{room}"), name)
+            globals()[name] = found
+            return found
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """With what is imported when it is asked for."""
+    return sorted({*globals(), *__all__})

@@ -259,8 +259,10 @@ def test_the_tree_has_all_groups(problem: AugmentedProblem, calibration: Any) ->
     names = [parameter.name for parameter in problem.parameters(law)]
     assert names == ["dry_friction", "dry_friction_spread", "turbulent_drag"]
     assert tree["posterior"]["turbulent_drag"].attrs["units"] == "m-1"
-    for group in ("event_posterior", "posterior_predictive", "prior_predictive"):
+    for group in ("event_posterior", "new_avalanches"):
         assert np.isfinite(tree[group]["front"].values).all()
+    for group in ("posterior_predictive", "prior_predictive"):
+        assert set(tree[group].data_vars) == set(tree["observed_data"].data_vars)
     assert np.isfinite(tree["log_likelihood"]["recordings"].values).all()
     assert tree["constant_data"]["added_strength"].values.tolist() == ["turbulent_drag"]
     assert calibration.entry()["added"][0]["id"] == "turbulent_drag"

@@ -122,7 +122,7 @@ def test_rules_on_the_page_are_the_codes() -> None:
 
 PAGES = (
     "own-data", "campaign-format", "tracks", "predictions", "reading-a-verdict", "laws-and-likelihoods",
-    "method", "own-mechanism", "own-law", "ryggfonn", "proof", "reliability", "glossary",
+    "method", "own-mechanism", "own-law", "ryggfonn", "proof", "reliability", "python", "glossary",
 )  # fmt: skip
 WORDS = """
     model comparison; comparison under one error model; candidate; added; linearised screening; local

@@ -56,9 +56,9 @@ def test_the_tree_holds_everything_and_comes_back(calibrated: Calibration, tmp_p
         events = tree["event_posterior"].to_dataset()
         assert events["retardation"].dims == ("chain", "draw", "event")
         assert events["retardation"].attrs["units"] == "m s-2"
-        predictive = tree["posterior_predictive"].to_dataset()
-        assert predictive["reading"].dims == ("chain", "draw", "event", "sensor")
-        assert predictive["reached"].dtype == bool
+        new = tree["new_avalanches"].to_dataset()
+        assert new["reading"].dims == ("chain", "draw", "event", "sensor")
+        assert new["reached"].dtype == bool
         assert tree["log_likelihood"].to_dataset()["recordings"].sizes["event"] == 22
         assert json.loads(tree.attrs["gate"])["passed"]
 
@@ -92,7 +92,7 @@ def test_many_draws_are_thinned(calibrated: Calibration) -> None:
     posterior, prior = tree["posterior"].to_dataset(), tree["prior"].to_dataset()
     many = xr.concat([posterior] * 10, "draw").assign_coords(draw=np.arange(5000))
     groups = predictive(calibrated.problem, calibrated.law, many, prior, 0)
-    for name in ("event_posterior", "posterior_predictive"):
+    for name in ("event_posterior", "new_avalanches", "posterior_predictive"):
         draws = groups[name]["draw"].values
         assert draws[1] == 3 and len(draws) * 4 * 22 <= MOST_AVALANCHES < 2 * len(draws) * 4 * 22
     assert groups["prior_predictive"].sizes["draw"] == prior.sizes["draw"]

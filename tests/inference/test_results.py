@@ -26,6 +26,8 @@ GROUPS = {
     "sample_stats",
     "log_likelihood",
     "posterior_predictive",
+    "mean_response",
+    "new_avalanches",
     "prior",
     "prior_predictive",
     "observed_data",
@@ -92,12 +94,12 @@ def test_parameters_have_units(group: str, calibration: Any) -> None:
 def test_shapes(calibration: Any, problem: Any) -> None:
     tree, n_draws = calibration.tree, {"chain": 4, "draw": 1000}
     events = {"event": 22, "sensor": 4}
-    assert dict(tree["posterior_predictive"]["reading"].sizes) == {**n_draws, **events}
-    assert dict(tree["posterior_predictive"]["mean_response"].sizes) == {**n_draws, "release": 1, "sensor": 4}
+    assert dict(tree["new_avalanches"]["reading"].sizes) == {**n_draws, **events}
+    assert dict(tree["mean_response"]["response"].sizes) == {**n_draws, "release": 1, "sensor": 4}
     assert dict(tree["log_likelihood"]["recordings"].sizes) == {**n_draws, "event": 22}
-    assert dict(tree["observed_data"]["reading"].sizes) == events
+    assert dict(tree["constant_data"]["reading"].sizes) == events
     assert tree["log_likelihood"]["event"].values.tolist() == list(problem.campaign.event_ids)
-    assert_array_equal(tree["observed_data"]["reading"].values, problem.values)
+    assert_array_equal(tree["constant_data"]["reading"].values, problem.values)
 
 
 def test_log_likelihood_is_pymcs(calibration: Any) -> None:
@@ -113,8 +115,11 @@ def test_log_likelihood_is_pymcs(calibration: Any) -> None:
 
 
 def test_predictive_readings_scatter_about_the_response_by_sigma(calibration: Any, problem: Any) -> None:
-    predictive = calibration.tree["posterior_predictive"].to_dataset()
-    residual = (predictive["reading"] - predictive["mean_response"].isel(release=0)).values.reshape(-1, 4)
+    reading, response = (
+        calibration.tree["new_avalanches"]["reading"],
+        calibration.tree["mean_response"]["response"],
+    )
+    residual = (reading - response.isel(release=0)).values.reshape(-1, 4)
     sd = np.sqrt(np.diag(problem.covariance))
     assert np.abs(residual.mean(axis=0) / sd).max() < 0.02
     assert np.abs((np.cov(residual.T) - problem.covariance) / np.outer(sd, sd)).max() < 0.02
@@ -129,7 +134,7 @@ def test_response_of_several_releases(two_releases: Any, calibration: Any) -> No
     )
     prior = calibration.tree["prior"].to_dataset().isel(draw=slice(5))
     tree = assemble(two_releases, law, posterior, prior, calibration.gate, calibration.settings)
-    response = tree["posterior_predictive"]["mean_response"]
+    response = tree["mean_response"]["response"]
     assert response["release"].values.tolist() == [0.0, 700.0]
     rows = law.strength_rows({n: posterior["posterior"][n].values.ravel() for n in law.parameter_names})
     expected = two_releases.simulate(law.mechanisms, rows)[:, [0, 1]]

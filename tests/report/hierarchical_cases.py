@@ -36,7 +36,7 @@ def hierarchical_calibration(problem: Problem, law: Law, draws: int = 40, chains
         prior[name] = (dims, np.clip(wide, -1, 1) if "correlation" in name else abs(wide))
     medians = law.strength_rows({name: posterior[name][1] for name in law.parameter_names})
     groups = {"posterior": posterior, "prior": prior}
-    for group, spread in (("event_posterior", 0.1), ("posterior_predictive", 0.2)):
+    for group, spread in (("event_posterior", 0.1), ("new_avalanches", 0.2)):
         groups[group] = avalanches(problem, law, medians, size, spread, rng)
     tree = xr.DataTree.from_dict({name: xr.Dataset(group) for name, group in groups.items()})
     tree.attrs["gate"] = '{"passed": true, "r_hat_max": 1.002, "ess_bulk_min": 900, "ess_tail_min": 800}'

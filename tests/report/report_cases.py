@@ -54,11 +54,12 @@ def calibration(problem: PooledProblem, law: Law, draws: int = 60, chains: int =
     of_event = problem.simulate(law.mechanisms, rows).reshape(chains, draws, problem.campaign.n_events, -1)
     first = [int(np.flatnonzero(problem.release_of_event == k)[0]) for k in range(len(problem.releases))]
     noise = rng.standard_normal(of_event.shape) @ np.linalg.cholesky(problem.covariance).T
-    predictive = {
-        "mean_response": ((*dims, "release", "sensor"), of_event[:, :, first]),
-        "reading": ((*dims, "event", "sensor"), of_event + noise),
+    groups = {
+        "posterior": posterior,
+        "prior": prior,
+        "mean_response": {"response": ((*dims, "release", "sensor"), of_event[:, :, first])},
+        "new_avalanches": {"reading": ((*dims, "event", "sensor"), of_event + noise)},
     }
-    groups = {"posterior": posterior, "prior": prior, "posterior_predictive": predictive}
     tree = xr.DataTree.from_dict({name: xr.Dataset(group) for name, group in groups.items()})
     tree.attrs["gate"] = '{"passed": true, "r_hat_max": 1.002, "ess_bulk_min": 900, "ess_tail_min": 800}'
     return tree

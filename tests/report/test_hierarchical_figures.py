@@ -82,8 +82,8 @@ def test_nothing_recorded_nothing_reached_and_draws_all_alike(problem, tmp_path)
     changed = replace(problem, campaign=replace(problem.campaign, status=status))
     law = load_law("pcm")
     tree = hierarchical_calibration(changed, law)
-    tree["posterior_predictive"]["reached"].values[..., 0] = False
-    for group in ("event_posterior", "posterior_predictive"):
+    tree["new_avalanches"]["reached"].values[..., 0] = False
+    for group in ("event_posterior", "new_avalanches"):
         for name in law.parameter_names:
             tree[group][name].values[:] = tree[group][name].values[0, 0, 0]
     for name in (parameter.name for parameter in changed.parameters(law)):
@@ -97,7 +97,7 @@ def test_what_is_said_of_a_sensor(problem):
     tree = hierarchical_calibration(problem, law)
     recordings = recordings_of(as_saved(tree, law, problem))
     sensor = recordings.sensors[2]
-    reached = tree["posterior_predictive"]["reached"].values
+    reached = tree["new_avalanches"]["reached"].values
     reached[..., 2] = False
     reached[0, :, 0, 2] = True
     draws = new_avalanche(tree, recordings, sensor)

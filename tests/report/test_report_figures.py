@@ -70,7 +70,7 @@ def test_only_runouts_several_releases_and_draws_all_alike(problem, tmp_path):
     tree = calibration(changed, law)
     for name in law.parameter_names:
         tree["posterior"][name].values[:] = tree["posterior"][name].values[0, 0]
-    tree["posterior_predictive"]["mean_response"].values[:] = 2000.0
+    tree["mean_response"]["response"].values[:] = 2000.0
     del tree.attrs["gate"]
     assert_pictures(save_model_figures(as_saved(tree, law, changed), tmp_path))
 

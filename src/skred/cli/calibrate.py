@@ -7,8 +7,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from skred.cli.inputs import problem_of
-from skred.cli.options import LIKELIHOOD, SAMPLING, Campaigns, Likelihood, Samplers, Sampling
+from skred.cli.inputs import law_of, problem_of
+from skred.cli.options import LIKELIHOOD, SAMPLING, Campaigns, Likelihood, Priors, Samplers, Sampling
 from skred.cli.output import OUTPUT, Output
 from skred.cli.run_model import calibrate_law
 
@@ -21,13 +21,12 @@ def calibrate(
     /,
     *,
     likelihood: Likelihood = LIKELIHOOD,
+    priors: Priors = None,
     sampler: Samplers = "metropolis",
     sampling: Sampling = SAMPLING,
     output: Output = OUTPUT,
 ) -> int:
     """Calibrate one law: sample the posterior, check it, and write summary.json, posterior.nc and figures."""
-    from skred.physics.laws import load_law
-
-    load_law(law)  # before a campaign is read: a wrong name is told at once
+    chosen = law_of(law, priors)  # before a campaign is read: a wrong name is told at once
     problem = problem_of(campaign, likelihood.likelihood, likelihood.errors, likelihood.smoothing)
-    return calibrate_law(law, problem, sampling, sampler, output)
+    return calibrate_law(chosen, problem, sampling, sampler, output)

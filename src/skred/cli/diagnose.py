@@ -8,7 +8,7 @@ from typing import Any
 
 from skred.cli.exit_codes import DONE, NOT_CONVERGED
 from skred.cli.hints import tell_hints
-from skred.cli.inputs import campaign_of, hierarchical_of
+from skred.cli.inputs import campaign_of, hierarchical_of, law_of
 from skred.cli.options import (
     DIAGNOSING,
     HIERARCHICAL,
@@ -16,6 +16,7 @@ from skred.cli.options import (
     DiagnosedModel,
     Diagnosing,
     Hierarchical,
+    Priors,
 )
 from skred.cli.output import OUTPUT, Output
 from skred.cli.refused import tell_refused_mechanisms
@@ -26,6 +27,7 @@ def diagnose(
     /,
     *,
     base_model: DiagnosedModel = "pcm",
+    priors: Priors = None,
     diagnosing: Diagnosing = DIAGNOSING,
     likelihood: Hierarchical = HIERARCHICAL,
     output: Output = OUTPUT,
@@ -35,9 +37,7 @@ def diagnose(
 
     recorded = campaign_of(campaign)
     with helpers("skred.diagnosis.diagnose"):  # they load packages while this process loads its own
-        from skred.physics.laws import load_law
-
-        law = load_law(base_model)
+        law = law_of(base_model, priors)
         tell_refused_mechanisms()
         problem = hierarchical_of(recorded, likelihood.errors, likelihood.smoothing)
         tell_hints(problem, output.tell)

@@ -5,8 +5,8 @@ Everything heavy is imported inside the function, so that ``--help`` is instant.
 
 from skred.cli.exit_codes import DONE
 from skred.cli.hints import tell_hints
-from skred.cli.inputs import campaign_of, hierarchical_of
-from skred.cli.options import HIERARCHICAL, Campaigns, DiagnosedModel, Hierarchical, IdleSeed
+from skred.cli.inputs import campaign_of, hierarchical_of, law_of
+from skred.cli.options import HIERARCHICAL, Campaigns, DiagnosedModel, Hierarchical, IdleSeed, Priors
 from skred.cli.output import OUTPUT, Output
 from skred.cli.refused import tell_refused_mechanisms
 
@@ -16,14 +16,13 @@ def identify(
     /,
     *,
     base_model: DiagnosedModel = "pcm",
+    priors: Priors = None,
     likelihood: Hierarchical = HIERARCHICAL,
     seed: IdleSeed = 0,
     output: Output = OUTPUT,
 ) -> int:
     """Say what these recordings can tell at all: from what strength on each mechanism would be seen."""
-    from skred.physics.laws import load_law
-
-    law = load_law(base_model)
+    law = law_of(base_model, priors)
     tell_refused_mechanisms()
     problem = hierarchical_of(campaign_of(campaign), likelihood.errors, likelihood.smoothing)
     tell_hints(problem, output.tell)

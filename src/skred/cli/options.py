@@ -102,8 +102,6 @@ Tune = Annotated[
         help="Adaptation draws before them; by default 500, hierarchical 1000.",
     ),
 ]
-TUNE = {"pooled": 500, "hierarchical": 1000}
-"""Adaptation draws where none are asked for: more parameters take longer to adapt to."""
 Chains = Annotated[int, Parameter(validator=validators.Number(gte=2, lte=100), help="Number of chains.")]
 Likelihoods = Annotated[
     Literal["pooled", "hierarchical"],
@@ -141,6 +139,12 @@ OuterFolds = Annotated[
     Parameter(
         validator=validators.Number(gte=2, lte=10_000),
         help="Repeat the whole diagnosis so often, each time without some avalanches, to predict those.",
+    ),
+]
+Priors = Annotated[
+    Path | None,
+    Parameter(
+        help="A TOML file with other scales of priors, such as: dry_friction = 0.3; told in every result."
     ),
 ]
 IdleSeed = Annotated[
@@ -194,7 +198,7 @@ class Sampling:
 
     def settings(self, likelihood: str, sampler: Samplers = "metropolis") -> "SamplerSettings":
         """As the sampler wants them, for a likelihood."""
-        from skred.inference.sampling import SamplerSettings
+        from skred.inference.sampling import TUNE, SamplerSettings
 
         tune = self.tune or TUNE[likelihood]
         return SamplerSettings(sampler, self.draws, tune, self.chains, self.seed)

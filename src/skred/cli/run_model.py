@@ -10,13 +10,14 @@ from cyclopts import App
 
 from skred.cli.exit_codes import DONE, NOT_CONVERGED
 from skred.cli.hints import tell_hints
-from skred.cli.inputs import problem_of
-from skred.cli.options import LIKELIHOOD, SAMPLING, Campaigns, Likelihood, Samplers, Sampling
+from skred.cli.inputs import law_of, problem_of
+from skred.cli.options import LIKELIHOOD, SAMPLING, Campaigns, Likelihood, Priors, Samplers, Sampling
 from skred.cli.output import OUTPUT, Output
 from skred.cli.program import exit_code_of, new_program
 
 if TYPE_CHECKING:
     from skred.inference.problem import Problem
+    from skred.physics.law import Law
 
 
 def run_model(law_id: str) -> None:
@@ -34,20 +35,22 @@ def _law_program(law_id: str) -> App:
         *,
         campaign: Campaigns = "ryggfonn",
         likelihood: Likelihood = LIKELIHOOD,
+        priors: Priors = None,
         sampler: Samplers = "metropolis",
         sampling: Sampling = SAMPLING,
         output: Output = OUTPUT,
     ) -> int:
         """Sample the posterior, check it, and write summary.json, posterior.nc and figures."""
+        law = law_of(law_id, priors)
         problem = problem_of(campaign, likelihood.likelihood, likelihood.errors, likelihood.smoothing)
-        return calibrate_law(law_id, problem, sampling, sampler, output)
+        return calibrate_law(law, problem, sampling, sampler, output)
 
     program.default(calibrate)
     return program
 
 
 def calibrate_law(
-    law_id: str, problem: "Problem", sampling: Sampling, sampler: Samplers, output: Output
+    law: "Law", problem: "Problem", sampling: Sampling, sampler: Samplers, output: Output
 ) -> int:
     """Calibrate one law, write its results and tell what came out.
 
@@ -56,12 +59,13 @@ def calibrate_law(
     int
         The exit code.
     """
-    from skred.physics.laws import load_law
-
-    law = load_law(law_id)
     tell_hints(problem, output.tell)
-    with output.results("calibrate", law_id) as results:
-        output.tell(f"{law_id}: sampling")
+    if sampler == "nuts":
+        from skred.inference.sampling import KINKED
+
+        output.tell(KINKED)
+    with output.results("calibrate", law.id) as results:
+        output.tell(f"{law.id}: sampling")
 
         from skred.inference.calibrate import calibrate, write_calibration
         from skred.inference.fit import calibration_statement
@@ -70,7 +74,7 @@ def calibrate_law(
 
         settings = sampling.settings(problem.likelihood, sampler)
         calibration = calibrate(problem, law, settings, progress=output.progress)
-        output.tell(f"{law_id}: writing {results.path}")
+        output.tell(f"{law.id}: writing {results.path}")
         write_calibration(calibration, results.unfinished)
         write_reports(results.unfinished)
     entry = calibration.entry()

@@ -91,7 +91,7 @@ def _of_new_avalanches(
 
 def _avalanches(tree: xr.DataTree, law: Law) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Strengths (n, n_strengths), releases and speeds there (n,) of randomly chosen new avalanches."""
-    predictive = tree["posterior_predictive"].to_dataset()
+    predictive = tree["new_avalanches"].to_dataset()
     names = [*(mechanism.strength.name for mechanism in law.mechanisms), "release", "release_speed"]
     rows = [predictive[name].transpose("chain", "draw", "event").values.ravel() for name in names]
     chosen = np.random.default_rng(0).permutation(len(rows[0]))[:_MOST_AVALANCHES]

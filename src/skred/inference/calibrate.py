@@ -68,6 +68,8 @@ class Calibration:
             "id": self.law.id,
             "title": self.law.title,
             "equation": self.law.equation,
+            "changed_priors": dict(self.law.changed_priors),
+            "prior_note": self.law.prior_note,
             "gate": self.gate.as_dict(),
             "parameters": _parameter_rows(self.tree, self.problem.parameters(self.law)),
             **summary(self.problem, self.law, self.tree),

@@ -148,11 +148,18 @@ def adjusted_p_values(recorded: FloatArray, predicted: FloatArray, testable: NDA
 def calibration_statement(entry: dict[str, Any]) -> list[str]:
     """Whether the chains of a calibration converged, and whether the model fits: two questions.
 
+    Priors that are not the law's own are told first.
+
     Parameters
     ----------
     entry : dict
         As `skred.inference.calibrate.Calibration.entry` makes it.
     """
+    changed = [entry["prior_note"]] if entry.get("prior_note") else []
+    return [*changed, *_calibration_statement(entry)]
+
+
+def _calibration_statement(entry: dict[str, Any]) -> list[str]:
     gate = entry["gate"]
     aside = entry.get("bounds_left_out")
     unseen = [f"Readings known by bounds only ({aside}) take no part in the check of fit."] if aside else []

@@ -57,6 +57,10 @@ class Problem(ABC):
             One for each mechanism, in its unit.
         """
 
+    def joined_by(self, mechanism: Mechanism) -> JoinedProblem:
+        """The problem for the model of a law that leaves a mechanism out, which is to be added."""
+        return JoinedProblem(self, mechanism)
+
     @abstractmethod
     def log_likelihood(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
         """Log density of each event for many parameter vectors: arrays by name to (n, n_events)."""
@@ -126,3 +130,35 @@ class Problem(ABC):
         strengths = np.asarray(strengths, float)
         speeds: FloatArray = front_speeds(strengths, releases, self.path, law, release_speed_m_s)
         return speeds
+
+
+class JoinedProblem:
+    """A problem for the model of a law that has one mechanism more than it writes down itself.
+
+    Where the law's model observes the recordings, the mechanism's coefficient joins it, with its prior.
+
+    Parameters
+    ----------
+    problem : Problem or JoinedProblem
+        Everything else is asked of it.
+    mechanism : Mechanism
+    """
+
+    def __init__(self, problem: Problem | JoinedProblem, mechanism: Mechanism) -> None:
+        self.problem, self.mechanism = problem, mechanism
+
+    def __getattr__(self, name: str) -> Any:
+        """Whatever the problem has."""
+        return getattr(self.problem, name)
+
+    def joined_by(self, mechanism: Mechanism) -> JoinedProblem:
+        """With another mechanism."""
+        return JoinedProblem(self, mechanism)
+
+    def observe(self, mechanisms: Sequence[Mechanism], strengths: Sequence[Any]) -> Any:
+        """As `Problem.observe`, with one more mechanism."""
+        import pymc as pm
+
+        strength = self.mechanism.strength
+        added = pm.HalfNormal(strength.name, sigma=strength.prior_scale)
+        return self.problem.observe((*mechanisms, self.mechanism), [*strengths, added])

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from skred.campaign import Status
+from skred.inference.by_sensor import observed_by_sensor
 from skred.inference.problem import Problem
 
 
@@ -16,18 +17,12 @@ def recorded_groups(problem: Problem) -> dict[str, xr.Dataset]:
 
     Groups
     ------
-    observed_data : ``reading`` (event, sensor), NaN where there is none
-    constant_data : status and standard deviation of each reading, sensors, releases, track, terrain, and what
-        the likelihood adds; ``reference_s`` among its attributes [m] where the campaign has one
+    observed_data : readings by sensor, see `skred.inference.by_sensor`
+    constant_data : ``reading`` (event, sensor), NaN where there is none, status and standard deviation of
+        each, sensors, releases, track, terrain, and what the likelihood adds; ``reference_s`` among its
+        attributes [m] where the campaign has one
     """
-    return {"observed_data": _observed(problem), "constant_data": _constant(problem)}
-
-
-def _observed(problem: Problem) -> xr.Dataset:
-    return xr.Dataset(
-        {"reading": (("event", "sensor"), problem.values, {"units": "m s-1; m for the runout"})},
-        coords=problem.coords,
-    )
+    return {"observed_data": observed_by_sensor(problem), "constant_data": _constant(problem)}
 
 
 def _constant(problem: Problem) -> xr.Dataset:
@@ -37,6 +32,7 @@ def _constant(problem: Problem) -> xr.Dataset:
     reference = campaign.reference_s_m
     return xr.Dataset(
         {
+            "reading": (("event", "sensor"), problem.values, reading),
             "status": (
                 ("event", "sensor"),
                 campaign.status,

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from skred.inference.by_sensor import joint_terms
 from skred.inference.gate import Gate
 from skred.inference.problem import Problem
 from skred.inference.recorded_data import recorded_groups
@@ -21,7 +22,7 @@ from skred.inference.sampling import SamplerSettings
 from skred.output import write_bytes
 from skred.physics.law import Law, Parameter, parameter_of
 
-FORMAT = 1
+FORMAT = 2
 """Of the files with trees; figures are made from no other."""
 _PACKAGES = ("skred", "pymc", "pytensor", "arviz", "numba", "numpy", "scipy", "xarray")
 
@@ -56,8 +57,9 @@ def assemble(
     Groups
     ------
     posterior, prior : parameters of the law, and of the population in a hierarchical calibration
-    posterior_predictive, prior_predictive, event_posterior : see `predictive`
-    log_likelihood : ``recordings`` (chain, draw, event)
+    posterior_predictive : readings of new avalanches from the recorded releases, by sensor
+    log_likelihood : ``recordings`` (chain, draw, event), and what `skred.inference.by_sensor` adds
+    new_avalanches, mean_response, event_posterior, prior_predictive : see `predictive`
     observed_data, constant_data : see `skred.inference.recorded_data.recorded_groups`
     """
     parameters = posterior["posterior"].to_dataset()
@@ -67,10 +69,7 @@ def assemble(
     sizes = (parameters.sizes["chain"], parameters.sizes["draw"])
     groups = {
         "posterior": _with_units(parameters, own, law),
-        "log_likelihood": xr.Dataset(
-            {"recordings": (("chain", "draw", "event"), log_density.reshape(*sizes, -1))},
-            coords={**chain_and_draw(parameters), "event": problem.coords["event"]},
-        ),
+        "log_likelihood": joint_terms(problem, log_density.reshape(*sizes, -1), chain_and_draw(parameters)),
         "prior": _with_units(prior, own, law),
         **predictive(problem, law, parameters, prior, settings.seed),
         **recorded_groups(problem),
@@ -155,6 +154,7 @@ def law_attributes(problem: Problem, law: Law) -> dict[str, Any]:
         "strengths": _json([parameter_of(mechanism.strength) for mechanism in law.mechanisms]),
         "equation": law.equation,
         "likelihood": problem.likelihood,
+        "changed_priors": json.dumps(dict(law.changed_priors)),
     }
 
 

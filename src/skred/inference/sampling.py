@@ -17,6 +17,13 @@ from skred.inference.problem import Problem
 from skred.physics.law import Law
 
 Sampler = Literal["metropolis", "nuts", "smc"]
+KINKED = (
+    "NUTS: the likelihood has kinks where a front just stops or just comes, which gradients do not see."
+    " Chains may diverge or get stuck there; compare with the default sampler."
+)
+"""To be told where NUTS is asked for."""
+TUNE = {"pooled": 500, "hierarchical": 1000}
+"""Adaptation draws where none are asked for: more parameters take longer to adapt to."""
 PRIOR_DRAWS = 1000
 """Draws of the prior that are kept for figures and starting points."""
 _STARTS_PER_CHAIN = 20

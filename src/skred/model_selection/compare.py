@@ -103,7 +103,8 @@ def score(
 
 def write_comparison(comparison: dict[str, Any], folder: Path, started: float) -> dict[str, Any]:
     """Say what came out, and write ``compare.json``; returns the document."""
-    comparison["statement"] = statement(comparison)
+    changed = [note for model in comparison["models"] if (note := model.get("prior_note"))]
+    comparison["statement"] = [*changed, *statement(comparison)]
     comparison["seconds"] = time.monotonic() - started
     write_json(folder / "compare.json", comparison)
     return comparison

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,16 @@ def _as_they_are(*parameters: Any) -> tuple[Any, ...]:
     return parameters
 
 
+def _and_the_last(translate: Callable[..., tuple[Any, ...]], *values: Any) -> tuple[Any, ...]:
+    """Translate all but the last, which is a parameter and a coefficient at once."""
+    return (*translate(*values[:-1]), values[-1])
+
+
+def _build_with_one_more(build: Callable[[Any], Any], mechanism: Mechanism, problem: Any) -> Any:
+    """A law's model with one more mechanism."""
+    return build(problem.joined_by(mechanism))
+
+
 @dataclass(frozen=True)
 class Law:
     """A friction law: what brakes a front, and the prior of how much.
@@ -77,6 +88,8 @@ class Law:
         Quantities that its model computes from the parameters, for display.
     relation : str
         The same in words of an equation, where they are not the parameters themselves.
+    changed_priors : tuple of (str, float)
+        Parameters whose prior is not the law's own, and its scale instead; see `skred.inference.priors`.
     """
 
     id: str
@@ -89,6 +102,7 @@ class Law:
     inverse: Callable[..., tuple[Any, ...]] = _as_they_are
     derived: tuple[Parameter, ...] = ()
     relation: str = ""
+    changed_priors: tuple[tuple[str, float], ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse an inverse that is none, and symbols that stand for two things."""
@@ -97,6 +111,35 @@ class Law:
             raise ValueError(f"{self.id}: inverse does not give back the parameters of strengths")
         for k, mechanism in enumerate(self.mechanisms):
             self.check_symbols(mechanism.strength, mechanism.id, self.mechanisms[:k])
+
+    def __add__(self, mechanism: Mechanism) -> Law:
+        """The law with one more term, which acts alike on all avalanches; its prior is the mechanism's own.
+
+        Raises
+        ------
+        ValueError
+            If the mechanism cannot be a part of a law, or the law has it, its name or its symbol already.
+        """
+        if not isinstance(mechanism, Mechanism):
+            return NotImplemented
+        if mechanism.column is None or mechanism.profile is None:
+            raise ValueError(
+                f"{mechanism.id!r} cannot be a part of a law: it acts at a place, on an instrument or by a"
+                " covariate that a diagnosis has to find; expected a mechanism with a column and a profile"
+            )
+        if mechanism.id in (own.id for own in self.mechanisms):
+            raise ValueError(f"the law {self.id!r} has {mechanism.id!r} already")
+        self.check_symbols(mechanism.strength, mechanism.id, self.mechanisms)
+        return replace(
+            self,
+            id=f"{self.id}+{mechanism.id}",
+            title=f"{self.title}, and {mechanism.title}",
+            mechanisms=(*self.mechanisms, mechanism),
+            parameters=(*self.parameters, parameter_of(mechanism.strength)),
+            build=partial(_build_with_one_more, self.build, mechanism),
+            strengths=partial(_and_the_last, self.strengths),
+            inverse=partial(_and_the_last, self.inverse),
+        )
 
     def check_symbols(self, strength: Strength, owner: str, others: Iterable[Mechanism]) -> None:
         """Refuse a coefficient that has the name or the symbol of something else.
@@ -133,6 +176,18 @@ class Law:
         terms = " ".join(f"- {mechanism.equation.removeprefix('-')}" for mechanism in self.mechanisms)
         relation = f", {self.relation}" if self.relation else ""
         return f"dU^2/(2 ds) = g sin(phi) {terms}{relation}"
+
+    @property
+    def prior_note(self) -> str:
+        """Which priors are not the law's own; empty where all are."""
+        if not self.changed_priors:
+            return ""
+        units = {parameter.name: parameter.unit for parameter in self.parameters}
+        changed = (
+            f"{name} {scale:g}{'' if units[name] == '1' else ' ' + units[name]}"
+            for name, scale in self.changed_priors
+        )
+        return f"Priors were changed: of {self.id} the scale of {', of '.join(changed)}."
 
     @property
     def parameter_names(self) -> list[str]:

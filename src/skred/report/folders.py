@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 """Of the documents that this version reads."""
+TREE_FORMAT = 2
+"""Of the netCDF files."""
 _AGAIN = "run the command that wrote it again"
 
 
@@ -171,11 +173,11 @@ def _read_document(file: Path, key: str) -> dict[str, Any]:
     return dict(document)
 
 
-def _check_format(file: Path, document: Any, key: str) -> None:
+def _check_format(file: Path, document: Any, key: str, expected: int = FORMAT) -> None:
     """Refuse what was written by another version of the format."""
     found = document.get("format") if isinstance(document, Mapping) else None
-    if found != FORMAT:
-        told = f"with {key} {found!r} instead of {FORMAT}" if found is not None else f"without {key!r}"
+    if found != expected:
+        told = f"with {key} {found!r} instead of {expected}" if found is not None else f"without {key!r}"
         raise ReportError(f"{file}: written by another version of skred, {told}; {_AGAIN}")
 
 
@@ -191,5 +193,5 @@ def _opened(file: Path) -> Iterator[xr.DataTree]:
     except (OSError, ValueError) as error:
         raise ReportError(f"{file}: not a netCDF file that can be read ({error})") from error
     with opened as tree:
-        _check_format(file, tree.attrs, "format")
+        _check_format(file, tree.attrs, "format", TREE_FORMAT)
         yield tree

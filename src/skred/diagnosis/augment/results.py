@@ -19,6 +19,7 @@ from skred.inference.hierarchical.results import (
     add_readings,
     avalanche_dataset,
     hierarchical_summary,
+    readings_by_sensor,
     thinned,
 )
 from skred.inference.results import predictive, summary
@@ -45,10 +46,13 @@ def augmented_predictive(
     samples = _samples(problem, law, kept)
     points = recorded_points(problem, law, samples, rng)
     recorded, fronts = fronts_of(problem, points, problem.added_rows(samples))
+    new = _predict(problem, law, kept, rng)
+    before = _predict(problem, law, thinned(prior, n_events), rng)
     return {
         "event_posterior": avalanche_dataset(problem, law, kept, recorded, fronts),
-        "posterior_predictive": _predict(problem, law, kept, rng),
-        "prior_predictive": _predict(problem, law, thinned(prior, n_events), rng),
+        "new_avalanches": new,
+        "posterior_predictive": readings_by_sensor(problem, new, seed),
+        "prior_predictive": readings_by_sensor(problem, before, seed),
     }
 
 

@@ -94,6 +94,7 @@ def identify_document(
         },
         "base_model": law.id,
         "equation": law.equation,
+        "changed_priors": dict(law.changed_priors),
         "error_model": problem.error_model.id,
         "smoothing_m": problem.terrain.smoothing_m,
         "reason": reason or None,
@@ -102,7 +103,7 @@ def identify_document(
         "can_tell": None if table is None else table.can_tell,
         "next_sensor": None if table is None else _next_sensor(table),
     }
-    document["statement"] = _statement(document)
+    document["statement"] = [*([law.prior_note] if law.prior_note else []), *_statement(document)]
     return document
 
 

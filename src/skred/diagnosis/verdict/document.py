@@ -44,7 +44,8 @@ _NO_LIMIT = 20.0
 def verdict(found: Outcome) -> dict[str, Any]:
     """The verdict of a diagnosis, as `verdict.json` holds it."""
     document = _told_nothing(found) if isinstance(found, NotDiagnosed) else _told(found)
-    document["statement"] = statement(found, document)
+    document["statement"] = f"{statement(found, document)} {found.law.prior_note}".rstrip()
+    document["changed_priors"] = dict(found.law.changed_priors)
     return document | _more(found)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -19,8 +20,9 @@ from skred.diagnosis.evidence.coefficient import Curve
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, NothingAdded, Outcome
 from skred.diagnosis.verdict.conditional import conditional_dataset
 from skred.diagnosis.verdict.mechanisms import candidates_of
-from skred.diagnosis.verdict.report_facts import FORMAT, checks_of, comparisons_of
+from skred.diagnosis.verdict.report_facts import checks_of, comparisons_of
 from skred.inference.recorded_data import recorded_groups
+from skred.inference.results import FORMAT
 from skred.physics.mechanisms.stretches import is_opposed
 
 FloatArray = NDArray[np.float64]
@@ -68,6 +70,7 @@ def figure_data(found: Outcome) -> xr.DataTree:
         "title": f"What {found.law.title} leaves out, {found.problem.campaign.name}",
         "format": FORMAT,
         "law": found.law.id,
+        "changed_priors": json.dumps(dict(found.law.changed_priors)),
         "campaign": found.problem.campaign.name,
         "campaign_fingerprint": found.problem.campaign.fingerprint(),
     }

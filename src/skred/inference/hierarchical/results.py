@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from skred.inference.by_sensor import predicted_by_sensor
 from skred.inference.fit import fit_entries
 from skred.inference.hierarchical.event_draws import (
     fronts_of,
@@ -17,7 +18,7 @@ from skred.inference.hierarchical.event_draws import (
 )
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import interval
-from skred.inference.results import predictive, summary
+from skred.inference.results import chain_and_draw, predictive, summary
 from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
@@ -36,20 +37,24 @@ def hierarchical_predictive(
     ------
     event_posterior : each strength by its name, ``release`` and ``release_speed`` (chain, draw, event), and
         ``front`` (chain, draw, event, sensor): the recorded avalanches themselves, readings without errors
-    posterior_predictive : of a new avalanche from each event's release, its strengths, ``release``,
+    new_avalanches : of a new avalanche from each event's release, its strengths, ``release``,
         ``release_speed``, ``front`` (readings without errors, 0 where it does not come), ``reading`` (with
         errors) and ``reached`` (chain, draw, event, sensor)
-    prior_predictive : the same from the prior
+    posterior_predictive : see `predicted_readings`; by sensor
+    prior_predictive : likewise
     """
     rng = np.random.default_rng([seed, 1])
     kept = thinned(posterior, problem.campaign.n_events)
     samples = _samples(problem, law, kept)
     recorded = recorded_avalanches(problem, law, samples, rng)
     event_posterior = avalanche_dataset(problem, law, kept, recorded, fronts_of(problem, law, recorded))
+    new = _predict(problem, law, kept, rng)
+    before = _predict(problem, law, thinned(prior, problem.campaign.n_events), rng)
     return {
         "event_posterior": event_posterior,
-        "posterior_predictive": _predict(problem, law, kept, rng),
-        "prior_predictive": _predict(problem, law, thinned(prior, problem.campaign.n_events), rng),
+        "new_avalanches": new,
+        "posterior_predictive": readings_by_sensor(problem, new, seed),
+        "prior_predictive": readings_by_sensor(problem, before, seed),
     }
 
 
@@ -111,22 +116,30 @@ def hierarchical_summary(problem: HierarchicalProblem, law: Law, tree: xr.DataTr
         "error_model": {"id": problem.error_model.id, "title": problem.error_model.title},
         "place_sd_m": problem.place_sd_m,
         "integration": problem.integration(law),
-        **fit_entries(problem, predicted_readings(problem, tree)),
+        **fit_entries(
+            problem, predicted_readings(problem, tree["new_avalanches"].to_dataset(), int(tree.attrs["seed"]))
+        ),
         "new_avalanche": new_avalanche_rows(problem, tree),
         "events": event_rows(problem, law, tree),
     }
 
 
-def predicted_readings(problem: HierarchicalProblem, tree: xr.DataTree) -> FloatArray:
+def readings_by_sensor(problem: HierarchicalProblem, new: xr.Dataset, seed: int) -> xr.Dataset:
+    """A predictive group, of the group new_avalanches."""
+    readings = predicted_readings(problem, new, seed).reshape(new["front"].shape)
+    return predicted_by_sensor(problem, readings, chain_and_draw(new))
+
+
+def predicted_readings(problem: HierarchicalProblem, new: xr.Dataset, seed: int) -> FloatArray:
     """Recordings that the model predicts, (n, n_events, n_sensors), for the check of fit.
 
     Of the new avalanches of the result, each read with the errors that the recorded avalanche of the same
     release states; 0 where the front does not come.
     """
-    groups, data = tree["posterior_predictive"].to_dataset(), problem.readings
+    data = problem.readings
     shape = (-1, problem.campaign.n_events, problem.campaign.n_sensors)
-    fronts, reached = (groups[name].values.reshape(shape) for name in ("front", "reached"))
-    rng = np.random.default_rng([int(tree.attrs["seed"]), 3])
+    fronts, reached = (new[name].values.reshape(shape) for name in ("front", "reached"))
+    rng = np.random.default_rng([seed, 3])
     sd = data.sd(np.arange(problem.campaign.n_events), fronts)
     readings = problem.error_model.draw(fronts, sd, data.is_velocity, rng)
     came = np.where(reached, np.maximum(readings, 0.0), 0.0)
@@ -135,7 +148,7 @@ def predicted_readings(problem: HierarchicalProblem, tree: xr.DataTree) -> Float
 
 def new_avalanche_rows(problem: HierarchicalProblem, tree: xr.DataTree) -> list[dict[str, Any]]:
     """A new avalanche's reading at each sensor, where it comes there, beside the recorded ones."""
-    predicted = tree["posterior_predictive"].to_dataset()
+    predicted = tree["new_avalanches"].to_dataset()
     rows = []
     for number, sensor in enumerate(problem.campaign.sensors):
         reached = predicted["reached"].values[..., number]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from skred.inference.by_sensor import predicted_by_sensor
 from skred.inference.fit import fit_entries
 from skred.inference.intervals import interval
 from skred.inference.pooled.problem import PooledProblem
@@ -25,23 +27,43 @@ def pooled_predictive(
 
     Groups
     ------
-    posterior_predictive : ``mean_response`` (chain, draw, release, sensor), the response of the path,
-        and ``reading`` (chain, draw, event, sensor), a latent reading of a new avalanche from each
-        event's release, y ~ N(mean_response, Sigma): at most 0 where it would not have been reached
-    prior_predictive : ``mean_response``
+    mean_response : ``response`` (chain, draw, release, sensor), the response of the path
+    new_avalanches : ``reading`` (chain, draw, event, sensor), a latent reading of a new avalanche from each
+        event's release, y ~ N(response, Sigma): at most 0 where it would not have been reached
+    posterior_predictive : see `predicted_readings`; by sensor
+    prior_predictive : likewise
     """
     rng = np.random.default_rng([seed, 1])
-    response = _response(problem, law, posterior)
+    groups = _new_avalanches(problem, law, posterior, rng)
+    before = _new_avalanches(problem, law, prior, rng)
+    return {
+        **groups,
+        "posterior_predictive": _by_sensor(problem, groups, seed),
+        "prior_predictive": _by_sensor(problem, before, seed),
+    }
+
+
+def _new_avalanches(
+    problem: PooledProblem, law: Law, parameters: xr.Dataset, rng: np.random.Generator
+) -> dict[str, xr.Dataset]:
+    """The response of the path, and latent readings that scatter about it."""
+    response = _response(problem, law, parameters)
     draws = response.values[:, :, problem.release_of_event]
     factor = np.linalg.cholesky(problem.covariance)
     reading = draws + rng.standard_normal(draws.shape) @ factor.T
     return {
-        "posterior_predictive": xr.Dataset(
-            {"mean_response": response, "reading": (("chain", "draw", "event", "sensor"), reading)},
-            coords={**chain_and_draw(posterior), **problem.coords},
+        "mean_response": xr.Dataset({"response": response}),
+        "new_avalanches": xr.Dataset(
+            {"reading": (("chain", "draw", "event", "sensor"), reading, response.attrs)},
+            coords={**chain_and_draw(parameters), **problem.coords},
         ),
-        "prior_predictive": xr.Dataset({"mean_response": _response(problem, law, prior)}),
     }
+
+
+def _by_sensor(problem: PooledProblem, groups: dict[str, xr.Dataset], seed: int) -> xr.Dataset:
+    shape = groups["new_avalanches"]["reading"].shape
+    readings = predicted_readings(problem, groups, seed).reshape(shape)
+    return predicted_by_sensor(problem, readings, chain_and_draw(groups["new_avalanches"]))
 
 
 def _response(problem: PooledProblem, law: Law, parameters: xr.Dataset) -> xr.DataArray:
@@ -68,26 +90,28 @@ def _response(problem: PooledProblem, law: Law, parameters: xr.Dataset) -> xr.Da
 @summary.register
 def pooled_summary(problem: PooledProblem, law: Law, tree: xr.DataTree) -> dict[str, Any]:
     """Mean response at each sensor, and the check of fit."""
+    groups = {name: tree[name].to_dataset() for name in ("mean_response", "new_avalanches")}
     return {
         "response": response_rows(problem, tree),
-        **fit_entries(problem, predicted_readings(problem, tree)),
+        **fit_entries(problem, predicted_readings(problem, groups, int(tree.attrs["seed"]))),
     }
 
 
-def predicted_readings(problem: PooledProblem, tree: xr.DataTree) -> FloatArray:
+def predicted_readings(problem: PooledProblem, groups: Mapping[str, xr.Dataset], seed: int) -> FloatArray:
     """Recordings that the model predicts, (n, n_events, n_sensors), for the check of fit.
 
     At each sensor the covariance was estimated from the recordings, so that recordings of other avalanches
     scatter about the mean response as Student's t, with one degree of freedom less than there are readings.
     """
-    groups = tree["posterior_predictive"].to_dataset()
     shape = (-1, problem.campaign.n_events, problem.campaign.n_sensors)
-    response = groups["mean_response"].isel(release=problem.release_of_event).values.reshape(shape)
+    response = (
+        groups["mean_response"]["response"].isel(release=problem.release_of_event).values.reshape(shape)
+    )
     known = (problem.observed | problem.not_reached).sum(axis=0)
     degrees = np.maximum(known - 1.0, 1.0)
-    rng = np.random.default_rng([int(tree.attrs["seed"]), 3])
+    rng = np.random.default_rng([seed, 3])
     widened = np.sqrt(degrees / rng.chisquare(degrees, (len(response), 1, len(degrees))))
-    latent = response + widened * (groups["reading"].values.reshape(shape) - response)
+    latent = response + widened * (groups["new_avalanches"]["reading"].values.reshape(shape) - response)
     # A latent velocity below 0 is that of a front that does not come.
     is_velocity = np.array([not sensor.is_runout for sensor in problem.campaign.sensors])
     return np.where(is_velocity, np.maximum(latent, 0.0), latent)
@@ -95,7 +119,7 @@ def predicted_readings(problem: PooledProblem, tree: xr.DataTree) -> FloatArray:
 
 def response_rows(problem: PooledProblem, tree: xr.DataTree) -> list[dict[str, Any]]:
     """Mean response at each sensor, averaged over the events, beside the recordings' mean."""
-    response = tree["posterior_predictive"].to_dataset()["mean_response"]
+    response = tree["mean_response"].to_dataset()["response"]
     mean_over_events = response.isel(release=problem.release_of_event).mean("release")
     rows = []
     for number, sensor in enumerate(problem.campaign.sensors):

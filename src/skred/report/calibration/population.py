@@ -66,7 +66,7 @@ def population_figure(tree: xr.DataTree) -> Figure:
     figure = new_figure(height, f"{title}\n{figure_text(law.title, 80)}")
     layout: dict[str, Any] = {"width_ratios": [1.7, 1]} if len(pairs) == 1 else {}
     panels = figure.subplots(rows, 2, squeeze=False, gridspec_kw=layout).ravel()
-    new = [_draws(tree, s.name, "posterior_predictive").ravel() for s in strengths]
+    new = [_draws(tree, s.name, "new_avalanches").ravel() for s in strengths]
     own = [_draws(tree, s.name, "event_posterior") for s in strengths]
     colour = law_colours([law.id])[law.id]
     for axes, (i, j) in zip(panels, pairs, strict=False):
@@ -259,7 +259,7 @@ def _event_columns(tree: xr.DataTree, law: CalibratedLaw) -> list[tuple[str, Flo
     columns: list[tuple[str, FloatArray, FloatArray | None]] = []
     for strength in law.strengths[:_MAX_STRENGTHS]:
         own, new = (
-            _draws(tree, strength.name, f"{which}") for which in ("event_posterior", "posterior_predictive")
+            _draws(tree, strength.name, f"{which}") for which in ("event_posterior", "new_avalanches")
         )
         columns.append((parameter_label(strength), own, new))
     release = _draws(tree, "release", "event_posterior")

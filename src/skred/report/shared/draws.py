@@ -187,8 +187,8 @@ def sensor_draws(tree: xr.DataTree, recordings: Recordings, sensor: Sensor) -> S
     """Gather what belongs to one sensor of a pooled calibration."""
     recorded = recorded_at(recordings, sensor)
     column = recordings.sensors.index(sensor)
-    predictive = tree["posterior_predictive"].to_dataset()
-    response = predictive["mean_response"].transpose("chain", "draw", "release", "sensor").values[..., column]
+    predictive, responses = tree["new_avalanches"].to_dataset(), tree["mean_response"].to_dataset()
+    response = responses["response"].transpose("chain", "draw", "release", "sensor").values[..., column]
     begin = np.column_stack([recordings.release_s_m, recordings.release_speed_m_s])
     _, events_per_release = np.unique(begin, axis=0, return_counts=True)
     reading = predictive["reading"].transpose("chain", "draw", "event", "sensor").values[..., column]
@@ -203,7 +203,7 @@ def new_avalanche(tree: xr.DataTree, recordings: Recordings, sensor: Sensor) -> 
     """Gather what belongs to one sensor of a hierarchical calibration."""
     recorded = recorded_at(recordings, sensor)
     column = recordings.sensors.index(sensor)
-    predictive = tree["posterior_predictive"].to_dataset()
+    predictive = tree["new_avalanches"].to_dataset()
     front, reading, reached = (
         predictive[name].transpose("chain", "draw", "event", "sensor").values[..., column]
         for name in ("front", "reading", "reached")

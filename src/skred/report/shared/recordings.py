@@ -102,14 +102,14 @@ class Recordings:
 
 
 def recordings_of(tree: xr.DataTree) -> Recordings:
-    """The recordings in the groups ``observed_data`` and ``constant_data`` of a result.
+    """The recordings in the group ``constant_data`` of a result.
 
     Raises
     ------
     KeyError
-        If a group or a variable is not there.
+        If it or a variable is not there.
     """
-    observed, constant = tree["observed_data"].to_dataset(), tree["constant_data"].to_dataset()
+    constant = tree["constant_data"].to_dataset()
     columns = ("quantity", "s_from", "s_to", "relative_sd", "absolute_sd")
     sensors = zip(constant["sensor"].values, *(constant[name].values for name in columns), strict=True)
     places = {}
@@ -125,7 +125,7 @@ def recordings_of(tree: xr.DataTree) -> Recordings:
             )
             for name, quantity, *numbers in sensors
         ),
-        values=_floats(observed["reading"].transpose("event", "sensor")),
+        values=_floats(constant["reading"].transpose("event", "sensor")),
         reading_sd=_floats(constant["reading_sd"].transpose("event", "sensor")),
         status=np.asarray(constant["status"].transpose("event", "sensor").values, dtype=np.int8),
         release_s_m=_floats(constant["release_s"]),

@@ -1,0 +1,107 @@
+"""From the names of campaigns and laws to what they name, or what is wrong with them.
+
+Everything heavy is imported inside the functions, so that a command's ``--help`` is instant.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from skred.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from skred.campaign import Campaign
+    from skred.inference.hierarchical.problem import HierarchicalProblem
+    from skred.inference.pooled.problem import PooledProblem
+    from skred.physics.law import Law
+    from skred.physics.mechanisms.spec import Mechanism
+
+
+def read_campaign(name: str | Path) -> Campaign:
+    """Read a campaign and check all of it.
+
+    Parameters
+    ----------
+    name : str or Path
+        A folder of five files, or the name of an included campaign such as ``ryggfonn``.
+
+    Raises
+    ------
+    skred.campaign.CampaignError
+        With every problem of the files.
+    """
+    return campaign_of(str(name))
+
+
+def laws() -> dict[str, Law]:
+    """The laws that are installed, by id; those that cannot be used are left out."""
+    from skred.physics.laws import installed_laws
+
+    return {law.id: law for law in installed_laws()[0]}
+
+
+def mechanisms() -> dict[str, Mechanism]:
+    """The mechanisms that are installed, by id; ``law + mechanism`` is a law."""
+    from skred.physics.mechanisms.library import mechanisms as installed
+
+    return installed()
+
+
+def chosen_laws(given: list[str | Law], priors: Mapping[str, float] | None) -> list[Law]:
+    """Laws by id or as they are, with the scales of priors that are given."""
+    from skred.inference.priors import laws_with_priors
+    from skred.physics.laws import load_law
+
+    return laws_with_priors([load_law(law) if isinstance(law, str) else law for law in given], priors)
+
+
+def campaign_of(given: str | Path | Campaign) -> Campaign:
+    """A campaign that passed every check."""
+    from skred.campaign import find_campaign, read_campaign
+
+    return read_campaign(find_campaign(str(given))) if isinstance(given, (str, Path)) else given
+
+
+def problem_of(
+    campaign: str | Path | Campaign, likelihood: str, errors: str | None, smoothing: float | None
+) -> PooledProblem | HierarchicalProblem:
+    """The problem of a campaign, or what is wrong with it."""
+    checked = campaign_of(campaign)
+    if likelihood == "hierarchical":
+        return hierarchical_of(checked, errors, smoothing)
+    if errors is not None:
+        raise InputError(
+            "--errors: only with --likelihood hierarchical; pooled errors come from the recordings"
+        )
+    problem = pooled_or_reason(checked, smoothing)
+    if isinstance(problem, str):
+        raise InputError(f"campaign {checked.name}: {problem}")
+    return problem
+
+
+def hierarchical_of(
+    campaign: Campaign, errors: str | None = None, smoothing: float | None = None
+) -> HierarchicalProblem:
+    """The hierarchical problem of a campaign, or what is wrong with it."""
+    from skred.inference.error_model import DEFAULT_ERRORS
+    from skred.inference.hierarchical.problem import hierarchical_problem
+
+    try:
+        return hierarchical_problem(campaign, error_model=errors or DEFAULT_ERRORS, smoothing_m=smoothing)
+    except ValueError as error:
+        raise InputError(f"campaign {campaign.name}: {error}") from error
+
+
+def pooled_or_reason(campaign: Campaign, smoothing: float | None) -> PooledProblem | str:
+    """The pooled problem of a campaign, or why there is none."""
+    from skred.inference.pooled.problem import pooled_problem
+
+    try:
+        problem = pooled_problem(campaign, smoothing_m=smoothing)
+        _ = problem.arrays
+    except ValueError as error:
+        return str(error)
+    return problem
