@@ -12,7 +12,7 @@ import xarray as xr
 from skred.inference.added_terms import GROUP, AddedTerm, added_group
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.recorded_data import recorded_groups
-from skred.inference.results import save
+from skred.inference.results import FORMAT, save
 from skred.output import write_json
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
@@ -63,7 +63,7 @@ def tree_of(
         "divergences": 0,
     }
     tree.attrs = {
-        "format": 1,
+        "format": FORMAT,
         "law": law_id,
         "equation": load_law(law_id).equation,
         "likelihood": "hierarchical",

@@ -231,7 +231,7 @@ def test_folders_that_are_no_source(problem: HierarchicalProblem, tmp_path: Path
 @pytest.mark.parametrize(
     ("changes", "expected"),
     [
-        ({"format": 2}, "another version"),
+        ({"format": 1}, "another version"),
         ({"likelihood": "pooled"}, "--likelihood hierarchical"),
         ({"equation": "a = b"}, "another equation"),
         ({"law": "no_such_law"}, "no_such_law"),

@@ -20,7 +20,7 @@ from skred.diagnosis.verdict.draws import FORCE, augmented_draws, profile_draws
 from skred.diagnosis.verdict.figure_data import figure_data
 from skred.diagnosis.verdict.improvement import improvement
 from skred.inference.added_terms import added_terms
-from skred.inference.results import save
+from skred.inference.results import FORMAT, save
 from skred.output import write_json
 from skred.prediction.predict import Simulation, prediction_of
 from skred.prediction.source import source_of
@@ -106,7 +106,7 @@ def test_draws_of_a_force_in_no_list_can_be_predicted_with(tmp_path):
     stub = replace(found, comparison=SimpleNamespace(leading=lambda name: base))
     tree = profile_draws(stub, replace(law, draws_after=draws))
     tree.attrs |= {
-        "format": 1,
+        "format": FORMAT,
         "law": found.law.id,
         "campaign": "ryggfonn",
         "campaign_fingerprint": "",

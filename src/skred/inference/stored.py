@@ -129,14 +129,14 @@ def _terrain(track: Track, constant: xr.Dataset, smoothing_m: float) -> Terrain:
 
 def _campaign(tree: xr.DataTree) -> Campaign:
     """What was recorded, from the groups of `skred.inference.recorded_data`."""
-    constant, observed = tree["constant_data"].to_dataset(), tree["observed_data"].to_dataset()
-    shape = observed["reading"].shape
+    constant = tree["constant_data"].to_dataset()
+    shape = constant["reading"].shape
     nothing = np.full(shape, np.nan)
     status = constant["status"].values
     least, most = (
         constant[name].values if name in constant else nothing for name in ("reading_least", "reading_most")
     )
-    values = np.where(np.isin(status, (Status.AT_LEAST, Status.BETWEEN)), least, observed["reading"].values)
+    values = np.where(np.isin(status, (Status.AT_LEAST, Status.BETWEEN)), least, constant["reading"].values)
     values = np.where(status == Status.AT_MOST, most, values)
     reference = constant.attrs.get("reference_s")
     return Campaign(
