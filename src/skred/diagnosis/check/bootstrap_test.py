@@ -42,7 +42,7 @@ class BootstrapTest:
     statistic : float
         Log odds of anything against nothing: by the whole comparison, or in the linear model.
     simulated : (n,) array
-        The same of clean campaigns, in the linear model.
+        The same of clean campaigns, in the linear model; by fronts where that reaches the statistic.
     linear : float or None
         Of the recordings in the linear model, where the statistic is not that.
     """

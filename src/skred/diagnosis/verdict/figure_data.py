@@ -85,7 +85,9 @@ def _checks(found: Diagnosis) -> xr.Dataset:
             "statistic": ("law", [check.statistic for _, check in checks], _NATS),
         },
         coords={"law": [" + ".join((found.law.id, *added)) for added, _ in checks]},
-        attrs={"statistic": "log odds of anything against nothing, in the linear model"},
+        attrs={
+            "statistic": "log odds of anything against nothing; of campaigns in the linear model, by fronts where these are high"
+        },
     )
 
 
