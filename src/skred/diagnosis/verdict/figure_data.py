@@ -86,7 +86,7 @@ def _checks(found: Diagnosis) -> xr.Dataset:
         },
         coords={"law": [" + ".join((found.law.id, *added)) for added, _ in checks]},
         attrs={
-            "statistic": "log odds of anything against nothing; of campaigns in the linear model, by fronts where these are high"
+            "statistic": "log odds of anything against nothing; of campaigns linear, by fronts where high"
         },
     )
 
