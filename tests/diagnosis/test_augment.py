@@ -10,6 +10,7 @@ from skred.diagnosis.augment.add import Adding, add_mechanisms
 from skred.diagnosis.augment.step import NotAugmented
 from skred.diagnosis.clock import Clock
 from skred.diagnosis.effort import Effort, Run
+from skred.inference.between_events import BetweenEvents
 from skred.inference.sampling import SamplerSettings
 
 BASE: Any = SimpleNamespace(law=SimpleNamespace(id="pcm"), problem=None, plain=lambda: None)
@@ -17,7 +18,8 @@ BASE: Any = SimpleNamespace(law=SimpleNamespace(id="pcm"), problem=None, plain=l
 
 def compared(**shares: float) -> Any:
     """A comparison with these probabilities."""
-    candidates = {name: SimpleNamespace(best=name) for name in shares}
+    common = BetweenEvents.COMMON
+    candidates = {name: SimpleNamespace(best=name, most_probable_way=common) for name in shares}
     under_errors = SimpleNamespace(base=BASE, candidates=candidates)
     return SimpleNamespace(probability=shares, leading=lambda name: under_errors, log_odds=3.0)
 
@@ -32,7 +34,7 @@ class MadeUp(Adding):
         self.p_values, self.second, self.gates = iter(p_values), second, iter(passed)
         self.p_of_odds = repeat(p_of_odds)
 
-    def calibrated(self, base: Any, chosen: Any) -> Any:
+    def calibrated(self, base: Any, chosen: Any, way: Any) -> Any:
         return SimpleNamespace(gate=SimpleNamespace(passed=next(self.gates), problems=("r-hat",)))
 
     def checked(self, base: Any, calibration: Any, chosen: Any) -> Any:

@@ -17,10 +17,7 @@ from scipy.stats import halfnorm, lognorm, norm
 
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.diagnosis.augment.augmented import augmented_problem
-from skred.diagnosis.augment.coefficient_grid import finer, locate
 from skred.diagnosis.augment.problem import AugmentedProblem
-from skred.diagnosis.augment.tables import highest
-from skred.diagnosis.augment.tabulated_op import TabulatedLogDensity, tabulated_log_density
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near, fit_base
 from skred.diagnosis.evidence.conditional_map import (
@@ -33,6 +30,9 @@ from skred.diagnosis.evidence.conditional_map import (
 from skred.diagnosis.evidence.event_quadrature import ROUGH
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
+from skred.diagnosis.tabulated.coefficient_grid import finer, locate
+from skred.diagnosis.tabulated.tables import highest
+from skred.diagnosis.tabulated.tabulated_op import TabulatedLogDensity, tabulated_log_density
 from skred.inference.calibrate import calibrate
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.problem import hierarchical_problem
@@ -287,13 +287,15 @@ def test_two_mechanisms(base: Base, drag: Curve) -> None:
     table = int(tables.grid.table(index)[0])
     first = tables.nodes.first[table * n_events : (table + 1) * n_events + 1]
     expected = integrated_log_density(means, factor, first, *tables.nodes[1:])
-    assert_allclose(tabulated_log_density(means, factor, strengths, *arrays), expected, rtol=1e-10)
+    given = strengths[None], np.zeros(1)
+    assert_allclose(tabulated_log_density(means, factor, *given, *arrays), expected, rtol=1e-10)
     rng = np.random.default_rng(1)
     added = tables.mean + rng.uniform(-1.0, 1.0, (4, 2)) @ tables.located.factor.T
     added[:, 0] = np.maximum(added[:, 0], both.range[0][0])
     population = (np.full((4, 1), np.log(0.3)), np.full((4, 1, 1), 0.25))
-    assert np.abs(both.errors_at(*population, added, np.arange(n_events))).max() < 0.1
-    inputs = [pt.as_tensor_variable(value) for value in (means, factor, strengths, *arrays)]
+    same = added[:, None], np.zeros((4, 1))
+    assert np.abs(both.errors_at(*population, *same, np.arange(n_events))).max() < 0.1
+    inputs = [pt.as_tensor_variable(value) for value in (means, factor, *given, *arrays)]
     for mode in ("NUMBA", "FAST_COMPILE"):
         value = pytensor.function([], TabulatedLogDensity()(*inputs), mode=mode)()
         assert_allclose(value, expected, rtol=1e-10)
@@ -317,9 +319,9 @@ def test_what_cannot_be_is_refused(base: Base, drag: Curve, problem: AugmentedPr
     with pytest.raises(ValueError, match="calibrate that law"):
         problem.log_likelihood(load_law("pcm"), {})
     with pytest.raises(TypeError, match="metropolis"):
-        strengths = pt.vector()
+        strengths = pt.matrix()
         inputs = [pt.as_tensor_variable(value) for value in problem.tables.arrays.values()]
-        density = TabulatedLogDensity()(np.zeros((3, 1)), np.ones((1, 1)), strengths, *inputs)
+        density = TabulatedLogDensity()(np.zeros((3, 1)), np.ones((1, 1)), strengths, np.zeros(1), *inputs)
         pt.grad(density.sum(), strengths)
 
 

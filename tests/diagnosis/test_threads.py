@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from diagnosis_cases import sparse_base
 
-from skred.diagnosis.augment.coefficient_grid import locate
-from skred.diagnosis.augment.tables import BUDGETS, build_tables
 from skred.diagnosis.check.bootstrap_test import bootstrap_test
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import curve_near
 from skred.diagnosis.evidence.event_quadrature import ROUGH
 from skred.diagnosis.evidence.extension import extended
+from skred.diagnosis.tabulated.coefficient_grid import locate
+from skred.diagnosis.tabulated.tables import BUDGETS, build_tables
 from skred.parallel.threads import in_parts, side_by_side, threads
 from skred.physics.mechanisms import mechanisms
 

@@ -13,6 +13,7 @@ from skred.diagnosis.check.decision import decide
 from skred.diagnosis.compare.comparison import Comparison, compare
 from skred.diagnosis.effort import Run
 from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.inference.between_events import BetweenEvents
 from skred.inference.calibrate import Calibration, calibrate_surely
 
 COMPARE_AGAIN = 0.2
@@ -36,9 +37,9 @@ class Adding:
         self.reference = reference
         self.run = run
 
-    def calibrated(self, base: Base, chosen: Sequence[Curve]) -> Calibration:
-        """The law with what is chosen added, calibrated."""
-        problem, settings = augmented_problem(base.plain(), chosen), self.run.settings
+    def calibrated(self, base: Base, chosen: Sequence[Curve], way: BetweenEvents) -> Calibration:
+        """The law with what is chosen added, calibrated; avalanches may differ in it where it is one."""
+        problem, settings = augmented_problem(base.plain(), chosen, way), self.run.settings
         # Its chains start around the posterior: half the tuning does.
         return calibrate_surely(problem, base.law, replace(settings, tune=settings.tune // 2))
 
@@ -76,7 +77,8 @@ def add_mechanisms(
         candidate = under_errors.candidates[names[0]]
         chosen.append(candidate.best)
         reference.begin(under_errors.base.problem)
-        calibration = adding.calibrated(under_errors.base, chosen)
+        way = candidate.most_probable_way if number == 0 else BetweenEvents.COMMON
+        calibration = adding.calibrated(under_errors.base, chosen, way)
         if not calibration.gate.passed:
             problems = "; ".join(calibration.gate.problems)
             reason = f"the gate of {base.law.id} + {names[0]} failed: {problems}"
@@ -95,6 +97,9 @@ def add_mechanisms(
         left = Left(comparison)
         second = decide(comparison.probability, again.at(comparison.log_odds).p_value, True)
         if not second.names:
+            break
+        if way is not BetweenEvents.COMMON:
+            left = Left(comparison, f"avalanches differ in {names[0]}, beside which no second one is added")
             break
         names = second.names
         run.clock.stage("augment", f"calibrating with {names[0]} as well")

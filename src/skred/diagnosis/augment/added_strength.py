@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from skred.diagnosis.evidence.coefficient import Curve
+from skred.inference.between_events import BetweenEvents, symbolic_components, variable
 from skred.physics.law import Parameter
 from skred.physics.mechanisms.spec import Direction, Mechanism, Shape
 
@@ -22,18 +24,35 @@ class AddedStrength:
     mechanism : Mechanism
     shape : Shape
     direction : Direction
+    between : BetweenEvents
+        How it differs between avalanches.
     """
 
     name: str
     mechanism: Mechanism
     shape: Shape
     direction: Direction
+    between: BetweenEvents = BetweenEvents.COMMON
 
     @property
-    def parameter(self) -> Parameter:
-        """As a free random variable."""
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Its free random variables: the strength, and how it differs between avalanches."""
         strength = self.mechanism.strength
-        return Parameter(self.name, strength.symbol, strength.unit, strength.paper_symbol)
+        own = Parameter(self.name, strength.symbol, strength.unit, strength.paper_symbol)
+        if self.between is BetweenEvents.COMMON:
+            return (own,)
+        symbol = {"spread": f"sd(log {strength.symbol})", "some": f"share({strength.symbol})"}[self.between]
+        return own, Parameter(self.between_name, symbol, "1")
+
+    @property
+    def between_name(self) -> str:
+        """Of the parameter that says how it differs between avalanches; empty where it does not."""
+        ends = self.between.parameter
+        return f"{self.name}_{ends}" if ends else ""
+
+    def symbolic(self, strength: Any) -> tuple[Any, Any]:
+        """Strengths that avalanches have and log shares of them, in the current PyMC model: two vectors."""
+        return symbolic_components(self.between, strength, variable(self.between, self.between_name))
 
     @property
     def scale(self) -> float:
@@ -42,13 +61,16 @@ class AddedStrength:
         return self.mechanism.added.scale_of(self.shape)
 
 
-def added_strengths(curves: Sequence[Curve]) -> tuple[AddedStrength, ...]:
-    """Of some curves, numbered where two have the same name."""
+def added_strengths(
+    curves: Sequence[Curve], between: Sequence[BetweenEvents] = ()
+) -> tuple[AddedStrength, ...]:
+    """Of some curves, numbered where two have the same name; in common unless given."""
     count: Counter[str] = Counter()
     added = []
-    for curve in curves:
+    ways = between or [BetweenEvents.COMMON] * len(curves)
+    for curve, way in zip(curves, ways, strict=True):
         name = curve.mechanism.strength.name
         count[name] += 1
         own = name if count[name] == 1 else f"{name}_{count[name]}"
-        added.append(AddedStrength(own, curve.mechanism, curve.shape, curve.direction))
+        added.append(AddedStrength(own, curve.mechanism, curve.shape, curve.direction, way))
     return tuple(added)

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 import skred.diagnosis.augment.results  # noqa: F401 - registers what it says of readings
 from skred.diagnosis.augment.added_strength import AddedStrength, added_strengths
-from skred.diagnosis.augment.coefficient_grid import Located, finer, locate
 from skred.diagnosis.augment.problem import (
     CHECKED_EVENTS,
     CLAIM_LIMIT,
     AugmentedProblem,
     extension_with,
 )
-from skred.diagnosis.augment.tables import BUDGETS, Tables, build_tables
+from skred.diagnosis.compare.between import ways_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.marginal import population_at
+from skred.diagnosis.tabulated.between_evidence import Way
+from skred.diagnosis.tabulated.coefficient_grid import Located, finer, locate
+from skred.diagnosis.tabulated.tables import BUDGETS, Tables, build_tables
+from skred.inference.between_events import BetweenEvents
 
 MOST_ADDED = 2
 """Mechanisms added at most: tables grow with the power of their number."""
@@ -29,19 +33,32 @@ _ENOUGH = 0.2
 """Share of the limit below which tables are good enough at that look: of few draws the worst is not seen."""
 
 
-def augmented_problem(base: Base, curves: Sequence[Curve]) -> AugmentedProblem:
+def augmented_problem(
+    base: Base, curves: Sequence[Curve], way: BetweenEvents = BetweenEvents.COMMON
+) -> AugmentedProblem:
     """Problem of a base law with the mechanisms of some curves added, one or two.
 
     Calibrate it as any other: ``calibrate(augmented_problem(base, curves), base.law, settings)``. Their
     strengths are parameters, by the names of the strengths.
 
+    Parameters
+    ----------
+    way : BetweenEvents
+        How avalanches differ in what is added, where that is one.
+
     Raises
     ------
     ValueError
-        If more are added than tables can be made for, or none; or if their constants exclude each other.
+        If more are added than tables can be made for, or none; if their constants exclude each other; or if
+        avalanches should differ in one of two.
     """
     if not 1 <= len(curves) <= MOST_ADDED:
         raise ValueError(f"expected one or {MOST_ADDED} mechanisms to add, found {len(curves)}")
+    if way is not BetweenEvents.COMMON:
+        if len(curves) > 1:
+            raise ValueError("of two mechanisms that are added avalanches can differ in none")
+        ways, tables = ways_of(base, curves[0])
+        return _with_tables(base, added_strengths(curves, [way]), _around(tables, ways[way]))
     added = added_strengths(curves)
     speeds = {
         d.weakening_speed
@@ -64,6 +81,13 @@ def augmented_problem(base: Base, curves: Sequence[Curve]) -> AugmentedProblem:
     return _with_tables(base, added, build_tables(base, extension, located, BUDGETS[-1]))
 
 
+def _around(tables: Tables, way: Way) -> Tables:
+    """Tables whose chains start around where a way has the strength."""
+    strength = way.draws[:, -2]
+    mean, sd = np.array([strength.mean()]), np.array([[strength.std()]])
+    return replace(tables, located=tables.located._replace(mean=mean, factor=sd))
+
+
 def _with_tables(base: Base, added: tuple[AddedStrength, ...], tables: Tables) -> AugmentedProblem:
     old = base.problem
     return AugmentedProblem(
@@ -80,4 +104,5 @@ def _rough_error(problem: AugmentedProblem, located: Located) -> float:
     means, covariances = population_at(psi, len(problem.base.law.mechanisms))
     factors = np.linalg.cholesky(covariances)
     chosen = np.sort(rng.permutation(problem.campaign.n_events)[:CHECKED_EVENTS])
-    return float(np.abs(problem.errors_at(means, factors, added, chosen, _ROUGH_RUNS).mean(axis=1)).max())
+    same = added[:, None, :], np.zeros((len(added), 1))
+    return float(np.abs(problem.errors_at(means, factors, *same, chosen, _ROUGH_RUNS).mean(axis=1)).max())

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from skred.diagnosis.augment.coefficient import added_draws
+from skred.diagnosis.augment.coefficient import added_draws, multiples_of_events
 from skred.diagnosis.check.bootstrap_test import BootstrapTest, bootstrap_test
 from skred.diagnosis.effort import Run
 from skred.diagnosis.evidence.coefficient import Base, Curve, fit_base
@@ -23,7 +23,8 @@ class Again:
     check : BootstrapTest
         Whether anything is wrong with it, by the linear model.
     base : Base
-        That law, its added strengths held at their means: for another comparison.
+        That law, its added strengths held at their means, each avalanche's own where they differ: for another
+        comparison.
     at : callable
         The log odds of that comparison to the bootstrap test of them.
     """
@@ -46,7 +47,10 @@ def check_again(base: Base, calibration: Calibration, chosen: Sequence[Curve], r
         What was added.
     run : Run
     """
+    own = multiples_of_events(calibration)
     directions = tuple(one.direction for one in chosen)
+    if own is not None:
+        directions = tuple(replace(one, own=own[:, k]) for k, one in enumerate(directions))
     strengths = added_draws(calibration).mean(axis=0)
     draws = population_draws(calibration, run.effort.replicas, run.seed + 1)
     again = fit_base(base.problem, base.law, typical(draws), base.fit.points, directions, strengths)

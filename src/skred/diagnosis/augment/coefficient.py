@@ -8,12 +8,15 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.diagnosis.augment.components import components_of
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.compare.candidate import Strength
 from skred.inference.calibrate import Calibration
 
 FloatArray = NDArray[np.float64]
+_DRAWS = 400
+"""Draws that say what each avalanche has of what is added: probabilities to a hundredth or two."""
 
 
 def augmented_of(calibration: Calibration) -> AugmentedProblem:
@@ -29,6 +32,32 @@ def added_draws(calibration: Calibration) -> FloatArray:
         return np.empty((sizes["chain"] * sizes["draw"], 0))
     columns = [posterior[one.name].transpose("chain", "draw").values.ravel() for one in problem.added]
     return np.column_stack(columns)
+
+
+def multiples_of_events(calibration: Calibration) -> FloatArray | None:
+    """What each recorded avalanche has of the added strengths, as multiples, (n_events, n_added).
+
+    Posterior means; None where all have them in common.
+    """
+    problem = augmented_of(calibration)
+    if problem.n_components == 1:
+        return None
+    samples = some_draws(calibration)
+    own, _ = components_of(problem.added, samples)
+    shares = problem.probability_of_each(calibration.law, samples)
+    strengths = np.einsum("nec,nck->ek", shares, own) / len(own)
+    multiples: FloatArray = strengths / problem.added_rows(samples).mean(axis=0)
+    return multiples
+
+
+def some_draws(calibration: Calibration) -> dict[str, FloatArray]:
+    """Draws of an augmented law's parameters by name, evenly over all chains."""
+    posterior = calibration.tree["posterior"].to_dataset()
+    names = [p.name for p in calibration.problem.parameters(calibration.law)]
+    values = {name: posterior[name].transpose("chain", "draw").values.ravel() for name in names}
+    n = len(values[names[0]])
+    chosen = np.linspace(0, n - 1, min(n, _DRAWS)).round().astype(int)
+    return {name: draws[chosen] for name, draws in values.items()}
 
 
 def strength_of(steps: Sequence[Step], number: int) -> Strength:

@@ -1,8 +1,9 @@
 """A base law with mechanisms added to it, calibrated anew: all strengths, spreads and correlations together.
 
-The events' own strengths are integrated out as in any hierarchical calibration. What is added is the same
-for all events; at each of its strengths events look different, so their likelihoods are tabulated on a
-grid of strengths that covers the posterior, and interpolated between.
+The events' own strengths are integrated out as in any hierarchical calibration. At each strength of what is
+added events look different, so their likelihoods are tabulated on a grid of strengths that covers the
+posterior, and interpolated between. Where avalanches differ in it, an event's likelihood is the mean over
+what it may have.
 """
 
 from __future__ import annotations
@@ -17,14 +18,15 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from skred.diagnosis.augment.added_strength import AddedStrength
-from skred.diagnosis.augment.coefficient_grid import finer
-from skred.diagnosis.augment.tables import Tables, build_tables, exact_nodes
-from skred.diagnosis.augment.tabulated_op import tabulated_log_densities
+from skred.diagnosis.augment.components import components_of, symbolic_components_of
 from skred.diagnosis.augment.truncated_normal import truncated_normal
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.tabulated.coefficient_grid import finer
+from skred.diagnosis.tabulated.tables import Tables, build_tables, exact_nodes
+from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.population import population_of, population_samples, population_variables
 from skred.inference.hierarchical.problem import COARSER, HierarchicalProblem
@@ -48,6 +50,8 @@ _EXACT_RUNS = 352
 """Events times draws up to which there are so many points; where there are fewer, more."""
 _EXACT_DRAWS = 16
 """Draws compared, evenly over the posterior."""
+_LEAST_EXACT_DRAWS = 4
+"""Of them where avalanches may differ in what is added, and each draw takes as many integrals."""
 CHECKED_EVENTS = 24
 """Events of larger campaigns that integration errors are looked for in, drawn at random."""
 _START_WIDER = 1.5
@@ -100,6 +104,12 @@ class AugmentedProblem(HierarchicalProblem):
         return extension_with(self.base, self.added)
 
     @property
+    def n_components(self) -> int:
+        """How many added strengths an avalanche may have."""
+        one = {p.name: np.ones(1) for added in self.added for p in added.parameters}
+        return components_of(self.added, one)[0].shape[1]
+
+    @property
     def range(self) -> tuple[FloatArray, FloatArray]:
         """Between which values each added strength is sampled, (n_added,) each: all that counts."""
         grid = self.tables.grid
@@ -108,14 +118,14 @@ class AugmentedProblem(HierarchicalProblem):
 
     def parameters(self, law: Law) -> tuple[Parameter, ...]:
         """The base law's and its population's parameters, then the added strengths."""
-        return (*super().parameters(law), *(one.parameter for one in self.added))
+        return (*super().parameters(law), *(p for one in self.added for p in one.parameters))
 
     def observe(self, mechanisms: Sequence[Mechanism], strengths: Sequence[Any]) -> Any:
         """Added strengths, and the observed variable ``recordings``: one log density per event."""
         import pymc as pm
         import pytensor.tensor as pt
 
-        from skred.diagnosis.augment.tabulated_op import TabulatedLogDensity
+        from skred.diagnosis.tabulated.tabulated_op import TabulatedLogDensity
 
         self._check(mechanisms)
         tables, n_events = self.tables, self.campaign.n_events
@@ -127,20 +137,22 @@ class AugmentedProblem(HierarchicalProblem):
         scales = pm.Data("added_scale", np.array([one.scale for one in self.added]))
         low, high = pm.Data("added_low", self.range[0]), pm.Data("added_high", self.range[1])
         added = [truncated_normal(one.name, scales[k], low[k], high[k]) for k, one in enumerate(self.added)]
+        own, log_shares = symbolic_components_of(self.added, added)
         factor = population_variables(mechanisms)
         means = pt.alloc(pt.log(pt.stack(list(strengths))), n_events, len(mechanisms))
 
-        def logp(event_number: Any, event_means: Any, event_factors: Any, event_added: Any) -> Any:
-            # The distribution's batch is the event; factor and added strengths are the same for all.
-            return TabulatedLogDensity()(event_means, event_factors[0], event_added[0], *held.values())
+        def logp(number: Any, of_events: Any, factors: Any, owns: Any, shares: Any) -> Any:
+            # The distribution's batch is the event; what follows its means is the same for all.
+            return TabulatedLogDensity()(of_events, factors[0], owns[0], shares[0], *held.values())
 
         return pm.CustomDist(
             "recordings",
             means,
             factor,
-            pt.stack(added),
+            own,
+            log_shares,
             logp=logp,
-            signature="(n),(n,m),(k)->()",
+            signature="(n),(n,m),(c,k),(c)->()",
             observed=np.arange(n_events, dtype=float),
             dims="event",
         )
@@ -148,18 +160,33 @@ class AugmentedProblem(HierarchicalProblem):
     def log_likelihood(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
         """Log density of each event for many parameter vectors: arrays by name to (n, n_events)."""
         self._check(law.mechanisms)
-        return self._tabulated(*population_of(law, samples), self.added_rows(samples))
+        return self._tabulated(*population_of(law, samples), *components_of(self.added, samples))
 
-    def _tabulated(self, means: FloatArray, factors: FloatArray, added: FloatArray) -> FloatArray:
+    def _tabulated(
+        self, means: FloatArray, factors: FloatArray, own: FloatArray, log_shares: FloatArray
+    ) -> FloatArray:
         n_events, tables = self.campaign.n_events, self.tables
         densities: FloatArray = tabulated_log_densities(
-            means, factors, added, n_events, *tables.arrays.values()
+            means, factors, own, log_shares, n_events, *tables.arrays.values()
         )
         return densities
 
     def added_rows(self, samples: Mapping[str, Any]) -> FloatArray:
         """Added strengths of many parameter vectors: arrays by name to (n, n_added)."""
         return np.column_stack([np.asarray(samples[one.name], dtype=float).ravel() for one in self.added])
+
+    def probability_of_each(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
+        """How probable each recorded avalanche has each component, (n, n_events, n_components)."""
+        own, log_shares = components_of(self.added, samples)
+        population = population_of(law, samples)
+        n_components = own.shape[1]
+        alone = [
+            self._tabulated(*population, own[:, k : k + 1], log_shares[:, k : k + 1])
+            for k in range(n_components)
+        ]
+        log_parts = np.stack(alone, axis=2)
+        parts: FloatArray = np.exp(log_parts - np.logaddexp.reduce(log_parts, axis=2, keepdims=True))
+        return parts
 
     def to_start_from(self, law: Law, prior: dict[str, FloatArray], seed: int) -> dict[str, FloatArray]:
         """Parameter vectors from around the posterior, wider.
@@ -175,7 +202,9 @@ class AugmentedProblem(HierarchicalProblem):
         psi = located.populations_near(added, rng, _START_WIDER)
         own = law.parameter_rows(np.exp(psi[:, : len(law.mechanisms)]))
         rest = population_samples(law, psi[:, len(law.mechanisms) :])
-        return {**own, **rest, **{one.name: added[:, k] for k, one in enumerate(self.added)}}
+        # How avalanches differ in it is not known beforehand: all that may be.
+        between = {one.between_name: prior[one.between_name] for one in self.added if one.between_name}
+        return {**own, **rest, **{one.name: added[:, k] for k, one in enumerate(self.added)}, **between}
 
     def constants(self) -> dict[str, Any]:
         """How well the releases are known, and between which strengths there are tables."""
@@ -195,26 +224,30 @@ class AugmentedProblem(HierarchicalProblem):
         Of at most 24 events, drawn at random from larger campaigns; positive where the tables are larger.
         """
         n = len(next(iter(samples.values())))
-        draws = np.linspace(0, n - 1, min(n, _EXACT_DRAWS)).astype(int)
+        each = max(_EXACT_DRAWS // self.n_components, _LEAST_EXACT_DRAWS)
+        draws = np.linspace(0, n - 1, min(n, each)).astype(int)
         samples = {name: np.ravel(values)[draws] for name, values in samples.items()}
         rng = np.random.default_rng([seed, 5])
         chosen = np.sort(rng.permutation(self.campaign.n_events)[:CHECKED_EVENTS])
-        return self.errors_at(*population_of(law, samples), self.added_rows(samples), chosen)
+        return self.errors_at(*population_of(law, samples), *components_of(self.added, samples), chosen)
 
     def errors_at(
         self,
         means: FloatArray,
         factors: FloatArray,
-        added: FloatArray,
+        own: FloatArray,
+        log_shares: FloatArray,
         chosen: NDArray[np.int64],
         runs: int = _EXACT_RUNS,
     ) -> FloatArray:
-        """As `integration_errors`, of chosen events at some populations and added strengths.
+        """As `integration_errors`, of chosen events at some populations and components of added strengths.
 
         Where there are fewer of them than `runs`, with more nodes each.
         """
-        base = self.base
-        population = Population(means, np.einsum("nij,nkj->nik", factors, factors))
+        base, (n, n_components, n_added) = self.base, own.shape
+        added, every = own.reshape(-1, n_added), np.repeat(np.arange(n), n_components)
+        means_each, factors_each = means[every], factors[every]
+        population = Population(means_each, np.einsum("nij,nkj->nik", factors_each, factors_each))
         rows = Rows(chosen, np.zeros_like(chosen), base.rows.readings.take(chosen), base.rows.errors)
         start = self.tables.modes[self.tables.grid.nearest(added)][:, chosen]
         given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
@@ -222,12 +255,16 @@ class AugmentedProblem(HierarchicalProblem):
         budget = _EXACT.times(more)
         likelihood = EventLikelihood(self.extension, rows, base.strengths).in_groups(given)
         nodes = exact_nodes(likelihood, population, start, budget, base.population)
-        errors = self._tabulated(means, factors, added)[:, chosen]
-        for k in range(len(means)):
+        exact = np.empty((len(added), len(chosen)))
+        for k in range(len(added)):
             first = nodes.first[k * len(chosen) : (k + 1) * len(chosen) + 1]
-            of_event = np.tile(means[k], (len(chosen), 1))
-            errors[k] -= integrated_log_density(of_event, factors[k], first, nodes.points, nodes.log_weights)
-        return errors
+            of_event = np.tile(means_each[k], (len(chosen), 1))
+            exact[k] = integrated_log_density(
+                of_event, factors_each[k], first, nodes.points, nodes.log_weights
+            )
+        parts = exact.reshape(n, n_components, -1) + log_shares[:, :, None]
+        together: FloatArray = np.logaddexp.reduce(parts, axis=1)
+        return self._tabulated(means, factors, own, log_shares)[:, chosen] - together
 
     def speeds(
         self,

@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from skred.diagnosis.augment.added_strength import AddedStrength
+from skred.diagnosis.augment.components import components_of, new_rows
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.extension import Extension
 from skred.inference.hierarchical.event_density import draw_nodes
@@ -44,8 +45,9 @@ def augmented_predictive(
     n_events = problem.campaign.n_events
     kept = thinned(posterior, n_events)
     samples = _samples(problem, law, kept)
-    points = recorded_points(problem, law, samples, rng)
-    recorded, fronts = fronts_of(problem, points, problem.added_rows(samples))
+    own = recorded_strengths(problem, law, samples, rng)
+    points = recorded_points(problem, law, samples, own, rng)
+    recorded, fronts = fronts_of(problem, points, own)
     new = _predict(problem, law, kept, rng)
     before = _predict(problem, law, thinned(prior, n_events), rng)
     return {
@@ -68,6 +70,8 @@ def _added_row(one: AddedStrength) -> dict[str, Any]:
         "id": one.mechanism.id,
         "title": one.mechanism.title,
         "parameter": one.name,
+        "between_events": str(one.between),
+        "between_events_parameter": one.between_name or None,
         "equation": equation_of(one.mechanism, shape),
         "s_from_m": shape.s_from_m,
         "s_to_m": shape.s_to_m,
@@ -86,7 +90,8 @@ def _predict(problem: AugmentedProblem, law: Law, draws: xr.Dataset, rng: np.ran
     drawn = new_avalanches(problem, law, samples, rng)
     deviation = _deviations(problem, drawn)
     points = np.concatenate([np.log(drawn.strengths), deviation[..., None]], axis=-1)
-    avalanches, fronts = fronts_of(problem, points, problem.added_rows(samples))
+    own = new_rows(problem.added, samples, rng, problem.campaign.n_events)
+    avalanches, fronts = fronts_of(problem, points, own)
     dataset = avalanche_dataset(problem, law, draws, avalanches, fronts)
     add_readings(problem, dataset, fronts, rng)
     return dataset
@@ -104,33 +109,59 @@ def _deviations(problem: AugmentedProblem, avalanches: Avalanches) -> FloatArray
     return deviation
 
 
-def recorded_points(
+def recorded_strengths(
     problem: AugmentedProblem, law: Law, samples: Mapping[str, Any], rng: np.random.Generator
+) -> FloatArray:
+    """What each recorded avalanche has of what is added, (n, n_events, n_added), for each draw."""
+    own, _ = components_of(problem.added, samples)
+    if own.shape[1] == 1:
+        return np.tile(own, (1, problem.campaign.n_events, 1))
+    shares = np.cumsum(problem.probability_of_each(law, samples), axis=2)
+    chosen = np.sum(rng.random(shares.shape[:2])[..., None] > shares[..., :-1], axis=2)
+    return np.take_along_axis(own, chosen[:, :, None], axis=1)
+
+
+def recorded_points(
+    problem: AugmentedProblem,
+    law: Law,
+    samples: Mapping[str, Any],
+    own: FloatArray,
+    rng: np.random.Generator,
 ) -> FloatArray:
     """Each recorded avalanche's own point, (n, n_events, n_base + 1), one for each draw of the population.
 
     A node of the nearest table by its share of the integral, moved to where it is in between the tables:
     nodes of the same number follow the events' modes from table to table.
+
+    Parameters
+    ----------
+    own : (n, n_events, n_added) array
+        What each has of what is added.
     """
     tables, n_events = problem.tables, problem.campaign.n_events
     means, factors = population_of(law, samples)
-    added = problem.added_rows(samples)
+    flat = own.reshape(-1, own.shape[2])
     uniforms = rng.random((len(means), n_events))
-    nearest = tables.grid.nearest(added)
+    nearest = tables.grid.nearest(flat).reshape(-1, n_events)
     first, points, log_weights = tables.nodes
     starts = first[:-1].reshape(-1, n_events)
     number = np.empty((len(means), n_events), dtype=np.int64)
-    for table in np.unique(nearest):
-        these = np.flatnonzero(nearest == table)
-        of_table = first[table * n_events : (table + 1) * n_events + 1]
-        drawn = draw_nodes(means[these], factors[these], uniforms[these], of_table, points, log_weights)
-        number[these] = drawn - starts[table]
-    corners, weights = tables.grid.around(added)
+    for event in range(n_events):
+        for table in np.unique(nearest[:, event]):
+            these = np.flatnonzero(nearest[:, event] == table)
+            place = table * n_events + event
+            drawn = draw_nodes(
+                means[these], factors[these], uniforms[these, event : event + 1], first[place : place + 2],
+                points, log_weights,
+            )  # fmt: skip
+            number[these, event] = drawn[:, 0] - first[place]
+    corners, weights = tables.grid.around(flat)
     coordinates = np.vstack([points, tables.release])
     result = np.zeros((len(means), n_events, len(coordinates)))
+    events = np.arange(n_events)
     for corner, weight in zip(corners.T, weights.T, strict=True):
-        nodes = starts[corner] + number
-        result += weight[:, None, None] * np.moveaxis(coordinates[:, nodes], 0, -1)
+        nodes = starts[corner.reshape(-1, n_events), events] + number
+        result += weight.reshape(-1, n_events)[..., None] * np.moveaxis(coordinates[:, nodes], 0, -1)
     return result
 
 
@@ -148,14 +179,15 @@ class _Instruments(Extension):
 
 
 def fronts_of(
-    problem: AugmentedProblem, points: FloatArray, added: FloatArray
+    problem: AugmentedProblem, points: FloatArray, own: FloatArray
 ) -> tuple[Avalanches, FloatArray]:
     """Avalanches as they are with what is added, and their readings without errors.
 
     Parameters
     ----------
     points : (n, n_events, n_base + 1) array
-    added : (n, n_added) array
+    own : (n, n_events, n_added) array
+        What each has of what is added.
 
     Returns
     -------
@@ -166,7 +198,7 @@ def fronts_of(
     n, n_events = points.shape[:2]
     extension, base = problem.extension, problem.base
     instruments = _Instruments(extension.problem, extension.law, extension.directions)
-    given = np.column_stack([np.tile(base.strengths, (n, 1)), added]).repeat(n_events, axis=0)
+    given = np.column_stack([np.tile(base.strengths, (n * n_events, 1)), own.reshape(n * n_events, -1)])
     avalanches, fronts = instruments.read(
         np.tile(np.arange(n_events), n), points.reshape(n * n_events, -1), given
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from skred.diagnosis.evidence.coefficient import Curve
 from skred.diagnosis.evidence.prior_odds import NOTHING, SHARES, UNLISTED
+from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.physics.mechanisms.spec import Group, Mechanism
 from skred.physics.mechanisms.stretches import is_opposed
 
@@ -25,9 +27,22 @@ BESIDE = SHARES[UNLISTED] / (1.0 - SHARES[NOTHING])
 """Prior probability that a force in no list acts beside a mechanism: as that it acts where anything does."""
 
 
-def log_gain(residue: float) -> float:
-    """What a force beside it adds to a mechanism's log Bayes factor, present with its prior probability."""
-    return float(np.logaddexp(math.log1p(-BESIDE), math.log(BESIDE) + residue))
+def log_gain(residue: float | None, ways: Mapping[BetweenEvents, float] | None = None) -> float:
+    """What is added to a mechanism's log Bayes factor, of what was looked at with its prior probability.
+
+    Parameters
+    ----------
+    residue : float or None
+        Log Bayes factor of a force beside it.
+    ways : mapping of BetweenEvents to float, optional
+        What each way in which avalanches may differ has more than the strength in common.
+    """
+    own = 0.0
+    if ways is not None:
+        own = float(np.logaddexp.reduce([math.log(PRIOR[kind]) + gain for kind, gain in ways.items()]))
+    if residue is None:
+        return own
+    return float(np.logaddexp(math.log1p(-BESIDE) + own, math.log(BESIDE) + residue))
 
 
 class Strength(NamedTuple):
@@ -55,6 +70,9 @@ class Candidate:
         Importance sampling less Laplace's formula there, nothing's subtracted; None where not looked at.
     residue : float or None
         Log Bayes factor of a force not in the list beside it; None where not looked at.
+    ways : mapping of BetweenEvents to float, or None
+        What each way in which avalanches may differ in the strength has more than the strength in common, in
+        nats; None where not looked at.
     """
 
     mechanism: Mechanism
@@ -63,6 +81,7 @@ class Candidate:
     correction: float = 0.0
     disagreement: float | None = None
     residue: float | None = None
+    ways: Mapping[BetweenEvents, float] | None = None
 
     @property
     def log_factors(self) -> FloatArray:
@@ -76,8 +95,27 @@ class Candidate:
 
     @property
     def log_bayes_factor(self) -> float:
-        """Against nothing; with a force not in the list beside it as far as that is probable."""
-        return self.alone + (0.0 if self.residue is None else log_gain(self.residue))
+        """Against nothing; differing, or with a force not in the list beside it, as far as is probable."""
+        return self.alone + log_gain(self.residue, self.ways)
+
+    @property
+    def in_common(self) -> float:
+        """Log Bayes factor against nothing with a strength that all avalanches have in common."""
+        return self.alone + log_gain(self.residue)
+
+    @property
+    def between(self) -> dict[BetweenEvents, float]:
+        """Probability of each way in which avalanches may differ in the strength."""
+        ways = {BetweenEvents.COMMON: 0.0} if self.ways is None else self.ways
+        heights = np.array([math.log(PRIOR[kind]) + gain for kind, gain in ways.items()])
+        shares = np.exp(heights - np.logaddexp.reduce(heights))
+        return dict.fromkeys(BetweenEvents, 0.0) | dict(zip(ways, shares.tolist(), strict=True))
+
+    @property
+    def most_probable_way(self) -> BetweenEvents:
+        """How avalanches most probably differ in it."""
+        shares = self.between
+        return max(shares, key=lambda kind: shares[kind])
 
     @property
     def shape_weights(self) -> FloatArray:

@@ -18,6 +18,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.diagnosis.compare.between import with_ways
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import refine
@@ -72,7 +73,14 @@ class ComparisonUnderErrors:
     @property
     def log_factors(self) -> dict[str, float]:
         """Log Bayes factor of each id against nothing under the same error model."""
-        found = {name: candidate.log_bayes_factor for name, candidate in self.candidates.items()}
+        return self._factors({name: one.log_bayes_factor for name, one in self.candidates.items()})
+
+    @property
+    def in_common(self) -> dict[str, float]:
+        """The same with strengths that all avalanches have in common."""
+        return self._factors({name: one.in_common for name, one in self.candidates.items()})
+
+    def _factors(self, found: dict[str, float]) -> dict[str, float]:
         return found | {UNLISTED: log_evidence_of(self.profiles), NOTHING: 0.0}
 
 
@@ -96,13 +104,17 @@ class Comparison:
     @property
     def log_factors(self) -> dict[str, float]:
         """Log Bayes factor of each id against nothing, over the error models."""
+        return self._over_errors([under_errors.log_factors for under_errors in self.under_each])
+
+    def _over_errors(self, factors: Sequence[Mapping[str, float]]) -> dict[str, float]:
+        """Log Bayes factors from those under each error model."""
         parts: dict[str, list[float]] = {}
-        for under_errors in self.under_each:
+        for under_errors, found in zip(self.under_each, factors, strict=True):
             prior = (
                 math.log(ERROR_SHARES[under_errors.error_model])
                 + self.base_evidence[under_errors.error_model]
             )
-            for name, factor in under_errors.log_factors.items():
+            for name, factor in found.items():
                 parts.setdefault(name, []).append(prior + factor)
         nothing = float(np.logaddexp.reduce(parts[NOTHING]))
         return {name: float(np.logaddexp.reduce(values)) - nothing for name, values in parts.items()}
@@ -114,8 +126,9 @@ class Comparison:
 
     @property
     def log_odds(self) -> float:
-        """Of anything against nothing."""
-        nothing = self.probability[NOTHING]
+        """Of anything against nothing, strengths in common: as odds of simulated campaigns are computed."""
+        in_common = self._over_errors([under_errors.in_common for under_errors in self.under_each])
+        nothing = stated(in_common, self.odds)[NOTHING]
         return math.log(max(1.0 - nothing, 1e-300)) - math.log(max(nothing, 1e-300))
 
     def leading(self, name: str) -> ComparisonUnderErrors:
@@ -205,6 +218,7 @@ def _under_errors(
         candidates = refine(base.setting, curves, near, pool)
         profiles = list(pool.map(partial(free_force, base, candidates=candidates), KINDS))
         candidates, profiles = recomputed(base, candidates, profiles, pool, best)
+        candidates = with_ways(base, candidates, pool)
         candidates = with_residues(base, candidates, profiles, pool)
     return ComparisonUnderErrors(error_model, base, candidates, profiles, curves)
 

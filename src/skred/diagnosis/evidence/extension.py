@@ -135,13 +135,21 @@ class Extension:
                 shift += strengths[:, k] * direction.log_strengths[events]
         return shift
 
+    def _own(self, events: IntArray) -> FloatArray:
+        """Multiples of each added strength that events have, (n, n_directions)."""
+        own = np.ones((len(events), len(self.directions)))
+        for k, direction in enumerate(self.directions):
+            if direction.own is not None:
+                own[:, k] = direction.own[events]
+        return own
+
     def _inputs(
         self, events: IntArray, points: FloatArray, strengths: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Strengths of all columns, releases and the speeds there, and factors of the readings."""
         logs = points[:, : self.n_base].copy()
         logs[:, 0] += self._log_strength_shift(events, strengths)
-        rows = np.column_stack([np.exp(logs), strengths[:, self._owner]])
+        rows = np.column_stack([np.exp(logs), (strengths * self._own(events))[:, self._owner]])
         releases = self.problem.releases
         place = releases.mean[events] + releases.sd[events] * points[:, -1]
         log_factor = np.zeros((len(events), len(self.problem.sensors)))
@@ -205,7 +213,10 @@ class Extension:
         by_strengths = np.zeros((*readings.shape, len(self.directions)))
         added = jacobian[:, :, self.n_base : rows.shape[1]]
         for k, direction in enumerate(self.directions):
-            by_strengths[:, :, k] = added[:, :, self._owner == k].sum(axis=2) + by_release * direction.release
+            of_columns = added[:, :, self._owner == k].sum(axis=2)
+            if direction.own is not None:
+                of_columns = of_columns * direction.own[events][:, None]
+            by_strengths[:, :, k] = of_columns + by_release * direction.release
             if direction.log_strengths is not None:
                 by_strengths[:, :, k] += by_logs[:, :, 0] * direction.log_strengths[events][:, None]
             if direction.log_readings is not None:

@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.check.bootstrap_test import LIMIT
-from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.between import TABLES, gains_of
+from skred.diagnosis.compare.candidate import Candidate, log_gain
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of, most_probable
-from skred.diagnosis.evidence.coefficient import Base, curve_at
+from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
 from skred.diagnosis.evidence.conditional_map import Rows
 from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
@@ -119,7 +120,8 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray) -> Influe
     # By the same, quicker method on both sides; only the difference is taken from it.
     stated = log_evidence_of(under_errors.profiles)
     if answer != UNLISTED:
-        stated = under_errors.candidates[answer].alone
+        candidate = under_errors.candidates[answer]
+        stated = candidate.alone + log_gain(None, candidate.ways)
     without_each = stated - gained
     needed = math.log((1.0 - LIMIT) / LIMIT * comparison.odds[NOTHING] / comparison.odds[answer])
     order = np.argsort(without_each)
@@ -186,13 +188,17 @@ def _of_mechanism(candidate: Candidate) -> Again:
     chosen = np.flatnonzero(factors > factors.max() - _SHAPES_WITHIN)
 
     def again(base: Base, part: _Part) -> float:
-        rest, found = part.base(base), []
+        rest, found = part.base(base), list[tuple[float, Curve]]()
         for k in chosen:
             curve = candidate.curves[k]
             known = {strength: part.fit(fit) for strength, fit in curve.known.items()}
             one = curve_at(rest, curve.mechanism, curve.shape, curve.strengths, USUAL, known)
-            found.append(candidate.log_weights[k] + one.log_bayes_factor)
-        return float(np.logaddexp.reduce(found))
+            found.append((candidate.log_weights[k] + one.log_bayes_factor, one))
+        in_common = float(np.logaddexp.reduce([factor for factor, _ in found]))
+        if candidate.ways is None:
+            return in_common
+        best = max(found, key=lambda one: one[0])[1]
+        return in_common + log_gain(None, gains_of(rest, best, TABLES[:1]))
 
     return again
 

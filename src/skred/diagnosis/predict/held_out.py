@@ -11,6 +11,7 @@ from arviz_stats.base import array_stats
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from skred.diagnosis.augment.components import new_rows
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.predictive import Predicted, predict_event
@@ -126,20 +127,24 @@ def _others(
     extension = problem.extension if isinstance(problem, AugmentedProblem) else extended(problem, law)
     posterior = calibration.tree["posterior"].to_dataset()
     names = [parameter.name for parameter in problem.parameters(law)]
-    every = _draws(problem, law, {n: posterior[n].transpose("chain", "draw").values.ravel() for n in names})
     rng = np.random.default_rng([seed, 31])
+    samples = {n: posterior[n].transpose("chain", "draw").values.ravel() for n in names}
+    every = _draws(problem, law, samples, rng)
     parts = []
     for event in range(problem.campaign.n_events):
         draws, share = every, weights[:, event]
         if event in refitted:
-            draws = _draws(problem, law, refitted[event])
+            draws = _draws(problem, law, refitted[event], rng)
             share = np.full(len(draws.means), 1.0 / len(draws.means))
         parts.append(LeftOut(extension, draws.take(rng.choice(len(share), size=_DRAWS, p=share))))
     return tuple(parts)
 
 
-def _draws(problem: HierarchicalProblem, law: Law, samples: Samples) -> Draws:
-    added = problem.added_rows(samples) if isinstance(problem, AugmentedProblem) else None
+def _draws(problem: HierarchicalProblem, law: Law, samples: Samples, rng: np.random.Generator) -> Draws:
+    """Populations, and what one avalanche from each has of what is added."""
+    added = None
+    if isinstance(problem, AugmentedProblem):
+        added = new_rows(problem.added, samples, rng, 1)[:, 0]
     means, factors = population_of(law, samples)
     return Draws(means, factors, np.empty((len(means), 0)) if added is None else added)
 

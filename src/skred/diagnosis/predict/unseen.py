@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from skred.campaign import Campaign
+from skred.diagnosis.augment.components import new_rows
 from skred.diagnosis.augment.problem import AugmentedProblem
-from skred.diagnosis.augment.tables import exact_nodes
 from skred.diagnosis.discrepancy.profile import Kind, Profile, entering, spline_basis
 from skred.diagnosis.evidence.conditional_map import (
     EventLikelihood,
@@ -30,6 +30,7 @@ from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of
 from skred.diagnosis.evidence.predictive import Predicted, predict_event
 from skred.diagnosis.predict.held_out import HeldOut
+from skred.diagnosis.tabulated.tables import exact_nodes
 from skred.errors import InputError
 from skred.inference.calibrate import Calibration
 from skred.inference.error_model import ERROR_MODELS
@@ -130,7 +131,7 @@ class Predictor:
     terms : tuple of Term
         What is added, if anything.
     strengths : (n_draws, n_terms + n_knots) array
-        Of what is added; of a profile its values at the knots.
+        Of what is added, as one avalanche of each draw has it; of a profile its values at the knots.
     profile : ProfileTerm or None
         The force profile that is added, if one is.
     """
@@ -179,7 +180,7 @@ def predictor_of(calibration: Calibration, n_draws: int = N_DRAWS) -> Predictor:
         if problem.base.directions:
             raise ValueError("a predictor cannot hold what is added with a fixed strength")
         terms = tuple(_term(problem, one.mechanism.id, one.shape) for one in problem.added)
-        strengths = problem.added_rows(samples)
+        strengths = new_rows(problem.added, samples, np.random.default_rng([37]), 1)[:, 0]
     smoothing, place_sd = problem.terrain.smoothing_m, problem.place_sd_m
     return Predictor(law.id, problem.error_model.id, place_sd, smoothing, means, factors, terms, strengths)
 

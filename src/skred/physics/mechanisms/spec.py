@@ -161,6 +161,8 @@ class Direction:
         Change of the logarithm of each sensor's readings.
     weakening_speed : float or None
         Its speed scale U_c [m/s] where it enters the column of weakening friction.
+    own : (n_events,) array or None
+        How much each event has of what it adds to the columns, as multiples; the same for all unless given.
     """
 
     columns: tuple[Column, ...] = ()
@@ -169,6 +171,7 @@ class Direction:
     release: float = 0.0
     log_readings: FloatArray | None = None
     weakening_speed: float | None = None
+    own: FloatArray | None = None
 
 
 @dataclass(frozen=True)

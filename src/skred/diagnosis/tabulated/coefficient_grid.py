@@ -110,12 +110,19 @@ class Grid(NamedTuple):
 
 
 class Located(NamedTuple):
-    """Fits on a grid that covers the posterior of the added strengths, with their mean and its factor."""
+    """Fits on a grid that covers the posterior of the added strengths, with their mean and its factor.
+
+    Attributes
+    ----------
+    held : bool
+        Whether all fits have one population, because avalanches differ in what is added.
+    """
 
     grid: Grid
     fits: list[Fit]
     mean: FloatArray
     factor: FloatArray
+    held: bool = False
 
     def populations_near(self, added: FloatArray, rng: np.random.Generator, wider: float = 1.0) -> FloatArray:
         """Draw the population's coordinates at each of some added strengths.
@@ -170,6 +177,8 @@ def finer(base: Base, extension: Extension, located: Located) -> Located:
     old = located.grid
     grid = Grid(old.origin, 0.5 * old.steps, 2 * old.size - 1)
     near = [located.fits[k] for k in old.nearest(grid.points)]
+    if located.held:
+        return located._replace(grid=grid, fits=near)
     fits = _fitted(base, extension, grid.points, (base.population, base.fit.points), near)
     kept = [_without_failures([one], before) for one, before in zip(fits, near, strict=True)]
     return located._replace(grid=grid, fits=[one for (one,) in kept])

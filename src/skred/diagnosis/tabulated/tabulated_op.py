@@ -38,11 +38,53 @@ def _cubic_weights(place, size, weights):  # type: ignore[no-untyped-def]
     return lowest
 
 
+@inner()
+def _interpolated(  # type: ignore[no-untyped-def]
+    own, known, at_tables, means, factor, origin, steps, size, first, points, log_weights, density
+):
+    """Fill the log density of each event that has some added strengths; tables asked for are kept."""
+    n_events, n_axes = density.size, own.size
+    least, most = np.full(n_events, np.inf), np.full(n_events, -np.inf)
+    weights, lowest = np.empty((n_axes, 4)), np.empty(n_axes, np.int64)
+    place, outside = np.empty(n_axes), 0.0
+    for axis in range(n_axes):
+        place[axis] = own[axis] - origin[axis]
+        for before in range(axis):
+            place[axis] -= steps[axis, before] * place[before]
+        place[axis] /= steps[axis, axis]
+    for axis in range(n_axes):
+        inside = min(max(place[axis], 0.0), size[axis] - 1.0)
+        outside += abs(place[axis] - inside)
+        lowest[axis] = _cubic_weights(inside, size[axis], weights[axis])
+    density[:] = 0.0
+    for corner in range(4**n_axes):
+        weight, table, rest = 1.0, 0, corner
+        for axis in range(n_axes):
+            table = table * size[axis] + lowest[axis] + rest % 4
+            weight *= weights[axis, rest % 4]
+            rest //= 4
+        if abs(weight) < 1e-12:
+            continue
+        if not known[table]:
+            of_table = first[table * n_events : (table + 1) * n_events + 1]
+            at_tables[table] = integrated_log_density(means, factor, of_table, points, log_weights)
+            known[table] = True
+        for event in range(n_events):
+            there = at_tables[table, event]
+            density[event] += weight * there
+            least[event] = min(least[event], there)
+            most[event] = max(most[event], there)
+    # Far from all nodes tables differ by hundreds, and polynomials through them overshoot.
+    for event in range(n_events):
+        density[event] = min(max(density[event], least[event] - _OVERSHOOT), most[event] + _OVERSHOOT)
+        density[event] -= _WALL * outside / n_events
+
+
 @compiled()
 def tabulated_log_density(  # type: ignore[no-untyped-def]
-    means, factor, strengths, origin, steps, size, first, points, log_weights
+    means, factor, strengths, log_shares, origin, steps, size, first, points, log_weights
 ):
-    """Log likelihood of each event at some added strengths, its own strengths integrated over the population.
+    """Log likelihood of each event, its own strengths integrated over the population.
 
     Parameters
     ----------
@@ -50,7 +92,10 @@ def tabulated_log_density(  # type: ignore[no-untyped-def]
         Population mean of the logarithms of the base's strengths, for each event.
     factor : (n_strengths, n_strengths) array
         Lower Cholesky factor of their covariance.
-    strengths : (n_added,) array
+    strengths : (n_components, n_added) array
+        Added strengths that an event may have.
+    log_shares : (n_components,) array
+        Logarithm of the share of events that have each.
     origin : (n_added,) array
         Strengths of the first table.
     steps : (n_added, n_added) array
@@ -67,52 +112,31 @@ def tabulated_log_density(  # type: ignore[no-untyped-def]
     (n_events,) array
         Outside the tables those at their edge, less what turns a chain back.
     """
-    n_events, n_axes = means.shape[0], strengths.size
-    density = np.zeros(n_events)
-    least, most = np.full(n_events, np.inf), np.full(n_events, -np.inf)
-    weights, lowest = np.empty((n_axes, 4)), np.empty(n_axes, np.int64)
-    place, outside = np.empty(n_axes), 0.0
-    for axis in range(n_axes):
-        place[axis] = strengths[axis] - origin[axis]
-        for before in range(axis):
-            place[axis] -= steps[axis, before] * place[before]
-        place[axis] /= steps[axis, axis]
-    for axis in range(n_axes):
-        inside = min(max(place[axis], 0.0), size[axis] - 1.0)
-        outside += abs(place[axis] - inside)
-        lowest[axis] = _cubic_weights(inside, size[axis], weights[axis])
-    for corner in range(4**n_axes):
-        weight, table, rest = 1.0, 0, corner
-        for axis in range(n_axes):
-            table = table * size[axis] + lowest[axis] + rest % 4
-            weight *= weights[axis, rest % 4]
-            rest //= 4
-        if abs(weight) < 1e-12:
-            continue
-        of_table = first[table * n_events : (table + 1) * n_events + 1]
-        at_corner = integrated_log_density(means, factor, of_table, points, log_weights)
+    n_events, n_components = means.shape[0], log_shares.size
+    n_tables = (first.size - 1) // n_events
+    known, at_tables = np.zeros(n_tables, np.bool_), np.empty((n_tables, n_events))
+    total, density = np.full(n_events, -np.inf), np.empty(n_events)
+    for component in range(n_components):
+        _interpolated(
+            strengths[component], known, at_tables, means, factor, origin, steps, size, first, points,
+            log_weights, density,
+        )  # fmt: skip
         for event in range(n_events):
-            density[event] += weight * at_corner[event]
-            least[event] = min(least[event], at_corner[event])
-            most[event] = max(most[event], at_corner[event])
-    # Far from all nodes tables differ by hundreds, and polynomials through them overshoot.
-    for event in range(n_events):
-        density[event] = min(max(density[event], least[event] - _OVERSHOOT), most[event] + _OVERSHOOT)
-        density[event] -= _WALL * outside / n_events
-    return density
+            total[event] = np.logaddexp(total[event], log_shares[component] + density[event])
+    return total
 
 
 @compiled()
 def tabulated_log_densities(  # type: ignore[no-untyped-def]
-    means, factors, strengths, n_events, origin, steps, size, first, points, log_weights
+    means, factors, strengths, log_shares, n_events, origin, steps, size, first, points, log_weights
 ):
-    """As `tabulated_log_density` for many draws of population and strengths, (n, n_events)."""
+    """As `tabulated_log_density` for many draws: strengths (n, n_components, n_added), to (n, n_events)."""
     result = np.empty((len(means), n_events))
     of_event = np.empty((n_events, means.shape[1]))
     for k in range(len(means)):
         of_event[:] = means[k]
         result[k] = tabulated_log_density(
-            of_event, factors[k], strengths[k], origin, steps, size, first, points, log_weights
+            of_event, factors[k], strengths[k], log_shares[k], origin, steps, size, first, points, log_weights
         )
     return result
 
@@ -126,7 +150,8 @@ class TabulatedLogDensity(ArrayOp):
     array_inputs = (
         ("means", 2, "float64"),
         ("factor", 2, "float64"),
-        ("strengths", 1, "float64"),
+        ("strengths", 2, "float64"),
+        ("log_shares", 1, "float64"),
         ("origin", 1, "float64"),
         ("steps", 2, "float64"),
         ("size", 1, "int64"),
@@ -134,7 +159,7 @@ class TabulatedLogDensity(ArrayOp):
         ("points", 2, "float64"),
         ("log_weights", 1, "float64"),
     )
-    differentiable = frozenset({"means", "factor", "strengths"})
+    differentiable = frozenset({"means", "factor", "strengths", "log_shares"})
 
     def output_shape(self, shapes: Sequence[tuple[Any, ...]]) -> tuple[Any, ...]:
         """(n_events,)."""
@@ -163,10 +188,10 @@ class TabulatedLogDensity(ArrayOp):
 def _funcify(op: TabulatedLogDensity, node: Any = None, **kwargs: Any) -> Any:
     @numba_njit
     def tabulated_density(  # type: ignore[no-untyped-def]
-        means, factor, strengths, origin, steps, size, first, points, log_weights
+        means, factor, strengths, log_shares, origin, steps, size, first, points, log_weights
     ):
         return tabulated_log_density(
-            means, factor, strengths, origin, steps, size, first, points, log_weights
+            means, factor, strengths, log_shares, origin, steps, size, first, points, log_weights
         )
 
     return tabulated_density, cache_key(tabulated_log_density)

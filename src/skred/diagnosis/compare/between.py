@@ -1,0 +1,93 @@
+"""Whether avalanches differ in what a mechanism does: it is compared in each way that they may differ.
+
+The ways share the mechanism's prior probability. They are computed at its best shape by the same tables, and
+what counts is what each has more than the strength in common.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.diagnosis.evidence.event_quadrature import Budget
+from skred.diagnosis.evidence.marginal import Evidence
+from skred.diagnosis.tabulated.between_evidence import BetweenTarget, Way, between_evidence
+from skred.diagnosis.tabulated.tables import Tables
+from skred.diagnosis.tabulated.wide_tables import wide_tables
+from skred.inference.between_events import PRIOR, BetweenEvents
+from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism
+
+_LOOKED_AT = 4
+"""Mechanisms that are looked at, the most probable ones with the strength in common: one that is far behind
+would have to gain more by what avalanches differ in than these do."""
+TABLES = Budget(64, 64, 128, 1.5, 1.8), Budget(128, 128, 256, 1.5, 1.8)
+"""Nodes of an event in each table: to find where populations are, and then there."""
+_FARTHEST, _FARTHEST_SD, _MOST_SCALES = 4.0, 6.0, 4.5
+"""How far tables reach: times the strength in common, its standard deviations beyond it, and scales of its
+prior at most."""
+
+
+def may_differ(mechanism: Mechanism) -> bool:
+    """Whether avalanches may differ in a mechanism's strength: physics, and not by a property they have."""
+    added = mechanism.added
+    return (
+        mechanism.group is Group.PHYSICS
+        and added is not None
+        and added.bound_to in (BoundTo.PLACE, BoundTo.TRACK)
+    )
+
+
+def with_ways(base: Base, candidates: Mapping[str, Candidate], pool: Executor) -> dict[str, Candidate]:
+    """Candidates, the most probable ones with what they gain where avalanches differ in their strength."""
+    found = dict(candidates)
+    differ = [one for one in candidates.values() if may_differ(one.mechanism) and one.alone > 0.0]
+    leading = sorted(differ, key=lambda one: -one.alone)[:_LOOKED_AT]
+    gains = pool.map(partial(gains_of, base), [one.best for one in leading])
+    for one, gained in zip(leading, gains, strict=True):
+        found[one.mechanism.id] = replace(one, ways=gained)
+    return found
+
+
+def gains_of(base: Base, curve: Curve, budgets: Sequence[Budget] = TABLES) -> dict[BetweenEvents, float]:
+    """What each way has more than the strength in common, in nats; parameters as `ways_of` has them."""
+    ways, _ = ways_of(base, curve, budgets)
+    common = ways[BetweenEvents.COMMON].log_evidence
+    return {kind: way.log_evidence - common for kind, way in ways.items()}
+
+
+def ways_of(
+    base: Base, curve: Curve, budgets: Sequence[Budget] = TABLES
+) -> tuple[dict[BetweenEvents, Way], Tables]:
+    """Evidence of each way at a curve's shape, and the tables that it was computed by.
+
+    Parameters
+    ----------
+    budgets : sequence of Budget
+        Nodes of an event in each table, each time around where the last ones found the populations.
+    """
+    assert curve.mechanism.added is not None
+    mean, sd = curve.moments
+    scale = curve.mechanism.added.scale_of(curve.shape)
+    reach = min(_MOST_SCALES * scale, max(_FARTHEST * abs(mean), abs(mean) + _FARTHEST_SD * sd))
+    near = curve.nearest(mean).found
+    ways: dict[BetweenEvents, Way] = {}
+    for budget in budgets:
+        tables = wide_tables(base, curve, math.copysign(reach, mean), near, budget, mean, sd)
+        for kind in BetweenEvents:
+            ways[kind] = between_evidence(BetweenTarget(base, curve, tables, kind), near, mean, seed=0)
+        best = max(ways, key=lambda kind: math.log(PRIOR[kind]) + ways[kind].log_evidence)
+        near = populations_of(ways[best])
+    return ways, tables
+
+
+def populations_of(way: Way) -> Evidence:
+    """The populations of a way, as one that tables cover."""
+    psi = way.draws[:, :-2]
+    return Evidence(way.log_evidence, psi.mean(axis=0), np.cov(psi.T))

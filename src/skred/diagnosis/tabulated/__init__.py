@@ -1,0 +1,1 @@
+"""Events' likelihoods on a grid of added strengths, and between its strengths."""

@@ -1,0 +1,203 @@
+"""The evidence of each way in which avalanches may differ in an added strength.
+
+An integral over the population, the strength, and what says how it differs, all at once; the events' own
+strengths are integrated by tables. Importance sampling around the highest mode, which is climbed to from
+several starts, adapted once (Cappé and others, 2008, doi 10.1007/s11222-008-9059-x).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.special import gammaln
+
+from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.diagnosis.evidence.marginal import Evidence, population_at
+from skred.diagnosis.evidence.population_target import NARROWEST, log_correlation_constant, log_priors
+from skred.diagnosis.tabulated.tables import Tables
+from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
+from skred.inference.between_events import BetweenEvents, components, from_unbounded
+
+FloatArray = NDArray[np.float64]
+_DEGREES = 5.0
+"""Degrees of freedom of the proposals: tails heavy enough to bound the weights."""
+_WIDER = 1.2
+"""How much wider than the mode's curvature, or the first draws, proposals are."""
+_DRAWS = 400, 1600
+"""Before and after the proposal is adapted: the error of a log evidence is then a few hundredths."""
+_STARTS: dict[BetweenEvents, tuple[tuple[float, float], ...]] = {
+    BetweenEvents.COMMON: ((1.0, 0.0),),
+    BetweenEvents.SPREAD: ((1.0, -1.6), (1.0, -0.3)),
+    BetweenEvents.SOME: ((1.0, 2.5), (1.5, 0.5), (2.5, -0.8)),
+}
+"""Where climbs begin: multiples of the strength that all have in common, and the other's coordinate."""
+_DIFFERENCE = 1e-3
+"""Step of central differences, in coordinates whose scale is one or so."""
+_LEAST_CURVATURE = 0.05
+"""Of minus the log density along an axis, as for any population here: proposals stay bounded."""
+_BAD = -1e10
+
+
+class Way(NamedTuple):
+    """One way in which avalanches may differ.
+
+    Attributes
+    ----------
+    log_evidence, error : float
+        In nats; its standard error by importance sampling.
+    draws : (n, n_psi + 2) array
+        Of its posterior: populations, the strength, and what says how it differs.
+    """
+
+    log_evidence: float
+    error: float
+    draws: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class BetweenTarget:
+    """The density of population, strength and what says how avalanches differ in it, given tables.
+
+    Coordinates are the population's, the logarithm of the strength's size, and, where avalanches differ, that
+    of `from_unbounded`.
+    """
+
+    base: Base
+    curve: Curve
+    tables: Tables
+    kind: BetweenEvents
+
+    @cached_property
+    def farthest(self) -> float:
+        """The farthest strength that there are tables for, with its sign."""
+        return float(self.tables.grid.points[-1, 0])
+
+    def split(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Populations, strengths, parameters, and log priors of the last two, from coordinates (n, size)."""
+        n_psi = self.base.fit.found.psi.size
+        added = self.curve.mechanism.added
+        assert added is not None
+        scale = added.scale_of(self.curve.shape)
+        size = np.exp(np.minimum(x[:, n_psi], 50.0))
+        log_p = -0.5 * (size / scale) ** 2 - 0.5 * math.log(2.0 * math.pi * scale**2) + x[:, n_psi]
+        if not added.either_sign:
+            log_p = log_p + math.log(2.0)
+        log_p = np.where(size <= abs(self.farthest), log_p, -np.inf)
+        if self.kind is BetweenEvents.COMMON:
+            parameter = np.zeros(len(x))
+        else:
+            parameter, more = from_unbounded(self.kind, x[:, n_psi + 1])
+            log_p = log_p + more
+        return x[:, :n_psi], np.copysign(size, self.farthest), parameter, log_p
+
+    def __call__(self, x: FloatArray) -> FloatArray:
+        """Log density at coordinates, (n, size) to (n,); not normalised by the evidence."""
+        psi, strength, parameter, log_p = self.split(x)
+        n = len(self.base.law.mechanisms)
+        inside = np.isfinite(log_p) & (psi[:, n : 2 * n] >= NARROWEST).all(axis=1)
+        result = np.full(len(x), -np.inf)
+        if not inside.any():
+            return result
+        population = population_at(psi[inside], n)
+        factors = np.linalg.cholesky(population.covariance)
+        own, log_shares = components(self.kind, strength[inside], parameter[inside])
+        densities = tabulated_log_densities(
+            population.mean, factors, np.ascontiguousarray(own[:, :, None]), log_shares,
+            len(self.base.rows.event), *self.tables.arrays.values(),
+        )  # fmt: skip
+        total = densities.sum(axis=1) + log_priors(psi[inside], n, self.base.log_scale)
+        result[inside] = np.nan_to_num(total + log_p[inside], nan=-np.inf) + log_correlation_constant(n)
+        return result
+
+
+def between_evidence(target: BetweenTarget, near: Evidence, strength: float, seed: int) -> Way:
+    """The evidence of one way, and draws of it.
+
+    Parameters
+    ----------
+    near : Evidence
+        Populations around the mode.
+    strength : float
+        What avalanches have in common, roughly.
+    """
+    log_size = math.log(abs(strength))
+    most = math.log(0.9 * abs(target.farthest))
+    alone = target.kind is BetweenEvents.COMMON
+    tops = []
+    for multiple, coordinate in _STARTS[target.kind]:
+        start = [*near.psi, min(log_size + math.log(multiple), most), *([] if alone else [coordinate])]
+        tops.append(_climbed(target, np.array(start)))
+    top = max(tops, key=lambda x: float(target(x[None])[0]))
+    covariance = _curvature(target, top)
+    rng = np.random.default_rng([seed, 71])
+    draws, log_w = _weighted(target, top, covariance, _DRAWS[0], rng)
+    weights = _normalised(log_w)
+    mean = weights @ draws
+    deviation = draws - mean
+    adapted = deviation.T @ (weights[:, None] * deviation)
+    effective = 1.0 / float(np.sum(weights**2))
+    share = effective / (effective + 3.0 * len(top))
+    centre, width = share * mean + (1.0 - share) * top, share * adapted + (1.0 - share) * covariance
+    draws, log_w = _weighted(target, centre, width, _DRAWS[1], rng)
+    weights = _normalised(log_w)
+    log_evidence = float(np.logaddexp.reduce(log_w)) - math.log(len(log_w))
+    error = float(len(log_w) * weights.std() / math.sqrt(len(log_w)))
+    drawn = draws[rng.choice(len(draws), size=len(draws), p=weights)]
+    psi, strengths, parameter, _ = target.split(drawn)
+    return Way(log_evidence, error, np.column_stack([psi, strengths, parameter]))
+
+
+def _normalised(log_w: FloatArray) -> FloatArray:
+    weights = np.exp(log_w - log_w.max())
+    return weights / weights.sum()
+
+
+def _climbed(target: BetweenTarget, start: FloatArray) -> FloatArray:
+    """The maximum that a climb from a start comes to."""
+
+    def value_and_slope(x: FloatArray) -> tuple[float, FloatArray]:
+        steps = _DIFFERENCE * np.eye(len(x))
+        heights = np.maximum(target(np.vstack([x[None], x + steps, x - steps])), _BAD)
+        n = len(x)
+        return -float(heights[0]), -(heights[1 : n + 1] - heights[n + 1 :]) / (2.0 * _DIFFERENCE)
+
+    found = minimize(value_and_slope, start, jac=True, method="BFGS", options={"maxiter": 60, "gtol": 0.02})
+    return np.asarray(found.x)
+
+
+def _curvature(target: BetweenTarget, top: FloatArray) -> FloatArray:
+    """Covariance by the Laplace approximation at a mode, by differences."""
+    n, step = len(top), 30.0 * _DIFFERENCE
+    steps = step * np.eye(n)
+    pairs = [(i, j) for i in range(n) for j in range(i)]
+    both = [top + steps[i] + steps[j] for i, j in pairs] + [top - steps[i] - steps[j] for i, j in pairs]
+    heights = np.maximum(target(np.vstack([top[None], top + steps, top - steps, *both])), _BAD)
+    middle, up, down = heights[0], heights[1 : n + 1], heights[n + 1 : 2 * n + 1]
+    sides = up + down - 2.0 * middle
+    hessian = np.diag(-sides / step**2)
+    more = heights[2 * n + 1 :].reshape(2, -1).sum(axis=0)
+    for (i, j), together in zip(pairs, more, strict=True):
+        hessian[i, j] = hessian[j, i] = -(together - 2.0 * middle - sides[i] - sides[j]) / (2.0 * step**2)
+    values, axes = np.linalg.eigh(hessian)
+    covariance: FloatArray = (axes / np.maximum(values, _LEAST_CURVATURE)) @ axes.T
+    return covariance
+
+
+def _weighted(
+    target: BetweenTarget, centre: FloatArray, covariance: FloatArray, n_draws: int, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Draws from a Student t, and their log weights."""
+    n = len(centre)
+    factor = _WIDER * np.linalg.cholesky(covariance + 1e-9 * np.eye(n))
+    white = rng.standard_normal((n_draws, n)) * np.sqrt(_DEGREES / rng.chisquare(_DEGREES, n_draws))[:, None]
+    draws = centre + white @ factor.T
+    log_t = float(gammaln(0.5 * (_DEGREES + n)) - gammaln(0.5 * _DEGREES))
+    log_t -= 0.5 * n * math.log(_DEGREES * math.pi) + float(np.log(np.diag(factor)).sum())
+    log_q = log_t - 0.5 * (_DEGREES + n) * np.log1p(np.sum(white**2, axis=1) / _DEGREES)
+    return draws, np.nan_to_num(target(draws) - log_q, nan=-np.inf)
