@@ -20,6 +20,8 @@ than a tenth is in common for all that recordings tell, and one that differs ten
 _Z = np.linspace(-3.0, 3.0, 13)
 """Where a normal density is summed, in standard deviations: half of one apart, so that an avalanche that
 tells its own strength to a fifth is not missed between two."""
+_FARTHEST = 50.0
+"""Largest logarithm of a multiple: beyond all tables, and powers of it stay finite."""
 _LOG_Z_SHARES = -0.5 * _Z**2 - math.log(float(np.sum(np.exp(-0.5 * _Z**2))))
 
 
@@ -57,7 +59,7 @@ def components(kind: BetweenEvents, strengths: FloatArray, parameter: FloatArray
         with np.errstate(divide="ignore"):
             shares = np.column_stack([np.log1p(-parameter), np.log(parameter)])
         return np.column_stack([np.zeros(len(strengths)), strengths]), shares
-    multiples = np.exp(np.multiply.outer(parameter, _Z))
+    multiples = np.exp(np.clip(np.multiply.outer(parameter, _Z), -_FARTHEST, _FARTHEST))
     return strengths[:, None] * multiples, np.tile(_LOG_Z_SHARES, (len(strengths), 1))
 
 

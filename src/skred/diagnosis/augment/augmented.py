@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,12 +14,13 @@ from skred.diagnosis.augment.problem import (
     AugmentedProblem,
     extension_with,
 )
-from skred.diagnosis.compare.between import ways_of
+from skred.diagnosis.compare.between import populations_of, ways_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.marginal import population_at
 from skred.diagnosis.tabulated.between_evidence import Way
 from skred.diagnosis.tabulated.coefficient_grid import Located, finer, locate
 from skred.diagnosis.tabulated.tables import BUDGETS, Tables, build_tables
+from skred.diagnosis.tabulated.wide_tables import wide_tables
 from skred.inference.between_events import BetweenEvents
 
 MOST_ADDED = 2
@@ -57,8 +57,8 @@ def augmented_problem(
     if way is not BetweenEvents.COMMON:
         if len(curves) > 1:
             raise ValueError("of two mechanisms that are added avalanches can differ in none")
-        ways, tables = ways_of(base, curves[0])
-        return _with_tables(base, added_strengths(curves, [way]), _around(tables, ways[way]))
+        tables = _around(base, curves[0], ways_of(base, curves[0])[way])
+        return _with_tables(base, added_strengths(curves, [way]), tables)
     added = added_strengths(curves)
     speeds = {
         d.weakening_speed
@@ -81,11 +81,11 @@ def augmented_problem(
     return _with_tables(base, added, build_tables(base, extension, located, BUDGETS[-1]))
 
 
-def _around(tables: Tables, way: Way) -> Tables:
-    """Tables whose chains start around where a way has the strength."""
+def _around(base: Base, curve: Curve, way: Way) -> Tables:
+    """Tables around where a way has populations and strength."""
     strength = way.draws[:, -2]
-    mean, sd = np.array([strength.mean()]), np.array([[strength.std()]])
-    return replace(tables, located=tables.located._replace(mean=mean, factor=sd))
+    mean, sd = float(strength.mean()), float(strength.std())
+    return wide_tables(base, curve, populations_of(way), BUDGETS[-1], mean, sd)
 
 
 def _with_tables(base: Base, added: tuple[AddedStrength, ...], tables: Tables) -> AugmentedProblem:

@@ -19,7 +19,6 @@ from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.marginal import Evidence
 from skred.diagnosis.tabulated.between_evidence import BetweenTarget, Way, between_evidence
-from skred.diagnosis.tabulated.tables import Tables
 from skred.diagnosis.tabulated.wide_tables import wide_tables
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism
@@ -29,9 +28,6 @@ _LOOKED_AT = 4
 would have to gain more by what avalanches differ in than these do."""
 TABLES = Budget(64, 64, 128, 1.5, 1.8), Budget(128, 128, 256, 1.5, 1.8)
 """Nodes of an event in each table: to find where populations are, and then there."""
-_FARTHEST, _FARTHEST_SD, _MOST_SCALES = 4.0, 6.0, 4.5
-"""How far tables reach: times the strength in common, its standard deviations beyond it, and scales of its
-prior at most."""
 
 
 def may_differ(mechanism: Mechanism) -> bool:
@@ -57,34 +53,29 @@ def with_ways(base: Base, candidates: Mapping[str, Candidate], pool: Executor) -
 
 def gains_of(base: Base, curve: Curve, budgets: Sequence[Budget] = TABLES) -> dict[BetweenEvents, float]:
     """What each way has more than the strength in common, in nats; parameters as `ways_of` has them."""
-    ways, _ = ways_of(base, curve, budgets)
+    ways = ways_of(base, curve, budgets)
     common = ways[BetweenEvents.COMMON].log_evidence
     return {kind: way.log_evidence - common for kind, way in ways.items()}
 
 
-def ways_of(
-    base: Base, curve: Curve, budgets: Sequence[Budget] = TABLES
-) -> tuple[dict[BetweenEvents, Way], Tables]:
-    """Evidence of each way at a curve's shape, and the tables that it was computed by.
+def ways_of(base: Base, curve: Curve, budgets: Sequence[Budget] = TABLES) -> dict[BetweenEvents, Way]:
+    """Evidence of each way at a curve's shape.
 
     Parameters
     ----------
     budgets : sequence of Budget
         Nodes of an event in each table, each time around where the last ones found the populations.
     """
-    assert curve.mechanism.added is not None
     mean, sd = curve.moments
-    scale = curve.mechanism.added.scale_of(curve.shape)
-    reach = min(_MOST_SCALES * scale, max(_FARTHEST * abs(mean), abs(mean) + _FARTHEST_SD * sd))
     near = curve.nearest(mean).found
     ways: dict[BetweenEvents, Way] = {}
     for budget in budgets:
-        tables = wide_tables(base, curve, math.copysign(reach, mean), near, budget, mean, sd)
+        tables = wide_tables(base, curve, near, budget, mean, sd)
         for kind in BetweenEvents:
             ways[kind] = between_evidence(BetweenTarget(base, curve, tables, kind), near, mean, seed=0)
         best = max(ways, key=lambda kind: math.log(PRIOR[kind]) + ways[kind].log_evidence)
         near = populations_of(ways[best])
-    return ways, tables
+    return ways
 
 
 def populations_of(way: Way) -> Evidence:
