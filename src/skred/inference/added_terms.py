@@ -16,6 +16,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from skred.inference.between_events import BetweenEvents
 from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import direction_of
@@ -45,6 +46,10 @@ class AddedTerm:
         Where and how it acts: the most probable one.
     direction : Direction
         What a unit of its strength changes on the campaign's own terrain, event by event where it differs.
+    between : BetweenEvents
+        How avalanches differ in it.
+    between_name : str
+        Of what says how, among the draws; empty where they do not.
     """
 
     name: str
@@ -54,6 +59,8 @@ class AddedTerm:
     bound_to: BoundTo
     shape: Shape
     direction: Direction
+    between: BetweenEvents = BetweenEvents.COMMON
+    between_name: str = ""
 
     @property
     def transfers(self) -> bool:
@@ -82,7 +89,8 @@ def added_group(terms: Sequence[AddedTerm]) -> xr.Dataset:
 
     Variables
     ---------
-    mechanism, title, group, bound_to, shape (added) : texts, the shape as JSON
+    mechanism, title, group, bound_to, shape, between_events, between_events_parameter (added) : texts, the
+        shape as JSON
     release_shift (added) : m; weakening_speed (added) : m s-1, NaN where it has none
     kernel_column, kernel_owner (part) : a column of the kernel's table, and the number of the term it is of
     kernel_profile (part, cell) : what a unit of strength adds to that column
@@ -97,6 +105,8 @@ def added_group(terms: Sequence[AddedTerm]) -> xr.Dataset:
         "group": [str(term.group) for term in terms],
         "bound_to": [str(term.bound_to) for term in terms],
         "shape": [json.dumps(asdict(term.shape)) for term in terms],
+        "between_events": [str(term.between) for term in terms],
+        "between_events_parameter": [term.between_name for term in terms],
     }
     weakening = [np.nan if d.weakening_speed is None else d.weakening_speed for d in directions]
     group = xr.Dataset(
@@ -137,9 +147,8 @@ def added_terms(tree: xr.DataTree) -> tuple[AddedTerm, ...]:
 
 
 def _term(group: xr.Dataset, number: int, name: str) -> AddedTerm:
-    text = {
-        key: str(group[key].values[number]) for key in ("mechanism", "title", "group", "bound_to", "shape")
-    }
+    keys = "mechanism", "title", "group", "bound_to", "shape", "between_events", "between_events_parameter"
+    text = {key: str(group[key].values[number]) for key in keys}
     mine = group["kernel_owner"].values == number
     columns = tuple(Column(int(c)) for c in group["kernel_column"].values[mine])
     profiles = group["kernel_profile"].values[mine] if columns else np.empty((0, 0))
@@ -154,8 +163,9 @@ def _term(group: xr.Dataset, number: int, name: str) -> AddedTerm:
     )
     kind, bound_to = Group(text["group"]), BoundTo(text["bound_to"])
     return AddedTerm(
-        name, text["mechanism"], text["title"], kind, bound_to, _shape(json.loads(text["shape"])), direction
-    )
+        name, text["mechanism"], text["title"], kind, bound_to, _shape(json.loads(text["shape"])), direction,
+        BetweenEvents(text["between_events"]), text["between_events_parameter"],
+    )  # fmt: skip
 
 
 def _shape(entry: dict[str, Any]) -> Shape:

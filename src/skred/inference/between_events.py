@@ -11,7 +11,7 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 SPREAD_MEDIAN, SPREAD_LOG_SD = 0.4, 0.6
@@ -95,18 +95,18 @@ def from_unbounded(kind: BetweenEvents, coordinate: FloatArray) -> tuple[FloatAr
 
 
 def own_multiples(
-    kind: BetweenEvents, parameter: FloatArray, shape: tuple[int, ...], rng: np.random.Generator
+    kind: BetweenEvents, parameter: ArrayLike, shape: tuple[int, ...], rng: np.random.Generator
 ) -> FloatArray:
     """What avalanches to come have of a strength, as multiples of it.
 
     Parameters
     ----------
-    parameter : array
+    parameter : array or float
         Broadcast to the shape from its first axis on.
     """
     if kind is BetweenEvents.COMMON:
         return np.ones(shape)
-    given = parameter.reshape(parameter.shape + (1,) * (len(shape) - parameter.ndim))
+    given = np.reshape(parameter, np.shape(parameter) + (1,) * (len(shape) - np.ndim(parameter)))
     if kind is BetweenEvents.SOME:
         return (rng.random(shape) < given).astype(float)
     multiples: FloatArray = np.exp(given * rng.standard_normal(shape))

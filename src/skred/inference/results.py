@@ -22,7 +22,7 @@ from skred.inference.sampling import SamplerSettings
 from skred.output import write_bytes
 from skred.physics.law import Law, Parameter, parameter_of
 
-FORMAT = 2
+FORMAT = 3
 """Of the files with trees; figures are made from no other."""
 _PACKAGES = ("skred", "pymc", "pytensor", "arviz", "numba", "numpy", "scipy", "xarray")
 

@@ -11,6 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from skred.inference.added_terms import GROUP, AddedTerm
+from skred.inference.between_events import BetweenEvents, own_multiples
 from skred.inference.hierarchical.releases import Releases
 from skred.physics.geometry import contributions_of
 from skred.physics.kernel.columns import Column
@@ -36,11 +37,14 @@ class Motion:
         What a unit of each added strength changes on this track.
     added : (n_populations, n_terms) array
         Added strengths of each population.
+    between : tuple of (BetweenEvents, (n_populations,) array)
+        How avalanches differ in each, and by how much; none where they differ in no strength.
     """
 
     contributions: Contributions
     terms: tuple[Direction, ...] = ()
     added: FloatArray | None = None
+    between: tuple[tuple[BetweenEvents, FloatArray], ...] = ()
 
     @property
     def differs_by_release(self) -> bool:
@@ -55,8 +59,12 @@ class Motion:
         for strength, term in zip(own, self.terms, strict=True):
             if term.log_strengths is not None:
                 logs[:, 0] += strength * term.log_strengths[event]
-        columns = np.repeat(own, [len(term.columns) for term in self.terms])
-        return np.column_stack([np.exp(logs), np.tile(columns, (len(logs), 1))])
+        each = np.tile(own, (len(logs), 1))
+        rng = np.random.default_rng([29, population])
+        for k, (kind, parameter) in enumerate(self.between):
+            each[:, k] *= own_multiples(kind, parameter[population], (len(logs),), rng)
+        columns = np.repeat(each, [len(term.columns) for term in self.terms], axis=1)
+        return np.column_stack([np.exp(logs), columns])
 
     def release(self, population: int, place: FloatArray, terrain: Terrain) -> FloatArray:
         """Where fronts start [m], from where releases were noted."""
@@ -116,9 +124,11 @@ def moved(
         releases = releases.take(np.repeat(np.arange(n), n_events))
         weights = None if weights is None else np.repeat(weights, n_events)
         directions = [_repeated(direction, n) for direction in directions]
-    return Moved(
-        Motion(_contributions(base, directions), tuple(directions), strengths), releases, weights, told
+    between = tuple(
+        (term.between, _draws(posterior, term.between_name or term.name)[chosen]) for term in used
     )
+    motion = Motion(_contributions(base, directions), tuple(directions), strengths, between)
+    return Moved(motion, releases, weights, told)
 
 
 def _repeated(direction: Direction, n: int) -> Direction:

@@ -63,6 +63,8 @@ def augmented_draws(found: Diagnosis) -> xr.DataTree:
             _bound_to(one.mechanism),
             one.shape,
             one.direction,
+            one.between,
+            one.between_name,
         )
         for one in augmented_of(calibration).added
     ]

@@ -13,6 +13,7 @@ from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.evidence.covariates import standard_of
 from skred.diagnosis.outcome import Diagnosis
+from skred.diagnosis.verdict.between import between_document, ways_document
 from skred.physics.mechanisms.spec import Mechanism
 from skred.physics.mechanisms.stretches import equation_of
 
@@ -36,9 +37,14 @@ def place_of(candidate: Candidate) -> dict[str, Any] | None:
 
 def strength_document(found: Diagnosis, number: int) -> dict[str, Any]:
     """The strength of an added mechanism, as the last calibration has it, over all places."""
-    added = augmented_of(found.steps[-1].calibration).added[number]
-    strength = strength_of(found.steps, number)
-    return {"parameter": added.name, "unit": added.mechanism.strength.unit, **strength._asdict()}
+    calibration = found.steps[-1].calibration
+    added = augmented_of(calibration).added[number]
+    return {
+        "parameter": added.name,
+        "unit": added.mechanism.strength.unit,
+        **strength_of(found.steps, number)._asdict(),
+        **between_document(calibration, added, found.steps[number].candidate),
+    }
 
 
 def added_document(found: Diagnosis, number: int) -> dict[str, Any]:
@@ -103,6 +109,7 @@ def _candidate(comparison: Comparison, name: str) -> dict[str, Any]:
             "parameter": strength.name,
             "unit": strength.unit,
             **candidate.strength()._asdict(),
+            "ways": ways_document(candidate),
         },
         "location": place_of(candidate),
         "covariate": shape.covariate,

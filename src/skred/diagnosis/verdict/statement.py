@@ -11,6 +11,7 @@ from skred.diagnosis.check.decision import NOTHING_AT_MOST, Decision
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
+from skred.diagnosis.verdict.between import between_sentence
 from skred.diagnosis.verdict.hangs_on import carried, hangs_on
 from skred.diagnosis.verdict.improvement import improvement
 from skred.diagnosis.words import enumerated, percent, plus_minus
@@ -87,6 +88,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         f" {percent(probability[UNLISTED])}).",
         f"Its {strength['parameter'].replace('_', ' ')} is"
         f" {plus_minus(strength['mean'], strength['sd'], strength['unit'])}.",
+        between_sentence(strength),
         _compensated(document["mechanisms"][0]["constants"]),
     ]
     if document["covariate"]:
