@@ -1,0 +1,132 @@
+"""Notebooks that are kept as text: run one, and turn what came out into a page of Markdown.
+
+A notebook is a Python file in the percent format of jupytext. The cell with the tag ``parameters`` says how
+much is computed; `run` can put other values behind it.
+"""
+
+from __future__ import annotations
+
+import base64
+import os
+import re
+import sys
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jupytext
+import nbformat
+from nbclient import NotebookClient
+
+SECONDS = 900
+"""Longest time of one cell, on a slow machine that does other work too."""
+ESCAPES = re.compile(r"\x1b\[[0-9;]*m")
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A notebook as a page.
+
+    Attributes
+    ----------
+    text : str
+        Markdown.
+    figures : dict of bytes
+        PNG files by the names that the text has.
+    """
+
+    text: str
+    figures: dict[str, bytes]
+
+
+def read(path: Path) -> Any:
+    """A notebook from its text, not yet run."""
+    return jupytext.read(path)
+
+
+def run(path: Path, given: Mapping[str, object] | None = None) -> Any:
+    """Run a notebook in an empty folder of its own.
+
+    Parameters
+    ----------
+    path : Path
+        Python in the percent format.
+    given : mapping, optional
+        Values in place of those of the cell ``parameters``.
+
+    Returns
+    -------
+    notebook
+        With what every cell printed and drew.
+
+    Raises
+    ------
+    nbclient.exceptions.CellExecutionError
+        If a cell fails; the message has the cell and its traceback.
+    """
+    notebook = read(path)
+    if given:
+        lines = "\n".join(f"{name} = {value!r}" for name, value in given.items())
+        notebook.cells.insert(_behind_parameters(notebook), nbformat.v4.new_code_cell(lines))
+    with tempfile.TemporaryDirectory() as folder:
+        client = NotebookClient(notebook, timeout=SECONDS, resources={"metadata": {"path": folder}})
+        client.execute(env=_environment())
+    return notebook
+
+
+def _environment() -> dict[str, str]:
+    """With the commands of this Python first, and lines that fit a page."""
+    commands = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    return {**os.environ, "PATH": commands, "COLUMNS": "96"}
+
+
+def _behind_parameters(notebook: Any) -> int:
+    for number, cell in enumerate(notebook.cells):
+        if "parameters" in cell.metadata.get("tags", ()):
+            return number + 1
+    raise ValueError("no cell of the notebook has the tag 'parameters'")
+
+
+def shown(notebook: Any, name: str) -> Shown:
+    """A notebook as a page, with all that its cells put out.
+
+    Parameters
+    ----------
+    notebook
+        Run or not.
+    name : str
+        First part of the names of its figures.
+    """
+    parts: list[str] = []
+    figures: dict[str, bytes] = {}
+    for cell in notebook.cells:
+        if cell.cell_type == "markdown":
+            parts.append(cell.source)
+        elif cell.cell_type == "code":
+            parts.append(f"```python\n{cell.source}\n```")
+            for output in cell.outputs:
+                parts.append(_output(output, cell.metadata, name, figures))
+    return Shown("\n\n".join(part for part in parts if part) + "\n", figures)
+
+
+def _output(output: Any, metadata: Mapping[str, Any], name: str, figures: dict[str, bytes]) -> str:
+    """One output: text as it is, HTML as it is, a figure as a file."""
+    if output.output_type == "stream":
+        return _text(output.text)
+    data = output.get("data", {})
+    if "image/png" in data:
+        file = f"{name}-{len(figures) + 1}.png"
+        figures[file] = base64.b64decode(data["image/png"])
+        return f"![{metadata['alt']}]({file})"
+    if "text/html" in data:
+        lines = [line.strip() for line in data["text/html"].splitlines()]
+        return '<div class="output">' + "".join(line for line in lines if line) + "</div>"
+    return _text(data.get("text/plain", ""))
+
+
+def _text(said: str) -> str:
+    """What a cell printed, without colours, so fenced that it may hold a fence itself."""
+    said = ESCAPES.sub("", said).rstrip()
+    return f"````{{.text .output}}\n{said}\n````" if said else ""
