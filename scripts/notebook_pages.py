@@ -1,7 +1,7 @@
 """For MkDocs (`hooks` in mkdocs.yml): every notebook of docs/notebooks is run and becomes a page.
 
-``SKRED_NOTEBOOKS=text`` shows them without running them, ``SKRED_NOTEBOOKS=quick`` runs them with the values of
-`QUICK`. What was run is kept in ``.cache/notebooks`` until a notebook, the package or its data change.
+``SKRED_NOTEBOOKS=text`` shows them without running them, ``SKRED_NOTEBOOKS=quick`` runs them with the values
+of `QUICK`. What was run is kept in ``.cache/notebooks`` until a notebook, the package or its data change.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     how = os.environ.get("SKRED_NOTEBOOKS", "full")
     if how not in ("full", "quick", "text"):
         raise PluginError(f"SKRED_NOTEBOOKS is {how!r}; expected full, quick or text")
-    for file in [one for one in files if one.src_uri.startswith("notebooks/") and one.src_uri.endswith(".py")]:
+    for file in [one for one in files if one.src_uri.startswith("notebooks/") and one.src_uri[-3:] == ".py"]:
         source = Path(str(file.abs_src_path))
         notebook = notebooks.read(source) if how == "text" else _run(source, how)
         page = notebooks.shown(notebook, source.stem)
@@ -78,7 +78,8 @@ def _run(source: Path, how: str) -> Any:
 def _fingerprint(source: Path, how: str) -> str:
     """Of all that can change what a notebook shows, as far as it is ours."""
     found = hashlib.sha256(f"{how} {QUICK}".encode())
-    for file in [source, *sorted(one for room in ("src", "models", "data") for one in (ROOT / room).rglob("*"))]:
+    rooms = [ROOT / "src", ROOT / "models", ROOT / "data"]
+    for file in [source, *sorted(one for room in rooms for one in room.rglob("*"))]:
         if file.is_file() and file.suffix != ".pyc":
             found.update(f"{file.relative_to(ROOT)}\n".encode() + file.read_bytes())
     return found.hexdigest()[:16]

@@ -19,6 +19,7 @@ from typing import Any
 import jupytext
 import nbformat
 from nbclient import NotebookClient
+from traitlets.config import Config
 
 SECONDS = 900
 """Longest time of one cell, on a slow machine that does other work too."""
@@ -71,7 +72,9 @@ def run(path: Path, given: Mapping[str, object] | None = None) -> Any:
         lines = "\n".join(f"{name} = {value!r}" for name, value in given.items())
         notebook.cells.insert(_behind_parameters(notebook), nbformat.v4.new_code_cell(lines))
     with tempfile.TemporaryDirectory() as folder:
-        client = NotebookClient(notebook, timeout=SECONDS, resources={"metadata": {"path": folder}})
+        settings = Config({"KernelManager": {"transport": "ipc"}})  # no port that others could listen to
+        resources = {"metadata": {"path": folder}}
+        client = NotebookClient(notebook, timeout=SECONDS, resources=resources, config=settings)
         client.execute(env=_environment())
     return notebook
 
@@ -105,10 +108,19 @@ def shown(notebook: Any, name: str) -> Shown:
         if cell.cell_type == "markdown":
             parts.append(cell.source)
         elif cell.cell_type == "code":
-            parts.append(f"```python\n{cell.source}\n```")
+            parts.append(_input(cell.source))
             for output in cell.outputs:
                 parts.append(_output(output, cell.metadata, name, figures))
     return Shown("\n\n".join(part for part in parts if part) + "\n", figures)
+
+
+def _input(code: str) -> str:
+    """A cell of Python, or commands as they are typed."""
+    commands = code.removeprefix("%%bash\n")
+    if commands == code:
+        return f"```python\n{code}\n```"
+    typed = "\n".join(line if line.startswith("  ") else f"$ {line}" for line in commands.splitlines())
+    return f"```console\n{typed}\n```"
 
 
 def _output(output: Any, metadata: Mapping[str, Any], name: str, figures: dict[str, bytes]) -> str:

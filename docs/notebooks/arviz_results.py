@@ -14,8 +14,6 @@
 # [From Python](../python.md#arviz) says what is in each group.
 
 # %%
-import warnings
-
 import arviz as az
 import arviz_plots as azp
 
@@ -42,56 +40,55 @@ pcm
 # %%
 az.summary(pcm.posterior, round_to=3)
 
-# %% alt="Rank plots of both coefficients of the PCM model: the ranks of all four chains lie inside the band"
-azp.plot_rank(pcm.posterior)
+# %% alt="Rank plots of both coefficients of the PCM model: four chains that wander around zero, with a p-value far above its limit"
+_ = azp.plot_rank(pcm.posterior)
 
 # %% [markdown]
+# The chains agree where the p-values of their ranks are above α.
+#
 # ## What would be recorded?
 #
 # `posterior_predictive` has one variable for each sensor: what it would read of new avalanches. Of the recorded ones the distribution is drawn over it.
 # Speeds are in m/s, the runout in m.
 
 # %% alt="For each sensor, recorded values and draws of what would be recorded"
-azp.plot_ppc_dist(pcm.posterior, num_samples=50)
+_ = azp.plot_ppc_dist(pcm.posterior, num_samples=50)
 
 # %% [markdown]
-# PIT values say where in its predicted distribution each recorded value lies. If the predictions are right, they are uniform: the curve stays
-# inside the band.
+# PIT values say where in its predicted distribution each recorded value lies. If the predictions are right, they are uniform, and the curve stays
+# near zero. Where p is below α, it does not.
 
-# %% alt="PIT values of all four sensors, with the band of uniform values"
-azp.plot_ppc_pit(pcm.posterior)
+# %% alt="PIT values of all four sensors beside those of a uniform distribution, each with its p-value"
+_ = azp.plot_ppc_pit(pcm.posterior)
 
 # %% [markdown]
 # ## Leave-one-out
 #
-# An avalanche is left out as a whole, with all its readings: they share one front. ArviZ warns where one is too influential for importance sampling.
+# An avalanche is left out as a whole, with all its readings: they share one front. ArviZ warns where one is too influential for importance
+# sampling, with a Pareto k above 0.7.
 
 # %%
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore", UserWarning)  # the plot below says of which avalanches
-    loo = {name: az.loo(one.posterior, pointwise=True) for name, one in {"pcm": pcm, "coulomb": coulomb}.items()}
-print(loo["pcm"])
+loo = az.loo(pcm.posterior, pointwise=True)
+loo
 
-# %% alt="Pareto k of every avalanche, most of them far below the limit"
-azp.plot_khat(loo["pcm"])
+# %% alt="Pareto k of every avalanche, all far below 0.7"
+_ = azp.plot_khat(loo)
 
 # %% [markdown]
 # The same PIT values with each avalanche left out, here of the sensor `b`:
 
-# %% alt="PIT values with each avalanche left out, of the sensor b"
-azp.plot_loo_pit(pcm.posterior, var_names="b")
+# %% alt="PIT values of the sensor b with each avalanche left out, beside a uniform distribution"
+_ = azp.plot_loo_pit(pcm.posterior, var_names="b")
 
 # %% [markdown]
 # ## Which law predicts better?
 
 # %%
-with warnings.catch_warnings():
-    warnings.simplefilter("ignore", UserWarning)
-    table = az.compare(loo)
+table = az.compare({"pcm": pcm.posterior, "coulomb": coulomb.posterior})
 table
 
 # %% alt="Expected log predictive density of both laws with standard errors"
-azp.plot_compare(table)
+_ = azp.plot_compare(table)
 
 # %% [markdown]
 # `skred compare` does this and more: it refits where importance sampling is unreliable, computes the evidence, and says in sentences

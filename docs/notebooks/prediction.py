@@ -24,8 +24,10 @@ from IPython.display import Image
 #
 # `--quick` simulates fewer campaigns for the check. Leave it out for an answer to rely on.
 
+# %% language="bash"
+# skred diagnose ryggfonn --base-model coulomb --quick --quiet --out diagnosed
+
 # %%
-# !skred diagnose ryggfonn --base-model coulomb --quick --quiet --out diagnosed
 verdict = json.loads(Path("diagnosed/verdict.json").read_text(encoding="utf-8"))
 print(verdict["verdict"], verdict["mechanism"], verdict["probability"][verdict["mechanism"]], sep="\n")
 
@@ -35,8 +37,8 @@ print(verdict["verdict"], verdict["mechanism"], verdict["probability"][verdict["
 # The house is at s = 2000 m, the road at 2100 m: s is the length along the track from its first point. A pressure of 30 kPa is asked about, and
 # avalanches like those recorded come 0.7 times a year, give or take 0.15: 22 in 32 years. Nothing is sampled again.
 
-# %%
-# !skred predict --from diagnosed --at house=2000 --at road=2100 --pressure 30 --per-year 0.7,0.15 --out predicted
+# %% language="bash"
+# skred predict --from diagnosed --at house=2000 --at road=2100 --pressure 30 --per-year 0.7,0.15 --out predicted
 
 # %% [markdown]
 # ## The numbers

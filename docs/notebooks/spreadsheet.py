@@ -13,7 +13,7 @@
 # It becomes a campaign, and the campaign a verdict. [Your own data](../own-data.md) explains each step for the command line,
 # and what else a table may look like.
 #
-# A line that begins with `!` is a command of the shell. Without a notebook, type it without the `!`.
+# Cells with a prompt `$` are commands of the shell, the others are Python.
 
 # %%
 from pathlib import Path
@@ -52,7 +52,7 @@ Datum;LC [m/s];CD [m/s];b [m/s];Auslauf ab Krone [m]
 16.04.2005;33,0;6,0;-;-50
 22.03.2007;35,0;15,0;0,0;0
 """
-Path("avalanches.csv").write_text(TABLE, encoding="utf-8");
+_ = Path("avalanches.csv").write_text(TABLE, encoding="utf-8")
 
 # %% [markdown]
 # The track is a profile of the path: horizontal distance and elevation. Here it is the one of the included campaign.
@@ -60,7 +60,7 @@ Path("avalanches.csv").write_text(TABLE, encoding="utf-8");
 # %%
 track = skred.read_campaign("ryggfonn").track
 points = [f"{x},{z}" for x, z in zip(track.x_m, track.z_m, strict=True)]
-Path("profile.csv").write_text("\n".join(["x_m,z_m", *points]) + "\n")
+_ = Path("profile.csv").write_text("\n".join(["x_m,z_m", *points]) + "\n")
 print(len(points), "points, from", track.z_m[0], "to", track.z_m[-1], "m above sea level")
 
 # %% [markdown]
@@ -68,8 +68,8 @@ print(len(points), "points, from", track.z_m[0], "to", track.z_m[-1], "m above s
 #
 # Without `--out` nothing is written. What the table leaves open is listed, with the words that answer it:
 
-# %%
-# !skred import avalanches.csv --track profile.csv
+# %% language="bash"
+# skred import avalanches.csv --track profile.csv || true  # it ends with an error, on purpose
 
 # %% [markdown]
 # ## Import
@@ -77,19 +77,17 @@ print(len(points), "points, from", track.z_m[0], "to", track.z_m[-1], "m above s
 # The places of the sensors are arc lengths, along the track from its first point. Runouts count from the dam's crown at 1940 m, downhill positive.
 # Speeds are good to 10 % and 1 m/s, and runouts to 12 m. No release was recorded, so all avalanches start at the top.
 
-# %%
-ANSWERS = """
---column "Datum=event"
---column "LC [m/s]=front_velocity at=1650"
---column "CD [m/s]=front_velocity at=1810"
---column "b [m/s]=front_velocity at=1910"
---column "Auslauf ab Krone [m]=runout place=reference sensor=runout absolute_sd=12"
---reference 1940
---set velocity.relative_sd=0.1 --set velocity.absolute_sd=1
---set release.s_m=0
---blank missing --dash not_reached
-""".replace("\n", " ")
-# !skred import avalanches.csv --track profile.csv {ANSWERS} --yes --out my-campaign
+# %% language="bash"
+# skred import avalanches.csv --track profile.csv \
+#   --column "Datum=event" \
+#   --column "LC [m/s]=front_velocity at=1650" \
+#   --column "CD [m/s]=front_velocity at=1810" \
+#   --column "b [m/s]=front_velocity at=1910" \
+#   --column "Auslauf ab Krone [m]=runout place=reference sensor=runout absolute_sd=12" \
+#   --reference 1940 \
+#   --set velocity.relative_sd=0.1 --set velocity.absolute_sd=1 \
+#   --set release.s_m=0 \
+#   --blank missing --dash not_reached --yes --out my-campaign
 
 # %% [markdown]
 # `import.toml` in the folder keeps these answers: `skred import next-winter.csv --mapping my-campaign/import.toml --out DIR` asks nothing.
@@ -98,17 +96,16 @@ ANSWERS = """
 #
 # Every problem would be listed with file, row and column:
 
-# %%
-# !skred validate my-campaign
+# %% language="bash"
+# skred validate my-campaign
 
 # %% [markdown]
 # ## What can these recordings tell at all?
 #
 # Before the diagnosis looks for missing physics in the Coulomb model, dry friction alone: how strong would each mechanism have to be to be seen?
 
-# %%
-campaign = skred.read_campaign("my-campaign")
-# !skred identify my-campaign --base-model coulomb
+# %% language="bash"
+# skred identify my-campaign --base-model coulomb --quiet
 
 # %% [markdown]
 # ## The verdict
@@ -116,7 +113,7 @@ campaign = skred.read_campaign("my-campaign")
 # `quick` simulates fewer campaigns for the check and adds one mechanism at most. For an answer to rely on, leave it out.
 
 # %%
-result = skred.diagnose("coulomb", campaign, quick=True)
+result = skred.diagnose("coulomb", "my-campaign", quick=True)
 print(*result.statement, sep="\n")
 
 # %% [markdown]
