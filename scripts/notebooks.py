@@ -71,8 +71,9 @@ def run(path: Path, given: Mapping[str, object] | None = None) -> Any:
     if given:
         lines = "\n".join(f"{name} = {value!r}" for name, value in given.items())
         notebook.cells.insert(_behind_parameters(notebook), nbformat.v4.new_code_cell(lines))
-    with tempfile.TemporaryDirectory() as folder:
-        settings = Config({"KernelManager": {"transport": "ipc"}})  # no port that others could listen to
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as sockets:
+        # Files of this user instead of ports, which others on the machine could listen to.
+        settings = Config({"KernelManager": {"transport": "ipc", "ip": f"{sockets}/kernel"}})
         resources = {"metadata": {"path": folder}}
         client = NotebookClient(notebook, timeout=SECONDS, resources=resources, config=settings)
         client.execute(env=_environment())

@@ -37,7 +37,7 @@ def test_links_lead_to_files_and_headings(page: Path) -> None:
     ("link", "problem"),
     [
         ("method.md", None),
-        ("method.md#probability-and-ties", None),
+        ("method.md#known-limits", None),
         ("#here-it-is", None),
         ("figures/track.png", None),
         ("https://example.org/nowhere", None),
