@@ -11,7 +11,7 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -110,8 +110,7 @@ def shown(notebook: Any, name: str) -> Shown:
             parts.append(cell.source)
         elif cell.cell_type == "code":
             parts.append(_input(cell.source))
-            for output in cell.outputs:
-                parts.append(_output(output, cell.metadata, name, figures))
+            parts += [_output(output, cell.metadata, name, figures) for output in _joined(cell.outputs)]
     return Shown("\n\n".join(part for part in parts if part) + "\n", figures)
 
 
@@ -122,6 +121,17 @@ def _input(code: str) -> str:
         return f"```python\n{code}\n```"
     typed = "\n".join(line if line.startswith("  ") else f"$ {line}" for line in commands.splitlines())
     return f"```console\n{typed}\n```"
+
+
+def _joined(outputs: Iterable[Any]) -> list[Any]:
+    """What was printed piece by piece, errors among the rest, as one piece."""
+    found: list[Any] = []
+    for output in outputs:
+        if output.output_type == "stream" and found and found[-1].output_type == "stream":
+            found[-1] = nbformat.v4.new_output("stream", text=found[-1].text + output.text)
+        else:
+            found.append(output)
+    return found
 
 
 def _output(output: Any, metadata: Mapping[str, Any], name: str, figures: dict[str, bytes]) -> str:
@@ -141,5 +151,5 @@ def _output(output: Any, metadata: Mapping[str, Any], name: str, figures: dict[s
 
 def _text(said: str) -> str:
     """What a cell printed, without colours, so fenced that it may hold a fence itself."""
-    said = ESCAPES.sub("", said).rstrip()
+    said = "\n".join(line.rstrip() for line in ESCAPES.sub("", said).splitlines()).rstrip()
     return f"````{{.text .output}}\n{said}\n````" if said else ""
