@@ -29,7 +29,7 @@ from IPython.display import Image
 
 # %%
 verdict = json.loads(Path("diagnosed/verdict.json").read_text(encoding="utf-8"))
-print(verdict["verdict"], verdict["mechanism"], verdict["probability"][verdict["mechanism"]], sep="\n")
+print(verdict["statement"])
 
 # %% [markdown]
 # ## Predict
@@ -43,23 +43,25 @@ print(verdict["verdict"], verdict["mechanism"], verdict["probability"][verdict["
 # %% [markdown]
 # ## The numbers
 #
-# `places.csv` has them as a table:
+# `places.csv` has them as a table. These are the rows of the house:
 
 # %%
-places = pd.read_csv("predicted/places.csv")
-places
+pd.set_option("display.max_colwidth", None)
+places = pd.read_csv("predicted/places.csv", keep_default_na=False)
+places[places["place"] == "house"].drop(columns=["place", "s [m]"]).round(2)
 
-# %% alt="At the house and at the road: probability that the front speed and the impact pressure are exceeded"
+# %% alt="At the house and at the road: share of avalanches that exceed each front speed and each impact pressure, with 90 % bands"
 Image("predicted/places.png")
 
 # %% [markdown]
 # How fast along the whole track:
 
-# %% alt="Probability of front speeds along the track, and of runouts"
+# %% alt="Front speeds that half, a tenth and a hundredth of the avalanches exceed along the track, and the probability of running beyond each place, with what was recorded"
 Image("predicted/prediction.png")
 
 # %% [markdown]
 # ## What it rests on
 #
-# The intervals hold if the law is right. These avalanches met a dam, which the track does not have: the force that was found may well be that dam, see [Ryggfonn](../ryggfonn.md).
+# The intervals hold if the law is right. All but one of these avalanches met a catching dam at s = 1940 m, which this track does not have: [Ryggfonn](../ryggfonn.md)
+# says what the answers depend on.
 # `predicted/report.html` is the page to attach, with everything that a prediction does not know.

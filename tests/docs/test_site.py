@@ -5,41 +5,16 @@ Of the dependency group ``site``; notebooks are shown here without being run.
 
 from __future__ import annotations
 
-import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-from built_site import Page, lost
+from built_site import ROOT, Page, build, lost
 
 import skred
 
 pytest.importorskip("mkdocs", reason="the group `site` is not installed: uv run --group site pytest")
-
-ROOT = Path(__file__).resolve().parents[2]
-
-
-def build(configuration: Path, site: Path) -> subprocess.CompletedProcess[str]:
-    """Make a site strictly; quietly, no warning would count."""
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict"]
-    return subprocess.run(
-        [*command, "--config-file", str(configuration), "--site-dir", str(site)],
-        capture_output=True,
-        text=True,
-        cwd=site.parent,
-        env={**os.environ, "SKRED_NOTEBOOKS": "text", "NO_MKDOCS_2_WARNING": "1"},
-    )
-
-
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The site as it is built, but for what notebooks put out."""
-    folder = tmp_path_factory.mktemp("built") / "site"
-    done = build(ROOT / "mkdocs.yml", folder)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return folder
 
 
 @pytest.fixture(scope="module")
