@@ -48,7 +48,7 @@ _ = azp.plot_rank(pcm.posterior)
 #
 # ## What would be recorded?
 #
-# `posterior_predictive` has one variable for each sensor: what it would read of new avalanches. Of the recorded ones the distribution is drawn over it.
+# `posterior_predictive` has one variable for each sensor: what it would read of new avalanches. The black line is what was recorded.
 # Speeds are in m/s, the runout in m.
 
 # %% alt="For each sensor, recorded values and draws of what would be recorded"

@@ -37,7 +37,7 @@ def test_search_works_from_the_disk(site: Path, telephone: tuple[Any, list[str]]
     page, wrong = telephone
     page.goto((site / "index.html").as_uri())
     page.click("label[for=__search].md-header__button")
-    page.fill(".md-search__input", "thalweg")
+    page.locator(".md-search__input").press_sequentially("thalweg")
     page.wait_for_selector(".md-search-result__link")
     page.click(".md-search-result__link")
     page.wait_for_url("**/*.html?h=thalweg")
