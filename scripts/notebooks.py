@@ -23,6 +23,10 @@ from traitlets.config import Config
 
 SECONDS = 900
 """Longest time of one cell, on a slow machine that does other work too."""
+PLAIN = re.compile(
+    r"<style scoped>.*?</style>| border=\"1\" class=\"dataframe\"| style=\"text-align: right;\"", re.S
+)
+"""What pandas says of the looks of a table; the site has its own."""
 ESCAPES = re.compile(r"\x1b\[[0-9;]*m")
 
 
@@ -135,7 +139,7 @@ def _joined(outputs: Iterable[Any]) -> list[Any]:
 
 
 def _output(output: Any, metadata: Mapping[str, Any], name: str, figures: dict[str, bytes]) -> str:
-    """One output: text as it is, HTML as it is, a figure as a file."""
+    """One output: text and HTML as they are, Markdown as a quotation, a figure as a file."""
     if output.output_type == "stream":
         return _text(output.text)
     data = output.get("data", {})
@@ -143,8 +147,10 @@ def _output(output: Any, metadata: Mapping[str, Any], name: str, figures: dict[s
         file = f"{name}-{len(figures) + 1}.png"
         figures[file] = base64.b64decode(data["image/png"])
         return f"![{metadata['alt']}]({file})"
+    if "text/markdown" in data:
+        return "\n".join(f"> {line}" for line in data["text/markdown"].splitlines())
     if "text/html" in data:
-        lines = [line.strip() for line in data["text/html"].splitlines()]
+        lines = [line.strip() for line in PLAIN.sub("", data["text/html"]).splitlines()]
         return '<div class="output">' + "".join(line for line in lines if line) + "</div>"
     return _text(data.get("text/plain", ""))
 

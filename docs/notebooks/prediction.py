@@ -17,7 +17,7 @@ import json
 from pathlib import Path
 
 import pandas as pd
-from IPython.display import Image
+from IPython.display import Image, Markdown
 
 # %% [markdown]
 # ## What is missing
@@ -29,7 +29,7 @@ from IPython.display import Image
 
 # %%
 verdict = json.loads(Path("diagnosed/verdict.json").read_text(encoding="utf-8"))
-print(verdict["statement"])
+Markdown(verdict["statement"])
 
 # %% [markdown]
 # ## Predict

@@ -66,6 +66,14 @@ import base64
 Image(base64.b64decode("PIXEL"))
 
 # %%
+from IPython.display import Markdown
+Markdown("*so*\\nsaid")
+
+# %%
+import pandas as pd
+pd.DataFrame({"a": [1]}, index=["row"])
+
+# %%
 from IPython.display import HTML
 HTML("<p>one</p>\\n\\n<p>two</p>")
 """.replace("PIXEL", PIXEL)
@@ -81,6 +89,8 @@ def test_a_notebook_becomes_a_page_with_all_that_it_puts_out(tmp_path: Path, not
     assert "from the shell again" in page.text
     assert "![A pixel](small-1.png)" in page.text and page.figures["small-1.png"][1:4] == b"PNG"
     assert '<div class="output"><p>one</p><p>two</p></div>' in page.text
+    assert "> *so*\n> said" in page.text
+    assert "<table><thead><tr><th></th><th>a</th></tr></thead>" in page.text and "<style" not in page.text
     unrun = notebooks.shown(notebooks.read(file), "small")
     assert "63" not in unrun.text and not unrun.figures
 
