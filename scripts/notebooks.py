@@ -121,10 +121,7 @@ def shown(notebook: Any, name: str) -> Shown:
 def _input(code: str) -> str:
     """A cell of Python, or commands as they are typed."""
     commands = code.removeprefix("%%bash\n")
-    if commands == code:
-        return f"```python\n{code}\n```"
-    typed = "\n".join(line if line.startswith("  ") else f"$ {line}" for line in commands.splitlines())
-    return f"```console\n{typed}\n```"
+    return f"```{'python' if commands == code else 'console'}\n{commands}\n```"
 
 
 def _joined(outputs: Iterable[Any]) -> list[Any]:

@@ -38,7 +38,8 @@ Markdown(verdict["statement"])
 # avalanches like those recorded come 0.7 times a year, give or take 0.15: 22 in 32 years. Nothing is sampled again.
 
 # %% language="bash"
-# skred predict --from diagnosed --at house=2000 --at road=2100 --pressure 30 --per-year 0.7,0.15 --out predicted
+# skred predict --from diagnosed --at house=2000 --at road=2100 \
+#   --pressure 30 --per-year 0.7,0.15 --out predicted
 
 # %% [markdown]
 # ## The numbers

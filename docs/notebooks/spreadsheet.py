@@ -13,7 +13,7 @@
 # It becomes a campaign, and the campaign a verdict. [Your own data](../own-data.md) explains each step for the command line,
 # and what else a table may look like.
 #
-# Cells with a prompt `$` are commands of the shell, the others are Python.
+# Cells that begin with `skred` are commands of the shell, the others are Python.
 
 # %%
 from pathlib import Path

@@ -85,7 +85,7 @@ def test_a_notebook_becomes_a_page_with_all_that_it_puts_out(tmp_path: Path, not
     page = notebooks.shown(notebooks.run(file, {"N": 3}), "small")
     assert "```python\nN = 3\n```" in page.text
     assert "````{.text .output}\n<b> 63\nbold\n````" in page.text
-    assert '```console\n$ echo "from the shell" \\\n  again\n```' in page.text
+    assert '```console\necho "from the shell" \\\n  again\n```' in page.text
     assert "from the shell again" in page.text
     assert "![A pixel](small-1.png)" in page.text and page.figures["small-1.png"][1:4] == b"PNG"
     assert '<div class="output"><p>one</p><p>two</p></div>' in page.text
