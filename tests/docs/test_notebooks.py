@@ -44,6 +44,16 @@ def test_every_notebook_begins_with_its_title_and_names_its_figures(file: Path, 
         assert bool(DRAWN.search(cell.source)) == ("alt" in cell.metadata), cell.source
 
 
+def test_what_a_quick_run_changes_is_there_to_be_changed(notebooks: Any) -> None:
+    import notebook_pages
+
+    assert notebook_pages.QUICK
+    for stem, given in notebook_pages.QUICK.items():
+        cells = notebooks.read(DOCS / "notebooks" / f"{stem}.py").cells
+        [named] = [cell.source for cell in cells if "parameters" in cell.metadata.get("tags", ())]
+        assert set(given) == set(re.findall(r"^(\w+) = ", named, re.M))
+
+
 TEXT = """\
 # %% [markdown]
 # # Notebook: small
