@@ -52,6 +52,17 @@ def test_the_import_is_what_the_page_shows(folder: Path, capsys: pytest.CaptureF
     assert read_campaign(folder / "my-second-campaign").n_events == 3
 
 
+@pytest.mark.slow
+def test_the_verdict_is_what_the_page_shows(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([*shlex.split(IMPORTS[-1]), "--yes", "--quiet"]) == 0
+    assert run(["diagnose", "my-campaign", "--quick", "--out", "diagnosed"]) == 0
+    said = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
+    shown = re.search(r"with `--quick`:\n\n```text\n(.*?)^```", PAGE, re.M | re.S)
+    assert shown
+    for line in shown.group(1).splitlines():
+        assert " ".join(line.split()) in said, line
+
+
 def test_every_meaning_and_key_of_a_column_is_explained() -> None:
     rows = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", PAGE, re.M))
     kinds = Column.model_json_schema()["properties"]["is"]["enum"]

@@ -28,6 +28,11 @@ def read_campaign(name: str | Path) -> Campaign:
     name : str or Path
         A folder of five files, or the name of an included campaign such as ``ryggfonn``.
 
+    Returns
+    -------
+    Campaign
+        Track, sensors, events, and the readings as arrays of shape (n_events, n_sensors), in m/s and m.
+
     Raises
     ------
     skred.campaign.CampaignError
@@ -37,14 +42,28 @@ def read_campaign(name: str | Path) -> Campaign:
 
 
 def laws() -> dict[str, Law]:
-    """The laws that are installed, by id; those that cannot be used are left out."""
+    """The laws that are installed, by id; those that cannot be used are left out.
+
+    Returns
+    -------
+    dict of Law
+        As ``laws()["pcm"]``. A law has `parameters` and an `equation`; `law.build(problem)` is its PyMC
+        model.
+    """
     from skred.physics.laws import installed_laws
 
     return {law.id: law for law in installed_laws()[0]}
 
 
 def mechanisms() -> dict[str, Mechanism]:
-    """The mechanisms that are installed, by id; ``law + mechanism`` is a law."""
+    """The mechanisms that are installed, by id; ``law + mechanism`` is a law.
+
+    Returns
+    -------
+    dict of Mechanism
+        Forces on a front, and faults of the instruments. Of these only forces that act alike along the whole
+        track can be added to a law.
+    """
     from skred.physics.mechanisms.library import mechanisms as installed
 
     return installed()

@@ -49,18 +49,30 @@ def calibrate(
 
     Parameters
     ----------
-    law, campaign
-        What to calibrate on what.
+    law : str or Law
+        Its id, or itself.
+    campaign : str, Path or Campaign
+        A folder, the name of an included campaign, or a campaign that was read.
     likelihood : {"pooled", "hierarchical"}
-        One parameter vector for the path, or one for every avalanche.
+        One set of parameters for the path, or one for every avalanche.
     errors : str, optional
-        Error model of the hierarchical likelihood, ``robust`` by default.
+        Error model of the hierarchical likelihood: ``robust`` (default), ``normal``, ``student``,
+        ``correlated`` or ``scaled``. The pooled one has none.
     smoothing_m : float, optional
-        Smoothing length of the terrain [m].
-    priors : mapping, optional
-        Scales of priors by name of parameter, see `skred.inference.priors`.
+        Smoothing length of the terrain [m]; by default 10, in proportion less on tracks below 600 m.
+    priors : mapping of str to float, optional
+        Scales of priors by name of parameter, each in its unit: of a half-normal prior its scale, of a
+        log-normal one its median.
     sampler : {"metropolis", "nuts", "smc"}
-    draws, tune, chains, seed : int
+        PyMC's. NUTS should not be trusted alone here, and says so.
+    draws : int
+        Kept in each chain.
+    tune : int, optional
+        Draws before them; by default 500, hierarchical 1000.
+    chains : int
+        Sampled one beside the other.
+    seed : int
+        Of all randomness.
 
     Returns
     -------
@@ -107,9 +119,26 @@ def compare(
 ) -> Result:
     """Calibrate several laws, and say which one the recordings prefer and by how much.
 
-    Parameters and errors as of `calibrate`; `exact_loo` refits without every event also where importance
-    sampling is reliable, `tell` takes one line for each stage. The document is ``compare.json``; the
-    posterior has one child for each law.
+    What is not listed here is as of `calibrate`.
+
+    Parameters
+    ----------
+    laws : sequence of str or Law
+        Ids, or the laws themselves.
+    exact_loo : bool
+        Hierarchical: refit without every avalanche, also where importance sampling is reliable.
+    tell : callable
+        Called with one line as each stage begins, such as ``print``.
+
+    Returns
+    -------
+    Result
+        Its document is ``compare.json``; the posterior has one child for each law.
+
+    Raises
+    ------
+    skred.errors.InputError
+        As of `calibrate`.
     """
     import xarray as xr
 
@@ -157,7 +186,22 @@ def identify(
 ) -> Result:
     """Say what recordings can tell at all: from what strength on each mechanism would be seen.
 
-    Parameters and errors as of `calibrate`. Nothing is sampled; the document is ``identify.json``.
+    What is not listed here is as of `calibrate`. The likelihood is the hierarchical one.
+
+    Parameters
+    ----------
+    tell : callable
+        Called with one line as each stage begins.
+
+    Returns
+    -------
+    Result
+        Its document is ``identify.json``; nothing is sampled.
+
+    Raises
+    ------
+    skred.errors.InputError
+        As of `calibrate`.
     """
     from skred.diagnosis.detect.run import identify_to
 
@@ -185,9 +229,33 @@ def diagnose(
 ) -> Result:
     """Say what physics a law leaves out, where and how surely, model it, and show what that improves.
 
-    Parameters and errors as of `calibrate`; `quick`, `exact_loo`, `max_mechanisms`, `lock` and `outer_folds`
-    as of the command. The document is ``verdict.json``; ``tree("augmented.nc")`` has the draws of the law
-    with what was added.
+    What is not listed here is as of `calibrate`. The likelihood is the hierarchical one.
+
+    Parameters
+    ----------
+    quick : bool
+        Fewer simulated campaigns for the check, and one mechanism at most.
+    exact_loo : bool
+        Refit without every avalanche, not only where importance sampling is unreliable.
+    max_mechanisms : int, optional
+        Mechanisms added at most, one after the other; by default 2, quick 1.
+    lock : int
+        Avalanches set aside by chance before anything is looked at, and opened once at the end.
+    outer_folds : int
+        Repeat the whole diagnosis so often, each time without some avalanches, to predict those.
+    tell : callable
+        Called with one line as each stage begins.
+
+    Returns
+    -------
+    Result
+        Its document is ``verdict.json``; ``tree("augmented.nc")`` has the draws of the law with what was
+        added, where something was.
+
+    Raises
+    ------
+    skred.errors.InputError
+        As of `calibrate`.
     """
     from skred.diagnosis.effort import SAMPLING, effort_of
     from skred.diagnosis.run import diagnose_to
@@ -221,8 +289,26 @@ def predict(
 ) -> Result:
     """Say how fast and how far the next avalanche goes along a track, and how sure that is.
 
-    Parameters and errors as of `calibrate`; `track` is a table like a campaign's ``track.csv``, by default
-    that of the campaign, and `release_s_m` where fronts start there [m]. The document is ``prediction.json``.
+    What is not listed here is as of `calibrate`. The likelihood is the hierarchical one.
+
+    Parameters
+    ----------
+    track : str or Path, optional
+        A table like a campaign's ``track.csv``; by default the campaign's track.
+    release_s_m : float, optional
+        Where fronts start [m]; by default as recorded, on another track at its first point.
+    tell : callable
+        Called with one line as each stage begins.
+
+    Returns
+    -------
+    Result
+        Its document is ``prediction.json``.
+
+    Raises
+    ------
+    skred.errors.InputError
+        As of `calibrate`, and if the track cannot be used.
     """
     from skred.inference.calibrate import calibrate as sample
     from skred.prediction.predict import predict as predict_avalanches
