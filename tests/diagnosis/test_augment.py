@@ -18,8 +18,8 @@ BASE: Any = SimpleNamespace(law=SimpleNamespace(id="pcm"), problem=None, plain=l
 
 def compared(**shares: float) -> Any:
     """A comparison with these probabilities."""
-    common = BetweenEvents.COMMON
-    candidates = {name: SimpleNamespace(best=name, most_probable_way=common) for name in shares}
+    ways = (BetweenEvents.COMMON,)
+    candidates = {name: SimpleNamespace(best=name, likely_ways=ways) for name in shares}
     under_errors = SimpleNamespace(base=BASE, candidates=candidates)
     return SimpleNamespace(probability=shares, leading=lambda name: under_errors, log_odds=3.0)
 

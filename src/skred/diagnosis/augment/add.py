@@ -77,8 +77,11 @@ def add_mechanisms(
         candidate = under_errors.candidates[names[0]]
         chosen.append(candidate.best)
         reference.begin(under_errors.base.problem)
-        way = candidate.most_probable_way if number == 0 else BetweenEvents.COMMON
-        calibration = adding.calibrated(under_errors.base, chosen, way)
+        # What cannot be sampled where avalanches differ is still an effect with a strength in common.
+        for way in dict.fromkeys((*(candidate.likely_ways if number == 0 else ()), BetweenEvents.COMMON)):
+            calibration = adding.calibrated(under_errors.base, chosen, way)
+            if calibration.gate.passed:
+                break
         if not calibration.gate.passed:
             problems = "; ".join(calibration.gate.problems)
             reason = f"the gate of {base.law.id} + {names[0]} failed: {problems}"

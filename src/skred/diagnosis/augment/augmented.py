@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 import skred.diagnosis.augment.results  # noqa: F401 - registers what it says of readings
 from skred.diagnosis.augment.added_strength import AddedStrength, added_strengths
+from skred.diagnosis.augment.components import components_of
 from skred.diagnosis.augment.problem import (
     CHECKED_EVENTS,
     CLAIM_LIMIT,
@@ -17,12 +19,12 @@ from skred.diagnosis.augment.problem import (
 from skred.diagnosis.compare.between import populations_of, ways_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.marginal import population_at
-from skred.diagnosis.tabulated.between_evidence import Way
-from skred.diagnosis.tabulated.coefficient_grid import Located, finer, locate
+from skred.diagnosis.tabulated.coefficient_grid import finer, locate
 from skred.diagnosis.tabulated.tables import BUDGETS, Tables, build_tables
 from skred.diagnosis.tabulated.wide_tables import wide_tables
 from skred.inference.between_events import BetweenEvents
 
+FloatArray = NDArray[np.float64]
 MOST_ADDED = 2
 """Mechanisms added at most: tables grow with the power of their number."""
 _ROUGH_DRAWS = 8
@@ -57,8 +59,7 @@ def augmented_problem(
     if way is not BetweenEvents.COMMON:
         if len(curves) > 1:
             raise ValueError("of two mechanisms that are added avalanches can differ in none")
-        tables = _around(base, curves[0], ways_of(base, curves[0])[way])
-        return _with_tables(base, added_strengths(curves, [way]), tables)
+        return _differing(base, curves[0], way)
     added = added_strengths(curves)
     speeds = {
         d.weakening_speed
@@ -74,18 +75,23 @@ def augmented_problem(
         return _with_tables(base, added, build_tables(base, extension, located, BUDGETS[0]))
     for budget in BUDGETS:
         problem = _with_tables(base, added, build_tables(base, extension, located, budget))
-        if _rough_error(problem, located) < _ENOUGH * CLAIM_LIMIT:
+        if _rough_error(problem) < _ENOUGH * CLAIM_LIMIT:
             return problem
     # More nodes do not help where a likelihood bends with the strength, between the tables' strengths.
     located = finer(base, extension, located)
     return _with_tables(base, added, build_tables(base, extension, located, BUDGETS[-1]))
 
 
-def _around(base: Base, curve: Curve, way: Way) -> Tables:
-    """Tables around where a way has populations and strength."""
-    strength = way.draws[:, -2]
+def _differing(base: Base, curve: Curve, way: BetweenEvents) -> AugmentedProblem:
+    """With one mechanism in which avalanches differ: tables around where that way has populations."""
+    found, added = ways_of(base, curve)[way], added_strengths([curve], [way])
+    strength, near = found.draws[:, -2], populations_of(found)
     mean, sd = float(strength.mean()), float(strength.std())
-    return wide_tables(base, curve, populations_of(way), BUDGETS[-1], mean, sd)
+    for budget in BUDGETS:
+        problem = _with_tables(base, added, wide_tables(base, curve, near, budget, mean, sd))
+        if _rough_error(problem) < _ENOUGH * CLAIM_LIMIT:
+            break
+    return problem
 
 
 def _with_tables(base: Base, added: tuple[AddedStrength, ...], tables: Tables) -> AugmentedProblem:
@@ -95,14 +101,22 @@ def _with_tables(base: Base, added: tuple[AddedStrength, ...], tables: Tables) -
     )
 
 
-def _rough_error(problem: AugmentedProblem, located: Located) -> float:
-    """Error of the log likelihood per event [nats], at populations as the fits have them."""
-    rng = np.random.default_rng(17)
-    reach = rng.uniform(-2.0, 2.0, (_ROUGH_DRAWS, len(located.mean))) @ located.factor.T
+def _rough_error(problem: AugmentedProblem) -> float:
+    """Error of the log likelihood per event [nats], at populations and strengths as chains start from."""
+    rng, law, located = np.random.default_rng(17), problem.base.law, problem.tables.located
+    n = max(_ROUGH_DRAWS // problem.n_components, 2)  # each draw takes as many integrals
+    reach = rng.uniform(-2.0, 2.0, (n, len(located.mean))) @ located.factor.T
     added = np.clip(located.mean + reach, *problem.range)
     psi = located.populations_near(added, rng)
-    means, covariances = population_at(psi, len(problem.base.law.mechanisms))
+    means, covariances = population_at(psi, len(law.mechanisms))
     factors = np.linalg.cholesky(covariances)
     chosen = np.sort(rng.permutation(problem.campaign.n_events)[:CHECKED_EVENTS])
-    same = added[:, None, :], np.zeros((len(added), 1))
-    return float(np.abs(problem.errors_at(means, factors, *same, chosen, _ROUGH_RUNS).mean(axis=1)).max())
+    own, log_shares = components_of(problem.added, _medians(problem, added))
+    errors = problem.errors_at(means, factors, own, log_shares, chosen, _ROUGH_RUNS)
+    return float(np.abs(errors.mean(axis=1)).max())
+
+
+def _medians(problem: AugmentedProblem, added: FloatArray) -> dict[str, FloatArray]:
+    """Parameters of what is added, by name: what says how avalanches differ at a moderate value."""
+    samples = {one.name: added[:, k] for k, one in enumerate(problem.added)}
+    return samples | {one.between_name: np.full(len(added), 0.5) for one in problem.added}

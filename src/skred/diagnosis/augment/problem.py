@@ -293,6 +293,9 @@ class AugmentedProblem(HierarchicalProblem):
         old = self.tables
         if self.refined:
             return None
+        if old.located.held:  # all cover one population already, and strengths lie close
+            tables = build_tables(self.base, self.extension, old.located, old.budget.times(2))
+            return replace(self, tables=tables, refined=True)
         if self.visited is not None:
             located = finer(self.base, self.extension, old.located)
             tables = build_tables(self.base, self.extension, located, old.budget, self.visited)

@@ -23,6 +23,8 @@ real forces have otherwise. Set on 28 opened trials, whose true forms differ on 
 16 of the true strengths without it, 24 with it."""
 
 
+_UNLIKELY = 0.1
+"""Probability up to which a way in which avalanches may differ is not modelled in place of a likelier one."""
 BESIDE = SHARES[UNLISTED] / (1.0 - SHARES[NOTHING])
 """Prior probability that a force in no list acts beside a mechanism: as that it acts where anything does."""
 
@@ -112,10 +114,11 @@ class Candidate:
         return dict.fromkeys(BetweenEvents, 0.0) | dict(zip(ways, shares.tolist(), strict=True))
 
     @property
-    def most_probable_way(self) -> BetweenEvents:
-        """How avalanches most probably differ in it."""
+    def likely_ways(self) -> tuple[BetweenEvents, ...]:
+        """How avalanches probably differ in it, the most probable way first."""
         shares = self.between
-        return max(shares, key=lambda kind: shares[kind])
+        likely = [kind for kind in shares if shares[kind] > _UNLIKELY]
+        return tuple(sorted(likely, key=lambda kind: -shares[kind]))
 
     @property
     def shape_weights(self) -> FloatArray:

@@ -177,8 +177,6 @@ def finer(base: Base, extension: Extension, located: Located) -> Located:
     old = located.grid
     grid = Grid(old.origin, 0.5 * old.steps, 2 * old.size - 1)
     near = [located.fits[k] for k in old.nearest(grid.points)]
-    if located.held:
-        return located._replace(grid=grid, fits=near)
     fits = _fitted(base, extension, grid.points, (base.population, base.fit.points), near)
     kept = [_without_failures([one], before) for one, before in zip(fits, near, strict=True)]
     return located._replace(grid=grid, fits=[one for (one,) in kept])

@@ -18,7 +18,7 @@ from skred.diagnosis.evidence.refit import Fit
 from skred.diagnosis.tabulated.coefficient_grid import Grid, Located
 from skred.diagnosis.tabulated.tables import Tables, build_tables
 
-TABLES = 17
+TABLES = 13
 """From nothing to the farthest strength: a step is less than what one avalanche tells of it."""
 _FARTHEST, _FARTHEST_SD, _MOST_SCALES = 4.0, 6.0, 4.5
 """How far they reach: times the strength in common, its standard deviations beyond it, and scales of its

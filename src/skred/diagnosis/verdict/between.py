@@ -58,10 +58,12 @@ def _events(calibration: Calibration, added: AddedStrength) -> list[dict[str, An
 
 def between_sentence(strength: dict[str, Any]) -> str:
     """How avalanches differ in it, in plain words; empty where they do not."""
-    way = strength["between_events"]
+    way, likely = strength["between_events"], 1.0 - strength["ways"][BetweenEvents.COMMON]
+    differs = percent(likely)
     if way == BetweenEvents.COMMON:
-        return ""
-    differs = percent(1.0 - strength["ways"][BetweenEvents.COMMON])
+        if likely < 0.5:
+            return ""
+        return f"Avalanches probably differ in it ({differs}); a law in which they do was not calibrated."
     if way == BetweenEvents.SPREAD:
         spread = strength["spread"]
         factor = float(np.exp(spread["mean"]))
