@@ -62,8 +62,8 @@ VIEWS: tuple[ViewKind, ...] = (
     ),
     ViewKind(
         "predictive", _FOUND, "Predictions by sensor",
-        "Black: recorded. Lines and bars: what the run predicts. Recordings should look like one of the predictions,"
-        " and nine in ten bars should hold their dot.",
+        "Black: recorded. Lines and bars: what the run predicts. The black line should look like one of the blue"
+        " ones, and nine in ten thin bars should hold their dot.",
         _predicted, predictive_panels,
     ),
     ViewKind(
@@ -96,8 +96,8 @@ VIEWS: tuple[ViewKind, ...] = (
     ),
     ViewKind(
         "loo_pit", _CHECKS, "LOO-PIT by sensor",
-        "Left-out readings should fall anywhere in their predictions with the same chance. A line that leaves the grey"
-        " band means that predictions are biased, too narrow or too wide.",
+        "Left-out readings should fall anywhere in their predictions with the same chance. A line far from zero means that"
+        " predictions are biased, too narrow or too wide; below α, the p-value says that this is no chance.",
         lambda run: _predicted(run) and _left_out(run), loo_pit_panels,
     ),
     ViewKind(
@@ -123,7 +123,7 @@ VIEWS: tuple[ViewKind, ...] = (
     ),
     ViewKind(
         "rank", _DRAWS, "Ranks",
-        "A line for each chain. Chains that explore the same stay inside the grey band.",
+        "A line for each chain. Chains that explore the same stay close to zero; a p-value below α says that they do not.",
         _posterior, rank_panels, by_parameter=True,
     ),
 )  # fmt: skip

@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 from bokeh.models import (
+    BasicTicker,
+    BasicTickFormatter,
     BoxZoomTool,
     ColumnDataSource,
     GlyphRenderer,
-    HelpTool,
     HoverTool,
     PanTool,
     Plot,
@@ -39,6 +40,8 @@ DRAWS_FILTER = "skred-draws"
 """Name of the filters that show draws of the chosen event only."""
 _FONT = "system-ui, 'Segoe UI', 'Helvetica Neue', Arial, sans-serif"
 _MOST_POINTS = 2000
+_LEGEND_WIDTH = 46
+"""Characters of a legend in a row on a narrow screen."""
 
 
 def new_figure(x_label: str, y_label: str, *, height: int = 280, **more: Any) -> Any:
@@ -82,10 +85,16 @@ def styled(made: Any, *, height: int | None = None, title: str | None = None) ->
     made.background_fill_color = made.border_fill_color = None
     made.outline_line_color = None
     _text(made, title)
+    made.renderers = [one for one in made.renderers if not _is_empty(one)]
     for renderer in made.renderers:
         if isinstance(renderer, GlyphRenderer):
             slim(renderer.data_source)
     return made
+
+
+def _is_empty(renderer: Any) -> bool:
+    """Whether a renderer has nothing to draw; bokeh would complain of missing columns."""
+    return isinstance(renderer, GlyphRenderer) and not any(len(v) for v in renderer.data_source.data.values())
 
 
 def _text(made: Any, title: str | None) -> None:
@@ -97,6 +106,10 @@ def _text(made: Any, title: str | None) -> None:
         axis.axis_label_text_color = axis.major_label_text_color = INK
         axis.axis_line_color = axis.major_tick_line_color = GREY
         axis.minor_tick_line_color = None
+        if isinstance(axis.formatter, BasicTickFormatter):
+            axis.formatter = BasicTickFormatter(power_limit_low=-5)
+        if isinstance(axis.ticker, BasicTicker):
+            axis.ticker.desired_num_ticks = 5
         if isinstance(axis.axis_label, str):
             axis.axis_label = plain(axis.axis_label)
     for grid in made.grid:
@@ -232,7 +245,10 @@ def legend_above(made: Any) -> None:
         legend.orientation, legend.border_line_color = "horizontal", None
         legend.background_fill_alpha, legend.padding, legend.margin = 0.0, 0, 2
         legend.label_text_font, legend.label_text_font_size = _FONT, "12px"
-        legend.click_policy, legend.ncols = "hide", "auto"
+        legend.click_policy = "hide"
+        labels = [str(getattr(item.label, "value", "")) for item in legend.items]
+        if sum(len(label) + 5 for label in labels) > _LEGEND_WIDTH:
+            legend.orientation = "vertical"
         legend.glyph_width = 16
         made.add_layout(legend, "above")
 

@@ -36,6 +36,11 @@ def shown_parts(*parts: str) -> list[str]:
     return [shown(part, 16) for part in parts if part.strip()]
 
 
+def unit_of(attributes: Mapping[Any, Any]) -> str:
+    """The unit of a variable in brackets; nothing where it says none."""
+    return f"[{unit_text(attributes['units'])}]" if "units" in attributes else ""
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """A tree of draws, or the curves of a diagnosis.
@@ -61,6 +66,11 @@ class Run:
     source: str
     tree: xr.DataTree
     document: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def number(self) -> int:
+        """Its number in the page."""
+        return int(self.key[1:])
 
     def has(self, *groups: str) -> bool:
         """Whether there are such groups, none of them empty."""
@@ -93,14 +103,14 @@ class Run:
         found = {}
         for name, variable in self.group("posterior").data_vars.items():
             symbol = symbol_text(variable.attrs["symbol"]) if "symbol" in variable.attrs else ""
-            unit = f" [{unit_text(variable.attrs['units'])}]" if "units" in variable.attrs else ""
+            unit = unit_of(variable.attrs)
             text = str(name).replace("_", " ") if self.is_ours else str(name)
             said = f" {symbol}" if symbol and symbol != text and len(symbol) < 12 else ""
-            found[str(name)] = " ".join((shown(text, 36), *shown_parts(said, unit)))
+            found[str(name)] = " ".join((shown(text, 48), *shown_parts(said, unit)))
         return found
 
     def parameters(self, chosen: Sequence[str] = (), group: str = "posterior") -> xr.Dataset:
-        """Draws of up to twelve parameters: ``p0``, ``p1``, ... (chain, draw), each with its ``label``.
+        """Draws of up to twelve parameters: ``p0``, ``p1``, ... (chain, draw), each with ``label`` and, short, ``axis``.
 
         Parameters
         ----------
@@ -116,7 +126,7 @@ class Run:
                 values = data[name]
                 if {d: n for d, n in values.sizes.items() if d not in ("chain", "draw")}.keys() == at.keys():
                     one = values.isel(at).drop_vars(set(values.coords) - {"chain", "draw"})
-                    columns[f"p{number}"] = one.assign_attrs(label=label)
+                    columns[f"p{number}"] = one.assign_attrs(label=label, axis=self.short_label(name, label))
         return xr.Dataset(columns)
 
     def label(self, name: str, at: Mapping[str, int]) -> str:
@@ -127,6 +137,13 @@ class Run:
         data = self.group("posterior")[name]
         places = [str(data[d].values[k]) if d in data.coords else str(k) for d, k in at.items()]
         return f"{text} ({shown(', '.join(places), 24)})"
+
+    def short_label(self, name: str, label: str) -> str:
+        """Symbol and unit of a parameter for an axis; its label, cut, where there is no symbol."""
+        attributes = self.group("posterior")[name].attrs
+        if "symbol" not in attributes:
+            return shown(label, 30)
+        return " ".join((shown(symbol_text(attributes["symbol"]), 24), *shown_parts(unit_of(attributes))))
 
     @cached_property
     def all_labels(self) -> list[str]:
@@ -174,8 +191,7 @@ class Run:
     def sensor_label(self, name: str) -> str:
         """An observed variable with its unit."""
         attributes = self.group("observed_data")[name].attrs
-        unit = f" [{unit_text(attributes['units'])}]" if "units" in attributes else ""
-        return " ".join((shown(attributes.get("long_name", name), 30), *shown_parts(unit)))
+        return " ".join((shown(attributes.get("long_name", name), 30), *shown_parts(unit_of(attributes))))
 
     @cached_property
     def aligned(self) -> xr.DataTree:

@@ -8,7 +8,7 @@ import numpy as np
 from bokeh.models import ColumnDataSource, FactorRange, HoverTool, Span
 from markupsafe import Markup
 
-from skred.dashboard.figures import BLUE, CHOSEN, legend_above, new_figure, points
+from skred.dashboard.figures import BLUE, legend_above, new_figure, points
 from skred.dashboard.reading import Given
 from skred.dashboard.run import Run, shown
 from skred.dashboard.view import Asked, NotShownError, Panel
@@ -41,7 +41,7 @@ def candidate_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
 
 
 def _probabilities(run: Run, ranked: list[tuple[float, str]]) -> Any:
-    names = [shown(title_of(run.document, name), 34) for _, name in ranked]
+    names = [shown(title_of(run.document, name).partition(":")[0], 32) for _, name in ranked]
     names = [f"{name} ({k + 1})" if names.count(name) > 1 else name for k, name in enumerate(names)]
     values = [value for value, _ in ranked]
     source = ColumnDataSource({"name": names, "value": values, "told": [share(v) for v in values]})
@@ -72,7 +72,7 @@ def _by_place(run: Run, ranked: list[tuple[float, str]]) -> Any:
         best = np.where(covers, factors[mine][:, None], -np.inf).max(axis=0)
         known = np.isfinite(best)
         made.line(at[known], best[known], color=PALETTE[count % len(PALETTE)], line_width=2,
-                  legend_label=shown(title_of(run.document, name), 30))  # fmt: skip
+                  legend_label=shown(title_of(run.document, name).partition(":")[0], 32))  # fmt: skip
         count += 1
     made.add_layout(Span(location=0, dimension="width", line_color=GREY))
     legend_above(made)
@@ -99,15 +99,13 @@ def _influence(run: Run, influence: Any) -> Panel:
     carried = [str(one) for one in doc.listed(influence, "carried_by")]
     data = {"x": np.arange(len(events), dtype=float), "y": list(without.values())}
     points(made, data, events, tips=[("without it", "@y{0.0} nats")])
-    for name, colour in (("log_bayes_factor", GREY),):
+    for name in ("log_bayes_factor", "needed"):
         value = doc.get(influence, name)
         if is_number(value):
-            made.add_layout(Span(location=float(value), dimension="width", line_color=colour, line_dash="dashed"))
+            made.add_layout(Span(location=float(value), dimension="width", line_color=GREY, line_dash="dashed"))
     name_events(made, events)
-    note = "The lower without an event, the more the leading answer hangs on it."
+    note = "Dashed: with all events, and what an answer needs. The lower without an event, the more hangs on it."
     if carried:
         note += f" Carried by {', '.join(shown(one, 30) for one in carried)}."
-    return Panel("The leading answer without each event", made, note=note)
+    return Panel("The leading answer without each event", made, note=note, wide=True)
 
-
-__all__ = ["CHOSEN", "candidate_panels"]

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
-from skred.dashboard.figures import new_figure, points, quietly, styled
+from skred.dashboard.figures import legend_above, new_figure, points, quietly, styled
 from skred.dashboard.reading import Given
 from skred.dashboard.run import Run
 from skred.dashboard.view import Asked, NotShownError, Panel
@@ -45,23 +45,24 @@ def _panels(runs: Sequence[Run]) -> list[Panel]:
     import arviz_stats as azs
 
     with quietly():
-        table = azs.compare({run.title: run.loo for run in runs})
+        table = azs.compare({str(run.number): run.loo for run in runs}, round_to="none")
         made = azp.plot_compare(table, backend="bokeh").viz["plot"].item()
     made.xaxis.axis_label = "difference of elpd to the best [nats]"
-    overrides = {at: str(name)[:26] for at, name in made.yaxis[0].major_label_overrides.items()}
+    overrides = {at: f"run {name}" for at, name in made.yaxis[0].major_label_overrides.items()}
     made.yaxis[0].major_label_overrides = overrides
     styled(made, height=120 + 40 * len(runs), title="")
     likelihood = str(runs[0].tree.attrs.get("likelihood", ""))
     title = f"arviz.compare, {len(runs)} runs{f', {likelihood}' if likelihood else ''}"
-    best = next(run for run in runs if run.title == table.index[0])
+    best = next(run for run in runs if str(run.number) == table.index[0])
     return [
-        Panel(title, html=_table(table), wide=True, note="elpd: expected log density of a left-out event."),
+        Panel(title, html=_table(table, runs), wide=True, note="elpd: expected log density of a left-out event."),
         Panel("Difference of elpd, with its standard error", made),
-        Panel(f"By event: difference to {best.title}", _by_event(runs, best)),
+        Panel(f"By event: difference to run {best.number}", _by_event(runs, best)),
     ]
 
 
-def _table(table: Any) -> str:
+def _table(table: Any, runs: Sequence[Run]) -> str:
+    titles = {str(run.number): f"{run.number}: {run.title}" for run in runs}
     columns = [
         ("rank", "rank", 0), ("elpd", "elpd [nats]", 1), ("se", "standard error", 1),
         ("p", "effective parameters", 1), ("elpd_diff", "difference", 1), ("diff_se", "its error", 1),
@@ -75,7 +76,7 @@ def _table(table: Any) -> str:
             Markup('<td class="n">{}</td>').format(f"{float(row[key]):.{digits}f}") for key, _, digits in there
         )
         warned = " (Pareto k above the limit for some events)" if bool(row.get("warning", False)) else ""
-        rows += Markup("<tr><th>{}{}</th>{}</tr>").format(name, warned, cells)
+        rows += Markup("<tr><th>{}{}</th>{}</tr>").format(titles[str(name)], warned, cells)
     return str(
         Markup("<table><thead><tr><th>run</th>{}</tr></thead><tbody>{}</tbody></table>").format(head, rows)
     )
@@ -95,16 +96,10 @@ def _by_event(runs: Sequence[Run], best: Run) -> Any:
         points(
             made, data, events, colour=PALETTE[number % len(PALETTE)],
             marker=_BOKEH_MARKERS[MARKERS[number % len(MARKERS)]],
-            legend=run.title if len(others) < 5 else None,
+            legend=f"run {run.number}",
             tips=[("run", "@title"), ("difference", "@y{0.00}")],
         )  # fmt: skip
     name_events(made, events)
-    from skred.dashboard.figures import legend_above
-
     legend_above(made)
     return made
 
-
-def escaped(text: object) -> str:
-    """Text as markup."""
-    return str(escape(text))

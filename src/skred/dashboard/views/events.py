@@ -41,8 +41,8 @@ def _table(given: Given, runs: Sequence[Run]) -> str:
     sensors = [] if recorded is None else [_sensor(recorded, k) for k in range(len(_sensors(recorded)))]
     head = [Markup('<th class="n">{}</th>').format(name) for name in sensors]
     scores = {run.key: _scores(run) for run in runs}
-    for number, run in enumerate(runs):
-        head.append(Markup('<th class="n" title="{}">k, run {}</th>').format(run.title, number + 1))
+    for run in runs:
+        head.append(Markup('<th class="n" title="{}">k, run {}</th>').format(run.title, run.number))
     rows = []
     for event in all_events(given)[:_MOST_ROWS]:
         cells = [Markup('<td class="n">{}</td>').format(text) for text in readings.get(event, [""] * len(sensors))]
@@ -53,7 +53,7 @@ def _table(given: Given, runs: Sequence[Run]) -> str:
         row = Markup('<tr data-event="{0}"><th><button type="button" class="link">{0}</button></th>{1}</tr>')
         rows.append(row.format(event, Markup("").join(cells)))
     runs_told = Markup("").join(
-        Markup("<li>run {}: {}</li>").format(number + 1, run.title) for number, run in enumerate(runs)
+        Markup("<li>run {}: {}</li>").format(run.number, run.title) for run in runs
     )
     table = Markup(
         '<div class="tall"><table class="events"><thead><tr><th>event</th>{}</tr></thead><tbody>{}</tbody>'

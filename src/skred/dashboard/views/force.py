@@ -31,7 +31,7 @@ def force_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
     added = [title_of(run.document, str(doc.get(one, "id"))) for one in doc.listed(run.document, "mechanisms")]
     note = f"Orange: where {', '.join(added)} was added." if added else "Nothing was added."
     legend_above(made)
-    come = new_figure("place along the track s [m]", "share of avalanches that come [-]", height=200,
+    come = new_figure("place along the track s [m]", "share that comes [-]", height=200,
                       x_range=made.x_range)  # fmt: skip
     come.varea(s, np.zeros(len(s)), force["covered"].values, color=GREY, fill_alpha=0.3)
     _sensors(come, run)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import xarray as xr
 from bokeh.models import ColumnDataSource, FactorRange, HoverTool
 
 from skred.dashboard.figures import new_figure
@@ -20,32 +21,31 @@ def forest_panels(run: None, given: Given, asked: Asked) -> list[Panel]:
 
     A forest of arviz-plots puts all parameters on one scale: ours have different units.
     """
-    runs = [one for one in given.runs if one.names]
-    by_label: dict[str, list[tuple[int, Run, np.ndarray]]] = {}
-    for number, one in enumerate(runs):
+    by_label: dict[str, list[tuple[Run, xr.DataArray]]] = {}
+    for one in (one for one in given.runs if one.names):
         for draws in one.parameters(asked.parameters).values():
-            by_label.setdefault(str(draws.attrs["label"]), []).append((number, one, draws.values.ravel()))
+            by_label.setdefault(str(draws.attrs["label"]), []).append((one, draws))
     if not by_label:
         raise NotShownError("none of the runs has the parameters that were asked for")
     # What several runs share comes first.
     chosen = sorted(by_label, key=lambda label: -len(by_label[label]))[: 2 * MOST_PARAMETERS]
-    return [Panel(label, _figure(label, by_label[label])) for label in chosen]
+    return [Panel(label, _figure(by_label[label])) for label in chosen]
 
 
-def _figure(label: str, rows: list[tuple[int, Run, np.ndarray]]) -> object:
-    names = [f"{number + 1}" for number, _, _ in rows]
+def _figure(rows: list[tuple[Run, xr.DataArray]]) -> object:
+    names = [str(run.number) for run, _ in rows]
     tails = [(1 - TWIG) / 2, (1 - TRUNK) / 2, 0.5, (1 + TRUNK) / 2, (1 + TWIG) / 2]
-    ends = np.array([np.nanquantile(draws, tails) for _, _, draws in rows])
+    ends = np.array([np.nanquantile(draws.values, tails) for _, draws in rows])
     source = ColumnDataSource(
         {
             "run": names,
-            "title": [run.title for _, run, _ in rows],
-            "colour": [PALETTE[number % len(PALETTE)] for number, _, _ in rows],
+            "title": [run.title for run, _ in rows],
+            "colour": [PALETTE[(run.number - 1) % len(PALETTE)] for run, _ in rows],
             **{key: ends[:, k] for k, key in enumerate(("twig0", "trunk0", "median", "trunk1", "twig1"))},
         }
     )
     made = new_figure(
-        label, "run", height=110 + 26 * len(rows), y_range=FactorRange(factors=names[::-1])
+        str(rows[0][1].attrs["axis"]), "run", height=110 + 26 * len(rows), y_range=FactorRange(factors=names[::-1])
     )
     made.hbar("run", left="twig0", right="twig1", height=0.06, source=source, color="colour")
     made.hbar("run", left="trunk0", right="trunk1", height=0.22, source=source, color="colour")

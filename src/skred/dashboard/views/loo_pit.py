@@ -8,6 +8,7 @@ from skred.dashboard.figures import figures_of, points, quietly, styled
 from skred.dashboard.reading import Given
 from skred.dashboard.run import Run, ids_of
 from skred.dashboard.view import Asked, NotShownError, Panel
+from skred.report.shared.style import GREY
 
 
 def loo_pit_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
@@ -41,6 +42,9 @@ def _mark(made: object, pit: np.ndarray, events: list[str]) -> None:
     made.xaxis.axis_label = "LOO-PIT: share of smaller predictions [-]"  # type: ignore[attr-defined]
     made.yaxis.axis_label = "difference from uniform [-]"  # type: ignore[attr-defined]
     styled(made, height=280, title="")
-    order = np.sort(pit)
-    difference = np.searchsorted(order, pit, side="right") / len(pit) - pit
+    order, n = np.sort(pit), len(pit)
+    at = np.concatenate([[0.0], np.repeat(order, 2), [1.0]])
+    height = np.concatenate([[0.0], np.repeat(np.arange(n + 1) / n, 2)[1:-1], [1.0]])
+    made.line(at, height - at, color=GREY, line_alpha=0.6)  # the plot's own line is on a coarse grid
+    difference = np.searchsorted(order, pit, side="right") / n - pit
     points(made, {"x": pit, "y": difference}, events, size=6, tips=[("LOO-PIT", "@x{0.00}")])

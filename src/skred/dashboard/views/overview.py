@@ -36,7 +36,7 @@ def overview_panels(run: None, given: Given, asked: Asked) -> list[Panel]:
 
 def _table(given: Given) -> str:
     heads = ("", "run", "what it is", "events", "parameters", "draws", "converged")
-    rows = [_row(number + 1, run) for number, run in enumerate(given.runs)]
+    rows = [_row(run) for run in given.runs]
     head = Markup("").join(Markup("<th>{}</th>").format(one) for one in heads)
     body = Markup("").join(
         Markup("<tr>{}</tr>").format(Markup("").join(Markup("<td>{}</td>").format(cell) for cell in row))
@@ -46,7 +46,7 @@ def _table(given: Given) -> str:
     return str(table.format(head, body))
 
 
-def _row(number: int, run: Run) -> tuple[Any, ...]:
+def _row(run: Run) -> tuple[Any, ...]:
     draws = "-"
     if run.has("posterior"):
         sizes = run.group("posterior").sizes
@@ -63,5 +63,5 @@ def _row(number: int, run: Run) -> tuple[Any, ...]:
         found = doc.get(run.document, "probability", str(doc.get(run.document, "mechanism")))
         state = f"probability {share(found)}" if is_number(found) else "see the verdict"
     return (
-        number, run.title, shown(said, 90), len(run.event_ids) or "-", len(run.names) or "-", draws, state,
+        run.number, run.title, shown(said, 90), len(run.event_ids) or "-", len(run.names) or "-", draws, state,
     )  # fmt: skip

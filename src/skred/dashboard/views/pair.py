@@ -29,9 +29,11 @@ def pair_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
         grid = azp.plot_pair(tree, backend="bokeh", marginal=False).viz["plot"]
     panels = []
     labels = [str(draws[name].attrs["label"]) for name in names]
+    axes = [str(draws[name].attrs["axis"]) for name in names]
     for row, y in enumerate(labels):
         for column, x in enumerate(labels[:row]):
-            panels.append(Panel(f"{y} against {x}", _named(grid.isel(row_index=row, col_index=column), x, y)))
+            cell = grid.isel(row_index=row, col_index=column)
+            panels.append(Panel(f"{y} against {x}", _named(cell, axes[column], axes[row])))
     return panels
 
 

@@ -27,7 +27,8 @@ def prior_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
     for name, figure in made.items():
         _named(collection, str(name))
         label = str(posterior[name].attrs["label"])
-        figure.xaxis.axis_label, figure.yaxis.axis_label = label, "density"
+        figure.xaxis.axis_label = str(posterior[name].attrs["axis"])
+        figure.yaxis.axis_label = "density"
         figure.yaxis.ticker = []
         styled(figure, height=240, title="")
         _around(figure, posterior[name])
@@ -49,6 +50,8 @@ def _named(collection: object, name: str) -> None:
         renderer.glyph.line_width = 2
         slim(renderer.data_source)
         items.append(LegendItem(label=group, renderers=[renderer]))
+    figure.center = [one for one in figure.center if not isinstance(one, Legend)]
+    figure.right = [one for one in figure.right if not isinstance(one, Legend)]
     figure.add_layout(Legend(items=items))
 
 

@@ -17,10 +17,10 @@ def rank_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
     draws = run.parameters(asked.parameters)
     tree = xr.DataTree.from_dict({"posterior": draws})
     with quietly():
-        made = figures_of(azp.plot_rank(tree, backend="bokeh"))
+        made = figures_of(azp.plot_rank(tree, backend="bokeh", visuals={"remove_axis": False}))
     panels = []
     for name, figure in made.items():
         figure.xaxis.axis_label = "rank of the draw, as a share [-]"
-        figure.yaxis.axis_label = "difference from uniform [-]"
+        figure.yaxis.axis_label = "difference [-]"
         panels.append(Panel(str(draws[name].attrs["label"]), styled(figure, height=230, title="")))
     return panels

@@ -8,6 +8,7 @@ import numpy as np
 from bokeh.layouts import column
 from bokeh.models import BoxAnnotation, CDSView, ColumnDataSource, IndexFilter
 from markupsafe import Markup
+from numpy.typing import NDArray
 
 from skred.campaign import Status
 from skred.dashboard.figures import (
@@ -28,6 +29,7 @@ from skred.dashboard.view import Asked, NotShownError, Panel
 from skred.report.shared.recordings import Recordings
 from skred.report.shared.style import GREY
 
+FloatArray = NDArray[np.float64]
 _MOST_EDGES = 90
 _CHOICE = Markup(
     '<label class="draws">Draws of the chosen event: '
@@ -61,17 +63,26 @@ def _medians(made: Any, speeds: EventSpeeds, recordings: Recordings) -> None:
     events = [shown(one, 60) for one in recordings.event_ids]
     kept = spread_out(speeds.s_m, _MOST_EDGES)
     s = speeds.s_m[kept].astype(np.float32)
-    median = np.median(speeds.speed, axis=0)[:, kept].astype(np.float32)
+    median = _until_stopped(np.median(speeds.speed, axis=0))[:, kept]
     source = ColumnDataSource({"xs": [s] * len(events), "ys": list(median), EVENT: events})
     lines = made.multi_line("xs", "ys", source=source, color=BLUE, alpha=0.45, line_width=1.3,
                             legend_label="median of an event")  # fmt: skip
     chosen_stands_out(made, lines, line=True)
 
 
+def _until_stopped(speed: FloatArray) -> NDArray[np.float32]:
+    """Speeds up to the first place where the front stands, NaN beyond it and above the release."""
+    moving = speed > 0.0
+    beside = moving.copy()
+    beside[..., 1:] |= moving[..., :-1]
+    beside[..., :-1] |= moving[..., 1:]
+    return np.where(beside, speed, np.nan).astype(np.float32)
+
+
 def _draws(made: Any, speeds: EventSpeeds, recordings: Recordings, key: str) -> None:
     """Draws of all events, of which the page shows those of the chosen one."""
     kept = spread_out(speeds.s_m, _MOST_EDGES)
-    s, values = speeds.s_m[kept].astype(np.float32), speeds.speed[:, :, kept].astype(np.float32)
+    s, values = speeds.s_m[kept].astype(np.float32), _until_stopped(speeds.speed)[:, :, kept]
     n_draws, n_events = values.shape[:2]
     events = [shown(one, 60) for one in recordings.event_ids]
     source = ColumnDataSource(

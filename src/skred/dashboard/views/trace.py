@@ -25,6 +25,6 @@ def trace_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
     panels = []
     for name, figure in made.items():
         label = str(draws[name].attrs["label"])
-        figure.xaxis.axis_label, figure.yaxis.axis_label = "draw", label
+        figure.xaxis.axis_label, figure.yaxis.axis_label = "draw", str(draws[name].attrs["axis"])
         panels.append(Panel(label, styled(figure, height=220, title="")))
     return panels
