@@ -123,7 +123,8 @@ VIEWS: tuple[ViewKind, ...] = (
     ),
     ViewKind(
         "rank", _DRAWS, "Ranks",
-        "A line for each chain. Chains that explore the same stay close to zero; a p-value below α says that they do not.",
+        "A line for each chain. Chains that explore the same stay close to zero; a p-value below α says that they do not,"
+        " or that draws of a chain are much alike.",
         _posterior, rank_panels, by_parameter=True,
     ),
 )  # fmt: skip

@@ -126,9 +126,11 @@ def _rows(runs: Sequence[Run]) -> Iterator[tuple[str, ...]]:
             with quietly():
                 low, median, high = np.quantile(draws, [0.05, 0.5, 0.95], axis=0)
             values = observed.values.ravel()
+            digits = 0 if observed.attrs.get("units") == "m" else 1
             below = (draws < values).mean(axis=0) + 0.5 * (draws == values).mean(axis=0)
             for k, event in enumerate(ids_of(observed)):
+                each = [f"{one[k]:.{digits}f}" for one in (values, median, low, high)]
                 yield (
-                    event, run.title, run.sensor_label(name), f"{values[k]:.1f}", f"{median[k]:.1f}",
-                    f"{low[k]:.1f} to {high[k]:.1f}", f"{100.0 * below[k]:.0f} %",
+                    event, f"{run.number}: {run.title}", run.sensor_label(name), each[0], each[1],
+                    f"{each[2]} to {each[3]}", f"{100.0 * below[k]:.0f} %",
                 )  # fmt: skip

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from skred.dashboard.figures import figures_of, points, quietly, styled
 from skred.dashboard.reading import Given
 from skred.dashboard.run import Run, ids_of
 from skred.dashboard.view import Asked, NotShownError, Panel
-from skred.report.shared.style import GREY
 
 
 def loo_pit_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
@@ -26,8 +27,10 @@ def loo_pit_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
     for name in names:
         with quietly():
             pit = azs.loo_pit(tree, var_names=[name])[name]
-            made = figures_of(azp.plot_loo_pit(tree, var_names=[name], backend="bokeh"))[name]
-        _mark(made, np.asarray(pit.values, dtype=float).ravel(), ids_of(run.group("observed_data")[name]))
+            collection = azp.plot_loo_pit(tree, var_names=[name], backend="bokeh")
+        made, line = figures_of(collection)[name], collection.viz["ecdf_lines"][name].item()
+        events = ids_of(run.group("observed_data")[name])
+        _mark(made, line, np.asarray(pit.values, dtype=float).ravel(), events)
         panels.append(Panel(run.sensor_label(name), made))
     return panels
 
@@ -37,14 +40,11 @@ def _is_given(run: Run, name: str) -> bool:
     return name in likelihood.data_vars or name in likelihood.coords
 
 
-def _mark(made: object, pit: np.ndarray, events: list[str]) -> None:
+def _mark(made: Any, line: Any, pit: np.ndarray, events: list[str]) -> None:
     """Put each reading on the line of the plot."""
-    made.xaxis.axis_label = "LOO-PIT: share of smaller predictions [-]"  # type: ignore[attr-defined]
-    made.yaxis.axis_label = "difference from uniform [-]"  # type: ignore[attr-defined]
+    made.xaxis.axis_label = "LOO-PIT: share of smaller predictions [-]"
+    made.yaxis.axis_label = "difference from uniform [-]"
     styled(made, height=280, title="")
-    order, n = np.sort(pit), len(pit)
-    at = np.concatenate([[0.0], np.repeat(order, 2), [1.0]])
-    height = np.concatenate([[0.0], np.repeat(np.arange(n + 1) / n, 2)[1:-1], [1.0]])
-    made.line(at, height - at, color=GREY, line_alpha=0.6)  # the plot's own line is on a coarse grid
-    difference = np.searchsorted(order, pit, side="right") / n - pit
-    points(made, {"x": pit, "y": difference}, events, size=6, tips=[("LOO-PIT", "@x{0.00}")])
+    x, y = (np.asarray(line.data_source.data[key], dtype=float) for key in ("x", "y"))
+    before = np.clip(np.searchsorted(x, pit, side="right") - 1, 0, len(x) - 1)
+    points(made, {"x": pit, "y": y[before]}, events, size=6, tips=[("LOO-PIT", "@x{0.00}")])

@@ -35,7 +35,8 @@ def _distribution(run: Run, name: str, label: str) -> Any:
 
     with quietly():
         collection = azp.plot_ppc_dist(
-            run.tree, var_names=[name], num_samples=_PREDICTED, kind="ecdf", backend="bokeh"
+            run.tree, var_names=[name], num_samples=_PREDICTED, kind="ecdf", backend="bokeh",
+            visuals={"remove_axis": False},
         )
     made = figures_of(collection)[name]
     recorded = _renderers(collection.viz["observed_dist"][name])
