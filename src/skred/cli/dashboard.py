@@ -16,7 +16,7 @@ from skred.errors import InputError
 Shown = Annotated[
     Path,
     Parameter(
-        help="Folders written by calibrate, compare or diagnose, folders of netCDF files of ArviZ, or such files.",
+        help="Folders of calibrate, compare or diagnose, folders of netCDF files of ArviZ, or such files.",
     ),
 ]
 Export = Annotated[

@@ -40,11 +40,19 @@ def entries(given: Given) -> list[Entry]:
     found = []
     for view in VIEWS:
         if view.over_all:
-            if view.id == "overview" or any(view.applies(run) for run in given.runs):
+            if view.id == "overview" or any(_applies(view, run) for run in given.runs):
                 found.append(Entry(view.id, view, None))
             continue
-        found += [Entry(f"{view.id}-{run.key}", view, run) for run in given.runs if view.applies(run)]
+        found += [Entry(f"{view.id}-{run.key}", view, run) for run in given.runs if _applies(view, run)]
     return found
+
+
+def _applies(view: ViewKind, run: Run) -> bool:
+    """Whether a view can be made; a stranger's file that it stumbles over has no such view."""
+    try:
+        return view.applies(run)
+    except Exception:
+        return False
 
 
 def answer(entry: Entry, given: Given, asked: Asked = Asked()) -> dict[str, Any]:  # noqa: B008
@@ -89,7 +97,10 @@ def _choice(entry: Entry, given: Given, asked: Asked) -> Markup:
     run = entry.run
     if not entry.view.by_parameter or run is None or len(run.all_labels) <= MOST_PARAMETERS:
         return Markup("")
-    shown = list(asked.parameters) or run.all_labels[:MOST_PARAMETERS]
+    shown = list(asked.parameters)[:MOST_PARAMETERS] or run.all_labels[:MOST_PARAMETERS]
+    told = f"{len(shown)} of {len(run.all_labels)} parameters are shown"
+    if not asked.can_choose:
+        return Markup('<p class="note wide">{}; the served dashboard can show others.</p>').format(told)
     boxes = Markup("").join(
         Markup('<label><input type="checkbox" data-parameter value="{0}"{1}> {0}</label>').format(
             label, Markup(" checked") if label in shown else ""
@@ -97,6 +108,7 @@ def _choice(entry: Entry, given: Given, asked: Asked) -> Markup:
         for label in run.all_labels
     )
     return Markup(
-        '<details class="wide parameters"><summary>{} of {} parameters are shown</summary>'
-        '<div class="boxes">{}</div><button type="button" data-again>Show these (at most {})</button></details>'
-    ).format(min(len(shown), MOST_PARAMETERS), len(run.all_labels), boxes, MOST_PARAMETERS)
+        '<details class="wide parameters"><summary>{}</summary>'
+        '<div class="boxes">{}</div>'
+        '<button type="button" data-again>Show these (at most {})</button></details>'
+    ).format(told, boxes, MOST_PARAMETERS)

@@ -17,7 +17,8 @@ _HEAD = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'unsafe-inline'; \
-style-src 'unsafe-inline'; img-src data: blob:; font-src data:; connect-src 'none'; base-uri 'none'; form-action 'none'">
+style-src 'unsafe-inline'; img-src data: blob:; font-src data:; connect-src 'none'; \
+base-uri 'none'; form-action 'none'">
 <link rel="icon" href="data:,">
 <style>{css}</style></head><body>
 """
@@ -66,7 +67,9 @@ def check_target(file: Path) -> None:
     if file.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"--export {file}: expected a name that ends in .html")
     if file.is_dir() or not file.absolute().parent.is_dir():
-        raise InputError(f"--export {file}: no such folder to write into, or a folder is there; choose another")
+        raise InputError(
+            f"--export {file}: no such folder to write into, or a folder is there; choose another"
+        )
 
 
 def _programs() -> list[str]:

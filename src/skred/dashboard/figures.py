@@ -7,7 +7,7 @@ rows of the event that was chosen. The same on the server and in the file.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -20,7 +20,6 @@ from bokeh.models import (
     GlyphRenderer,
     HoverTool,
     PanTool,
-    Plot,
     ResetTool,
     SaveTool,
     TapTool,
@@ -159,7 +158,7 @@ def quietly() -> Iterator[None]:
 
 def points(
     made: Any,
-    data: dict[str, ArrayLike],
+    data: Mapping[str, Any],
     events: Sequence[str],
     *,
     x: str = "x",
@@ -175,7 +174,7 @@ def points(
     Parameters
     ----------
     made : bokeh figure
-    data : dict of arrays
+    data : mapping of arrays
         Columns; numbers, or texts that the tips show.
     events : sequence of str
         The event of each point.

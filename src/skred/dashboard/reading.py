@@ -119,9 +119,9 @@ def _found(place: Path) -> Iterator[_Found]:
                 yield _Found(place / file, f"{name}: {words}", "calibration")
         return
     if (place / "compare.json").is_file():
-        for file in sorted((*place.glob("*/posterior.nc"), *place.glob("pooled/*/posterior.nc"))):
-            words = " ".join(file.parent.relative_to(place).parts[::-1]).replace("pooled", "(pooled)")
-            yield _Found(file, f"{name}: {words}", "calibration")
+        for posterior in sorted((*place.glob("*/posterior.nc"), *place.glob("pooled/*/posterior.nc"))):
+            words = " ".join(posterior.parent.relative_to(place).parts[::-1]).replace("pooled", "(pooled)")
+            yield _Found(posterior, f"{name}: {words}", "calibration")
         return
     if (place / "posterior.nc").is_file():
         summary = place / "summary.json"
@@ -166,12 +166,28 @@ def _tree(file: Path, *, of_ours: bool) -> xr.DataTree:
                 told = f"format {opened.attrs.get('format')!r:.20} instead of {TREE_FORMAT}"
                 raise InputError(f"{file}: written by another version of skred, {told}; {_AGAIN}")
             _check_size(file, opened)
-            return opened.load()
+            return opened.load() if of_ours else _cleaned(opened.load())
     except InputError:
         raise
     except Exception as error:  # whatever a library says of a file that is not what it seems
         what = " ".join(f"{type(error).__name__}: {error}".split())
         raise InputError(f"{file}: not a netCDF file that can be read ({what:.120})") from error
+
+
+def _cleaned(tree: xr.DataTree) -> xr.DataTree:
+    """Groups of draws with numbers only, and with numbers of chains and draws: what ArviZ computes with."""
+    import xarray as xr
+
+    groups = {}
+    for name, node in tree.children.items():
+        data = node.to_dataset()
+        if name != "constant_data":
+            data = data[[key for key, values in data.data_vars.items() if values.dtype.kind in "iufb"]]
+        bare = [d for d in ("chain", "draw") if d in data.sizes and d not in data.coords]
+        groups[str(name)] = data.assign_coords({d: range(data.sizes[d]) for d in bare})
+    cleaned = xr.DataTree.from_dict(groups)
+    cleaned.attrs = dict(tree.attrs)
+    return cleaned
 
 
 def _check_size(file: Path, tree: xr.DataTree) -> None:

@@ -23,6 +23,8 @@ MOST_SENSORS = 12
 """Observed variables with panels of their own."""
 MOST_EVENTS = 1000
 """Events that can be chosen."""
+MOST_OBSERVATIONS = 20_000
+"""Of a variable: with more of them, leaving out one by one says little and takes long."""
 _MOST_LISTED = 500
 
 
@@ -90,7 +92,10 @@ class Run:
         """What was recorded; None where the tree does not say."""
         if not self.is_ours or "constant_data" not in self.tree.children:
             return None
-        return recordings_of(self.tree)
+        try:
+            return recordings_of(self.tree)
+        except (KeyError, TypeError, ValueError, AttributeError):
+            return None
 
     @cached_property
     def names(self) -> list[tuple[str, dict[str, int]]]:
@@ -110,7 +115,7 @@ class Run:
         return found
 
     def parameters(self, chosen: Sequence[str] = (), group: str = "posterior") -> xr.Dataset:
-        """Draws of up to twelve parameters: ``p0``, ``p1``, ... (chain, draw), each with ``label`` and, short, ``axis``.
+        """Draws of up to twelve parameters: ``p0``, ``p1``, ... (chain, draw), with ``label`` and ``axis``.
 
         Parameters
         ----------
@@ -155,7 +160,10 @@ class Run:
         """The variable of log_likelihood that leaving out events goes by: the first."""
         if not self.has("log_likelihood", "posterior"):
             return None
-        return str(next(iter(self.tree["log_likelihood"].data_vars)))
+        name, values = next(iter(self.group("log_likelihood").data_vars.items()))
+        own = [n for d, n in values.sizes.items() if d not in ("chain", "draw")]
+        drawn = {"chain", "draw"} <= set(values.dims)
+        return str(name) if drawn and int(np.prod(own)) <= MOST_OBSERVATIONS else None
 
     @cached_property
     def event_ids(self) -> list[str]:
@@ -175,6 +183,16 @@ class Run:
             return azs.loo(self.tree, var_name=self.likelihood_name, pointwise=True)
 
     @cached_property
+    def can_leave_out(self) -> bool:
+        """Whether `loo` can be computed; of a stranger's file it may fail in any way."""
+        if self.likelihood_name is None:
+            return False
+        try:
+            return len(np.ravel(self.loo.pareto_k)) == len(self.event_ids)
+        except Exception:
+            return False
+
+    @cached_property
     def observed_names(self) -> list[str]:
         """Variables that are both observed and predicted: our sensors."""
         if not self.has("observed_data", "posterior_predictive"):
@@ -183,7 +201,7 @@ class Run:
         names = [
             str(name)
             for name, values in observed.data_vars.items()
-            if name in predicted and values.dtype.kind in "iuf" and values.size > 1
+            if name in predicted and values.dtype.kind in "iuf" and 1 < values.size <= MOST_OBSERVATIONS
             and set(predicted[name].dims) == {"chain", "draw", *values.dims}
         ]  # fmt: skip
         return names[:MOST_SENSORS]
@@ -234,7 +252,9 @@ def ids_of(values: xr.DataArray) -> list[str]:
     """Ids of the observations of a variable: coordinates of its dimensions, in their order."""
     own = [d for d in values.dims if d not in ("chain", "draw")]
     names = [
-        [str(one) for one in values[d].values] if d in values.coords else list(map(str, range(values.sizes[d])))
+        [str(one) for one in values[d].values]
+        if d in values.coords
+        else list(map(str, range(values.sizes[d])))
         for d in own
     ]
     flat = [", ".join(parts) for parts in _product(names)]

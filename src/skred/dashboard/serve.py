@@ -58,9 +58,9 @@ class Answers:
         if entry is None:
             return {"html": "", "items": []}
         if wanted:
-            return answer(entry, self.given, Asked(wanted))
+            return answer(entry, self.given, Asked(wanted, can_choose=True))
         if key not in self._made:
-            self._made[key] = answer(entry, self.given)
+            self._made[key] = answer(entry, self.given, Asked(can_choose=True))
         return self._made[key]
 
 
@@ -111,7 +111,9 @@ def start(given: Given, port: int = 0) -> tuple[Any, str]:
             websocket_max_message_size=_LONGEST_QUESTION * 10,
         )  # fmt: skip
     except OSError as error:
-        raise InputError(f"--port {port}: cannot be served on ({error}); choose another, or 0 for any") from error
+        raise InputError(
+            f"--port {port}: cannot be served on ({error}); choose another, or 0 for any"
+        ) from error
     server.start()
     return server, f"http://localhost:{server.port}/"
 

@@ -48,9 +48,12 @@ class Asked:
     ----------
     parameters : sequence of str
         Labels of the parameters to show; the first twelve where there is none.
+    can_choose : bool
+        Whether somebody can ask for others: a server can be asked, a file cannot.
     """
 
     parameters: Sequence[str] = field(default_factory=tuple)
+    can_choose: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,7 +45,7 @@ def _probabilities(run: Run, ranked: list[tuple[float, str]]) -> Any:
     names = [f"{name} ({k + 1})" if names.count(name) > 1 else name for k, name in enumerate(names)]
     values = [value for value, _ in ranked]
     source = ColumnDataSource({"name": names, "value": values, "told": [share(v) for v in values]})
-    made = new_figure("probability [-]", "", height=90 + 24 * len(names), x_range=(0, 1.12),
+    made = new_figure("probability [-]", "", height=90 + 24 * len(names), x_range=(0, 1.25),
                       y_range=FactorRange(factors=names[::-1]))  # fmt: skip
     bars = made.hbar("name", right="value", height=0.6, source=source, color=BLUE, fill_alpha=0.7)
     made.text("value", "name", text="told", source=source, x_offset=5, text_baseline="middle",
@@ -102,10 +102,13 @@ def _influence(run: Run, influence: Any) -> Panel:
     for name in ("log_bayes_factor", "needed"):
         value = doc.get(influence, name)
         if is_number(value):
-            made.add_layout(Span(location=float(value), dimension="width", line_color=GREY, line_dash="dashed"))
+            made.add_layout(
+                Span(location=float(value), dimension="width", line_color=GREY, line_dash="dashed")
+            )
     name_events(made, events)
-    note = "Dashed: with all events, and what an answer needs. The lower without an event, the more hangs on it."
+    note = (
+        "Dashed: with all events, and what an answer needs. The lower without an event, the more hangs on it."
+    )
     if carried:
         note += f" Carried by {', '.join(shown(one, 30) for one in carried)}."
     return Panel("The leading answer without each event", made, note=note, wide=True)
-

@@ -34,7 +34,7 @@ def comparable(given: Given) -> list[list[Run]]:
     """Sets of two or more runs of the same observations with the same likelihood."""
     sets: dict[tuple[Any, ...], list[Run]] = {}
     for run in given.runs:
-        if run.likelihood_name is not None:
+        if run.can_leave_out:
             what = [str(run.tree.attrs.get(key, "")) for key in ("campaign_fingerprint", "likelihood")]
             sets.setdefault((*what, tuple(run.event_ids)), []).append(run)
     return [runs for runs in sets.values() if len(runs) > 1]
@@ -55,7 +55,9 @@ def _panels(runs: Sequence[Run]) -> list[Panel]:
     title = f"arviz.compare, {len(runs)} runs{f', {likelihood}' if likelihood else ''}"
     best = next(run for run in runs if str(run.number) == table.index[0])
     return [
-        Panel(title, html=_table(table, runs), wide=True, note="elpd: expected log density of a left-out event."),
+        Panel(
+            title, html=_table(table, runs), wide=True, note="elpd: expected log density of a left-out event."
+        ),
         Panel("Difference of elpd, with its standard error", made),
         Panel(f"By event: difference to run {best.number}", _by_event(runs, best)),
     ]
@@ -73,7 +75,8 @@ def _table(table: Any, runs: Sequence[Run]) -> str:
     rows = Markup("")
     for name, row in table.iterrows():
         cells = Markup("").join(
-            Markup('<td class="n">{}</td>').format(f"{float(row[key]):.{digits}f}") for key, _, digits in there
+            Markup('<td class="n">{}</td>').format(f"{float(row[key]):.{digits}f}")
+            for key, _, digits in there
         )
         warned = " (Pareto k above the limit for some events)" if bool(row.get("warning", False)) else ""
         rows += Markup("<tr><th>{}{}</th>{}</tr>").format(titles[str(name)], warned, cells)
@@ -102,4 +105,3 @@ def _by_event(runs: Sequence[Run], best: Run) -> Any:
     name_events(made, events)
     legend_above(made)
     return made
-

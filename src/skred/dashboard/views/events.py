@@ -45,16 +45,16 @@ def _table(given: Given, runs: Sequence[Run]) -> str:
         head.append(Markup('<th class="n" title="{}">k, run {}</th>').format(run.title, run.number))
     rows = []
     for event in all_events(given)[:_MOST_ROWS]:
-        cells = [Markup('<td class="n">{}</td>').format(text) for text in readings.get(event, [""] * len(sensors))]
+        cells = [
+            Markup('<td class="n">{}</td>').format(text) for text in readings.get(event, [""] * len(sensors))
+        ]
         for run in runs:
             k, limit = scores[run.key].get(event, (np.nan, np.inf))
             bad = Markup(' class="n bad"') if k > limit else Markup(' class="n"')
             cells.append(Markup("<td{}>{}</td>").format(bad, "" if np.isnan(k) else f"{k:.2f}"))
         row = Markup('<tr data-event="{0}"><th><button type="button" class="link">{0}</button></th>{1}</tr>')
         rows.append(row.format(event, Markup("").join(cells)))
-    runs_told = Markup("").join(
-        Markup("<li>run {}: {}</li>").format(run.number, run.title) for run in runs
-    )
+    runs_told = Markup("").join(Markup("<li>run {}: {}</li>").format(run.number, run.title) for run in runs)
     table = Markup(
         '<div class="tall"><table class="events"><thead><tr><th>event</th>{}</tr></thead><tbody>{}</tbody>'
         '</table></div><p class="note">k is Pareto k; red where importance sampling is not reliable.</p>'
@@ -91,19 +91,22 @@ def _readings(run: Run) -> dict[str, list[str]]:
 
 
 def _scores(run: Run) -> dict[str, tuple[float, float]]:
+    if not run.can_leave_out:
+        return {}
     k = np.asarray(run.loo.pareto_k, dtype=float).ravel()
     return {event: (float(one), float(run.loo.good_k)) for event, one in zip(run.event_ids, k, strict=True)}
 
 
 def _details(runs: Sequence[Run]) -> str:
     """A row for each event, run and sensor; the page shows those of the chosen event."""
-    rows = []
+    rows: list[Markup] = []
     for row in _rows(runs):
         if len(rows) == _MOST_DETAILS:
             break
         event, *cells = row
         said = Markup("").join(
-            Markup('<td class="{}">{}</td>').format("" if k < 2 else "n", cell) for k, cell in enumerate(cells)
+            Markup('<td class="{}">{}</td>').format(("text", "", "n")[min(k, 2)], cell)
+            for k, cell in enumerate(cells)
         )
         rows.append(Markup('<tr data-event="{}" data-only hidden>{}</tr>').format(event, said))
     head = ("run", "sensor", "recorded", "predicted median", "90 % interval", "share predicted below")
@@ -112,7 +115,8 @@ def _details(runs: Sequence[Run]) -> str:
     )
     table = Markup(
         '<p class="note" data-none>Choose an event above, or click a point in any figure.</p>'
-        '<div class="scroll"><table data-details hidden><thead><tr>{}</tr></thead><tbody>{}</tbody></table></div>'
+        '<div class="scroll"><table data-details hidden><thead><tr>{}</tr></thead>'
+        "<tbody>{}</tbody></table></div>"
     )
     return str(table.format(titles, Markup("").join(rows)))
 

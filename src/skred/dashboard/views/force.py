@@ -28,7 +28,9 @@ def force_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
     made.add_layout(Span(location=0, dimension="width", line_color=GREY))
     for mechanism in doc.listed(run.document, "mechanisms"):
         _stretch(made, mechanism)
-    added = [title_of(run.document, str(doc.get(one, "id"))) for one in doc.listed(run.document, "mechanisms")]
+    added = [
+        title_of(run.document, str(doc.get(one, "id"))) for one in doc.listed(run.document, "mechanisms")
+    ]
     note = f"Orange: where {', '.join(added)} was added." if added else "Nothing was added."
     legend_above(made)
     come = new_figure("place along the track s [m]", "share that comes [-]", height=200,

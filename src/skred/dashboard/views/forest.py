@@ -45,7 +45,10 @@ def _figure(rows: list[tuple[Run, xr.DataArray]]) -> object:
         }
     )
     made = new_figure(
-        str(rows[0][1].attrs["axis"]), "run", height=110 + 26 * len(rows), y_range=FactorRange(factors=names[::-1])
+        str(rows[0][1].attrs["axis"]),
+        "run",
+        height=110 + 26 * len(rows),
+        y_range=FactorRange(factors=names[::-1]),
     )
     made.hbar("run", left="twig0", right="twig1", height=0.06, source=source, color="colour")
     made.hbar("run", left="trunk0", right="trunk1", height=0.22, source=source, color="colour")

@@ -37,9 +37,17 @@ def overview_panels(run: None, given: Given, asked: Asked) -> list[Panel]:
 def _table(given: Given) -> str:
     heads = ("", "run", "what it is", "events", "parameters", "draws", "converged")
     rows = [_row(run) for run in given.runs]
-    head = Markup("").join(Markup("<th>{}</th>").format(one) for one in heads)
+    head = Markup("").join(
+        Markup('<th class="{}">{}</th>').format("" if k in (1, 2, 6) else "n", one)
+        for k, one in enumerate(heads)
+    )
     body = Markup("").join(
-        Markup("<tr>{}</tr>").format(Markup("").join(Markup("<td>{}</td>").format(cell) for cell in row))
+        Markup("<tr>{}</tr>").format(
+            Markup("").join(
+                Markup('<td class="{}">{}</td>').format("text" if k in (1, 2, 6) else "n", cell)
+                for k, cell in enumerate(row)
+            )
+        )
         for row in rows
     )
     table = Markup('<div class="scroll"><table><thead><tr>{}</tr></thead><tbody>{}</tbody></table></div>')
@@ -63,5 +71,6 @@ def _row(run: Run) -> tuple[Any, ...]:
         found = doc.get(run.document, "probability", str(doc.get(run.document, "mechanism")))
         state = f"probability {share(found)}" if is_number(found) else "see the verdict"
     return (
-        run.number, run.title, shown(said, 90), len(run.event_ids) or "-", len(run.names) or "-", draws, state,
+        run.number, run.title, shown(said, 90), len(run.event_ids) or "-", len(run.names) or "-", draws,
+        state,
     )  # fmt: skip

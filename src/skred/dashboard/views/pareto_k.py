@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from bokeh.models import Span
+from bokeh.models import DataRange1d, Span
 
 from skred.dashboard.figures import of_events, quietly, styled
 from skred.dashboard.reading import Given
@@ -27,8 +27,6 @@ def pareto_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
     of_events(marks, events, made, tips=[("Pareto k", "@y{0.00}")])
     limit = float(loo.good_k)
     made.add_layout(Span(location=limit, dimension="width", line_color=GREY, line_dash="dashed"))
-    from bokeh.models import DataRange1d
-
     made.y_range = DataRange1d()
     name_events(made, events)
     over = int(np.sum(~(np.asarray(loo.pareto_k, dtype=float) <= limit)))
@@ -46,3 +44,4 @@ def name_events(made: object, events: list[str]) -> None:
         axis.ticker = list(range(n))
         axis.major_label_overrides = {k: event[:14] for k, event in enumerate(events)}
         axis.major_label_orientation = np.pi / 2
+        axis.major_label_text_font_size = "12px" if n <= 16 else "10px"

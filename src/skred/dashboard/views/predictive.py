@@ -35,7 +35,11 @@ def _distribution(run: Run, name: str, label: str) -> Any:
 
     with quietly():
         collection = azp.plot_ppc_dist(
-            run.tree, var_names=[name], num_samples=_PREDICTED, kind="ecdf", backend="bokeh",
+            run.tree,
+            var_names=[name],
+            num_samples=_PREDICTED,
+            kind="ecdf",
+            backend="bokeh",
             visuals={"remove_axis": False},
         )
     made = figures_of(collection)[name]
@@ -90,4 +94,3 @@ def _intervals(run: Run, name: str, label: str) -> Any:
 
 def _renderers(marks: Any) -> list[GlyphRenderer]:
     return [one for one in np.ravel(marks.values) if isinstance(one, GlyphRenderer)]
-

@@ -34,7 +34,7 @@ _MOST_EDGES = 90
 _CHOICE = Markup(
     '<label class="draws">Draws of the chosen event: '
     '<input type="range" min="0" max="{0}" value="0" data-draws="{1}" aria-label="which draw"> '
-    '<output>all {0}</output></label>'
+    "<output>all {0}</output></label>"
 )
 
 
@@ -101,10 +101,10 @@ def _draws(made: Any, speeds: EventSpeeds, recordings: Recordings, key: str) -> 
 def _recorded(made: Any, recordings: Recordings) -> None:
     """Readings at the middles of their sensors; a front that did not come reads 0."""
     rows: list[tuple[float, float, str, str, str]] = []
-    for column, sensor in enumerate(recordings.sensors):
+    for at, sensor in enumerate(recordings.sensors):
         for number, event in enumerate(recordings.event_ids):
-            status = recordings.status[number, column]
-            value = recordings.values[number, column]
+            status = recordings.status[number, at]
+            value = recordings.values[number, at]
             name = shown(sensor.id, 30)
             middle = 0.5 * (sensor.s_from_m + sensor.s_to_m)
             if status == Status.OBSERVED and sensor.is_runout:
@@ -122,7 +122,7 @@ def _recorded(made: Any, recordings: Recordings) -> None:
 
 def _track(made: Any, recordings: Recordings) -> None:
     made.line(recordings.track_s_m, recordings.track_z_m, color="#222222", line_width=1.5)
-    for _, sensor, middle in recordings.placed():
+    for _, sensor, _ in recordings.placed():
         if sensor.is_span:
             made.add_layout(
                 BoxAnnotation(left=sensor.s_from_m, right=sensor.s_to_m, fill_color=BLUE, fill_alpha=0.15)
