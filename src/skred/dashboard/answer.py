@@ -86,7 +86,11 @@ def _told(message: str) -> str:
 
 
 def _panel(panel: Panel, target: str) -> Markup:
-    figure = Markup('<div class="fig" id="{}"></div>').format(target) if panel.figure is not None else ""
+    figure = (
+        Markup('<div class="fig" id="{}" role="img" aria-label="{}"></div>').format(target, panel.title)
+        if panel.figure is not None
+        else ""
+    )
     note = Markup('<p class="note">{}</p>').format(panel.note) if panel.note else ""
     made = Markup('<section class="panel{}"><h3>{}</h3>{}{}{}</section>')
     return made.format(" wide" if panel.wide else "", panel.title, Markup(panel.html), figure, note)

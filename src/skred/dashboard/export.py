@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import base64
+import json
+import zlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from bokeh.resources import INLINE
 
 from skred.dashboard.answer import answer, entries
-from skred.dashboard.page import TITLE, asset, body, in_script
+from skred.dashboard.page import TITLE, asset, body
 from skred.dashboard.reading import Given
 from skred.errors import InputError
 from skred.output import write_text
@@ -21,9 +25,6 @@ style-src 'unsafe-inline'; img-src data: blob:; font-src data:; connect-src 'non
 base-uri 'none'; form-action 'none'">
 <link rel="icon" href="data:,">
 <style>{css}</style></head><body>
-"""
-_ASK = """
-window.skredAsk = async (key) => JSON.parse(document.getElementById("answer-" + key).textContent);
 """
 
 
@@ -48,12 +49,18 @@ def export(given: Given, file: Path, tell: Callable[[str], None] = lambda line: 
     parts = [_HEAD.format(title=TITLE, css=asset("dashboard.css")), body(given, asked)]
     for number, entry in enumerate(asked):
         tell(f"view {number + 1} of {len(asked)}: {entry.key}")
-        data = in_script(answer(entry, given))
-        parts.append(f'<script type="application/json" id="answer-{entry.key}">{data}</script>\n')
+        data = _packed(answer(entry, given))
+        parts.append(f'<script type="text/plain" id="answer-{entry.key}">{data}</script>\n')
     parts += [f"<script>{script}</script>\n" for script in _programs()]
-    parts.append(f"<script>{_ASK}{asset('dashboard.js')}</script>\n</body></html>\n")
+    parts.append(f"<script>{asset('ask_file.js')}{asset('dashboard.js')}</script>\n</body></html>\n")
     write_text(file, "".join(parts))
     return file
+
+
+def _packed(view: dict[str, Any]) -> str:
+    """A view as text that the page unpacks; a third of its size, so that the file can be sent by mail."""
+    plain = json.dumps(view, allow_nan=False, separators=(",", ":")).encode("utf-8")
+    return base64.b64encode(zlib.compress(plain, level=9)).decode("ascii")
 
 
 def check_target(file: Path) -> None:

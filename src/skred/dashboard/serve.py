@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import logging
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -115,7 +117,13 @@ def start(given: Given, port: int = 0) -> tuple[Any, str]:
             f"--port {port}: cannot be served on ({error}); choose another, or 0 for any"
         ) from error
     server.start()
+    threading.Thread(target=_import_plots, daemon=True).start()
     return server, f"http://localhost:{server.port}/"
+
+
+def _import_plots() -> None:
+    """What the first view would wait for."""
+    importlib.import_module("arviz_plots")
 
 
 def serve(
