@@ -24,6 +24,16 @@ SELECTED = """event => window.skred.sources().map(s => [Array.from(s.data.event)
     .filter(([events]) => events.includes(event))
     .map(([events, rows]) => rows.length > 0 && rows.every(k => events[k] === event))"""
 
+POINT = """() => {
+    for (const view of Object.values(Bokeh.index.roots ?? Bokeh.index)) {
+      if (!view.el.closest(".view:not([hidden])")) continue;
+      for (const one of view.model.renderers ?? []) if (one.data_source?.data.event) {
+        const k = 6, data = one.data_source.data, box = view.canvas_view.el.getBoundingClientRect();
+        const x = view.frame.x_scale.compute(data.x[k]), y = view.frame.y_scale.compute(data.y[k]);
+        return [box.x + x, box.y + y, Array.from(data.event)[k]];
+      } } }"""
+"""The place of the seventh point of the figure in sight, and its event."""
+
 
 @pytest.fixture(scope="module")
 def page_file(results: Path, tmp_path_factory: Any) -> Path:
@@ -123,23 +133,39 @@ def test_a_click_on_an_event_highlights_it_everywhere(page_file: Path) -> None:
 
 @needs_chromium
 def test_a_click_on_a_point_chooses_its_event(page_file: Path) -> None:
-    where = """() => {
-        for (const view of Object.values(Bokeh.index.roots ?? Bokeh.index)) {
-          if (!view.el.closest(".view:not([hidden])")) continue;
-          for (const one of view.model.renderers ?? []) if (one.data_source?.data.event) {
-            const k = 6, data = one.data_source.data, box = view.canvas_view.el.getBoundingClientRect();
-            const x = view.frame.x_scale.compute(data.x[k]), y = view.frame.y_scale.compute(data.y[k]);
-            return [box.x + x, box.y + y, Array.from(data.event)[k]];
-          } } }"""
     with opened(page_file.as_uri()) as page:
         page.show("pareto_k")
         page.page.wait_for_timeout(500)
-        x, y, event = page.page.evaluate(where)
+        x, y, event = page.page.evaluate(POINT)
         page.page.mouse.click(x, y)
         page.page.wait_for_function("window.skred.chosen() !== null", timeout=5000)
         assert page.page.evaluate("window.skred.chosen()") == event
         page.show("events")
         assert page.page.locator("tr.chosen").get_attribute("data-event") == event
+
+
+@needs_chromium
+def test_names_that_attack_do_nothing_where_one_points_at_them(arviz_file: Any, tmp_path: Path) -> None:
+    from skred.dashboard.export import export
+    from skred.dashboard.reading import read_given
+
+    attack = "<img src=x onerror=document.body.dataset.attacked=1>"
+    file = export(read_given([arviz_file("evil", attack)]), tmp_path / "evil.html")
+    with opened(file.as_uri()) as page:
+        for view in page.views:
+            page.show(view)
+        page.show("pareto_k")
+        page.page.wait_for_timeout(500)
+        x, y, event = page.page.evaluate(POINT)
+        page.page.mouse.move(x, y)
+        page.page.wait_for_timeout(500)
+        assert page.page.get_by_text(event).count() > 0  # the tip shows it
+        page.page.mouse.click(x, y)
+        page.show("events")
+        assert page.page.evaluate("window.skred.chosen()") == event
+        assert page.page.locator("img").count() == 0
+        assert page.page.evaluate("document.body.dataset.attacked") is None
+        assert page.complaints == []
 
 
 @needs_chromium

@@ -99,9 +99,10 @@ def _scores(run: Run) -> dict[str, tuple[float, float]]:
 
 def _details(runs: Sequence[Run]) -> str:
     """A row for each event, run and sensor; the page shows those of the chosen event."""
-    rows: list[Markup] = []
+    rows, more = list[Markup](), Markup("")
     for row in _rows(runs):
         if len(rows) == _MOST_DETAILS:
+            more = Markup('<p class="note">Only the first {} rows are in this page.</p>').format(len(rows))
             break
         event, *cells = row
         said = Markup("").join(
@@ -118,7 +119,7 @@ def _details(runs: Sequence[Run]) -> str:
         '<div class="scroll"><table data-details hidden><thead><tr>{}</tr></thead>'
         "<tbody>{}</tbody></table></div>"
     )
-    return str(table.format(titles, Markup("").join(rows)))
+    return str(table.format(titles, Markup("").join(rows)) + more)
 
 
 def _rows(runs: Sequence[Run]) -> Iterator[tuple[str, ...]]:
