@@ -20,7 +20,7 @@ from skred.physics.laws import load_law
 from skred.physics.terrain import Terrain
 
 FloatArray = NDArray[np.float64]
-_MOST_CURVES, _MOST_DRAWS = 500, 16
+_MOST_CURVES, _MOST_DRAWS = 1200, 16
 """Curves of a run, and draws of an event."""
 
 

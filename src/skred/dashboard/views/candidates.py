@@ -52,6 +52,7 @@ def _probabilities(run: Run, ranked: list[tuple[float, str]]) -> Any:
               text_font_size="12px")  # fmt: skip
     made.add_tools(HoverTool(renderers=[bars], tooltips=[("candidate", "@name"), ("probability", "@told")]))
     made.ygrid.visible = False
+    made.xaxis.ticker.desired_num_ticks = 3
     return made
 
 

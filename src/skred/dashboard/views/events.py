@@ -106,11 +106,11 @@ def _details(runs: Sequence[Run]) -> str:
             break
         event, *cells = row
         said = Markup("").join(
-            Markup('<td class="{}">{}</td>').format(("text", "", "n")[min(k, 2)], cell)
+            Markup('<td class="{}">{}</td>').format(("", "", "n")[min(k, 2)], cell)
             for k, cell in enumerate(cells)
         )
         rows.append(Markup('<tr data-event="{}" data-only hidden>{}</tr>').format(event, said))
-    head = ("run", "sensor", "recorded", "predicted median", "90 % interval", "share predicted below")
+    head = ("run", "sensor", "recorded", "predicted (90 %)", "predicted below")
     titles = Markup("").join(
         Markup('<th class="{}">{}</th>').format("" if k < 2 else "n", name) for k, name in enumerate(head)
     )
@@ -134,8 +134,14 @@ def _rows(runs: Sequence[Run]) -> Iterator[tuple[str, ...]]:
             digits = 0 if observed.attrs.get("units") == "m" else 1
             below = (draws < values).mean(axis=0) + 0.5 * (draws == values).mean(axis=0)
             for k, event in enumerate(ids_of(observed)):
-                each = [f"{one[k]:.{digits}f}" for one in (values, median, low, high)]
+                recorded, middle, least, most = (
+                    f"{one[k]:.{digits}f}" for one in (values, median, low, high)
+                )
                 yield (
-                    event, f"{run.number}: {run.title}", run.sensor_label(name), each[0], each[1],
-                    f"{each[2]} to {each[3]}", f"{100.0 * below[k]:.0f} %",
-                )  # fmt: skip
+                    event,
+                    str(run.number),
+                    run.sensor_label(name),
+                    recorded,
+                    f"{middle} ({least} to {most})",
+                    f"{100.0 * below[k]:.0f} %",
+                )

@@ -12,6 +12,8 @@ from skred.dashboard.view import Asked, Panel
 from skred.report.shared import document as doc
 from skred.report.shared.numbers import is_number, share
 
+_CLASSES = ("n", "text", "text wide-only", "n", "n", "n", "text")
+
 
 def overview_panels(run: None, given: Given, asked: Asked) -> list[Panel]:
     """The runs, their verdicts, and troubles."""
@@ -38,14 +40,12 @@ def _table(given: Given) -> str:
     heads = ("", "run", "what it is", "events", "parameters", "draws", "converged")
     rows = [_row(run) for run in given.runs]
     head = Markup("").join(
-        Markup('<th class="{}">{}</th>').format("" if k in (1, 2, 6) else "n", one)
-        for k, one in enumerate(heads)
+        Markup('<th class="{}">{}</th>').format(_CLASSES[k], one) for k, one in enumerate(heads)
     )
     body = Markup("").join(
         Markup("<tr>{}</tr>").format(
             Markup("").join(
-                Markup('<td class="{}">{}</td>').format("text" if k in (1, 2, 6) else "n", cell)
-                for k, cell in enumerate(row)
+                Markup('<td class="{}">{}</td>').format(_CLASSES[k], cell) for k, cell in enumerate(row)
             )
         )
         for row in rows

@@ -30,7 +30,8 @@ from skred.report.shared.recordings import Recordings
 from skred.report.shared.style import GREY
 
 FloatArray = NDArray[np.float64]
-_MOST_EDGES = 90
+Curve = NDArray[np.float32]
+_MOST_EDGES = 100
 _CHOICE = Markup(
     '<label class="draws">Draws of the chosen event: '
     '<input type="range" min="0" max="{0}" value="0" data-draws="{1}" aria-label="which draw"> '
@@ -61,41 +62,39 @@ def speed_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
 
 def _medians(made: Any, speeds: EventSpeeds, recordings: Recordings) -> None:
     events = [shown(one, 60) for one in recordings.event_ids]
-    kept = spread_out(speeds.s_m, _MOST_EDGES)
-    s = speeds.s_m[kept].astype(np.float32)
-    median = _until_stopped(np.median(speeds.speed, axis=0))[:, kept]
-    source = ColumnDataSource({"xs": [s] * len(events), "ys": list(median), EVENT: events})
-    lines = made.multi_line("xs", "ys", source=source, color=BLUE, alpha=0.45, line_width=1.3,
-                            legend_label="median of an event")  # fmt: skip
+    xs, ys = _curves(speeds.s_m, np.median(speeds.speed, axis=0))
+    source = ColumnDataSource({"xs": xs, "ys": ys, EVENT: events})
+    lines = made.multi_line(
+        "xs", "ys", source=source, color=BLUE, alpha=0.45, line_width=1.3, legend_label="median of an event"
+    )
     chosen_stands_out(made, lines, line=True)
 
 
-def _until_stopped(speed: FloatArray) -> NDArray[np.float32]:
-    """Speeds up to the first place where the front stands, NaN beyond it and above the release."""
-    moving = speed > 0.0
-    beside = moving.copy()
-    beside[..., 1:] |= moving[..., :-1]
-    beside[..., :-1] |= moving[..., 1:]
-    return np.where(beside, speed, np.nan).astype(np.float32)
+def _curves(s_m: FloatArray, speed: FloatArray) -> tuple[list[Curve], list[Curve]]:
+    """Places and speeds of each front from where it starts to where it stops, (n, n_edges) to lists of n."""
+    xs, ys = [], []
+    for one in speed:
+        moving = np.flatnonzero(one > 0.0)
+        first, last = (moving[0], moving[-1]) if len(moving) else (0, 0)
+        at = np.arange(max(first - 1, 0), min(last + 2, len(one)))
+        kept = at[spread_out(at, _MOST_EDGES)]
+        xs.append(s_m[kept].astype(np.float32))
+        ys.append(one[kept].astype(np.float32))
+    return xs, ys
 
 
 def _draws(made: Any, speeds: EventSpeeds, recordings: Recordings, key: str) -> None:
     """Draws of all events, of which the page shows those of the chosen one."""
-    kept = spread_out(speeds.s_m, _MOST_EDGES)
-    s, values = speeds.s_m[kept].astype(np.float32), _until_stopped(speeds.speed)[:, :, kept]
-    n_draws, n_events = values.shape[:2]
+    n_draws, n_events, n_edges = speeds.speed.shape
     events = [shown(one, 60) for one in recordings.event_ids]
+    xs, ys = _curves(speeds.s_m, speeds.speed.reshape(n_draws * n_events, n_edges))
     source = ColumnDataSource(
-        {
-            "xs": [s] * (n_draws * n_events),
-            "ys": [values[k, e] for e in range(n_events) for k in range(n_draws)],
-            "of": [event for event in events for _ in range(n_draws)],
-            "draw": np.tile(np.arange(n_draws), n_events),
-        }
+        {"xs": xs, "ys": ys, "of": events * n_draws, "draw": np.repeat(np.arange(n_draws), n_events)}
     )
     view = CDSView(filter=IndexFilter(indices=[], name=DRAWS_FILTER, tags=[key]))
-    made.multi_line("xs", "ys", source=source, view=view, color=CHOSEN, alpha=0.5, line_width=1.0,
-                    level="underlay")  # fmt: skip
+    made.multi_line(
+        "xs", "ys", source=source, view=view, color=CHOSEN, alpha=0.5, line_width=1.0, level="underlay"
+    )
 
 
 def _recorded(made: Any, recordings: Recordings) -> None:
