@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,12 @@ from skred.dashboard.answer import answer, entries
 from skred.dashboard.catalogue import VIEWS, view_of
 from skred.dashboard.fronts import event_speeds
 from skred.dashboard.view import Asked, Panel
+from skred.inference.added_terms import AddedTerm, added_group
+from skred.physics.laws import load_law
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import direction_of
+from skred.physics.mechanisms.spec import BoundTo, Setting, Shape
+from skred.physics.terrain import Terrain
 
 
 def panels(given: Any, view: str, run: str | None = None, **asked: Any) -> list[Panel]:
@@ -32,7 +39,8 @@ def sources(figure: Any, *columns: str) -> list[dict[str, Any]]:
     """Data of the renderers of a figure that have such columns."""
     from bokeh.models import GlyphRenderer
 
-    found = [one.data_source.data for one in figure.select({"type": GlyphRenderer})]
+    renderers = sorted(figure.select({"type": GlyphRenderer}), key=lambda one: int(one.id.lstrip("p")))
+    found = [one.data_source.data for one in renderers]
     return [data for data in found if set(columns) <= set(data)]
 
 
@@ -42,6 +50,7 @@ def pcm(results: Path) -> xr.DataTree:
         return tree.load()
 
 
+@pytest.mark.slow
 def test_every_view_of_every_run_can_be_made(given: Any) -> None:
     made = {entry.key: answer(entry, given) for entry in entries(given)}
     assert {entry.view.id for entry in entries(given)} == {view.id for view in VIEWS}
@@ -135,6 +144,50 @@ def test_fronts_are_those_of_the_calibration(run: str, given: Any) -> None:
     squared = np.apply_along_axis(lambda v: np.interp(place, found.s_m, v**2), -1, found.speed)
     assert_allclose(np.sqrt(squared), np.broadcast_to(stored[..., column], squared.shape), atol=0.3)
     assert np.median(np.abs(np.sqrt(squared) - stored[..., column])) < 1e-3
+
+
+def test_what_was_added_acts_as_in_a_law_that_has_it(given: Any) -> None:
+    """Coulomb friction with turbulent drag added is the PCM model; friction and drag are the two routes."""
+    run = named(given, "hierarchical")
+    drag, groups = 0.003, {str(name): node.to_dataset() for name, node in run.tree.children.items()}
+    events, posterior = groups["event_posterior"], groups["posterior"]
+    constant = groups["constant_data"]
+    slope = constant["slope"].values
+    terrain = Terrain(
+        constant["cell_edge"].values, np.sin(slope), np.cos(slope), constant["curvature"].values, 0.0
+    )
+    empty = np.zeros(terrain.n_cells + 1)
+    setting = Setting(terrain, ("coulomb_friction",), (0.0, terrain.length_m), (), (), {}, 0, empty)
+    mechanism = mechanisms()["turbulent_drag"]
+    direction = direction_of(mechanism, setting, Shape())
+    term = AddedTerm(
+        "turbulent_drag", mechanism.id, mechanism.title, mechanism.group, BoundTo.TRACK, Shape(), direction
+    )
+    added = replace(
+        run,
+        tree=with_groups(
+            run,
+            posterior=posterior.assign(turbulent_drag=xr.full_like(posterior["dry_friction"], drag)),
+            added=added_group([term]),
+        ),
+    )
+    of_law = replace(
+        run,
+        tree=with_groups(
+            run, event_posterior=events.assign(turbulent_drag=xr.full_like(events["release"], drag))
+        ),
+    )
+    of_law.tree.attrs.update(law="pcm", equation=load_law("pcm").equation)
+    slower, alike = event_speeds(added).speed, event_speeds(of_law).speed
+    assert_allclose(slower, alike, atol=1e-9)
+    assert slower.max() < 0.8 * event_speeds(run).speed.max()
+
+
+def with_groups(run: Any, **changed: xr.Dataset) -> xr.DataTree:
+    groups = {str(name): node.to_dataset() for name, node in run.tree.children.items()}
+    tree = xr.DataTree.from_dict({**groups, **changed})
+    tree.attrs = dict(run.tree.attrs)
+    return tree
 
 
 def test_recordings_lie_on_the_speeds(given: Any) -> None:
