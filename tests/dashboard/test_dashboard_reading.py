@@ -47,6 +47,16 @@ def test_a_tree_of_another_version_is_told(results: Path, tmp_path: Path) -> Non
     assert not found.runs and "None instead of 1" in found.troubles[0].message
 
 
+def test_a_comparison_shows_its_laws_and_is_checked(results: Path, tmp_path: Path) -> None:
+    for law in ("pcm", "coulomb"):
+        shutil.copytree(results / law, tmp_path / "both" / law)
+    for number, n_runs in ((1, 2), (7, 0)):
+        (tmp_path / "both" / "compare.json").write_text(json.dumps({"format": number}))
+        found = read_given([tmp_path / "both"])
+        assert len(found.runs) == n_runs and len(found.troubles) == (n_runs == 0)
+    assert "format 7 instead of 1" in found.troubles[0].message
+
+
 @pytest.mark.parametrize("content", [b"", b"no netCDF", b"\x89HDF\r\n\x1a\n" + bytes(200)])
 def test_what_is_no_netcdf_is_told(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "x.nc").write_bytes(content)

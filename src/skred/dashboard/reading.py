@@ -56,10 +56,6 @@ class Given:
     runs: tuple[Run, ...]
     troubles: tuple[Trouble, ...]
 
-    def run(self, key: str) -> Run | None:
-        """A run by its key."""
-        return next((run for run in self.runs if run.key == key), None)
-
 
 @dataclass(frozen=True)
 class _Found:
@@ -119,9 +115,10 @@ def _found(place: Path) -> Iterator[_Found]:
                 yield _Found(place / file, f"{name}: {words}", "calibration")
         return
     if (place / "compare.json").is_file():
-        for posterior in sorted((*place.glob("*/posterior.nc"), *place.glob("pooled/*/posterior.nc"))):
+        files = sorted((*place.glob("*/posterior.nc"), *place.glob("pooled/*/posterior.nc")))
+        for posterior in files or [place / "posterior.nc"]:  # where there is none, that is told
             words = " ".join(posterior.parent.relative_to(place).parts[::-1]).replace("pooled", "(pooled)")
-            yield _Found(posterior, f"{name}: {words}", "calibration")
+            yield _Found(posterior, f"{name}: {words}", "calibration", place / "compare.json")
         return
     if (place / "posterior.nc").is_file():
         summary = place / "summary.json"

@@ -24,6 +24,8 @@ _LONGEST_QUESTION = 100_000
 _MOST_ASKED = 100
 _TEMPLATE = """{% extends base %}
 {% block postamble %}<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="\
+default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; connect-src 'self' ws://localhost:*">
 <link rel="icon" href="data:,"><style>{{ dashboard_css }}</style>{% endblock %}
 {% block contents %}{{ dashboard_body }}
 <div hidden>{{ embed(roots.question) }}{{ embed(roots.reply) }}</div>
