@@ -13,11 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-pytest.importorskip("bokeh", reason="the extra dashboard is not installed")
-pytest.importorskip("panel", reason="the extra dashboard is not installed")
 sys.path.append(str(Path(__file__).parent.parent / "report"))  # for a diagnosis that is made up quickly
-
-EVIL = "<img src=x onerror=alert(1)>"
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -13,10 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from dashboard_cases import CHROMIUM, EVIL, needs_chromium
 
-NAMES = ("chromium", "chromium-browser", "google-chrome")
-CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
-needs_chromium = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed")
 QUIET = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 EVENT = "19920311"
 
@@ -149,8 +146,7 @@ def test_names_that_attack_do_nothing_where_one_points_at_them(arviz_file: Any, 
     from skred.dashboard.export import export
     from skred.dashboard.reading import read_given
 
-    attack = "<img src=x onerror=document.body.dataset.attacked=1>"
-    file = export(read_given([arviz_file("evil", attack)]), tmp_path / "evil.html")
+    file = export(read_given([arviz_file("evil", EVIL)]), tmp_path / "evil.html")
     with opened(file.as_uri()) as page:
         for view in page.views:
             page.show(view)

@@ -12,7 +12,7 @@ from typing import Any
 import h5netcdf
 import numpy as np
 import pytest
-from conftest import EVIL
+from dashboard_cases import EVIL
 
 from skred.cli.main import run
 from skred.dashboard.answer import answer, entries
@@ -108,6 +108,20 @@ def test_names_from_a_file_are_shown_and_never_run(arviz_file: Callable[..., Pat
     # A page that takes a name for a part of its template would say 49; bokeh takes $$ for a formula.
     assert "&lt;img" in pages[0] and "{{7*7}}" in pages[0]
     assert "$$" not in "".join(pages)
+
+
+@pytest.mark.parametrize("kind", ["cannot", "tie", "unexplained", "nothing"])
+def test_every_kind_of_verdict_is_shown_whatever_its_names(kind: str, results: Path, tmp_path: Path) -> None:
+    from diagnosis_report_cases import write_documents  # found once `results` is made
+
+    text = "" if kind == "cannot" else f"{EVIL}$$x$$"
+    write_documents(kind, tmp_path, text)
+    found = read_given([tmp_path])
+    assert not found.troubles
+    for entry in entries(found):
+        made = answer(entry, found)
+        assert "could not be made" not in made["html"], made["html"]
+        assert "<img" not in made["html"] and "$$" not in in_script(made["items"])
 
 
 def test_many_parameters_are_shown_twelve_at_a_time(arviz_file: Callable[..., Path]) -> None:

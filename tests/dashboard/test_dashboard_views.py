@@ -10,6 +10,7 @@ import arviz as az
 import numpy as np
 import pytest
 import xarray as xr
+from dashboard_cases import named
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skred.dashboard.answer import answer, entries
@@ -29,10 +30,6 @@ def panels(given: Any, view: str, run: str | None = None, **asked: Any) -> list[
     assert kind is not None
     of = None if run is None else named(given, run)
     return kind.make(of, given, Asked(**asked))
-
-
-def named(given: Any, start: str) -> Any:
-    return next(run for run in given.runs if run.title.startswith(start))
 
 
 def sources(figure: Any, *columns: str) -> list[dict[str, Any]]:
