@@ -8,6 +8,7 @@ import sys
 
 from skred.cli.calibrate import calibrate
 from skred.cli.compare import compare
+from skred.cli.dashboard import dashboard
 from skred.cli.diagnose import diagnose
 from skred.cli.identify import identify
 from skred.cli.import_tables import import_
@@ -34,6 +35,7 @@ app.command(diagnose)
 app.command(identify)
 app.command(mechanisms)
 app.command(report)
+app.command(dashboard)
 app.command(prove_app)
 
 

@@ -17,12 +17,13 @@ FloatArray = NDArray[np.float64]
 SPREAD_MEDIAN, SPREAD_LOG_SD = 0.4, 0.6
 """Median of the prior of the sd of log strengths, and sd of its logarithm: an effect that differs by less
 than a tenth is in common for all that recordings tell, and one that differs tenfold is present in some."""
-_Z = np.linspace(-3.0, 3.0, 13)
-"""Where a normal density is summed, in standard deviations: half of one apart, so that an avalanche that
-tells its own strength to a fifth is not missed between two."""
+_Z = np.linspace(-3.0, 3.0, 25)
+"""Where a normal density is summed, in standard deviations: a quarter of one apart, so that an avalanche that
+tells its own strength to a tenth is not missed between two."""
 _FARTHEST = 50.0
 """Largest logarithm of a multiple: beyond all tables, and powers of it stay finite."""
 _LOG_Z_SHARES = -0.5 * _Z**2 - math.log(float(np.sum(np.exp(-0.5 * _Z**2))))
+"""Of the normal density, at these places."""
 
 
 class BetweenEvents(StrEnum):

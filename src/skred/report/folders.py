@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 """Of the documents that this version reads."""
-TREE_FORMAT = 2
+TREE_FORMAT = 3
 """Of the netCDF files."""
 _AGAIN = "run the command that wrote it again"
 

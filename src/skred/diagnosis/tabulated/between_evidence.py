@@ -42,6 +42,7 @@ _DIFFERENCE = 1e-3
 _LEAST_CURVATURE = 0.05
 """Of minus the log density along an axis, as for any population here: proposals stay bounded."""
 _BAD = -1e10
+"""Height where there is none: a climb turns back, and differences stay finite."""
 
 
 class Way(NamedTuple):

@@ -1,0 +1,1 @@
+"""The dashboard: results of several runs in one page, served or written as one offline file."""

@@ -1,0 +1,167 @@
+// One implementation for the server and for the file: they differ in `skredAsk` only, which gives the markup
+// and the figures of a view. What follows one event through all views is here, for figures and tables alike.
+"use strict";
+(function () {
+  const catalogue = JSON.parse(document.getElementById("catalogue").textContent);
+  const element = (id) => document.getElementById(id);
+  const stage = element("stage"), made = new Map(), watched = new Set();
+  let view = null, run = null, chosen = null, busy = false, turn = 0;
+
+  const entryKeys = new Set(catalogue.entries);
+  const viewOf = (id) => catalogue.views.find((one) => one.id === id);
+  const runsOf = (id) => catalogue.runs.filter((one) => entryKeys.has(`${id}-${one.key}`));
+  const keyOf = () => (viewOf(view).over_all ? view : `${view}-${run}`);
+  const exists = (id) => entryKeys.has(id) || runsOf(id).length > 0;
+
+  // ---- views
+  async function show() {
+    const kind = viewOf(view), runs = runsOf(view), mine = ++turn;
+    if (!kind.over_all && !runs.some((one) => one.key === run)) run = runs[0].key;
+    element("title").textContent = kind.title;
+    element("how").textContent = kind.how;
+    element("view").value = view;
+    element("run-choice").hidden = kind.over_all || runs.length === 0;
+    element("run-choice").style.display = kind.over_all ? "none" : "";
+    element("run").replaceChildren(...runs.map((one) => new Option(one.title, one.key, false, one.key === run)));
+    for (const button of document.querySelectorAll("nav button")) {
+      if (button.dataset.view === view) button.setAttribute("aria-current", "page");
+      else button.removeAttribute("aria-current");
+    }
+    for (const other of stage.children) other.hidden = true;
+    const key = keyOf();
+    if (!made.has(key)) {
+      element("wait").hidden = false;
+      made.set(key, await draw(key, []));
+      element("wait").hidden = true;
+    }
+    if (mine === turn) made.get(key).hidden = false;
+    else made.get(key).hidden = key !== keyOf();
+    document.body.dataset.shown = key;
+    document.body.dataset.chosen = chosen === null ? "" : chosen;
+  }
+
+  async function draw(key, parameters) {
+    const section = document.createElement("div");
+    section.className = "view";
+    section.dataset.key = key;
+    stage.append(section);
+    await fill(section, key, parameters);
+    return section;
+  }
+
+  async function fill(section, key, parameters) {
+    try {
+      const answer = await window.skredAsk(key, parameters);
+      section.innerHTML = answer.html;
+      for (const item of answer.items) await Bokeh.embed.embed_item(item);
+    } catch (error) {
+      section.textContent = `This view did not come: ${error.message}. Is the server still there?`;
+    }
+    mark(section);
+    watch();
+    follow();
+  }
+
+  // ---- one event through all views
+  const sources = () => Bokeh.documents.flatMap((one) => [...one.all_models])
+    .filter((one) => one.type === "ColumnDataSource" && one.data.event !== undefined);
+
+  function watch() {
+    for (const source of sources()) {
+      if (watched.has(source)) continue;
+      watched.add(source);
+      source.selected.properties.indices.change.connect(() => {
+        if (busy) return;
+        const [row] = source.selected.indices;
+        choose(row === undefined ? null : Array.from(source.data.event)[row]);
+      });
+    }
+  }
+
+  function choose(event) {
+    chosen = event || null;
+    element("event").value = chosen === null ? "" : chosen;
+    document.body.classList.toggle("has-event", chosen !== null);
+    document.body.dataset.chosen = chosen === null ? "" : chosen;
+    for (const section of stage.children) mark(section);
+    follow();
+  }
+
+  // Rows of the event in every source of every figure; without an event nothing is selected.
+  function follow() {
+    busy = true;
+    try {
+      for (const source of sources()) {
+        const events = Array.from(source.data.event), rows = [];
+        if (chosen !== null) events.forEach((one, row) => { if (one === chosen) rows.push(row); });
+        source.selected.indices = rows;
+      }
+      for (const one of Bokeh.documents) for (const model of one.all_models) {
+        if (model.name === "skred-draws") showDraws(one, model);
+      }
+    } finally { busy = false; }
+  }
+
+  // Draws of the chosen event: all, or the one that the slider of the view says.
+  function showDraws(doc, filter) {
+    const slider = document.querySelector(`[data-draws="${filter.tags[0]}"]`);
+    const which = Number(slider === null ? 0 : slider.value);
+    for (const renderer of doc.all_models) {
+      if (renderer.type !== "GlyphRenderer" || renderer.view.filter !== filter) continue;
+      const data = renderer.data_source.data, draws = Array.from(data.draw), rows = [];
+      if (chosen !== null) Array.from(data.of).forEach((one, row) => {
+        if (one === chosen && (which === 0 || draws[row] === which - 1)) rows.push(row);
+      });
+      filter.indices = rows;
+    }
+  }
+
+  function mark(section) {
+    let any = false;
+    for (const row of section.querySelectorAll("tr[data-event]")) {
+      const same = row.dataset.event === chosen;
+      if (row.dataset.only !== undefined) { row.hidden = !same; any = any || same; }
+      else row.classList.toggle("chosen", same);
+    }
+    for (const table of section.querySelectorAll("[data-details]")) table.hidden = !any;
+    for (const told of section.querySelectorAll("[data-none]")) {
+      told.hidden = any;
+      told.textContent = chosen === null ? "Choose an event above, or click a point in any figure."
+        : "No run says anything of this event by sensor.";
+    }
+  }
+
+  // ---- what people do
+  element("view").addEventListener("change", (change) => { view = change.target.value; show(); });
+  element("run").addEventListener("change", (change) => { run = change.target.value; show(); });
+  element("event").addEventListener("change", (change) => choose(change.target.value));
+  element("none").addEventListener("click", () => choose(null));
+  for (const [id, step] of [["before", -1], ["after", 1]]) element(id).addEventListener("click", () => {
+    const n = catalogue.events.length, at = catalogue.events.indexOf(chosen);
+    if (n) choose(catalogue.events[at < 0 ? (step > 0 ? 0 : n - 1) : (at + step + n) % n]);
+  });
+  for (const button of document.querySelectorAll("nav button")) {
+    button.disabled = !exists(button.dataset.view);
+    button.addEventListener("click", () => { view = button.dataset.view; show(); });
+  }
+  for (const option of [...element("view").options]) option.disabled = !exists(option.value);
+  stage.addEventListener("click", (click) => {
+    const row = click.target.closest("tr[data-event]:not([data-only])");
+    if (row) choose(row.dataset.event === chosen ? null : row.dataset.event);
+    if (click.target.closest("[data-again]")) {
+      const section = click.target.closest(".view");
+      const wanted = [...section.querySelectorAll("[data-parameter]:checked")].map((one) => one.value);
+      fill(section, section.dataset.key, wanted);
+    }
+  });
+  stage.addEventListener("input", (input) => {
+    if (input.target.dataset.draws === undefined) return;
+    const which = Number(input.target.value);
+    input.target.nextElementSibling.textContent = which === 0 ? `all ${input.target.max}` : `number ${which}`;
+    follow();
+  });
+
+  view = "overview";
+  window.skred = { choose, chosen: () => chosen, sources };
+  show();
+})();

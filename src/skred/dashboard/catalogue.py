@@ -1,0 +1,142 @@
+"""All views, in the order in which the page lists them."""
+
+from __future__ import annotations
+
+from skred.dashboard.run import Run
+from skred.dashboard.view import ViewKind
+from skred.dashboard.views.candidates import candidate_panels
+from skred.dashboard.views.comparison import comparison_panels
+from skred.dashboard.views.events import event_panels
+from skred.dashboard.views.force import force_panels
+from skred.dashboard.views.forest import forest_panels
+from skred.dashboard.views.held_out import held_out_panels
+from skred.dashboard.views.loo_pit import loo_pit_panels
+from skred.dashboard.views.overview import overview_panels
+from skred.dashboard.views.pair import pair_panels
+from skred.dashboard.views.pareto_k import pareto_panels
+from skred.dashboard.views.predictive import predictive_panels
+from skred.dashboard.views.prior_posterior import prior_panels
+from skred.dashboard.views.rank import rank_panels
+from skred.dashboard.views.speed import speed_panels
+from skred.dashboard.views.trace import trace_panels
+
+
+def _any(run: Run) -> bool:
+    return True
+
+
+def _posterior(run: Run) -> bool:
+    return bool(run.names)
+
+
+def _calibrated(run: Run) -> bool:
+    return run.kind == "calibration" and bool(run.names) and run.recordings is not None
+
+
+def _left_out(run: Run) -> bool:
+    return run.likelihood_name is not None
+
+
+def _predicted(run: Run) -> bool:
+    return bool(run.observed_names)
+
+
+_FOUND, _CHECKS, _DRAWS = "Results", "Checks", "Parameters"
+VIEWS: tuple[ViewKind, ...] = (
+    ViewKind(
+        "overview", _FOUND, "Overview",
+        "All runs of this page. The list of views and the choice of a run and of an event go for the "
+        "whole page.",
+        _any, overview_panels, over_all=True,
+    ),
+    ViewKind(
+        "events", _FOUND, "Events",
+        "Each row is an avalanche (or observation). Click one: it is highlighted here and in every "
+        "other view.",
+        _left_out, event_panels, over_all=True,
+    ),
+    ViewKind(
+        "speed", _FOUND, "Speed along the track",
+        "How fast each front is at each place. A good law's line passes the event's dots; choose an "
+        "event to see its draws, which spread as far as its readings leave open.",
+        _calibrated, speed_panels,
+    ),
+    ViewKind(
+        "predictive", _FOUND, "Predictions by sensor",
+        "Black: recorded. Lines and bars: what the run predicts. The black line should look like one "
+        "of the blue ones, and nine in ten thin bars should hold their dot.",
+        _predicted, predictive_panels,
+    ),
+    ViewKind(
+        "candidates", _FOUND, "Candidates",
+        "What could be missing from the law, how probable each candidate is, where it would act, and "
+        "which events carry the answer.",
+        lambda run: run.kind == "diagnosis", candidate_panels,
+    ),
+    ViewKind(
+        "force", _FOUND, "Force along the track",
+        "Above zero the law brakes too little there, below zero too much. Where the band holds zero, "
+        "nothing is missing that these recordings could show.",
+        lambda run: run.kind == "diagnosis" and run.has("force"), force_panels,
+    ),
+    ViewKind(
+        "held_out", _FOUND, "Left-out avalanches",
+        "Each avalanche is predicted from all others. Points on the dashed line are predicted "
+        "exactly; bars hold 90 %.",
+        lambda run: run.kind == "diagnosis" and run.has("held_out"), held_out_panels,
+    ),
+    ViewKind(
+        "comparison", _CHECKS, "Comparison of runs",
+        "elpd says how well left-out events are predicted: higher is better. A difference below twice"
+        " its error decides nothing.",
+        _left_out, comparison_panels, over_all=True,
+    ),
+    ViewKind(
+        "pareto_k", _CHECKS, "Pareto k by event",
+        "An event above the dashed line is so influential that leaving it out by importance sampling "
+        "cannot be trusted.",
+        _left_out, pareto_panels,
+    ),
+    ViewKind(
+        "loo_pit", _CHECKS, "LOO-PIT by sensor",
+        "Left-out readings should fall anywhere in their predictions with the same chance. A line far"
+        " from zero means that predictions are biased, too narrow or too wide; below α, the p-value "
+        "says that this is no chance.",
+        lambda run: _predicted(run) and _left_out(run), loo_pit_panels,
+    ),
+    ViewKind(
+        "forest", _DRAWS, "Forest",
+        "Median (dot), 50 % (thick) and 90 % (thin) of each parameter, a line for each run; numbers "
+        "of runs as in the overview.",
+        _posterior, forest_panels, over_all=True, by_parameter=True,
+    ),
+    ViewKind(
+        "prior", _DRAWS, "Prior and posterior",
+        "Grey: before the recordings. Blue: after them. Where both agree, the recordings taught "
+        "nothing.",
+        lambda run: _posterior(run) and run.has("prior"), prior_panels, by_parameter=True,
+    ),
+    ViewKind(
+        "pair", _DRAWS, "Pairs",
+        "Each dot is a draw. A narrow band says that the recordings fix a combination of both, not "
+        "each by itself.",
+        _posterior, pair_panels, by_parameter=True,
+    ),
+    ViewKind(
+        "trace", _DRAWS, "Trace",
+        "Draws in their order, a colour for each chain. Chains that mix well look alike, as noise "
+        "without drift.",
+        _posterior, trace_panels, by_parameter=True,
+    ),
+    ViewKind(
+        "rank", _DRAWS, "Ranks",
+        "A line for each chain. Chains that explore the same stay close to zero; a p-value below α "
+        "says that they do not, or that draws of a chain are much alike.",
+        _posterior, rank_panels, by_parameter=True,
+    ),
+)  # fmt: skip
+
+
+def view_of(name: str) -> ViewKind | None:
+    """A view by its id."""
+    return next((view for view in VIEWS if view.id == name), None)

@@ -1,0 +1,268 @@
+"""One run in the dashboard: a tree of draws, and what is asked of it more than once."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from skred.report.shared.labels import shortened, symbol_text, unit_text
+from skred.report.shared.recordings import Recordings, recordings_of
+
+FloatArray = NDArray[np.float64]
+MOST_PARAMETERS = 12
+"""Parameters shown at a time: each has panels of its own."""
+MOST_SENSORS = 12
+"""Observed variables with panels of their own."""
+MOST_EVENTS = 1000
+"""Events that can be chosen."""
+MOST_OBSERVATIONS = 20_000
+"""Of a variable: with more of them, leaving out one by one says little and takes long."""
+_MOST_LISTED = 500
+
+
+def shown(text: Any, length: int = 40) -> str:
+    """A name from a file as text that is drawn as it is: short, printable, and no formula."""
+    return shortened(text, length).replace("$$", "$ $").strip() or "(no name)"
+
+
+def shown_parts(*parts: str) -> list[str]:
+    """Those of some short texts that say something."""
+    return [shown(part, 16) for part in parts if part.strip()]
+
+
+def unit_of(attributes: Mapping[Any, Any]) -> str:
+    """The unit of a variable in brackets; nothing where it says none."""
+    return f"[{unit_text(attributes['units'])}]" if "units" in attributes else ""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A tree of draws, or the curves of a diagnosis.
+
+    Attributes
+    ----------
+    key : str
+        Names it in the page: letters and digits.
+    title : str
+        For people.
+    kind : str
+        ``calibration``, ``diagnosis`` or ``arviz``.
+    source : str
+        The file or folder.
+    tree : DataTree
+    document : mapping
+        Of a diagnosis, the content of ``verdict.json``; of a calibration, ``summary.json``; may be empty.
+    """
+
+    key: str
+    title: str
+    kind: str
+    source: str
+    tree: xr.DataTree
+    document: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def number(self) -> int:
+        """Its number in the page."""
+        return int(self.key[1:])
+
+    def has(self, *groups: str) -> bool:
+        """Whether there are such groups, none of them empty."""
+        return all(name in self.tree.children and len(self.tree[name].data_vars) for name in groups)
+
+    def group(self, name: str) -> xr.Dataset:
+        """A group as a dataset."""
+        return self.tree[name].to_dataset()
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether skred wrote it."""
+        return self.kind != "arviz"
+
+    @cached_property
+    def recordings(self) -> Recordings | None:
+        """What was recorded; None where the tree does not say."""
+        if not self.is_ours or "constant_data" not in self.tree.children:
+            return None
+        try:
+            return recordings_of(self.tree)
+        except (KeyError, TypeError, ValueError, AttributeError):
+            return None
+
+    @cached_property
+    def names(self) -> list[tuple[str, dict[str, int]]]:
+        """The parameters, each a variable and the place in its own dimensions."""
+        return scalars_of(self.group("posterior")) if self.has("posterior") else []
+
+    @cached_property
+    def labels(self) -> dict[str, str]:
+        """What a parameter is called, with its symbol and unit, by the name of its variable."""
+        found = {}
+        for name, variable in self.group("posterior").data_vars.items():
+            symbol = symbol_text(variable.attrs["symbol"]) if "symbol" in variable.attrs else ""
+            unit = unit_of(variable.attrs)
+            text = str(name).replace("_", " ") if self.is_ours else str(name)
+            said = f" {symbol}" if symbol and symbol != text and len(symbol) < 12 else ""
+            found[str(name)] = " ".join((shown(text, 48), *shown_parts(said, unit)))
+        return found
+
+    def parameters(self, chosen: Sequence[str] = (), group: str = "posterior") -> xr.Dataset:
+        """Draws of up to twelve parameters: ``p0``, ``p1``, ... (chain, draw), with ``label`` and ``axis``.
+
+        Parameters
+        ----------
+        chosen : sequence of str
+            Labels; the first ones where none is given.
+        group : str
+        """
+        data = self.group(group)
+        columns: dict[str, xr.DataArray] = {}
+        for number, (name, at) in enumerate(self.names):
+            label = self.all_labels[number]
+            if name in data and not (chosen and label not in chosen) and len(columns) < MOST_PARAMETERS:
+                values = data[name]
+                if {d: n for d, n in values.sizes.items() if d not in ("chain", "draw")}.keys() == at.keys():
+                    one = values.isel(at).drop_vars(set(values.coords) - {"chain", "draw"})
+                    columns[f"p{number}"] = one.assign_attrs(label=label, axis=self.short_label(name, label))
+        return xr.Dataset(columns)
+
+    def label(self, name: str, at: Mapping[str, int]) -> str:
+        """A parameter by its variable and the place in that."""
+        text = self.labels.get(name, shown(name))
+        if not at:
+            return text
+        data = self.group("posterior")[name]
+        places = [str(data[d].values[k]) if d in data.coords else str(k) for d, k in at.items()]
+        return f"{text} ({shown(', '.join(places), 24)})"
+
+    def short_label(self, name: str, label: str) -> str:
+        """Symbol and unit of a parameter for an axis; its label, cut, where there is no symbol."""
+        attributes = self.group("posterior")[name].attrs
+        if "symbol" not in attributes:
+            return shown(label, 30)
+        return " ".join((shown(symbol_text(attributes["symbol"]), 24), *shown_parts(unit_of(attributes))))
+
+    @cached_property
+    def all_labels(self) -> list[str]:
+        """Labels of all parameters that can be chosen."""
+        return [self.label(name, at) for name, at in self.names]
+
+    @cached_property
+    def likelihood_name(self) -> str | None:
+        """The variable of log_likelihood that leaving out events goes by: the first."""
+        if not self.has("log_likelihood", "posterior"):
+            return None
+        name, values = next(iter(self.group("log_likelihood").data_vars.items()))
+        own = [n for d, n in values.sizes.items() if d not in ("chain", "draw")]
+        drawn = {"chain", "draw"} <= set(values.dims)
+        return str(name) if drawn and int(np.prod(own)) <= MOST_OBSERVATIONS else None
+
+    @cached_property
+    def event_ids(self) -> list[str]:
+        """What can be left out: the avalanches, or the observations."""
+        if self.likelihood_name is None:
+            recordings = self.recordings
+            return list(recordings.event_ids) if recordings is not None else []
+        return ids_of(self.group("log_likelihood")[self.likelihood_name])
+
+    @cached_property
+    def loo(self) -> Any:
+        """`arviz.loo` of the likelihood, pointwise."""
+        import arviz_stats as azs
+
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of large Pareto k, which the views show
+            return azs.loo(self.tree, var_name=self.likelihood_name, pointwise=True)
+
+    @cached_property
+    def can_leave_out(self) -> bool:
+        """Whether `loo` can be computed; of a stranger's file it may fail in any way."""
+        if self.likelihood_name is None:
+            return False
+        try:
+            return len(np.ravel(self.loo.pareto_k)) == len(self.event_ids)
+        except Exception:
+            return False
+
+    @cached_property
+    def observed_names(self) -> list[str]:
+        """Variables that are both observed and predicted: our sensors."""
+        if not self.has("observed_data", "posterior_predictive"):
+            return []
+        predicted, observed = self.group("posterior_predictive"), self.group("observed_data")
+        names = [
+            str(name)
+            for name, values in observed.data_vars.items()
+            if name in predicted and values.dtype.kind in "iuf" and 1 < values.size <= MOST_OBSERVATIONS
+            and set(predicted[name].dims) == {"chain", "draw", *values.dims}
+        ]  # fmt: skip
+        return names[:MOST_SENSORS]
+
+    def sensor_label(self, name: str) -> str:
+        """An observed variable with its unit."""
+        attributes = self.group("observed_data")[name].attrs
+        return " ".join((shown(attributes.get("long_name", name), 30), *shown_parts(unit_of(attributes))))
+
+    @cached_property
+    def aligned(self) -> xr.DataTree:
+        """The tree with the draws of its predictions only: those may be thinned."""
+        if not self.has("posterior_predictive", "posterior"):
+            return self.tree
+        kept = self.group("posterior_predictive")["draw"].values
+        groups = {}
+        for name, node in self.tree.children.items():
+            data = node.to_dataset()
+            of_draws = name in ("posterior", "log_likelihood", "sample_stats") and "draw" in data.sizes
+            groups[str(name)] = data.sel(draw=kept) if of_draws else data
+        return xr.DataTree.from_dict(groups)
+
+    @cached_property
+    def gate(self) -> Mapping[str, Any]:
+        """Whether the chains converged; empty where the tree does not say."""
+        try:
+            found = json.loads(self.tree.attrs["gate"])
+        except (KeyError, TypeError, ValueError):
+            return {}
+        return found if isinstance(found, dict) else {}
+
+
+def scalars_of(data: xr.Dataset) -> list[tuple[str, dict[str, int]]]:
+    """Every number of a posterior with chains and draws, up to 500 of them, the scalar ones first."""
+    found: list[tuple[str, dict[str, int]]] = []
+    for name, values in sorted(data.data_vars.items(), key=lambda item: item[1].ndim):
+        if not {"chain", "draw"} <= set(values.dims) or values.dtype.kind not in "iuf":
+            continue
+        own = {d: n for d, n in values.sizes.items() if d not in ("chain", "draw")}
+        for place in np.ndindex(*own.values()):
+            if len(found) == _MOST_LISTED:
+                return found
+            found.append((str(name), dict(zip(map(str, own), place, strict=True))))
+    return found
+
+
+def ids_of(values: xr.DataArray) -> list[str]:
+    """Ids of the observations of a variable: coordinates of its dimensions, in their order."""
+    own = [d for d in values.dims if d not in ("chain", "draw")]
+    names = [
+        [str(one) for one in values[d].values]
+        if d in values.coords
+        else list(map(str, range(values.sizes[d])))
+        for d in own
+    ]
+    flat = [", ".join(parts) for parts in _product(names)]
+    return [shown(one, 60) for one in flat]
+
+
+def _product(lists: list[list[str]]) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = [()]
+    for values in lists:
+        rows = [(*row, value) for row in rows for value in values]
+    return rows

@@ -1,0 +1,107 @@
+"""Runs compared by leaving events out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from skred.dashboard.figures import legend_above, new_figure, points, quietly, styled
+from skred.dashboard.reading import Given
+from skred.dashboard.run import Run
+from skred.dashboard.view import Asked, NotShownError, Panel
+from skred.dashboard.views.pareto_k import name_events
+from skred.report.shared.style import MARKERS, PALETTE
+
+_BOKEH_MARKERS = {"o": "circle", "s": "square", "D": "diamond", "^": "triangle", "v": "inverted_triangle",
+                  "P": "plus"}  # fmt: skip
+
+
+def comparison_panels(run: None, given: Given, asked: Asked) -> list[Panel]:
+    """A table and a figure of `arviz.compare` for each set of runs that predict the same, and the events."""
+    sets = comparable(given)
+    if not sets:
+        raise NotShownError(
+            "no two of the runs can be compared: it takes runs of the same recordings with the same"
+            " likelihood; give the folders of two laws, or one of skred compare"
+        )
+    return [panel for runs in sets for panel in _panels(runs)]
+
+
+def comparable(given: Given) -> list[list[Run]]:
+    """Sets of two or more runs of the same observations with the same likelihood."""
+    sets: dict[tuple[Any, ...], list[Run]] = {}
+    for run in given.runs:
+        if run.can_leave_out:
+            what = [str(run.tree.attrs.get(key, "")) for key in ("campaign_fingerprint", "likelihood")]
+            sets.setdefault((*what, tuple(run.event_ids)), []).append(run)
+    return [runs for runs in sets.values() if len(runs) > 1]
+
+
+def _panels(runs: Sequence[Run]) -> list[Panel]:
+    import arviz_plots as azp
+    import arviz_stats as azs
+
+    with quietly():
+        table = azs.compare({str(run.number): run.loo for run in runs}, round_to="none")
+        made = azp.plot_compare(table, backend="bokeh").viz["plot"].item()
+    made.xaxis.axis_label = "difference of elpd to the best [nats]"
+    overrides = {at: f"run {name}" for at, name in made.yaxis[0].major_label_overrides.items()}
+    made.yaxis[0].major_label_overrides = overrides
+    styled(made, height=120 + 40 * len(runs), title="")
+    likelihood = str(runs[0].tree.attrs.get("likelihood", ""))
+    title = f"arviz.compare, {len(runs)} runs{f', {likelihood}' if likelihood else ''}"
+    best = next(run for run in runs if str(run.number) == table.index[0])
+    return [
+        Panel(
+            title, html=_table(table, runs), wide=True, note="elpd: expected log density of a left-out event."
+        ),
+        Panel("Difference of elpd, with its standard error", made),
+        Panel(f"By event: difference to run {best.number}", _by_event(runs, best)),
+    ]
+
+
+def _table(table: Any, runs: Sequence[Run]) -> str:
+    titles = {str(run.number): f"{run.number}: {run.title}" for run in runs}
+    columns = [
+        ("rank", "rank", 0), ("elpd", "elpd [nats]", 1), ("se", "standard error", 1),
+        ("p", "effective parameters", 1), ("elpd_diff", "difference", 1), ("diff_se", "its error", 1),
+        ("dse", "its error", 1), ("weight", "weight", 2),
+    ]  # fmt: skip
+    there = [(key, words, digits) for key, words, digits in columns if key in table]
+    head = Markup("").join(Markup('<th class="n">{}</th>').format(words) for _, words, _ in there)
+    rows = Markup("")
+    for name, row in table.iterrows():
+        cells = Markup("").join(
+            Markup('<td class="n">{}</td>').format(f"{float(row[key]):.{digits}f}")
+            for key, _, digits in there
+        )
+        warned = " (Pareto k above the limit for some events)" if bool(row.get("warning", False)) else ""
+        rows += Markup("<tr><th>{}{}</th>{}</tr>").format(titles[str(name)], warned, cells)
+    return str(
+        Markup("<table><thead><tr><th>run</th>{}</tr></thead><tbody>{}</tbody></table>").format(head, rows)
+    )
+
+
+def _by_event(runs: Sequence[Run], best: Run) -> Any:
+    events = best.event_ids
+    made = new_figure("event", "difference of elpd [nats]", height=330)
+    reference = np.asarray(best.loo.elpd_i, dtype=float).ravel()
+    others = [run for run in runs if run is not best]
+    for number, run in enumerate(others):
+        data = {
+            "x": np.arange(len(events), dtype=float),
+            "y": np.asarray(run.loo.elpd_i, dtype=float).ravel() - reference,
+            "title": [run.title] * len(events),
+        }
+        points(
+            made, data, events, colour=PALETTE[number % len(PALETTE)],
+            marker=_BOKEH_MARKERS[MARKERS[number % len(MARKERS)]],
+            legend=f"run {run.number}",
+            tips=[("run", "@title"), ("difference", "@y{0.00}")],
+        )  # fmt: skip
+    name_events(made, events)
+    legend_above(made)
+    return made

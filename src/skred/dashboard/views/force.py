@@ -1,0 +1,62 @@
+"""The force that a law leaves out, along the track."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from bokeh.layouts import column
+from bokeh.models import BoxAnnotation, Span
+
+from skred.dashboard.figures import BLUE, CHOSEN, legend_above, new_figure
+from skred.dashboard.reading import Given
+from skred.dashboard.run import Run
+from skred.dashboard.view import Asked, Panel
+from skred.report.diagnosis.words import stretch_in, title_of
+from skred.report.shared import document as doc
+from skred.report.shared.numbers import is_number
+from skred.report.shared.style import GREY
+
+
+def force_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
+    """The model discrepancy with its band, where avalanches come, and what was added."""
+    force = run.group("force")
+    s, mean, low, high = (force[name].values.astype(float) for name in ("s", "mean", "low", "high"))
+    made = new_figure("place along the track s [m]", "missing retardation [m/s²]", height=380)
+    made.varea(s, low, high, color=BLUE, fill_alpha=0.18, legend_label="90 %, the whole profile")
+    made.line(s, mean, color=BLUE, line_width=2, legend_label="a force in no list")
+    made.add_layout(Span(location=0, dimension="width", line_color=GREY))
+    for mechanism in doc.listed(run.document, "mechanisms"):
+        _stretch(made, mechanism)
+    added = [
+        title_of(run.document, str(doc.get(one, "id"))) for one in doc.listed(run.document, "mechanisms")
+    ]
+    note = f"Orange: where {', '.join(added)} was added." if added else "Nothing was added."
+    legend_above(made)
+    come = new_figure("place along the track s [m]", "share that comes [-]", height=200,
+                      x_range=made.x_range)  # fmt: skip
+    come.varea(s, np.zeros(len(s)), force["covered"].values, color=GREY, fill_alpha=0.3)
+    _sensors(come, run)
+    note += " Below: how many avalanches come that far, and the places of the sensors (blue)."
+    both = column(made, come, sizing_mode="stretch_width")
+    return [Panel("What a retardation in no list would have to be", both, note=note, wide=True)]
+
+
+def _stretch(made: Any, mechanism: Any) -> None:
+    """Where a mechanism was added; with its strength as height where that is a retardation."""
+    stretch = stretch_in(doc.get(mechanism, "location"))
+    if stretch is None:
+        return
+    mean, unit = (doc.get(mechanism, "strength", key) for key in ("mean", "unit"))
+    if is_number(mean) and unit == "m s-2":
+        made.quad(left=stretch[0], right=stretch[1], bottom=0.0, top=mean, color=CHOSEN, fill_alpha=0.15,
+                  legend_label="added")  # fmt: skip
+    else:
+        box = BoxAnnotation(left=stretch[0], right=stretch[1], fill_color=CHOSEN, fill_alpha=0.13)
+        made.add_layout(box)
+
+
+def _sensors(made: Any, run: Run) -> None:
+    recordings = run.recordings
+    for _, _, middle in recordings.placed() if recordings is not None else ():
+        made.add_layout(Span(location=middle, dimension="height", line_color=BLUE, line_width=1.5))

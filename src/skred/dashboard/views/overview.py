@@ -1,0 +1,76 @@
+"""What is shown, whether it converged, and what could not be shown."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from markupsafe import Markup
+
+from skred.dashboard.reading import Given
+from skred.dashboard.run import Run, shown
+from skred.dashboard.view import Asked, Panel
+from skred.report.shared import document as doc
+from skred.report.shared.numbers import is_number, share
+
+_CLASSES = ("n", "text", "text wide-only", "n", "n", "n", "text")
+
+
+def overview_panels(run: None, given: Given, asked: Asked) -> list[Panel]:
+    """The runs, their verdicts, and troubles."""
+    panels = []
+    if given.troubles:
+        rows = Markup("").join(
+            Markup("<li><strong>{}</strong><br>{}</li>").format(one.source, one.message)
+            for one in given.troubles
+        )
+        html = Markup('<div class="box" role="alert"><p>Not shown:</p><ul>{}</ul></div>').format(rows)
+        panels.append(Panel("What cannot be shown", html=str(html), wide=True))
+    for one in given.runs:
+        statement = doc.get(one.document, "statement")
+        if one.kind == "diagnosis" and statement:
+            verdict = shown(str(doc.get(one.document, "verdict")).replace("_", " "), 40)
+            html = Markup("<p class='lead'><strong>Verdict: {}.</strong> {}</p>").format(verdict, statement)
+            panels.append(Panel(one.title, html=str(html), wide=True))
+    if given.runs:
+        panels.append(Panel("Runs", html=_table(given), wide=True))
+    return panels
+
+
+def _table(given: Given) -> str:
+    heads = ("", "run", "what it is", "events", "parameters", "draws", "converged")
+    rows = [_row(run) for run in given.runs]
+    head = Markup("").join(
+        Markup('<th class="{}">{}</th>').format(_CLASSES[k], one) for k, one in enumerate(heads)
+    )
+    body = Markup("").join(
+        Markup("<tr>{}</tr>").format(
+            Markup("").join(
+                Markup('<td class="{}">{}</td>').format(_CLASSES[k], cell) for k, cell in enumerate(row)
+            )
+        )
+        for row in rows
+    )
+    table = Markup('<div class="scroll"><table><thead><tr>{}</tr></thead><tbody>{}</tbody></table></div>')
+    return str(table.format(head, body))
+
+
+def _row(run: Run) -> tuple[Any, ...]:
+    draws = "-"
+    if run.has("posterior"):
+        sizes = run.group("posterior").sizes
+        draws = f"{sizes.get('chain', 1)} × {sizes.get('draw', 0)}"
+    gate = run.gate
+    state = "not said"
+    if gate:
+        r_hat, ess = gate.get("r_hat_max"), gate.get("ess_bulk_min")
+        numbers = f" (r-hat {r_hat:.3f}, ess {ess:.0f})" if is_number(r_hat) and is_number(ess) else ""
+        state = ("yes" if gate.get("passed") is True else "NO") + numbers
+    what = {"calibration": run.tree.attrs.get("title", "calibration"), "arviz": "netCDF with ArviZ's groups"}
+    said = what.get(run.kind) or run.tree.attrs.get("title", run.kind)
+    if run.kind == "diagnosis":
+        found = doc.get(run.document, "probability", str(doc.get(run.document, "mechanism")))
+        state = f"probability {share(found)}" if is_number(found) else "see the verdict"
+    return (
+        run.number, run.title, shown(said, 90), len(run.event_ids) or "-", len(run.names) or "-", draws,
+        state,
+    )  # fmt: skip

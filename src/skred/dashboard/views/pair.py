@@ -1,0 +1,48 @@
+"""Parameters against each other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import xarray as xr
+
+from skred.dashboard.figures import apart, quietly, spread_out, styled
+from skred.dashboard.reading import Given
+from skred.dashboard.run import Run
+from skred.dashboard.view import Asked, Panel
+
+MOST_PARAMETERS, MOST_DRAWS = 6, 250
+"""Parameters, each of which gets a row and a column; draws of a chain."""
+
+
+def pair_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
+    """The draws of each pair of parameters, by arviz-plots, each a panel of its own."""
+    import arviz_plots as azp
+
+    draws = run.parameters(asked.parameters)
+    names = [str(name) for name in draws.data_vars][:MOST_PARAMETERS]
+    kept = spread_out(draws["draw"], MOST_DRAWS)
+    tree = xr.DataTree.from_dict({"posterior": draws[names].isel(draw=kept)})
+    if len(names) < 2:
+        return [Panel("One parameter only", html="<p>A pair needs two parameters.</p>", wide=True)]
+    with quietly():
+        grid = azp.plot_pair(tree, backend="bokeh", marginal=False).viz["plot"]
+    panels = []
+    labels = [str(draws[name].attrs["label"]) for name in names]
+    axes = [str(draws[name].attrs["axis"]) for name in names]
+    for row, y in enumerate(labels):
+        for column, x in enumerate(labels[:row]):
+            cell = grid.isel(row_index=row, col_index=column)
+            panels.append(Panel(f"{y} against {x}", _named(cell, axes[column], axes[row])))
+    return panels
+
+
+def _named(cell: Any, x: str, y: str) -> Any:
+    figure = cell.item()
+    figure.xaxis.axis_label, figure.yaxis.axis_label = x, y
+    # In the grid of arviz-plots inner figures have no axes and share their ranges.
+    apart(figure)
+    for axis in figure.axis:
+        axis.visible = True
+        axis.major_label_text_font_size = "12px"
+    return styled(figure, height=260, title="")

@@ -1,0 +1,26 @@
+"""Ranks of the draws: whether all chains explore the same."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from skred.dashboard.figures import figures_of, quietly, styled
+from skred.dashboard.reading import Given
+from skred.dashboard.run import Run
+from skred.dashboard.view import Asked, Panel
+
+
+def rank_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
+    """Differences of each chain's distribution of ranks from a uniform one, by arviz-plots."""
+    import arviz_plots as azp
+
+    draws = run.parameters(asked.parameters)
+    tree = xr.DataTree.from_dict({"posterior": draws})
+    with quietly():
+        made = figures_of(azp.plot_rank(tree, backend="bokeh", visuals={"remove_axis": False}))
+    panels = []
+    for name, figure in made.items():
+        figure.xaxis.axis_label = "rank of the draw, as a share [-]"
+        figure.yaxis.axis_label = "difference [-]"
+        panels.append(Panel(str(draws[name].attrs["label"]), styled(figure, height=230, title="")))
+    return panels

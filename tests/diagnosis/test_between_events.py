@@ -1,0 +1,265 @@
+"""Strengths that differ between avalanches: against dense grids, another law's evidence, a made campaign."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnosis_cases import base_of
+from numpy.testing import assert_allclose
+from scipy.special import logsumexp
+from scipy.stats import beta, halfnorm, lognorm, norm
+
+from skred.campaign import Campaign, Status, find_campaign, read_campaign
+from skred.diagnosis.augment.augmented import augmented_problem
+from skred.diagnosis.augment.coefficient import multiples_of_events
+from skred.diagnosis.augment.components import components_of, new_rows
+from skred.diagnosis.compare.between import gains_of, may_differ, ways_of
+from skred.diagnosis.compare.candidate import BESIDE, log_gain
+from skred.diagnosis.compare.screening import curve
+from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
+from skred.diagnosis.evidence.event_quadrature import ROUGH
+from skred.diagnosis.evidence.extension import extended, setting_of
+from skred.inference.between_events import (
+    PRIOR,
+    SPREAD_LOG_SD,
+    SPREAD_MEDIAN,
+    BetweenEvents,
+    components,
+    from_unbounded,
+    own_multiples,
+    variable,
+)
+from skred.inference.calibrate import calibrate
+from skred.inference.hierarchical.problem import hierarchical_problem
+from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD as TAU_LOG_SD
+from skred.inference.hierarchical.rough_population import SPREAD_MEDIAN as TAU_MEDIAN
+from skred.inference.reading_density import log_likelihoods
+from skred.inference.sampling import SamplerSettings
+from skred.physics.laws import load_law
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import direction_of
+
+COMMON, SPREAD, SOME = BetweenEvents
+RYGGFONN = read_campaign(find_campaign("ryggfonn"))
+STRETCH = 1400.0, 1700.0
+
+
+def stretch_curve(base: Base, mechanism_id: str = "segment_friction") -> Curve:
+    mechanism = mechanisms()[mechanism_id]
+    assert mechanism.added is not None
+    first = next(one for one in mechanism.added.shapes(base.setting) if one.s_from_m is not None)
+    shape = replace(first, s_from_m=STRETCH[0], s_to_m=STRETCH[1])
+    return curve_near(base, mechanism, shape, curve(base, mechanism, shape, ROUGH), ROUGH)
+
+
+def made_campaign(law_id: str, mean: list[float], sd: list[float], own: np.ndarray, seed: int) -> Campaign:
+    """Avalanches of Ryggfonn's releases and sensors, each with its own friction on a stretch."""
+    n = len(own)
+    blank = replace(
+        RYGGFONN,
+        events=RYGGFONN.events[:n],
+        values=RYGGFONN.values[:n],
+        status=np.full_like(RYGGFONN.status[:n], Status.OBSERVED),
+        stated_sd=RYGGFONN.stated_sd[:n],
+    )
+    problem, law = hierarchical_problem(blank), load_law(law_id)
+    setting, mechanism = setting_of(problem, law), mechanisms()["segment_friction"]
+    assert mechanism.added is not None
+    first = next(one for one in mechanism.added.shapes(setting) if one.s_from_m is not None)
+    shape = replace(first, s_from_m=STRETCH[0], s_to_m=STRETCH[1])
+    extension = extended(problem, law, (direction_of(mechanism, setting, shape),))
+    rng = np.random.default_rng(seed)
+    logs = np.log(mean) + np.array(sd) * rng.standard_normal((n, len(mean)))
+    fronts = extension.predict(np.arange(n), np.column_stack([logs, np.zeros(n)]), own[:, None])[:, :-1]
+    noise = problem.readings.sd(np.arange(n), fronts) * rng.standard_normal(fronts.shape)
+    is_runout = np.array([sensor.is_runout for sensor in blank.sensors])
+    stopped = ~is_runout & (fronts <= 3.0)
+    status = np.where(stopped, Status.NOT_REACHED, Status.OBSERVED)
+    values = np.where(stopped, np.nan, np.maximum(fronts + noise, 0.5))
+    stated = np.where(stopped, np.nan, problem.readings.sd(np.arange(n), fronts))
+    return replace(blank, values=values, status=status, stated_sd=stated)
+
+
+@pytest.fixture(scope="module")
+def few() -> tuple[Base, Curve]:
+    """Six avalanches of one coefficient each: three have an effect."""
+    own = np.array([3.0, 0.0, 3.0, 0.0, 3.0, 0.0])
+    base = base_of(made_campaign("coulomb", [0.36], [0.06], own, seed=4), "coulomb")
+    return base, stretch_curve(base)
+
+
+def dense_log_evidence(base: Base, found: Curve, way: BetweenEvents) -> float:
+    """Sums over dense grids of everything: each event's friction and strength, populations, the effect."""
+    extension = extended(base.problem, base.law, (found.direction,))
+    logs = np.linspace(np.log(0.15), np.log(0.8), 400)
+    strengths = np.linspace(0.0, 5.4, 73)
+    n_events, n = len(base.rows.event), len(logs)
+    events = np.repeat(np.arange(n_events), n)
+    points = np.column_stack([np.tile(logs, n_events), np.zeros(n_events * n)])
+    rows, readings = base.rows, base.rows.readings
+    likelihood = np.array([
+        log_likelihoods(events, extension.predict(events, points, np.array([x])), readings, rows.errors)
+        for x in strengths
+    ]).reshape(len(strengths), n_events, n)  # fmt: skip
+    means, spreads = np.linspace(np.log(0.25), np.log(0.5), 31), np.geomspace(0.02, 0.6, 17)
+    # (mean, spread, strength, event): the event's own friction summed over.
+    step = logs[1] - logs[0]
+    table = np.empty((len(means), len(spreads), len(strengths), n_events))
+    for i, mean in enumerate(means):
+        for j, spread in enumerate(spreads):
+            own = norm.logpdf(logs, mean, spread) + np.log(step)
+            table[i, j] = logsumexp(likelihood + own, axis=2)
+    scale, width = np.exp(base.log_scale[0]), np.diff(means)[0]
+    prior = halfnorm.logpdf(np.exp(means), scale=scale) + means + np.log(width)
+    of_spread = lognorm.logpdf(spreads, TAU_LOG_SD, scale=TAU_MEDIAN) + np.log(np.gradient(spreads))
+    population = prior[:, None] + of_spread
+    assert found.mechanism.added is not None
+    scale = found.mechanism.added.scale_of(found.shape)
+    density = norm.logpdf(strengths, 0.0, scale) + (0.0 if found.mechanism.added.either_sign else np.log(2.0))
+    width = np.full(len(strengths), strengths[1])
+    width[[0, -1]] *= 0.5
+    of_strength = density + np.log(width)
+    if way is COMMON:
+        each = table.sum(axis=3)
+        return float(logsumexp(each + population[:, :, None] + of_strength))
+    totals = []
+    parameters = np.linspace(0.01, 0.99, 25) if way is SOME else np.geomspace(0.05, 2.0, 16)
+    prior_of = beta(1, 1) if way is SOME else lognorm(SPREAD_LOG_SD, scale=SPREAD_MEDIAN)
+    for parameter, d in zip(parameters, np.gradient(parameters), strict=True):
+        if way is SOME:
+            mixed = np.logaddexp(np.log(parameter) + table, np.log1p(-parameter) + table[:, :, :1])
+        else:
+            mixed = np.full_like(table, -np.inf)
+            for k, median in enumerate(strengths[1:], start=1):
+                shares = norm.logpdf(np.log(strengths[1:] / median), 0.0, parameter) - np.log(strengths[1:])
+                mixed[:, :, k] = logsumexp(table[:, :, 1:] + (shares + np.log(strengths[1]))[:, None], axis=2)
+        total = logsumexp(mixed.sum(axis=3) + population[:, :, None] + of_strength)
+        totals.append(total + prior_of.logpdf(parameter) + np.log(d))
+    return float(logsumexp(totals))
+
+
+@pytest.mark.slow
+def test_gains_are_those_of_dense_grids(few: tuple[Base, Curve]) -> None:
+    base, found = few
+    gains, dense = gains_of(base, found), {way: dense_log_evidence(base, found, way) for way in BetweenEvents}
+    exact = {way: value - dense[COMMON] for way, value in dense.items()}
+    assert abs(gains[SPREAD] - exact[SPREAD]) < 0.35 and abs(gains[SOME] - exact[SOME]) < 0.35, exact
+
+
+@pytest.mark.slow
+def test_a_base_law_with_the_term_has_the_same_evidence() -> None:
+    """PCM is Coulomb with a drag that is log-normal between avalanches, but for priors of spread."""
+    coulomb, pcm = base_of(RYGGFONN, "coulomb"), base_of(RYGGFONN, "pcm")
+    drag = mechanisms()["turbulent_drag"]
+    assert drag.added is not None
+    shape = drag.added.shapes(coulomb.setting)[0]
+    found = curve_near(coulomb, drag, shape, curve(coulomb, drag, shape, ROUGH), ROUGH)
+    ways = ways_of(coulomb, found)
+    differ = ways[SPREAD].log_evidence - coulomb.fit.found.log_evidence
+    assert differ - found.log_bayes_factor > 20.0
+    assert abs(differ - (pcm.fit.found.log_evidence - coulomb.fit.found.log_evidence)) < 3.0
+    assert abs(ways[COMMON].log_evidence - coulomb.fit.found.log_evidence - found.log_bayes_factor) < 0.5
+
+
+@pytest.mark.slow
+def test_who_has_it_is_found() -> None:
+    """Nine of 22 avalanches have friction on a stretch: the share, the strength, and which."""
+    own = np.where(np.arange(22) < 9, 5.0, 0.0)
+    campaign = made_campaign("pcm", [0.30, 1.2e-3], [0.10, 0.25], own, seed=5)
+    base = base_of(campaign, "pcm")
+    found = stretch_curve(base)
+    calibration = calibrate(
+        augmented_problem(base, [found], SOME), base.law, SamplerSettings(draws=1500, tune=700, seed=1)
+    )
+    assert calibration.gate.numerics
+    posterior = calibration.tree["posterior"]
+    share, strength = posterior["segment_friction_share"].values, posterior["segment_friction"].values
+    assert abs(share.mean() - 9.0 / 22.0) < 2.0 * share.std()
+    assert abs(strength.mean() - 5.0) < 2.5 * strength.std()
+    multiples = multiples_of_events(calibration)
+    assert multiples is not None
+    assert (multiples[own > 0.0, 0] > 0.8).all() and (multiples[own == 0.0, 0] < 0.6).all()
+    fronts = calibration.tree["event_posterior"]["front"].values
+    readings = base.rows.readings
+    inside = np.abs(np.median(fronts, axis=(0, 1)) - readings.values)[readings.observed]
+    assert np.median(inside / readings.sd(np.arange(22), readings.values)[readings.observed]) < 1.5
+
+
+def test_components_are_shares_of_avalanches() -> None:
+    strength, parameter = np.array([2.0, 3.0]), np.array([0.25, 0.5])
+    for way in BetweenEvents:
+        own, log_shares = components(way, strength, parameter)
+        assert own.shape == log_shares.shape
+        assert_allclose(np.exp(log_shares).sum(axis=1), 1.0)
+    own, log_shares = components(SOME, strength, parameter)
+    assert_allclose(np.sum(own * np.exp(log_shares), axis=1), strength * parameter)
+    own, log_shares = components(SPREAD, strength, parameter)
+    mean = np.sum(np.log(own) * np.exp(log_shares), axis=1)
+    assert_allclose(mean, np.log(strength))
+    sd = np.sqrt(np.sum((np.log(own) - mean[:, None]) ** 2 * np.exp(log_shares), axis=1))
+    assert_allclose(sd, parameter, rtol=0.02)
+
+
+@pytest.mark.parametrize("way", [SPREAD, SOME])
+def test_the_coordinate_without_bounds_has_the_prior(way: BetweenEvents) -> None:
+    """Its density is that of PyMC's variable with the change of variable, and integrates to one."""
+    import pymc as pm
+
+    coordinate = np.linspace(-30.0, 30.0, 60001)
+    values, log_density = from_unbounded(way, coordinate)
+    assert np.trapezoid(np.exp(log_density), coordinate) == pytest.approx(1.0, abs=1e-3)
+    with pm.Model():
+        logp = pm.logp(variable(way, "x"), values[29000:31000:100]).eval()
+    slope = np.gradient(values, coordinate)[29000:31000:100]
+    assert_allclose(log_density[29000:31000:100], logp + np.log(slope), atol=1e-4)
+
+
+def test_multiples_of_avalanches_to_come() -> None:
+    rng = np.random.default_rng(0)
+    assert (own_multiples(COMMON, np.zeros(3), (3, 4), rng) == 1.0).all()
+    some = own_multiples(SOME, np.array([0.2, 0.7]), (2, 20000), rng)
+    assert set(np.unique(some)) == {0.0, 1.0}
+    assert_allclose(some.mean(axis=1), [0.2, 0.7], atol=0.015)
+    spread = np.log(own_multiples(SPREAD, 0.5, (20000,), rng))
+    assert abs(spread.mean()) < 0.015 and abs(spread.std() - 0.5) < 0.01
+
+
+def test_gains_share_the_prior() -> None:
+    assert sum(PRIOR.values()) == 1.0
+    assert log_gain(None) == 0.0
+    assert log_gain(None, dict.fromkeys(BetweenEvents, 0.0)) == pytest.approx(0.0)
+    gains = {COMMON: 0.0, SPREAD: 3.0, SOME: -2.0}
+    own = np.log(0.5 + 0.25 * np.exp(3.0) + 0.25 * np.exp(-2.0))
+    assert log_gain(None, gains) == pytest.approx(own)
+    assert log_gain(5.0, gains) == pytest.approx(np.log((1.0 - BESIDE) * np.exp(own) + BESIDE * np.exp(5.0)))
+
+
+def test_only_physics_of_track_and_stretch_may_differ() -> None:
+    differ = {name for name, one in mechanisms().items() if may_differ(one)}
+    assert {"segment_drag", "segment_friction", "obstacle", "turbulent_drag"} <= differ
+    assert not differ & {"sensor_bias", "release_offset", "covariate_friction"}
+
+
+def test_of_two_both_are_components(few: tuple[Base, Curve]) -> None:
+    """Each pair is a component; what avalanches to come have is drawn for each of them."""
+    base, found = few
+    problem = augmented_problem(base, [found], SOME)
+    (one,) = problem.added
+    other: Any = replace(one, name="other", between=SPREAD)
+    samples = {
+        "segment_friction": np.full(500, 2.0),
+        "segment_friction_share": np.full(500, 0.3),
+        "other": np.full(500, 1.0),
+        "other_spread": np.full(500, 0.4),
+    }
+    own, log_shares = components_of([one, other], samples)
+    assert own.shape == (500, 50, 2)
+    assert_allclose(np.exp(log_shares).sum(axis=1), 1.0)
+    rows = new_rows([one, other], samples, np.random.default_rng(1), 8)
+    assert rows.shape == (500, 8, 2)
+    assert abs((rows[..., 0] > 0.0).mean() - 0.3) < 0.03
+    with pytest.raises(ValueError, match="differ in none"):
+        augmented_problem(base, [found, found], SOME)
