@@ -135,7 +135,8 @@ def dense_log_evidence(base: Base, found: Curve, way: BetweenEvents) -> float:
             mixed = np.full_like(table, -np.inf)
             for k, median in enumerate(strengths[1:], start=1):
                 shares = norm.logpdf(np.log(strengths[1:] / median), 0.0, parameter) - np.log(strengths[1:])
-                mixed[:, :, k] = logsumexp(table[:, :, 1:] + (shares + np.log(strengths[1]))[:, None], axis=2)
+                shares -= logsumexp(shares)  # a grid is coarse where nearly all have the same
+                mixed[:, :, k] = logsumexp(table[:, :, 1:] + shares[:, None], axis=2)
         total = logsumexp(mixed.sum(axis=3) + population[:, :, None] + of_strength)
         totals.append(total + prior_of.logpdf(parameter) + np.log(d))
     return float(logsumexp(totals))
