@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,9 +12,10 @@ from skred.report.comparison.likelihoods import likelihoods_figure
 from skred.report.comparison.parts import law_axis, practical_band, styles, typeset
 from skred.report.comparison.sensors import new_avalanches_figure, predictions_figure
 from skred.report.shared.document import Document, get, is_hierarchical, listed, pareto_k_limit, ranked
+from skred.report.shared.drawing import Picture, draw
 from skred.report.shared.labels import figure_text
 from skred.report.shared.numbers import floats, is_number
-from skred.report.shared.style import GREY, INK, legend_below, new_figure, styled, write_png
+from skred.report.shared.style import GREY, INK, legend_below, new_figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,12 +27,12 @@ COMPARISON_FIGURES = ("comparison_elpd", "pointwise", "pareto_k", "predictions",
 """Names of all figures that there may be."""
 
 
-def save_comparison_figures(comparison: Document, folder: Path) -> dict[str, Path]:
-    """Write the figures that the comparison has numbers for, as PNG.
+def save_comparison_figures(comparison: Document, folder: Path) -> dict[str, Picture]:
+    """Make the figures that the comparison has numbers for, and write them as PNG.
 
     Returns
     -------
-    dict of Path
+    dict of Picture
         By name: comparison_elpd, pointwise, pareto_k, predictions, evidence; of a hierarchical comparison
         that has a pooled one beside it also likelihoods.
     """
@@ -38,12 +40,8 @@ def save_comparison_figures(comparison: Document, folder: Path) -> dict[str, Pat
     makers = (
         elpd_figure, pointwise_figure, pareto_k_figure, predictions, evidence_figure, likelihoods_figure,
     )  # fmt: skip
-    files = {}
-    for name, make in zip(COMPARISON_FIGURES, makers, strict=True):
-        figure = make(comparison)
-        if figure is not None:
-            files[name] = write_png(figure, folder / f"{name}.png")
-    return files
+    named = zip(COMPARISON_FIGURES, makers, strict=True)
+    return draw({name: partial(make, comparison) for name, make in named}, folder)
 
 
 @styled

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from skred.report.shared import document as doc
-from skred.report.shared.html import environment, picture
+from skred.report.shared.html import page
 from skred.report.shared.numbers import decimals_for, fixed, is_number, rounded
 from skred.report.shared.relative import relative_new_avalanche, relative_response
+
+if TYPE_CHECKING:
+    from skred.report.shared.drawing import Picture
 
 _TITLES = {
     "comparison_elpd": "Differences of elpd to the best law, with their standard errors, single and doubled.",
@@ -50,7 +52,7 @@ _SECTIONS = {
 }
 
 
-def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> str:
+def render_comparison(comparison: doc.Document, figures: Mapping[str, Picture]) -> str:
     """Render the report of a comparison.
 
     Parameters
@@ -59,42 +61,39 @@ def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> 
         The document that is also written as ``compare.json``; null where there is no number. Runouts in
         ``response`` and ``new_avalanche`` are arc lengths, shown relative to the campaign's reference where
         it has one. Where ``alpha_beta`` is null, ``alpha_beta_reason`` says why.
-    figures : mapping of str to Path
-        PNG files: ``comparison_elpd``, ``pointwise``, ``pareto_k``, ``predictions``, ``evidence``,
+    figures : mapping of str to Picture
+        ``comparison_elpd``, ``pointwise``, ``pareto_k``, ``predictions``, ``evidence``,
         ``likelihoods``, and those of one law as ``<law id>/trace`` and so on, see
         `skred.report.calibration.figures.save_model_figures`. What is missing is left out.
 
     Returns
     -------
     str
-        A self-contained page: style inside, pictures as data URIs.
+        A self-contained page, see `skred.report.shared.html.page`.
     """
     hierarchical = doc.is_hierarchical(comparison)
     sections = _sections(comparison)
-    return (
-        environment()
-        .get_template("compare.html.jinja")
-        .render(
-            c=comparison,
-            models=doc.models(comparison),
-            ranked=doc.ranked(comparison),
-            failed=doc.failed(comparison),
-            figures={name: picture(file) for name, file in figures.items()},
-            sensors=_sensors(comparison),
-            hierarchical=hierarchical,
-            sections=sections,
-            number={name: place for place, name in enumerate(sections, start=1)},
-            side_by_side=doc.side_by_side(comparison),
-            titles={**_TITLES, **_HIERARCHICAL_TITLES} if hierarchical else _TITLES,
-            of_a_law=_OF_A_LAW,
-            of_a_population=_OF_A_POPULATION,
-            limits=doc.get(comparison, "limits") or {},
-            k_limit=doc.pareto_k_limit(comparison),
-            counts=_counts,
-            within_factor=_within_factor,
-            relative=relative_response,
-            relative_new=relative_new_avalanche,
-        )
+    return page(
+        "compare.html.jinja",
+        figures,
+        c=comparison,
+        models=doc.models(comparison),
+        ranked=doc.ranked(comparison),
+        failed=doc.failed(comparison),
+        sensors=_sensors(comparison),
+        hierarchical=hierarchical,
+        sections=sections,
+        number={name: place for place, name in enumerate(sections, start=1)},
+        side_by_side=doc.side_by_side(comparison),
+        titles={**_TITLES, **_HIERARCHICAL_TITLES} if hierarchical else _TITLES,
+        of_a_law=_OF_A_LAW,
+        of_a_population=_OF_A_POPULATION,
+        limits=doc.get(comparison, "limits") or {},
+        k_limit=doc.pareto_k_limit(comparison),
+        counts=_counts,
+        within_factor=_within_factor,
+        relative=relative_response,
+        relative_new=relative_new_avalanche,
     )
 
 

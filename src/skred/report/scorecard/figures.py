@@ -6,6 +6,7 @@ Every figure is made from the scorecard's document alone; one without data is le
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +15,9 @@ from scipy.special import ndtr
 
 from skred.report.scorecard.panels import baselines_figure, gain_figure, places_figure, reliability_figure
 from skred.report.shared.document import Document, get, listed
+from skred.report.shared.drawing import Picture, draw
 from skred.report.shared.labels import figure_text, name_text
-from skred.report.shared.style import GREY, INK, legend_below, new_figure, shade_map, styled, tint, write_png
+from skred.report.shared.style import GREY, INK, legend_below, new_figure, shade_map, styled, tint
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,21 +33,16 @@ _KINDS = ("sparse", "dense")
 _SNR = (1.5, 13.0)
 
 
-def save_scorecard_figures(document: Document, folder: Path) -> dict[str, Path]:
-    """Write the figures of a scorecard as PNG.
+def save_scorecard_figures(document: Document, folder: Path) -> dict[str, Picture]:
+    """Make the figures of a scorecard, and write them as PNG.
 
     Returns
     -------
     dict
-        Files by name: ``false_alarms``, ``power``, ``confusion``, ``confusion_classes``, ``places``,
+        By name: ``false_alarms``, ``power``, ``confusion``, ``confusion_classes``, ``places``,
         ``reliability``, ``gain`` and ``baselines``, as far as there are data for them.
     """
-    files = {}
-    for name, make in _makers().items():
-        figure = make(document)
-        if figure is not None:
-            files[name] = write_png(figure, folder / f"{name}.png")
-    return files
+    return draw({name: partial(make, document) for name, make in _makers().items()}, folder)
 
 
 def _makers() -> dict[str, Callable[[Document], Figure | None]]:
