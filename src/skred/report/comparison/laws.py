@@ -14,8 +14,16 @@ from skred.report.comparison.sensors import new_avalanches_figure, predictions_f
 from skred.report.shared.document import Document, get, is_hierarchical, listed, pareto_k_limit, ranked
 from skred.report.shared.drawing import Picture, draw
 from skred.report.shared.labels import figure_text
-from skred.report.shared.numbers import floats, is_number
-from skred.report.shared.style import GREY, INK, legend_below, new_figure, styled
+from skred.report.shared.marks import mark
+from skred.report.shared.numbers import fixed, floats, is_number
+from skred.report.shared.style import (
+    GREY,
+    INK,
+    is_narrow,
+    legend_below,
+    new_figure,
+    styled,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,6 +70,8 @@ def elpd_figure(comparison: Document) -> Figure | None:
         axes.hlines(row, difference - doubled, difference + doubled, color=colour, linewidth=1.2)
         axes.hlines(row, difference - se, difference + se, color=colour, linewidth=4, alpha=0.55)
         axes.plot(difference, row, marker=markers[law["id"]], color=colour, markersize=6)
+        told = f"{law['id']}: {fixed(difference)} nats, standard error {fixed(se)}, doubled {fixed(doubled)}"
+        mark(axes, difference, row, [told])
         place = (difference, row)
         axes.annotate(
             typeset(difference), place, (0, 7), textcoords="offset points", ha="center", fontsize=7.5
@@ -98,6 +108,11 @@ def pointwise_figure(comparison: Document) -> Figure | None:
         colour, failed = colours[law["id"]], set(map(str, listed(law, "exact", "failed_refits")))
         axes.vlines(x, 0, difference, color=colour, linewidth=1.0, alpha=0.7)
         filled = [colour if str(event) not in failed else "#ffffff" for event in events]
+        told = [
+            f"{event}, {law['id']}: {fixed(one)} nats"
+            for event, one in zip(events, difference.tolist(), strict=True)
+        ]
+        mark(axes, x, difference, told, list(map(str, events)))
         axes.scatter(x, difference, s=20, c=filled, marker=markers[law["id"]], edgecolors=colour, zorder=3)
         total = typeset(float(np.nansum(difference)))
         axes.scatter(
@@ -118,7 +133,7 @@ def pointwise_figure(comparison: Document) -> Figure | None:
 
 def _event_axis(axes: Axes, events: list[Any]) -> None:
     """Events by name; of many only some are named."""
-    step = -(-len(events) // _MAX_NAMED_EVENTS)
+    step = -(-len(events) // (_MAX_NAMED_EVENTS // 2 if is_narrow() else _MAX_NAMED_EVENTS))
     places = range(0, len(events), step)
     axes.set_xticks(places, [figure_text(events[k], 14) for k in places], rotation=90, fontsize=7)
     axes.set_xlim(-0.7, len(events) - 0.3)
@@ -141,7 +156,13 @@ def pareto_k_figure(comparison: Document) -> Figure | None:
     axes = figure.subplots()
     axes.axhline(limit, color=INK, linewidth=1.0, linestyle="--", label=f"limit {limit:.2f}")
     for law in laws:
-        k = np.maximum(floats(listed(law, "loo", "pareto_k")), _LOWEST_K)
+        found = floats(listed(law, "loo", "pareto_k"))
+        k = np.maximum(found, _LOWEST_K)
+        told = [
+            f"{event}, {law['id']}: k = {fixed(one)}"
+            for event, one in zip(events, found.tolist(), strict=True)
+        ]
+        mark(axes, np.arange(len(events)), k, told, list(map(str, events)))
         label = figure_text(law["id"], 24)
         axes.scatter(
             np.arange(len(events)),
@@ -172,6 +193,7 @@ def evidence_figure(comparison: Document) -> Figure | None:
     for row, law in enumerate(laws):
         seeds = floats(listed(law, "evidence", "log_evidence"))
         mean = float(get(law, "evidence", "mean"))
+        mark(axes, mean, row, [f"{law['id']}: {fixed(mean)}; seeds {', '.join(map(fixed, seeds.tolist()))}"])
         colour = colours[law["id"]]
         axes.scatter(
             seeds,

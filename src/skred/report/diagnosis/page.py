@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 from skred.report.diagnosis import rows, unseen
 from skred.report.diagnosis.conditional import conditional_rows
 from skred.report.diagnosis.equation import equations, parameter_rows, symbol_rows
+from skred.report.diagnosis.events import MOST_OPEN, event_rows, reading_rows
 from skred.report.diagnosis.evidence import group_of
+from skred.report.diagnosis.lay import lay_words
 from skred.report.diagnosis.words import comparisons, in_words, law_id, stretch_in, verdict_words
 from skred.report.shared import document as doc
 from skred.report.shared import html
@@ -69,6 +71,10 @@ def page(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Pictur
         priors=rows.prior_rows(document),
         settings=rows.settings_rows(document),
         force_prior=_force_prior(doc.get(report, "profile_prior")),
+        lay=lay_words(document),
+        events=event_rows(document, tree),
+        readings=reading_rows(tree),
+        most_open=MOST_OPEN,
         checks=doc.listed(report, "checks"),
         too_few=_too_few(document),
         dropped=in_words(doc.listed(report, "not_added")),

@@ -17,7 +17,19 @@ from skred.report.scorecard.panels import baselines_figure, gain_figure, places_
 from skred.report.shared.document import Document, get, listed
 from skred.report.shared.drawing import Picture, draw
 from skred.report.shared.labels import figure_text, name_text
-from skred.report.shared.style import GREY, INK, legend_below, new_figure, shade_map, styled, tint
+from skred.report.shared.marks import mark
+from skred.report.shared.numbers import fixed
+from skred.report.shared.style import (
+    GREY,
+    INK,
+    folded,
+    is_narrow,
+    legend_below,
+    new_figure,
+    shade_map,
+    styled,
+    tint,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -98,6 +110,8 @@ def false_alarms_figure(document: Document) -> Figure | None:
             linewidth=1.6,
             label="acceptance criterion for the upper limit",
         )
+        told = f"{rows[place][0]}: {one['hits']} of {one['n']}, upper limit {fixed(limit)}"
+        mark(axes, one["share"], place, [f"{told}, criterion {fixed(bar)}"])
         axes.text(max(limit, bar) + 0.008, place, f"{one['hits']} of {one['n']}", va="center", fontsize=7.5)
     axes.set_yticks(range(len(rows)), [figure_text(row[0], 30) for row in rows])
     axes.tick_params(axis="y", length=0)
@@ -117,7 +131,10 @@ def power_figure(document: Document) -> Figure | None:
     if not any(get(own_scores(document, kind), "detection", "all", "n") for kind in _KINDS):
         return None
     figure = new_figure(6.2, "What is found and what is named, against signal-to-noise")
-    panels = figure.subplots(2, 2, sharex=True, sharey=True)
+    if is_narrow():
+        figure.set_size_inches(figure.get_size_inches() * (1.0, 1.7))
+    rows, columns = (4, 1) if is_narrow() else (2, 2)
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).reshape(2, 2)
     for column, kind in enumerate(_KINDS):
         _detection(panels[0, column], document, kind)
         _names(panels[1, column], document, kind)
@@ -200,6 +217,10 @@ def _binned(
         return
     x = np.array([middle for middle, _ in known]) + shift
     value, low, high = (np.array([one[key] for _, one in known]) for key in ("share", "low", "high"))
+    told = [
+        f"{label} {fixed(y)} ({fixed(a)} to {fixed(b)})" for y, a, b in zip(value, low, high, strict=True)
+    ]
+    mark(axes, x, value, told)
     axes.errorbar(
         x,
         value,
@@ -220,7 +241,7 @@ def confusion_figure(document: Document, over: str) -> Figure | None:
     if not rows:
         return None
     words = f"What was hidden (rows) and what was said (columns), by {name_text(over)}; counts of trials"
-    figure = new_figure(1.9 + 0.27 * len(rows), words)
+    figure = new_figure(1.9 + (0.33 if is_narrow() else 0.27) * len(rows), words)
     axes = figure.subplots()
     totals = counts.sum(axis=1, keepdims=True)
     shades = counts / np.maximum(totals, 1)
@@ -232,7 +253,7 @@ def confusion_figure(document: Document, over: str) -> Figure | None:
             str(counts[row, column]),
             ha="center",
             va="center",
-            fontsize=7.5,
+            fontsize=6.5 if is_narrow() else 7.5,
             color="white" if shades[row, column] > 0.45 else INK,
         )
         if rows[row] == columns[column]:
@@ -240,12 +261,16 @@ def confusion_figure(document: Document, over: str) -> Figure | None:
     axes.set_xticks(
         range(len(columns)),
         [_short_label(name) for name in columns],
-        rotation=40,
+        rotation=90 if is_narrow() else 40,
         ha="right",
+        va="center" if is_narrow() else "top",
         rotation_mode="anchor",
+        fontsize=6.5 if is_narrow() else None,
     )
     axes.set_yticks(
-        range(len(rows)), [f"{_label(name)} ({int(n)})" for name, n in zip(rows, totals[:, 0], strict=True)]
+        range(len(rows)),
+        [folded(f"{_label(name)} ({int(n)})", 22) for name, n in zip(rows, totals[:, 0], strict=True)],
+        fontsize=7 if is_narrow() else None,
     )
     axes.set_xticks(np.arange(len(columns) + 1) - 0.5, minor=True)
     axes.set_yticks(np.arange(len(rows) + 1) - 0.5, minor=True)

@@ -1,6 +1,6 @@
 """The dark counterpart of a colour: its lightness turned over, its hue kept, no contrast lost.
 
-Colours are those of CSS, ``#rrggbb``. Lightness is that of Oklab (Ottosson, 2020), in which equal steps look equal.
+Colours are those of CSS, ``#rrggbb``. Lightness is that of Oklab (Ottosson, 2020): equal steps look equal.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Pages that need nothing else: their templates, their style and script, and the policy that allows only these."""
+"""Pages that need nothing else: their templates, style and script, and the policy that allows only these."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
 def page(template: str, figures: Mapping[str, Picture], **values: Any) -> str:
     """Render a page: one file with all it needs, which asks no one for anything.
 
-    Its Content-Security-Policy forbids everything but its own style and script, known by their hashes, and pictures
-    that are part of it.
+    Its Content-Security-Policy forbids everything but its own style and script, known by their hashes, and
+    pictures that are part of it.
 
     Parameters
     ----------
@@ -101,13 +101,13 @@ def _reachable_tables(html: str) -> str:
         nonlocal number
         number += 1
         if found["caption"]:
-            name, caption = f'aria-labelledby="table-{number}"', f'<caption id="table-{number}">'
+            name, caption = f'aria-labelledby="table-{number}"', f'<caption id="table-{number}"><span>'
         else:
             name, caption = f'aria-label="Table {number}"', ""
         return f'<div class="wide" role="region" tabindex="0" {name}>{found["table"]}{caption}'
 
     pattern = r'<div class="wide">(?P<table><table[^>]*>\s*)(?P<caption><caption>)?'
-    html = re.sub(pattern, named, html)
+    html = re.sub(pattern, named, html).replace("</caption>", "</span></caption>")
     html = re.sub(r"(<tr[^>]*>)<th(?=[ >])", r'\1<th scope="row"', html)
     return re.sub(
         r"<thead>.*?</thead>",

@@ -1,8 +1,8 @@
 """A figure as markup inside a page: lines and letters as they are, colours that follow light and dark.
 
-The drawing is matplotlib's SVG with text as text. What a strict Content-Security-Policy forbids is taken out of it
-(styles in attributes become attributes), colours become variables of the page's style, and what `mark` has said
-of places is laid over it as transparent targets with a title each: a browser shows these without a script.
+The drawing is matplotlib's SVG with text as text. What a strict Content-Security-Policy forbids is taken out
+of it (styles become attributes), colours become variables of the page's style, and what `mark` has said of
+places is laid over it as transparent targets with a title each: a browser shows these without a script.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ _TARGET = 7.0
 """Radius of a target, in points: as large as a finger's tip needs on a telephone, nearly."""
 _DROPPED = frozenset({"font-family", "stroke-linejoin", "stroke-linecap", "font-stretch", "font-variant"})
 _MOST_FOLDS = 3
+_TICK_WIDTH = 0.55
+"""Inches that a tick's label takes."""
 
 
 @styled
@@ -69,6 +71,8 @@ def _finish(figure: Figure) -> None:
     """Labels that stacked panels share; in a narrow figure what is too long for its panel is folded."""
     if not is_narrow():
         return
+    for axes in figure.axes:
+        _fewer_ticks(axes)
     for panels in notes_of(figure).stacked:
         for axes in panels[1:]:
             if not axes.get_ylabel() and panels[0].get_shared_y_axes().joined(axes, panels[0]):
@@ -77,6 +81,18 @@ def _finish(figure: Figure) -> None:
         figure.draw_without_rendering()
         if not sum(_fold_labels(axes) for axes in figure.axes):
             return
+
+
+def _fewer_ticks(axes: Axes) -> None:
+    """No more ticks along a short axis than their labels have room for."""
+    from matplotlib.ticker import AutoLocator, MaxNLocator
+
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    width = axes.get_position().width * float(figure.get_size_inches()[0])
+    locator = axes.xaxis.get_major_locator()
+    if isinstance(locator, (AutoLocator, MaxNLocator)):
+        locator.set_params(nbins=max(2, min(6, int(width / _TICK_WIDTH))))
 
 
 def _fold_labels(axes: Axes) -> int:

@@ -1,7 +1,7 @@
 """What a reader can point at in a figure: places with words, and the avalanche that they belong to.
 
-A figure function says with `mark` what stands where. `skred.report.shared.inline` lays transparent targets over
-the drawing: so hovering and highlighting work alike in every figure, whatever it is drawn with.
+A figure function says with `mark` what stands where. `skred.report.shared.inline` lays transparent targets
+over the drawing: so hovering and highlighting work alike in every figure, whatever it is drawn with.
 """
 
 from __future__ import annotations

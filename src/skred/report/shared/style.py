@@ -71,7 +71,7 @@ _NARROW: ContextVar[bool] = ContextVar("narrow", default=False)
 
 @contextmanager
 def narrow() -> Iterator[None]:
-    """Make figures for the screen of a telephone: panels below each other, letters as large as on the page."""
+    """Make figures for the screen of a telephone: panels below each other, letters not smaller."""
     token = _NARROW.set(True)
     try:
         yield

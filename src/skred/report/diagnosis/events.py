@@ -1,0 +1,88 @@
+"""Tables of the avalanches themselves: what each says of the answer, and each reading beside its predictions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from skred.report.shared import document as doc
+from skred.report.shared.labels import printable, unit_text
+from skred.report.shared.numbers import fixed
+from skred.report.shared.recordings import recordings_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Rows = list[dict[str, Any]]
+_WHEN = ("before", "after")
+MOST_OPEN = 120
+"""Readings of a table that is open when the page opens."""
+
+
+def event_rows(document: doc.Document, tree: xr.DataTree) -> Rows:
+    """One row an avalanche: the evidence without it, and its log score before and after; empty without both."""
+    without = {
+        printable(doc.get(one, "event")): doc.get(one, "log_bayes_factor")
+        for one in doc.listed(document, "influence", "events")
+    }
+    scores: dict[str, dict[str, float]] = {}
+    if "held_out" in tree.children:
+        held = tree["held_out"].to_dataset()
+        for when in map(str, held["when"].values):
+            values = held["log_score"].sel(when=when).values.tolist()
+            scores[when] = dict(zip(map(printable, held["event"].values), values, strict=True))
+    carried = set(map(printable, doc.listed(document, "influence", "carried_by")))
+    names = list(dict.fromkeys([*scores.get("before", {}), *without]))
+    rows = []
+    for name in names:
+        before, after = (scores.get(when, {}).get(name) for when in _WHEN)
+        change = after - before if after is not None and before is not None else None
+        rows.append(
+            {
+                "event": name,
+                "carries": "yes" if name in carried else "",
+                "without": fixed(without.get(name), 1),
+                "before": fixed(before, 1),
+                "after": fixed(after, 1),
+                "change": fixed(change, 1, signed=True),
+            }
+        )
+    return rows
+
+
+def reading_rows(tree: xr.DataTree) -> Rows:
+    """One row a reading that was predicted from the other avalanches, and from the readings above it."""
+    if "held_out" not in tree.children:
+        return []
+    recordings = recordings_of(tree)
+    held = tree["held_out"].to_dataset()
+    given = tree["conditional"].to_dataset() if "conditional" in tree.children else None
+    rows = []
+    for event, column in np.argwhere(recordings.observed):
+        sensor = recordings.sensors[column]
+        zero = (recordings.reference_s_m or 0.0) if sensor.is_runout else 0.0
+        decimals = 0 if sensor.is_runout else 1
+        at = {"event": int(event), "sensor": int(column), "zero": zero, "decimals": decimals}
+        rows.append(
+            {
+                "event": printable(recordings.event_ids[event]),
+                "sensor": printable(sensor.id),
+                "unit": unit_text("m" if sensor.is_runout else "m s-1"),
+                "recorded": fixed(float(recordings.values[event, column] - zero), decimals),
+                "others": [_band(held, when, **at) for when in _WHEN],
+                "above": [_band(given, when, **at) for when in _WHEN],
+            }
+        )
+    return rows
+
+
+def _band(found: xr.Dataset | None, when: str, *, event: int, sensor: int, zero: float, decimals: int) -> str:
+    """Mean and 90 % interval of a prediction; a dash where there is none."""
+    if found is None or when not in found["when"].values:
+        return "-"
+    part = found.sel(when=when).isel(event=event, sensor=sensor)
+    if "n_above" in part and int(part["n_above"]) == 0:
+        return "-"
+    mean, low, high = (fixed(float(part[name]) - zero, decimals) for name in ("mean", "low", "high"))
+    return f"{mean} ({low} to {high})"
