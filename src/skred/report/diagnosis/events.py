@@ -1,4 +1,4 @@
-"""Tables of the avalanches themselves: what each says of the answer, and each reading beside its predictions."""
+"""Tables of the avalanches themselves: what each says of the answer, each reading beside its predictions."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MOST_OPEN = 120
 
 
 def event_rows(document: doc.Document, tree: xr.DataTree) -> Rows:
-    """One row an avalanche: the evidence without it, and its log score before and after; empty without both."""
+    """One row an avalanche: the evidence without it, its log score before and after; empty without both."""
     without = {
         printable(doc.get(one, "event")): doc.get(one, "log_bayes_factor")
         for one in doc.listed(document, "influence", "events")

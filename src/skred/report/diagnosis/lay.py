@@ -37,7 +37,7 @@ def _answer(document: doc.Document) -> list[str]:
     if verdict == "nothing_missing":
         return ["Answer: no. Something of a size that matters would mostly have been found here."]
     if verdict == "unexplained":
-        told = f"Answer: yes, something is missing{where}, but nothing on the list of known causes accounts for it."
+        told = f"Answer: yes, something is missing{where}, but no cause on the list accounts for it."
         return [told, "The report shows how strongly it brakes or drives the avalanches, and where."]
     if verdict in ("missing_physics", "instrument"):
         return [_named(document, verdict, where), *_tied(document)]
@@ -84,9 +84,8 @@ def _hangs_on(document: doc.Document) -> list[str]:
         return []
     n, are = len(carried), "avalanche carries" if len(carried) == 1 else "avalanches carry"
     them = "it" if n == 1 else "them"
-    return [
-        f"Take it with care: only {n} {are} this answer ({', '.join(carried)}); without {them} it would not be given."
-    ]
+    names = ", ".join(carried)
+    return [f"Take it with care: only {n} {are} this answer ({names}). Without {them} it would not be given."]
 
 
 def _use(document: doc.Document) -> list[str]:
@@ -100,9 +99,7 @@ def _use(document: doc.Document) -> list[str]:
             parts.append(f"from {fixed(before, decimals)} to {fixed(after, decimals)} {unit} for {words}")
     told = []
     if parts:
-        told = [
-            f"With it, the typical error of predictions of avalanches that were left out goes {' and '.join(parts)}."
-        ]
+        told = [f"With it, the typical error for avalanches that were left out goes {' and '.join(parts)}."]
     return [*told, "A name is the best of a list of simple causes. It is no proof of a cause."]
 
 

@@ -301,6 +301,8 @@ def uncertainty_figure(document: Document, tree: xr.DataTree) -> Figure:
     data = tree.to_dataset()
     title = f"Where the uncertainty comes from, on {figure_text(data.attrs['track'], 40)}"
     figure = new_figure(6.6, f"{title}\n{figure_text(_subtitle(data, document), 100)}")
+    if is_narrow():
+        figure.set_size_inches(figure.get_size_inches() * (1.0, 1.2))
     speed, arrival, runout = figure.subplots(3, 1, gridspec_kw={"height_ratios": [1.6, 0.7, 1.0]})
     s_m = data["s"].values
     for part, (colour, dashes, label) in _PART_STYLES.items():
@@ -360,7 +362,7 @@ def _runout_parts(axes: Axes, data: xr.Dataset) -> None:
                 va="center",
                 fontsize=7.5,
             )
-    axes.set_yticks(range(len(parts)), [folded(_PART_STYLES[part][2], 16) for part in parts])
+    axes.set_yticks(range(len(parts)), [folded(_PART_STYLES[part][2], 22) for part in parts])
     axes.invert_yaxis()
     axes.set_xlim(0, 1.1 * highest)
     axes.set_xlabel("sd of runout [m]")

@@ -267,9 +267,10 @@ def confusion_figure(document: Document, over: str) -> Figure | None:
         rotation_mode="anchor",
         fontsize=6.5 if is_narrow() else None,
     )
+    names = [f"{_label(name)} ({int(n)})" for name, n in zip(rows, totals[:, 0], strict=True)]
     axes.set_yticks(
         range(len(rows)),
-        [folded(f"{_label(name)} ({int(n)})", 22) for name, n in zip(rows, totals[:, 0], strict=True)],
+        [folded(name, 22) for name in names],
         fontsize=7 if is_narrow() else None,
     )
     axes.set_xticks(np.arange(len(columns) + 1) - 0.5, minor=True)
