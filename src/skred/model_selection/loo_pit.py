@@ -1,7 +1,7 @@
 """Leave-one-out probability integral transforms: where each reading lies in its prediction from the others.
 
-Where predictions are as sure as they should be, these places are spread evenly from 0 to 1. Too many near 0 and 1:
-predictions are too sure; too many in the middle: not sure enough; too many at one end: biased.
+Where predictions are as sure as they should be, these places are spread evenly from 0 to 1. Too many near 0
+and 1: predictions are too sure; too many in the middle: not sure enough; too many at one end: biased.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ def loo_pit(tree: xr.DataTree, log_weights: xr.DataArray) -> list[dict[str, Any]
     tree : DataTree
         A calibration: ``observed_data`` and ``posterior_predictive`` by sensor are read.
     log_weights : DataArray
-        Of the draws (event, chain, draw) for each avalanche left out as a whole, smoothed; as `arviz_stats.loo` gives
-        them.
+        Of the draws (event, chain, draw) for each avalanche left out as a whole, smoothed; as `arviz_stats.loo`
+        gives them.
 
     Returns
     -------
     list of dict
-        For each sensor: ``sensor``; ``events``; ``below`` and ``up_to``, the probability of a reading that is smaller,
-        and of one that is not larger, for each. The two differ where a front may not come, which reads 0.
+        For each sensor: ``sensor``; ``events``; ``below`` and ``up_to``, the probability of a reading that is
+        smaller, and of one that is not larger, for each. The two differ where a front may not come: it reads 0.
     """
     observed, predicted = (tree[name].to_dataset() for name in ("observed_data", "posterior_predictive"))
     rows = []

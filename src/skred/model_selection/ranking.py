@@ -23,16 +23,16 @@ def ranking(models: Sequence[dict[str, Any]], events: Sequence[str]) -> dict[str
     Parameters
     ----------
     models : sequence of dict
-        Entries of laws whose chains converged, best first, as `skred.model_selection.compare.rank` gives them.
+        Entries of laws whose chains converged, best first, see `skred.model_selection.compare.rank`.
     events : sequence of str
         Ids of the avalanches, in the order of the pointwise scores.
 
     Returns
     -------
     dict or None
-        ``best``: id of the first law. ``rivals``: see `rival`, one for each other law. ``orders``: ids of the laws
-        from best to worst by each score: ``exact`` (leave-one-event-out, which decides), ``loo`` (importance
-        sampling alone), ``waic`` and ``evidence``. None with fewer than two laws.
+        ``best``: id of the first law. ``rivals``: see `rival`, one for each other law. ``orders``: ids of the
+        laws from best to worst by each score: ``exact`` (leave-one-event-out, which decides), ``loo``
+        (importance sampling alone), ``waic`` and ``evidence``. None with fewer than two laws.
     """
     if len(models) < 2:
         return None
@@ -67,9 +67,10 @@ def rival(best: Sequence[float], other: Sequence[float], events: Sequence[str]) 
     Returns
     -------
     dict
-        ``difference`` and ``se``: of the sums, other less best. ``ratio``: size of the difference over its standard
-        error; null where that is 0. ``without_each``: the difference without each avalanche. ``reversed_without``:
-        the smallest set of avalanches without which the other law is first; null where there is none.
+        ``difference`` and ``se``: of the sums, other less best. ``ratio``: size of the difference over its
+        standard error; null where that is 0. ``without_each``: the difference without each avalanche.
+        ``reversed_without``: the smallest set of avalanches without which the other law is ahead of the best;
+        null where there is none.
         ``counts``: whether the difference counts in practice. ``counts_not_without``: the avalanches that
         favour the best law most, as many as must go until the difference no longer counts; null where it
         does not count anyway. ``events_needed``: how many avalanches like these it takes until it counts, at

@@ -10,6 +10,8 @@ import numpy as np
 
 from skred.report.comparison.likelihoods import likelihoods_figure
 from skred.report.comparison.parts import law_axis, practical_band, styles, typeset
+from skred.report.comparison.pit import pit_figure
+from skred.report.comparison.ranking import ranking_figure
 from skred.report.comparison.sensors import new_avalanches_figure, predictions_figure
 from skred.report.shared.document import Document, get, is_hierarchical, listed, pareto_k_limit, ranked
 from skred.report.shared.drawing import Picture, draw
@@ -31,7 +33,9 @@ if TYPE_CHECKING:
 
 _MAX_NAMED_EVENTS = 45
 _LOWEST_K = -0.5
-COMPARISON_FIGURES = ("comparison_elpd", "pointwise", "pareto_k", "predictions", "evidence", "likelihoods")
+COMPARISON_FIGURES = (
+    "comparison_elpd", "pointwise", "pareto_k", "predictions", "evidence", "likelihoods", "ranking", "loo_pit",
+)  # fmt: skip
 """Names of all figures that there may be."""
 
 
@@ -41,12 +45,13 @@ def save_comparison_figures(comparison: Document, folder: Path) -> dict[str, Pic
     Returns
     -------
     dict of Picture
-        By name: comparison_elpd, pointwise, pareto_k, predictions, evidence; of a hierarchical comparison
+        By name: comparison_elpd, pointwise, pareto_k, predictions, evidence, ranking, loo_pit; of a hierarchical comparison
         that has a pooled one beside it also likelihoods.
     """
     predictions = new_avalanches_figure if is_hierarchical(comparison) else predictions_figure
     makers = (
         elpd_figure, pointwise_figure, pareto_k_figure, predictions, evidence_figure, likelihoods_figure,
+        ranking_figure, pit_figure,
     )  # fmt: skip
     named = zip(COMPARISON_FIGURES, makers, strict=True)
     return draw({name: partial(make, comparison) for name, make in named}, folder)

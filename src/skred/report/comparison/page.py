@@ -6,6 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from skred.report.comparison.lay import lay_words
+from skred.report.comparison.pit import pit_rows
+from skred.report.comparison.ranking import event_rows, order_rows, rival_rows
 from skred.report.shared import document as doc
 from skred.report.shared.html import page
 from skred.report.shared.numbers import decimals_for, fixed, is_number, rounded
@@ -20,6 +23,11 @@ _TITLES = {
     "pareto_k": "Pareto k of each event: above the limit, importance sampling cannot be trusted.",
     "predictions": "Mean response of each law at each sensor against the mean of the recordings.",
     "evidence": "Log evidence of each law; every seed is a point.",
+    "ranking": "Difference of elpd to the best law: without each avalanche, and without more and more of those that"
+    " favour the best law most; above 0 the order has turned.",
+    "loo_pit": "Share of readings that lie below a place in their prediction, less what is expected: a line within the"
+    " band says nothing against the predictions. A hump: readings are lower than predicted; a trough: higher. First"
+    " below and then above 0: predictions are not sure enough; the other way round: too sure.",
     "trace": "Traces of all chains, and the ranks of their draws.",
     "joint": "Joint posterior of the parameters with marginal histograms.",
     "marginals": "Posterior of each parameter against its prior density.",
@@ -41,6 +49,8 @@ _OF_A_POPULATION = ("new_avalanche", "population", "events")
 _SECTIONS = {
     "recorded": "What was recorded",
     "preferred": "Which law the recordings prefer, and by how much",
+    "change": "What would change the ranking",
+    "foretold": "Are the predictions as sure as they should be?",
     "trust": "Can the chains be trusted?",
     "population": "Every avalanche its own friction",
     "likelihoods": "Pooled and hierarchical side by side",
@@ -91,6 +101,11 @@ def render_comparison(comparison: doc.Document, figures: Mapping[str, Picture]) 
         limits=doc.get(comparison, "limits") or {},
         k_limit=doc.pareto_k_limit(comparison),
         counts=_counts,
+        lay=lay_words(comparison),
+        rivals=rival_rows(comparison),
+        orders=order_rows(comparison),
+        events=event_rows(comparison),
+        pits=pit_rows(comparison),
         within_factor=_within_factor,
         relative=relative_response,
         relative_new=relative_new_avalanche,
@@ -103,6 +118,8 @@ def _sections(comparison: doc.Document) -> dict[str, str]:
     has = {
         "population": hierarchical,
         "likelihoods": hierarchical and doc.get(comparison, "pooled") is not None,
+        "change": bool(rival_rows(comparison)),
+        "foretold": bool(pit_rows(comparison)),
         "errors": hierarchical and bool(doc.listed(comparison, "error_models")),
     }
     return {name: title for name, title in _SECTIONS.items() if has.get(name, True)}

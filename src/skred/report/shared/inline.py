@@ -8,6 +8,7 @@ places is laid over it as transparent targets with a title each: a browser shows
 from __future__ import annotations
 
 import io
+import math
 import re
 import warnings
 from typing import TYPE_CHECKING
@@ -27,6 +28,10 @@ _TARGET = 7.0
 """Radius of a target, in points: as large as a finger's tip needs on a telephone, nearly."""
 _DROPPED = frozenset({"font-family", "stroke-linejoin", "stroke-linecap", "font-stretch", "font-variant"})
 _MOST_FOLDS = 3
+_PLACES, _CLOSEST, _LONG = 1, 0.6, 80
+"""Of paths: decimals of a point, and which points of which are left out: closer ones of longer ones."""
+_RASTER = 110
+"""Dots per inch of what has too many points to be drawn as lines."""
 _TICK_WIDTH = 0.55
 """Inches that a tick's label takes."""
 
@@ -130,7 +135,7 @@ def _drawn(figure: Figure) -> ElementTree.Element:
     into = io.StringIO()
     with warnings.catch_warnings(), matplotlib.rc_context({"svg.hashsalt": "skred", "svg.fonttype": "none"}):
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
-        figure.savefig(into, format="svg", metadata={"Date": None, "Creator": None})
+        figure.savefig(into, format="svg", dpi=_RASTER, metadata={"Date": None, "Creator": None})
     return ElementTree.fromstring(into.getvalue())
 
 
@@ -164,8 +169,9 @@ def _plain_attributes(element: ElementTree.Element) -> None:
         colour = element.get(name, "")
         if re.fullmatch(r"#[0-9a-fA-F]{6}", colour):
             element.set(name, f"var(--c{colour[1:].lower()})")
+    if "d" in element.attrib:
+        element.set("d", _short_path(element.attrib["d"]))
     for name in (
-        "d",
         "transform",
         "x",
         "y",
@@ -185,6 +191,22 @@ def _plain_attributes(element: ElementTree.Element) -> None:
 
 def _short(text: str) -> str:
     return " ".join(re.sub(r"-?\d+\.\d+(?:e-?\d+)?", lambda found: f"{float(found[0]):.2f}", text).split())
+
+
+def _short_path(text: str) -> str:
+    """A path with numbers of a tenth of a point; of long lines no points closer than that can be seen."""
+    points = re.findall(r"([MLCQzZ])([^MLCQzZ]*)", text)
+    thinned, last = [], (math.inf, math.inf)
+    for number, (command, numbers) in enumerate(points):
+        at = tuple(float(one) for one in numbers.split())
+        next_is_line = number + 1 < len(points) and points[number + 1][0] == "L"
+        close = len(at) == 2 and math.dist(at, last) < _CLOSEST
+        if command == "L" and next_is_line and close and len(points) > _LONG:
+            continue
+        last = at if len(at) == 2 else (math.inf, math.inf)
+        same = command == "L" and thinned and thinned[-1][0] in "LM"
+        thinned.append((command, " " if same else command, " ".join(f"{one:.{_PLACES}f}" for one in at)))
+    return "".join(shown + numbers for _, shown, numbers in thinned)
 
 
 def _own_ids(root: ElementTree.Element, key: str) -> None:
