@@ -20,14 +20,15 @@ def loo_pit(tree: xr.DataTree, log_weights: xr.DataArray) -> list[dict[str, Any]
     tree : DataTree
         A calibration: ``observed_data`` and ``posterior_predictive`` by sensor are read.
     log_weights : DataArray
-        Of the draws (event, chain, draw) for each avalanche left out as a whole, smoothed; as `arviz_stats.loo`
-        gives them.
+        Of the draws (event, chain, draw) for each avalanche left out as a whole, smoothed; see
+        `arviz_stats.loo`.
 
     Returns
     -------
     list of dict
-        For each sensor: ``sensor``; ``events``; ``below`` and ``up_to``, the probability of a reading that is
-        smaller, and of one that is not larger, for each. The two differ where a front may not come: it reads 0.
+        For each sensor: ``sensor``; ``events``; ``below`` and ``up_to``, the probability of a reading that
+        is smaller, and of one that is not larger, for each. They differ where a front may
+        not come, which reads 0.
     """
     observed, predicted = (tree[name].to_dataset() for name in ("observed_data", "posterior_predictive"))
     rows = []

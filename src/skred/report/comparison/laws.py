@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 _MAX_NAMED_EVENTS = 45
 _LOWEST_K = -0.5
 COMPARISON_FIGURES = (
-    "comparison_elpd", "pointwise", "pareto_k", "predictions", "evidence", "likelihoods", "ranking", "loo_pit",
+    "comparison_elpd", "pointwise", "pareto_k", "predictions", "evidence", "likelihoods", "ranking",
+    "loo_pit",
 )  # fmt: skip
 """Names of all figures that there may be."""
 
@@ -45,8 +46,8 @@ def save_comparison_figures(comparison: Document, folder: Path) -> dict[str, Pic
     Returns
     -------
     dict of Picture
-        By name: comparison_elpd, pointwise, pareto_k, predictions, evidence, ranking, loo_pit; of a hierarchical comparison
-        that has a pooled one beside it also likelihoods.
+        By name, see `COMPARISON_FIGURES`; likelihoods only of a hierarchical comparison with a pooled one
+        beside it.
     """
     predictions = new_avalanches_figure if is_hierarchical(comparison) else predictions_figure
     makers = (

@@ -15,8 +15,8 @@ def lay_words(comparison: Document) -> list[str]:
     n = whole(get(campaign, "n_events"))
     asked = (
         f"{_number(laws, failed(comparison))} of how avalanches slow down were fitted to the {n} avalanches"
-        f" recorded at {printable(get(campaign, 'name') or 'this path')}. Question: which predicts best an avalanche"
-        " that it has not seen?"
+        f" recorded at {printable(get(campaign, 'name') or 'this path')}. Question: which predicts best an"
+        " avalanche that it has not seen?"
     )
     if not laws:
         return [
@@ -63,7 +63,8 @@ def _firm(comparison: Document, n: str) -> list[str]:
         one = "avalanche" if count == 1 else "avalanches"
         return [f"Take that with care: without {count} {one} ({which}) {name} would be ahead of {first}."]
     return [
-        f"The order does not hang on a few: {count} of the {n} avalanches would have to go before {name} were first."
+        f"That {first} is first does not hang on a few: {count} of the {n} avalanches would have to go before"
+        " another were ahead of it."
     ]
 
 
@@ -71,9 +72,8 @@ def _miss(laws: Sequence[Document]) -> list[str]:
     """Best of several need not be good."""
     if get(laws[0], "fits") is not False:
         return []
-    return [
-        f"Best does not mean good: {printable(get(laws[0], 'id'))} misses some recordings by more than chance allows."
-    ]
+    name = printable(get(laws[0], "id"))
+    return [f"Best does not mean good: {name} misses some recordings by more than chance allows."]
 
 
 def _meaning(laws: Sequence[Document]) -> str:

@@ -23,11 +23,12 @@ _TITLES = {
     "pareto_k": "Pareto k of each event: above the limit, importance sampling cannot be trusted.",
     "predictions": "Mean response of each law at each sensor against the mean of the recordings.",
     "evidence": "Log evidence of each law; every seed is a point.",
-    "ranking": "Difference of elpd to the best law: without each avalanche, and without more and more of those that"
-    " favour the best law most; above 0 the order has turned.",
-    "loo_pit": "Share of readings that lie below a place in their prediction, less what is expected: a line within the"
-    " band says nothing against the predictions. A hump: readings are lower than predicted; a trough: higher. First"
-    " below and then above 0: predictions are not sure enough; the other way round: too sure.",
+    "ranking": "Difference of elpd to the best law: without each avalanche, and without more and more of"
+    " those that favour the best law most; above 0 the order has turned.",
+    "loo_pit": "Share of readings that lie below a place in their prediction, less what is expected: a line"
+    " within the band says nothing against the predictions. A hump: readings are lower than predicted; a"
+    " trough: higher. First below and then above 0: predictions are not sure enough; the other way round: too"
+    " sure.",
     "trace": "Traces of all chains, and the ranks of their draws.",
     "joint": "Joint posterior of the parameters with marginal histograms.",
     "marginals": "Posterior of each parameter against its prior density.",

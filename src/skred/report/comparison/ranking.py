@@ -154,7 +154,7 @@ def event_rows(comparison: Document) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``laws``: ids; ``rows``: of ``event``, ``best``, ``differences`` and ``k``; empty where scores are missing.
+        ``laws``: ids; ``rows``: of ``event``, ``best``, ``differences`` and ``k``; empty without scores.
     """
     events = listed(comparison, "event_ids")
     laws = [

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from skred.report.scorecard.lay import lay_words
 from skred.report.scorecard.sections import sections_of
 from skred.report.shared.document import Document, get, listed
 from skred.report.shared.html import page
@@ -34,6 +35,7 @@ def render_scorecard(document: Document, figures: Mapping[str, Picture]) -> str:
         figures,
         d=document,
         sections=sections_of(document),
+        lay=lay_words(document),
         called=Counter(bar["status"] for bar in listed(document, "bars")),
         ledger=get(document, "ledger") or {},
     )

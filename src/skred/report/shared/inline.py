@@ -63,7 +63,8 @@ def inline_svg(figure: Figure, key: str) -> str:
         "role": "img",
         "aria-label": "",
     }
-    ElementTree.register_namespace("", _SVG)
+    for element in root.iter():  # a page knows what svg is
+        element.tag = element.tag.rpartition("}")[2]
     return ElementTree.tostring(root, encoding="unicode")
 
 
