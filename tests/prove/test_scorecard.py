@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from page_checks import check_page
 from scorecard_cases import CRASH, QUIET, drawn, effect, named, truth
 
 from skred.prove.scorecard import scorecard, write_scorecard
@@ -77,6 +78,7 @@ def test_every_part_has_every_kind(card: tuple[Path, dict[str, Any]]) -> None:
 
 def test_the_page_is_self_contained_and_names_are_escaped(card: tuple[Path, dict[str, Any]]) -> None:
     _, page = written(card[0])
+    check_page(page)
     assert (
         page.count("<script>") == 1
         and "<script>alert" not in page

@@ -12,8 +12,8 @@ def lay_words(document: Document) -> list[str]:
     own = get(document, "methods", str(get(document, "diagnosis")), "open", "all")
     told = [
         f"How often is the diagnosis right? It was given {get(document, 'n_trials')} made-up campaigns whose"
-        " answer was laid aside and sealed beforehand: in some a force or a fault of an instrument is hidden, in"
-        " others nothing."
+        " answer was laid aside and sealed beforehand: in some a force or a fault of an instrument is hidden,"
+        " in others nothing."
     ]
     alarms = _of(own, "false_alarms", "all")
     if alarms:

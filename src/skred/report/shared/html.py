@@ -108,13 +108,13 @@ def _reachable_tables(html: str) -> str:
 
     pattern = r'<div class="wide">(?P<table><table[^>]*>\s*)(?P<caption><caption>)?'
     html = re.sub(pattern, named, html).replace("</caption>", "</span></caption>")
-    html = re.sub(r"(<tr[^>]*>)<th(?=[ >])", r'\1<th scope="row"', html)
-    return re.sub(
+    html = re.sub(
         r"<thead>.*?</thead>",
-        lambda head: re.sub(r'<th(?: scope="row")?(?=[ >])', '<th scope="col"', head[0]),
+        lambda head: re.sub(r"<th(?=[ >])", '<th scope="col"', head[0]),
         html,
         flags=re.DOTALL,
     )
+    return re.sub(r"<th(?=[ >])(?! scope=)", '<th scope="row"', html)
 
 
 def drawn(figures: Mapping[str, Picture], key: str, words: str) -> Markup:

@@ -47,8 +47,11 @@ def inline_svg(figure: Figure, key: str) -> str:
     key : str
         Letters and digits that no other figure of the page has: ids begin with it.
     """
-    _finish(figure)
-    root = _drawn(figure)
+    with warnings.catch_warnings():
+        # Names may be in any script; a box for a missing glyph is no reason to fail.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        _finish(figure)
+        root = _drawn(figure)
     _without_what_a_page_has(root)
     for element in root.iter():
         _plain_attributes(element)
@@ -134,8 +137,7 @@ def _drawn(figure: Figure) -> ElementTree.Element:
     import matplotlib
 
     into = io.StringIO()
-    with warnings.catch_warnings(), matplotlib.rc_context({"svg.hashsalt": "skred", "svg.fonttype": "none"}):
-        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+    with matplotlib.rc_context({"svg.hashsalt": "skred", "svg.fonttype": "none"}):
         figure.savefig(into, format="svg", dpi=_RASTER, metadata={"Date": None, "Creator": None})
     return ElementTree.fromstring(into.getvalue())
 
