@@ -22,6 +22,7 @@ from skred.report.shared.style import (
     INK,
     WIDTH,
     bare,
+    grow,
     is_narrow,
     law_colours,
     new_figure,
@@ -66,7 +67,7 @@ def trace_figure(tree: xr.DataTree) -> Figure:
     title = "Chains: traces that overlap and ranks that are level have mixed"
     figure = new_figure(0.9 + 1.75 * n, f"{title}\n{figure_text(law.title, 80)}\n{gate_text(tree)}")
     if is_narrow():
-        figure.set_size_inches(figure.get_size_inches() * (1.0, 1.6))
+        grow(figure, 1.6)
         panels = figure.subplots(2 * n, 1, squeeze=False).reshape(n, 2)
     else:
         panels = figure.subplots(n, 2, squeeze=False, gridspec_kw={"width_ratios": [1.7, 1]})

@@ -28,6 +28,7 @@ from skred.report.shared.style import (
     INK,
     RECORDED,
     bare,
+    grow,
     is_narrow,
     law_colours,
     legend_below,
@@ -70,7 +71,7 @@ def population_figure(tree: xr.DataTree) -> Figure:
     figure = new_figure(height, f"{title}\n{figure_text(law.title, 80)}")
     layout: dict[str, Any] = {"width_ratios": [1.7, 1]} if len(pairs) == 1 else {}
     if is_narrow():
-        figure.set_size_inches(figure.get_size_inches() * (1.0, 1.7))
+        grow(figure, 1.7)
         panels = figure.subplots(2 * rows, 1, squeeze=False).ravel()
     else:
         panels = figure.subplots(rows, 2, squeeze=False, gridspec_kw=layout).ravel()

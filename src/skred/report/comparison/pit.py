@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,24 +28,72 @@ INSIDE = 0.9
 """Probability that the whole line stays in the band, where predictions are right."""
 
 
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Places of one sensor's readings in their predictions.
+
+    Attributes
+    ----------
+    events : list of str
+    below, up_to : (n,) arrays
+        Probability of a reading that is smaller, and of one that is not larger. Between them the place of a
+        front that may not come, which reads 0, is spread evenly (Czado, Gneiting and Held, 2009).
+    """
+
+    events: list[str]
+    below: FloatArray
+    up_to: FloatArray
+
+    @property
+    def middle(self) -> FloatArray:
+        """One place for each reading."""
+        return 0.5 * (self.below + self.up_to)
+
+    def line(self) -> tuple[FloatArray, FloatArray]:
+        """Corners of the share of readings below a place, less that place."""
+        at = np.unique(np.concatenate([[0.0, 1.0], self.below, self.up_to]))
+        width = self.up_to - self.below
+        spread = np.clip((at[:, None] - self.below) / np.where(width > 0.0, width, 1.0), 0.0, 1.0)
+        before, after = (
+            np.where(width > 0.0, spread, step(at[:, None], self.below)).mean(axis=1) - at
+            for step in (np.greater, np.greater_equal)
+        )
+        return np.repeat(at, 2), np.column_stack([before, after]).ravel()
+
+    def share_inside(self, low: float, high: float) -> float:
+        """Share of the places between two values."""
+        at, line = self.line()
+        return float(np.interp(high, at, line + at) - np.interp(low, at, line + at))
+
+
 def _sensors(comparison: Document) -> list[str]:
     """Sensors of which some law has enough places."""
     names = (
         str(get(one, "sensor"))
         for law in ranked(comparison)
         for one in listed(law, "loo", "pit")
-        if len(places_of(one)) >= _LEAST
+        if places_of(one) is not None
     )
     return list(dict.fromkeys(names))
 
 
-def places_of(one: Document) -> FloatArray:
-    """Places between 0 and 1, those of a front that may not come in the middle of what reads 0."""
+def _of(comparison: Document, sensor: str) -> list[tuple[str, Places]]:
+    """Each law's places of a sensor."""
+    found = []
+    for law in ranked(comparison):
+        for one in listed(law, "loo", "pit"):
+            places = places_of(one)
+            if str(get(one, "sensor")) == sensor and places is not None:
+                found.append((str(get(law, "id")), places))
+    return found
+
+
+def places_of(one: Document) -> Places | None:
+    """Places of a sensor's readings; None where there are too few, or numbers are missing."""
+    events = list(map(str, listed(one, "events")))
     below, up_to = (floats(listed(one, name)) for name in ("below", "up_to"))
-    if len(below) != len(up_to) or len(below) != len(listed(one, "events")):
-        return np.empty(0)
-    middle = 0.5 * (below + up_to)
-    return middle if np.isfinite(middle).all() else np.empty(0)
+    whole = len(below) == len(up_to) == len(events) >= _LEAST
+    return Places(events, below, up_to) if whole and np.isfinite(below + up_to).all() else None
 
 
 def _limit(n: int) -> float:
@@ -52,13 +101,6 @@ def _limit(n: int) -> float:
     from scipy.stats import kstwo
 
     return float(kstwo.ppf(INSIDE, n))
-
-
-def _departure(places: FloatArray) -> float:
-    """Largest distance of the share of places below a value from that value."""
-    ordered, n = np.sort(places), len(places)
-    above, below = np.arange(1, n + 1) / n - ordered, ordered - np.arange(n) / n
-    return float(max(above.max(), below.max()))
 
 
 @styled
@@ -82,33 +124,18 @@ def pit_figure(comparison: Document) -> Figure | None:
 
 def _panel(axes: Axes, comparison: Document, sensor: str) -> None:
     colours, _ = styles(comparison)
-    banded = False
-    for law in ranked(comparison):
-        for one in listed(law, "loo", "pit"):
-            places = places_of(one)
-            if str(get(one, "sensor")) != sensor or len(places) < _LEAST:
-                continue
-            if not banded:
-                limit = _limit(len(places))
-                axes.axhspan(
-                    -limit,
-                    limit,
-                    color=PALE,
-                    linewidth=0,
-                    label=f"holds the line with probability {INSIDE:g}",
-                )
-                banded = True
-            name, colour = str(get(law, "id")), colours[str(get(law, "id"))]
-            order = np.argsort(places, kind="stable")
-            steps = np.arange(len(places) + 1) / len(places)
-            x = np.repeat(np.concatenate([[0.0], places[order], [1.0]]), 2)[1:-1]
-            axes.plot(x, np.repeat(steps, 2) - x, color=colour, linewidth=1.2, label=figure_text(name, 24))
-            events = [str(listed(one, "events")[k]) for k in order]
-            told = [
-                f"{event}, {sensor}, {name}: {100 * p:.0f} % of the prediction lies below the reading"
-                for event, p in zip(events, places[order].tolist(), strict=True)
-            ]
-            mark(axes, places[order], steps[1:] - places[order], told, events)
+    for number, (law, places) in enumerate(_of(comparison, sensor)):
+        if number == 0:
+            limit = _limit(len(places.events))
+            label = f"holds the line with probability {INSIDE:g}"
+            axes.axhspan(-limit, limit, color=PALE, linewidth=0, label=label)
+        x, y = places.line()
+        axes.plot(x, y, color=colours[law], linewidth=1.2, label=figure_text(law, 24))
+        told = [
+            f"{event}, {sensor}, {law}: {100 * p:.0f} % of the prediction lies below the reading"
+            for event, p in zip(places.events, places.middle.tolist(), strict=True)
+        ]
+        mark(axes, places.middle, np.interp(places.middle, x, y), told, places.events)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.set_xlim(0.0, 1.0)
     axes.set_title(figure_text(sensor, 30))
@@ -119,38 +146,31 @@ def pit_rows(comparison: Document) -> list[dict[str, Any]]:
     """For each sensor and law: how many readings, where they lie, and how far from even, as text."""
     rows = []
     for sensor in _sensors(comparison):
-        for law in ranked(comparison):
-            for one in listed(law, "loo", "pit"):
-                places = places_of(one)
-                if str(get(one, "sensor")) != sensor or len(places) < _LEAST:
-                    continue
-                departure, limit = _departure(places), _limit(len(places))
-                inside = float(np.mean((places > _MIDDLE[0]) & (places < _MIDDLE[1])))
-                rows.append(
-                    {
-                        "sensor": printable(sensor),
-                        "law": printable(get(law, "id")),
-                        "n": len(places),
-                        "mean": fixed(float(places.mean())),
-                        "inside": share(inside),
-                        "departure": fixed(departure),
-                        "limit": fixed(limit),
-                        "told": _told(places, departure > limit),
-                    }
-                )
+        for law, places in _of(comparison, sensor):
+            _, line = places.line()
+            limit = _limit(len(places.events))
+            rows.append(
+                {
+                    "sensor": printable(sensor),
+                    "law": printable(law),
+                    "n": len(places.events),
+                    "mean": fixed(float(places.middle.mean())),
+                    "inside": share(places.share_inside(*_MIDDLE)),
+                    "departure": fixed(float(np.abs(line).max())),
+                    "limit": fixed(limit),
+                    "told": told(line, limit),
+                }
+            )
     return rows
 
 
-def _told(places: FloatArray, departs: bool) -> str:
-    """What the places say, in words."""
-    if not departs:
-        return "nothing against it"
-    if abs(float(places.mean()) - 0.5) > 2.0 / np.sqrt(12.0 * len(places)):
+def told(line: FloatArray, limit: float) -> str:
+    """What the line of the places says, in words."""
+    above, below = float(line.max()) > limit, float(line.min()) < -limit
+    if above and below:
         return (
-            "readings are lower than predicted"
-            if places.mean() < 0.5
-            else "readings are higher than predicted"
+            "predictions are too sure" if line.argmax() < line.argmin() else "predictions are not sure enough"
         )
-    return (
-        "predictions are too sure" if float(places.var()) > 1.0 / 12.0 else "predictions are not sure enough"
-    )
+    if above or below:
+        return f"readings are {'lower' if above else 'higher'} than predicted"
+    return "nothing against it"

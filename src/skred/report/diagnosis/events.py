@@ -63,21 +63,21 @@ def reading_rows(tree: xr.DataTree) -> Rows:
         sensor = recordings.sensors[column]
         zero = (recordings.reference_s_m or 0.0) if sensor.is_runout else 0.0
         decimals = 0 if sensor.is_runout else 1
-        at = {"event": int(event), "sensor": int(column), "zero": zero, "decimals": decimals}
+        at = (int(event), int(column), zero, decimals)
         rows.append(
             {
                 "event": printable(recordings.event_ids[event]),
                 "sensor": printable(sensor.id),
                 "unit": unit_text("m" if sensor.is_runout else "m s-1"),
                 "recorded": fixed(float(recordings.values[event, column] - zero), decimals),
-                "others": [_band(held, when, **at) for when in _WHEN],
-                "above": [_band(given, when, **at) for when in _WHEN],
+                "others": [_band(held, when, *at) for when in _WHEN],
+                "above": [_band(given, when, *at) for when in _WHEN],
             }
         )
     return rows
 
 
-def _band(found: xr.Dataset | None, when: str, *, event: int, sensor: int, zero: float, decimals: int) -> str:
+def _band(found: xr.Dataset | None, when: str, event: int, sensor: int, zero: float, decimals: int) -> str:
     """Mean and 90 % interval of a prediction; a dash where there is none."""
     if found is None or when not in found["when"].values:
         return "-"

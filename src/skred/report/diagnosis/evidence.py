@@ -31,6 +31,7 @@ from skred.report.shared.style import (
     PALE,
     RECORDED,
     folded,
+    grow,
     is_narrow,
     legend_below,
     new_figure,
@@ -92,7 +93,7 @@ def strength_figure(document: doc.Document, tree: xr.DataTree, number: int) -> F
     title = f"{figure_text(short_title(document, name), 60)} ({what}): evidence along its coefficient"
     figure = new_figure(5.6, f"{title}\n{figure_text(_shape_text(comparison, name), 90)}")
     if is_narrow():
-        figure.set_size_inches(figure.get_size_inches() * (1.0, 1.6))
+        grow(figure, 1.6)
         panels = figure.subplot_mosaic([["evidence"], ["density"], ["scale"]])
     else:
         panels = figure.subplot_mosaic([["evidence", "density"], ["scale", "scale"]])

@@ -17,6 +17,7 @@ from skred.report.shared.style import (
     INK,
     RECORDED,
     folded,
+    grow,
     is_narrow,
     law_colours,
     legend_below,
@@ -107,7 +108,7 @@ def _panels(figure: Figure, n: int) -> Any:
     ratios = [1.3, 1.15, 1.0]
     if not is_narrow() or n == 1:
         return figure.subplots(3, n, sharex="col", squeeze=False, gridspec_kw={"height_ratios": ratios})
-    figure.set_size_inches(figure.get_size_inches() * (1.0, 1.45))
+    grow(figure, 1.45)
     panels = figure.subplots(3 * n, 1, squeeze=False, gridspec_kw={"height_ratios": n * ratios})
     panels = panels[:, 0].reshape(n, 3).T
     for column in range(n):
@@ -302,7 +303,7 @@ def uncertainty_figure(document: Document, tree: xr.DataTree) -> Figure:
     title = f"Where the uncertainty comes from, on {figure_text(data.attrs['track'], 40)}"
     figure = new_figure(6.6, f"{title}\n{figure_text(_subtitle(data, document), 100)}")
     if is_narrow():
-        figure.set_size_inches(figure.get_size_inches() * (1.0, 1.2))
+        grow(figure, 1.2)
     speed, arrival, runout = figure.subplots(3, 1, gridspec_kw={"height_ratios": [1.6, 0.7, 1.0]})
     s_m = data["s"].values
     for part, (colour, dashes, label) in _PART_STYLES.items():

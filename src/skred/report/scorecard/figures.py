@@ -23,6 +23,7 @@ from skred.report.shared.style import (
     GREY,
     INK,
     folded,
+    grow,
     is_narrow,
     legend_below,
     new_figure,
@@ -132,7 +133,7 @@ def power_figure(document: Document) -> Figure | None:
         return None
     figure = new_figure(6.2, "What is found and what is named, against signal-to-noise")
     if is_narrow():
-        figure.set_size_inches(figure.get_size_inches() * (1.0, 1.7))
+        grow(figure, 1.7)
     rows, columns = (4, 1) if is_narrow() else (2, 2)
     panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).reshape(2, 2)
     for column, kind in enumerate(_KINDS):

@@ -196,7 +196,8 @@ def baselines_figure(document: Document) -> Figure | None:
             one = get(paired, name, kind, "right_first_name")
             if one["difference"] is None:
                 continue
-            y, style = row + shift, {"color": colour, "markersize": 5}
+            y = row + shift
+            style: dict[str, Any] = {"color": colour, "markersize": 5}
             shares.plot([one["theirs"], one["ours"]], [y, y], color=colour, linewidth=0.8)
             shares.plot(one["theirs"], y, "o", markerfacecolor="white", label=f"{kind}: baseline", **style)
             shares.plot(one["ours"], y, "o", label=f"{kind}: diagnosis", **style)

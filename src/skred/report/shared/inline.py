@@ -199,7 +199,8 @@ def _short(text: str) -> str:
 def _short_path(text: str) -> str:
     """A path with numbers of a tenth of a point; of long lines no points closer than that can be seen."""
     points = re.findall(r"([MLCQzZ])([^MLCQzZ]*)", text)
-    thinned, last = [], (math.inf, math.inf)
+    thinned: list[tuple[str, str, str]] = []
+    last: tuple[float, ...] = (math.inf, math.inf)
     for number, (command, numbers) in enumerate(points):
         at = tuple(float(one) for one in numbers.split())
         next_is_line = number + 1 < len(points) and points[number + 1][0] == "L"

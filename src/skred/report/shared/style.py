@@ -173,6 +173,12 @@ def new_figure(height: float, title: str, width: float = WIDTH) -> Figure:
     return figure
 
 
+def grow(figure: Figure, factor: float) -> None:
+    """Make a figure taller."""
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(float(width), factor * float(height))
+
+
 def side_by_side(
     figure: Figure, n: int, *, sharey: bool = False, width_ratios: Sequence[float] | None = None
 ) -> list[Axes]:
