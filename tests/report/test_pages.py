@@ -8,11 +8,13 @@ import pytest
 from diagnosis_report_cases import documents
 from hierarchical_cases import hierarchical_comparison
 from page_checks import check_page, texts, without_scripts
-from report_cases import as_saved, calibration, comparison, entry, pit, ryggfonn
+from report_cases import as_saved, calibration, comparison, entry, gate, pit, ryggfonn
+from test_report_html import hostile, nulls
 
 from skred.model_selection.ranking import ranking
 from skred.physics.laws import load_law
 from skred.report.calibration.figures import save_model_figures
+from skred.report.calibration.page import render_calibration
 from skred.report.comparison.laws import save_comparison_figures
 from skred.report.comparison.page import render_comparison
 from skred.report.diagnosis.report import render_diagnosis, save_diagnosis_figures
@@ -99,6 +101,42 @@ def test_an_order_that_hangs_on_one_avalanche_is_told_first():
 def test_older_documents_have_no_such_sections():
     text = without_scripts(render_comparison(comparison(), {}))
     assert "What would change the ranking" not in text and "as sure as they should be" not in text
+
+
+def calibrated():
+    """What ``summary.json`` says of a law."""
+    law = entry("pcm", [-14.0] * 4, [-14.0] * 4)
+    fit = {
+        "sensor": "sensor 0", "unit": "m/s", "n_recorded": 21, "recorded_mean": 32.1, "recorded_sd": 12.4,
+        "predicted_mean": 33.3, "predicted_sd": 12.2, "predicted_mean_se": 3.8, "p_mean": 0.99, "p_sd": 1.0,
+        "inside": 0.95, "fits": True,
+    }  # fmt: skip
+    keys = ("id", "title", "equation", "gate", "parameters", "response")
+    interval = {"kind": "equal-tailed", "probability": 0.9}
+    return {
+        "format": 1, "campaign": "ryggfonn", "likelihood": "pooled", "interval": interval, "fits": True,
+        "fit": [fit], "fit_level": 0.01, "settings": {"draws": 1000}, "versions": {"skred": "0.1.0"},
+        **{key: law[key] for key in keys},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("change", [{}, {"fits": False}, {"gate": gate(passed=False)}, {"fit": None}])
+def test_a_calibration_is_a_page_for_everyone(change):
+    page = check_page(render_calibration(calibrated() | change, {}))
+    lay = next(one for one in page.all("p") if one.has("lay")).text
+    assert ("Do not use these numbers" in lay) == ("gate" in change)
+    assert "0.287" in page.text and "A simple model (pcm)" in lay
+
+
+def test_anything_may_be_null_in_a_calibration():
+    for one in ({}, nulls(calibrated()), dict.fromkeys(calibrated())):
+        text = check_page(render_calibration(one, {})).text
+        assert "None" not in text and "nan" not in text.split()
+
+
+def test_names_of_a_calibration_are_escaped():
+    html = render_calibration(hostile(calibrated()), {})
+    assert "<script>alert" not in html and "<script>alert" in check_page(html).text
 
 
 def test_colours_in_the_dark_lose_no_contrast():

@@ -114,8 +114,11 @@ def _plain_name(name: Any, folder: Path) -> str:
 
 
 def _calibration(folder: Path, beside: Path) -> list[str]:
-    _read_document(folder / "summary.json", "format")
-    _model_figures(folder, beside)
+    from skred.report.calibration.page import render_calibration
+
+    document = _read_document(folder / "summary.json", "format")
+    figures = _model_figures(folder, beside)
+    write_text(beside / "report.html", render_calibration(document, figures))
     return _possible_of_a_model()
 
 
