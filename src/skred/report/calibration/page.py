@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from skred.report.shared import document as doc
 from skred.report.shared.html import page
-from skred.report.shared.labels import printable, unit_text
+from skred.report.shared.labels import name_text, printable, unit_text
 from skred.report.shared.numbers import decimals_for, fixed, is_number, rounded, share, whole
 from skred.report.shared.relative import relative_new_avalanche, relative_response
 
@@ -69,6 +69,7 @@ def lay_words(document: doc.Document) -> list[str]:
             *told,
             "The computation did not come to an end that can be trusted. Do not use these numbers.",
         ]
+    told += _known(document)
     if doc.get(document, "fits") is False:
         missed = [one["sensor"] for one in _fit_rows(document) if one["fits"] == "no"]
         told.append(f"The model does not describe what was recorded at {', '.join(missed)}.")
@@ -76,6 +77,23 @@ def lay_words(document: doc.Document) -> list[str]:
         told.append("Nothing recorded lies beyond what the model predicts. That does not make it right.")
     what = "single new avalanches" if doc.listed(document, "new_avalanche") else "the mean of many avalanches"
     return [*told, f"The predictions below are of {what}. All numbers hold for this path only."]
+
+
+def _known(document: doc.Document) -> list[str]:
+    """What the parameters are, and how surely; of a population its medians."""
+    parts = []
+    for one in doc.listed(document, "parameters"):
+        values = [doc.get(one, key) for key in ("mean", "low", "high")]
+        name = printable(doc.get(one, "name"))
+        if not all(map(is_number, values)) or name.endswith(("_spread", "_correlation")):
+            continue
+        decimals = decimals_for(doc.get(one, "sd"))
+        mean, low, high = (rounded(value, decimals) for value in values)
+        unit = unit_text(doc.get(one, "unit"))
+        parts.append(
+            f"{name_text(name)} {mean}{'' if unit == '-' else f' {unit}'} (between {low} and {high})"
+        )
+    return [f"Answer: {'; '.join(parts)}."] if parts else []
 
 
 def _fit_rows(document: doc.Document) -> list[dict[str, Any]]:
