@@ -13,6 +13,8 @@ from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.inference.paired import paired_difference
 
 FloatArray = NDArray[np.float64]
+_NONE = 1e-9
+"""A difference of elpd that is none [nats]."""
 _SCHEMES = {"exact": "elpd", "loo": "elpd", "waic": "elpd", "evidence": "mean"}
 """Scores by which laws can be put in an order, and the key of each."""
 
@@ -99,7 +101,7 @@ def _reversed_without(
 ) -> list[str] | None:
     """The smallest set whose removal turns the sign: the largest terms, as few as do."""
     left = lead.sum() - np.cumsum(lead[strongest])
-    turned = np.flatnonzero(left[:-1] < 0.0)  # one avalanche at least is left
+    turned = np.flatnonzero(left[:-1] < -_NONE)  # one avalanche at least is left
     return [events[k] for k in strongest[: turned[0] + 1]] if len(turned) else None
 
 
