@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skred.report.shared import document as doc
 from skred.report.shared.labels import printable, unit_text
@@ -15,7 +16,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Rows = list[dict[str, Any]]
-_WHEN = ("before", "after")
+Bands = dict[str, NDArray[np.float64]]
+_WHEN, _BAND = ("before", "after"), ("mean", "low", "high")
+MOST_ROWS = 3000
+"""Readings that a page lists."""
 MOST_OPEN = 120
 """Readings of a table that is open when the page opens."""
 
@@ -52,37 +56,50 @@ def event_rows(document: doc.Document, tree: xr.DataTree) -> Rows:
 
 
 def reading_rows(tree: xr.DataTree) -> Rows:
-    """One row a reading that was predicted from the other avalanches, and from the readings above it."""
+    """One row a reading that was predicted from the other avalanches, and from the readings above it.
+
+    None with more readings than a page holds: they are in ``diagnosis.nc``.
+    """
     if "held_out" not in tree.children:
         return []
     recordings = recordings_of(tree)
-    held = tree["held_out"].to_dataset()
-    given = tree["conditional"].to_dataset() if "conditional" in tree.children else None
+    if recordings.observed.sum() > MOST_ROWS:
+        return []
+    others, above = _predictions(tree, "held_out"), _predictions(tree, "conditional")
     rows = []
-    for event, column in np.argwhere(recordings.observed):
+    for event, column in np.argwhere(recordings.observed).tolist():
         sensor = recordings.sensors[column]
         zero = (recordings.reference_s_m or 0.0) if sensor.is_runout else 0.0
         decimals = 0 if sensor.is_runout else 1
-        at = (int(event), int(column), zero, decimals)
+        at = (event, column, zero, decimals)
         rows.append(
             {
                 "event": printable(recordings.event_ids[event]),
                 "sensor": printable(sensor.id),
                 "unit": unit_text("m" if sensor.is_runout else "m s-1"),
                 "recorded": fixed(float(recordings.values[event, column] - zero), decimals),
-                "others": [_band(held, when, *at) for when in _WHEN],
-                "above": [_band(given, when, *at) for when in _WHEN],
+                "others": [_band(others.get(when), *at) for when in _WHEN],
+                "above": [_band(above.get(when), *at) for when in _WHEN],
             }
         )
     return rows
 
 
-def _band(found: xr.Dataset | None, when: str, event: int, sensor: int, zero: float, decimals: int) -> str:
+def _predictions(tree: xr.DataTree, group: str) -> dict[str, Bands]:
+    """Predictions of a group before and after, each (event, sensor); empty where there is none."""
+    if group not in tree.children:
+        return {}
+    found = tree[group].to_dataset().load().transpose(..., "event", "sensor")
+    names = [name for name in (*_BAND, "n_above") if name in found]
+    return {
+        str(when): {name: np.asarray(found[name].sel(when=when).values, dtype=float) for name in names}
+        for when in found["when"].values
+    }
+
+
+def _band(found: Bands | None, event: int, column: int, zero: float, decimals: int) -> str:
     """Mean and 90 % interval of a prediction; a dash where there is none."""
-    if found is None or when not in found["when"].values:
+    if found is None or ("n_above" in found and found["n_above"][event, column] == 0):
         return "-"
-    part = found.sel(when=when).isel(event=event, sensor=sensor)
-    if "n_above" in part and int(part["n_above"]) == 0:
-        return "-"
-    mean, low, high = (fixed(float(part[name]) - zero, decimals) for name in ("mean", "low", "high"))
+    mean, low, high = (fixed(float(found[name][event, column]) - zero, decimals) for name in _BAND)
     return f"{mean} ({low} to {high})"

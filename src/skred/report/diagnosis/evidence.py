@@ -58,7 +58,7 @@ def probabilities_figure(document: doc.Document, comparison: doc.Document, numbe
     names = list(reversed(shares))
     which = ", given the first finding" if number else ""
     title = f"What is missing{which}: probability of each candidate\n{figure_text(law_title(document), 80)}"
-    figure = new_figure(1.25 + (0.31 if is_narrow() else 0.215) * max(len(names), 1), title)
+    figure = new_figure(1.25 + (0.34 if is_narrow() else 0.215) * max(len(names), 1), title)
     axes = figure.subplots()
     rows = np.arange(len(names))
     values = [shares[name] for name in names]
@@ -73,7 +73,7 @@ def probabilities_figure(document: doc.Document, comparison: doc.Document, numbe
     axes.plot(prior, rows, linestyle="none", marker="|", markersize=9, color=INK, label="before: prior")
     for words, colour in kinds():
         axes.fill_between([], [], color=colour, linewidth=0, label=words)
-    axes.set_yticks(rows, [folded(figure_text(short_title(document, name), 54), 22) for name in names])
+    axes.set_yticks(rows, [folded(figure_text(short_title(document, name), 54), 27) for name in names])
     axes.tick_params(axis="y", length=0)
     axes.set_xlim(0.0, 1.16)
     axes.set_xticks(np.linspace(0.0, 1.0, 6))

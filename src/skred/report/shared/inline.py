@@ -43,7 +43,7 @@ def inline_svg(figure: Figure, key: str) -> str:
     Parameters
     ----------
     figure : Figure
-        Its layout is made anew.
+        As it was laid out for a file; one for a narrow screen is laid out here.
     key : str
         Letters and digits that no other figure of the page has: ids begin with it.
     """
@@ -51,6 +51,7 @@ def inline_svg(figure: Figure, key: str) -> str:
         # Names may be in any script; a box for a missing glyph is no reason to fail.
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         _finish(figure)
+        figure.set_layout_engine("none")  # it is laid out, which takes as long as to draw it
         root = _drawn(figure)
     _without_what_a_page_has(root)
     for element in root.iter():
