@@ -133,6 +133,7 @@ def _check_figures(page: Element) -> None:
             assert drawing.attributes["role"] == "img" and len(drawing.attributes["aria-label"]) > 10
             for mark in (one for one in drawing.all("g") if one.has("mark")):
                 assert len(mark.all("title")) == len(mark.all("circle")) == 1 and mark.all("title")[0].text
+                assert "\ufffd" not in mark.all("title")[0].text, "lines stay lines"
     assert not page.all("img"), "pictures are drawings with words"
 
 

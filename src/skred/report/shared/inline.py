@@ -245,7 +245,9 @@ def _targets(figure: Figure) -> ElementTree.Element | None:
         target = ElementTree.SubElement(group, f"{{{_SVG}}}g", {"class": "mark"})
         if one.event is not None:
             target.set("data-event", printable(one.event))
-        ElementTree.SubElement(target, f"{{{_SVG}}}title").text = printable(one.words)
+        ElementTree.SubElement(target, f"{{{_SVG}}}title").text = "\n".join(
+            map(printable, one.words.split("\n"))
+        )
         place = {"cx": f"{scale * x:.1f}", "cy": f"{height - scale * y:.1f}", "r": f"{_TARGET:g}"}
         ElementTree.SubElement(target, f"{{{_SVG}}}circle", place)
     return group if len(group) else None
