@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import shutil
+from contextlib import nullcontext
+from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from diagnosis_report_cases import documents
 from hierarchical_cases import hierarchical_comparison
 from page_checks import check_page, texts, without_scripts
-from report_cases import as_saved, calibration, comparison, entry, gate, pit, ryggfonn
+from report_cases import as_saved, calibration, comparison, entry, gate, picture, pit, ryggfonn
 from test_report_html import hostile, nulls
 
 from skred.model_selection.ranking import ranking
@@ -19,7 +22,10 @@ from skred.report.comparison.laws import save_comparison_figures
 from skred.report.comparison.page import render_comparison
 from skred.report.diagnosis.report import render_diagnosis, save_diagnosis_figures
 from skred.report.shared.colours import DARK_PAPER, PAPER, contrast, dark
-from skred.report.shared.style import INK, PALETTE
+from skred.report.shared.drawing import Picture
+from skred.report.shared.inline import inline_svg
+from skred.report.shared.marks import mark
+from skred.report.shared.style import INK, PALETTE, legend_below, narrow, new_figure, side_by_side
 
 KINDS = ("cannot", "nothing", "unexplained", "sensor", "tie", "two")
 
@@ -137,6 +143,51 @@ def test_anything_may_be_null_in_a_calibration():
 def test_names_of_a_calibration_are_escaped():
     html = render_calibration(hostile(calibrated()), {})
     assert "<script>alert" not in html and "<script>alert" in check_page(html).text
+
+
+def test_a_page_that_would_be_too_large_leaves_out_the_largest_figures(tmp_path):
+    one = picture(tmp_path / "figure.png")
+    large = Picture(one.file, one.wide + " " * 1_500_000, one.narrow)
+    figures = {f"pcm/{name}": large for name in ("trace", "joint", "predictive")} | {"pareto_k": one}
+    html = render_comparison(comparison(), figures)
+    page = check_page(html)
+    assert len(page.all("figure")) == 3 and "the files are beside it: pcm/predictive.png." in page.text
+    assert "beside it: pcm" not in render_comparison(comparison(), {"pareto_k": one})
+
+
+def test_a_figure_for_a_telephone_has_its_panels_below_each_other():
+    def made():
+        figure = new_figure(
+            3.0, "A title that is much too long for the narrow screen of a telephone, and folded"
+        )
+        panels = side_by_side(figure, 2, sharey=True)
+        panels[0].plot(
+            [1.0, 2.0], [1.0, 2.0], label="a label that is so long that it has to be folded as well"
+        )
+        panels[0].set_ylabel("said once")
+        mark(
+            panels[1],
+            [1.0, 9.0, np.nan],
+            [1.5, 1.5, 1.0],
+            ["here <&>", "outside", "nowhere"],
+            ["e1", "e2", "e3"],
+        )
+        panels[1].set_xlim(0.0, 2.0)
+        legend_below(figure, panels, columns=2)
+        return figure
+
+    sizes, words = {}, {}
+    for name, around in (("wide", nullcontext()), ("narrow", narrow())):
+        with around:
+            root = ElementTree.fromstring(inline_svg(made(), name))
+        sizes[name] = [float(number) for number in root.get("viewBox").split()[2:]]
+        words[name] = [text.text for text in root.iter("text")]
+        marks = [one for one in root.iter("g") if one.get("class") == "mark"]
+        assert [one.get("data-event") for one in marks] == ["e1"], "what cannot be seen cannot be pointed at"
+        assert marks[0].find("title").text == "here <&>"
+    assert sizes["narrow"][0] < 0.5 * sizes["wide"][0] and sizes["narrow"][1] > 1.4 * sizes["wide"][1]
+    assert words["wide"].count("said once") == 1 and words["narrow"].count("said once") == 2
+    assert max(map(len, filter(None, words["narrow"]))) < 50 < max(map(len, filter(None, words["wide"])))
 
 
 def test_colours_in_the_dark_lose_no_contrast():

@@ -34,6 +34,11 @@ class Picture:
     wide: str
     narrow: str
 
+    @property
+    def size(self) -> int:
+        """Characters that it takes in a page."""
+        return len(self.wide) + len(self.narrow)
+
     def markup(self, words: str) -> Markup:
         """Both for the page, with what they show told to those who cannot see it."""
         from markupsafe import Markup, escape

@@ -32,6 +32,10 @@ if TYPE_CHECKING:
     from skred.report.shared.drawing import Picture
 
 
+_MOST_DRAWN = 4_300_000
+"""Characters of drawings in a page: with tables and words it stays below 5 MB."""
+
+
 def page(template: str, figures: Mapping[str, Picture], **values: Any) -> str:
     """Render a page: one file with all it needs, which asks no one for anything.
 
@@ -52,6 +56,7 @@ def page(template: str, figures: Mapping[str, Picture], **values: Any) -> str:
     """
     from markupsafe import Markup
 
+    figures, left_out = _that_fit(figures)
     drawings = [text for one in figures.values() for text in (one.wide, one.narrow)]
     style = _asset("style.css") + _colours(set().union(*map(colours_in, drawings)))
     script = _asset("report.js")
@@ -63,10 +68,20 @@ def page(template: str, figures: Mapping[str, Picture], **values: Any) -> str:
             style=Markup(style),
             script=Markup(script),
             policy=Markup(_policy(style, script)),
+            left_out=left_out,
             **values,
         )
     )
     return _reachable_tables(html)
+
+
+def _that_fit(figures: Mapping[str, Picture]) -> tuple[dict[str, Picture], list[str]]:
+    """Figures that a page has room for, the smallest first, and the names of the others."""
+    room, kept = _MOST_DRAWN, set[str]()
+    for name in sorted(figures, key=lambda name: figures[name].size):
+        room -= figures[name].size
+        kept |= {name} if room >= 0 else set()
+    return {name: one for name, one in figures.items() if name in kept}, [n for n in figures if n not in kept]
 
 
 def _policy(style: str, script: str) -> str:
