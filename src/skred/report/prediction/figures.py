@@ -1,4 +1,4 @@
-"""Figures and table of a prediction: how far, how fast, and how sure."""
+"""Figures of a prediction: how far, how fast, and how sure."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.report.prediction.table import prediction_table
 from skred.report.shared.document import get
-from skred.report.shared.labels import figure_text, printable, shortened, unit_text
+from skred.report.shared.labels import figure_text, printable, unit_text
 from skred.report.shared.marks import mark
-from skred.report.shared.numbers import share, three_digits, whole
 from skred.report.shared.recordings import recordings_of
 from skred.report.shared.style import (
     GREY,
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from rich.table import Table
 
     from skred.report.shared.document import Document
     from skred.report.shared.recordings import Recordings
 
+__all__ = ["FIGURES", "prediction_figure", "prediction_table", "uncertainty_figure"]
 FloatArray = NDArray[np.float64]
 _DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (1.5, 1.5)))
 _LEAST_SHOWN, _FLOOR = 0.002, 0.0005
@@ -372,57 +372,3 @@ def _runout_parts(axes: Axes, data: xr.Dataset) -> None:
 
 FIGURES = {"prediction": prediction_figure, "uncertainty": uncertainty_figure}
 """Makers of all figures by their names."""
-
-
-def prediction_table(document: dict[str, Any]) -> Table:
-    """How far and how fast, with bands, for the terminal.
-
-    Parameters
-    ----------
-    document : dict
-        The content of ``prediction.json``.
-    """
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    name = shortened(document["track"]["name"], 60)
-    title = Text(f"{name}: the next avalanche, {printable(document['law']['title'])}")
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1))
-    table.add_column("predicted", overflow="fold")
-    for column in ("", "90 % band", "unit"):
-        table.add_column(column, justify="right", no_wrap=True)
-    if not document["valid"]:
-        table.add_row(Text("nothing: the chains did not converge", style="red"), "", "", "")
-        return table
-    for row in document["runout"]["exceeded_by"]:
-        what = f"runout exceeded by {100 * row['share']:g} %"
-        bound = "≥ " if row["at_least"] else ""
-        table.add_row(what, bound + whole(row["value"]), f"{whole(row['low'])} to {whole(row['high'])}", "m")
-    for place in document["at"]:
-        _place_rows(table, place)
-    return table
-
-
-def _place_rows(table: Table, place: dict[str, Any]) -> None:
-    """Arrival, thresholds, and what a tenth of all avalanches exceed, at one place."""
-    from rich.text import Text
-
-    where = f"{shortened(place['name'], 20)} (s = {place['s_m']:.0f} m)"
-    table.add_row(Text(f"{where}: reached"), *_chance(place["reached"]), "-")
-    for name, words in (("speed", "speed"), ("pressure", "impact pressure")):
-        unit = place[name]["unit"]
-        for row in place[name]["above"]:
-            what = f"{where}: {words} above {row['threshold']:g} {unit}"
-            table.add_row(Text(what), *_chance(row), "-")
-        tenth = next(row for row in place[name]["exceeded_by"] if row["share"] == 0.1)
-        value, low, high = (three_digits(tenth[key]) for key in ("value", "low", "high"))
-        table.add_row(Text(f"{where}: {words} exceeded by 10 %"), value, f"{low} to {high}", unit)
-    period = place["reached"].get("return_period_years")
-    if period is not None:
-        value, low, high = (three_digits(period[key]) for key in ("value", "low", "high"))
-        table.add_row(Text(f"{where}: return period of arrival"), value, f"{low} to {high}", "years")
-
-
-def _chance(band: dict[str, float]) -> tuple[str, str]:
-    return share(band["value"]), f"{share(band['low'])} to {share(band['high'])}"
