@@ -56,7 +56,7 @@ def page(template: str, figures: Mapping[str, Picture], **values: Any) -> str:
     """
     from markupsafe import Markup
 
-    figures, left_out = _that_fit(figures)
+    figures, too_large = _that_fit(figures)
     drawings = [text for one in figures.values() for text in (one.wide, one.narrow)]
     style = _asset("style.css") + _colours(set().union(*map(colours_in, drawings)))
     script = _asset("report.js")
@@ -68,7 +68,7 @@ def page(template: str, figures: Mapping[str, Picture], **values: Any) -> str:
             style=Markup(style),
             script=Markup(script),
             policy=Markup(_policy(style, script)),
-            left_out=left_out,
+            too_large=too_large,
             **values,
         )
     )
