@@ -109,7 +109,7 @@ def test_comparison_figures_of_many_sensors_events_and_laws(tmp_path):
     laws[2]["exact"]["pointwise"][5] = None
     events = [f"{HOSTILE}{k}" for k in range(60)]
     files = save_comparison_figures({**comparison(), "models": laws, "event_ids": events}, tmp_path)
-    assert len(files) == 5
+    assert len(files) == 6
     assert_pictures(files)
 
 
