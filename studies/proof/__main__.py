@@ -320,8 +320,8 @@ def main(
         figures = save_scorecard_figures(run, Path(folder))
         shown = [name for name in SHOWN if name in figures]
         for name in shown:
-            shrink(figures[name])
-            shutil.copy(figures[name], FIGURES / f"proof-{name}.png")
+            shrink(figures[name].file)
+            shutil.copy(figures[name].file, FIGURES / f"proof-{name}.png")
     write_text(ROOT / "docs" / "proof.md", page(shown, run))
 
 

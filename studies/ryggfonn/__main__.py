@@ -112,8 +112,8 @@ def diagnose_case(case: Case, replicas: int, *, figures: bool = True) -> dict[st
             written = save_diagnosis_figures(whole, figure_data(found), Path(folder))
             for name in SHOWN:
                 if name in written:
-                    shrink(written[name])
-                    shutil.copy(written[name], FIGURES / f"ryggfonn-{case.name}-{name}.png")
+                    shrink(written[name].file)
+                    shutil.copy(written[name].file, FIGURES / f"ryggfonn-{case.name}-{name}.png")
     if figures and case.name == "pcm" and isinstance(found, Diagnosis):
         document["retardations"] = retardations(found)
         shrink(write_png(groups_figure(document["retardations"]), FIGURES / "ryggfonn-groups.png"))

@@ -56,7 +56,7 @@ def test_a_calibration_is_that_of_the_command(calibrated: Result, tmp_path: Path
             tree["posterior"]["dry_friction"], calibrated.posterior["posterior"]["dry_friction"]
         )
         assert json.loads(tree.attrs["changed_priors"]) == {"dry_friction": 0.3}
-    where = calibrated.report(tmp_path / "report")
+    where = calibrated.report(tmp_path / "report").parent
     assert {file.name for file in where.iterdir()} == {f.name for f in (tmp_path / "out").iterdir()}
 
 

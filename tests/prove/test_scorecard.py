@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from page_checks import check_page
 from scorecard_cases import CRASH, QUIET, drawn, effect, named, truth
 
 from skred.prove.scorecard import scorecard, write_scorecard
@@ -77,9 +78,15 @@ def test_every_part_has_every_kind(card: tuple[Path, dict[str, Any]]) -> None:
 
 def test_the_page_is_self_contained_and_names_are_escaped(card: tuple[Path, dict[str, Any]]) -> None:
     _, page = written(card[0])
-    assert "<script" not in page and "<i>nothing" not in page and "<b>law" not in page
+    check_page(page)
+    assert (
+        page.count("<script>") == 1
+        and "<script>alert" not in page
+        and "<i>nothing" not in page
+        and "<b>law" not in page
+    )
     assert "always &lt;i&gt;nothing" in page and "&lt;b&gt;law&lt;/b&gt;" in page
-    assert page.count("data:image/png;base64,") == len(FIGURES)
+    assert page.count("<figure") == len(FIGURES) and page.count("<svg") == 2 * len(FIGURES)
     assert 'src="http' not in page and 'href="http' not in page and "nan" not in page.replace("nano", "")
 
 

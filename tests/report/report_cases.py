@@ -1,6 +1,7 @@
 """A calibration and a comparison document made up quickly: no sampler runs."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -12,6 +13,7 @@ from skred.inference.problem import Problem
 from skred.inference.recorded_data import recorded_groups
 from skred.inference.results import law_attributes
 from skred.physics.law import Law
+from skred.report.shared.drawing import Picture
 
 DRAWS = {
     "dry_friction": (0.29, 0.02),
@@ -20,6 +22,13 @@ DRAWS = {
     "retardation": (4.6, 0.05),
 }
 HOSTILE = "<script>alert('x')</script>[red]$\\frac{$\x1b[31m" + "long" * 60
+
+
+def picture(file: Path) -> Picture:
+    """A figure that shows nothing."""
+    file.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(100))
+    empty = '<svg viewBox="0 0 1 1" role="img" aria-label=""><path d="M0 0" fill="var(--c0072b2)"/></svg>'
+    return Picture(file, empty, empty)
 
 
 def ryggfonn() -> PooledProblem:
@@ -85,6 +94,17 @@ def gate(passed: bool = True) -> dict:
     }
 
 
+def pit(sensor: str, n: int) -> dict:
+    """Places of readings spread evenly; fronts that may not come in the last one."""
+    below = [(k + 0.4) / n for k in range(n)]
+    return {
+        "sensor": sensor,
+        "events": [f"e{k + 1}" for k in range(n)],
+        "below": below,
+        "up_to": [*below[:-1], below[-1] + 0.1],
+    }
+
+
 def entry(law_id: str, pointwise: list[float], best: list[float], n_sensors: int = 4) -> dict:
     """A law that passed the gate."""
     differences = np.subtract(pointwise, best)
@@ -132,6 +152,7 @@ def entry(law_id: str, pointwise: list[float], best: list[float], n_sensors: int
             "pareto_k_max": 0.41,
             "n_bad": 0,
             "pareto_k": [0.41 - 0.1 * k for k in range(len(best))],
+            "pit": [pit("sensor 0", len(best))],
         },
         "waic": {"elpd": elpd + 0.04, "se": 13.3, "p": 2.2, "n_unreliable": 1},
         "exact": {"elpd": elpd, "se": 13.5, "pointwise": list(pointwise), "mcse": 0.03, "failed_refits": []},

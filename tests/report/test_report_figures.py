@@ -1,6 +1,7 @@
 import subprocess
 import sys
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from skred.report.shared.draws import density, interval, spread
 from skred.report.shared.labels import figure_text, printable, shortened, symbol_text, unit_text
 from skred.report.shared.style import law_colours, write_png
 
+SHAPES = {"svg", "g", "defs", "clipPath", "path", "rect", "use", "text", "tspan", "image", "circle", "title"}
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -23,12 +25,30 @@ def problem():
     return ryggfonn()
 
 
-def assert_pictures(files, at_least=12_000):
+def assert_pictures(pictures, at_least=12_000):
+    files = [one.file for one in pictures.values()]
     for file in files:
         assert file.read_bytes().startswith(PNG)
         assert file.stat().st_size > at_least, file.name
     folder = files[0].parent
     assert sorted(folder.iterdir()) == sorted(files), "nothing but the figures, no partial files"
+    for one in pictures.values():
+        assert_drawing(one.wide)
+        assert_drawing(one.narrow)
+
+
+def assert_drawing(markup):
+    """What a page with a strict policy can hold: no style attribute, no script, nothing from elsewhere."""
+    root = ElementTree.fromstring(markup)
+    assert root.tag == "svg" and root.get("role") == "img" and root.get("aria-label") == ""
+    names = {element.get("id") for element in root.iter()} - {None}
+    for element in root.iter():
+        assert element.tag in SHAPES, element.tag
+        assert not {name for name in element.attrib if name == "style" or name.startswith(("on", "{"))}
+        reference = element.get("href", "#")
+        assert reference.startswith("data:image/png;base64,") or reference[1:] in names | {""}
+        for name in ("fill", "stroke"):
+            assert not element.get(name, "").startswith("#"), "a colour that does not follow light and dark"
 
 
 @pytest.mark.slow
@@ -39,7 +59,7 @@ def test_every_law_of_the_pack_has_its_figures(problem, law_id, tmp_path):
     names = ["trace", "joint", "marginals", "predictive", "along_track"]
     if len(law.parameters) == 1:
         names.remove("joint")
-    assert [file.stem for file in files] == names
+    assert list(files) == names
     assert_pictures(files)
 
 
@@ -78,7 +98,7 @@ def test_only_runouts_several_releases_and_draws_all_alike(problem, tmp_path):
 def test_comparison_figures(tmp_path):
     files = save_comparison_figures(comparison(), tmp_path)
     assert list(files) == ["comparison_elpd", "pointwise", "pareto_k", "predictions", "evidence"]
-    assert_pictures(list(files.values()))
+    assert_pictures(files)
 
 
 @pytest.mark.slow
@@ -89,8 +109,8 @@ def test_comparison_figures_of_many_sensors_events_and_laws(tmp_path):
     laws[2]["exact"]["pointwise"][5] = None
     events = [f"{HOSTILE}{k}" for k in range(60)]
     files = save_comparison_figures({**comparison(), "models": laws, "event_ids": events}, tmp_path)
-    assert len(files) == 5
-    assert_pictures(list(files.values()))
+    assert len(files) == 6
+    assert_pictures(files)
 
 
 def test_figures_without_numbers_are_left_out(tmp_path):

@@ -28,6 +28,8 @@ from skred.inference.results import save
 from skred.inference.sampling import SamplerSettings
 from skred.inference.waic import waic
 from skred.model_selection.alpha_beta_entry import alpha_beta_entry
+from skred.model_selection.loo_pit import loo_pit
+from skred.model_selection.ranking import ranking
 from skred.model_selection.statement import statement
 from skred.output import write_json
 from skred.physics.law import Law
@@ -102,9 +104,11 @@ def score(
 
 
 def write_comparison(comparison: dict[str, Any], folder: Path, started: float) -> dict[str, Any]:
-    """Say what came out, and write ``compare.json``; returns the document."""
+    """Say what came out and what would change it, and write ``compare.json``; returns the document."""
     changed = [note for model in comparison["models"] if (note := model.get("prior_note"))]
     comparison["statement"] = [*changed, *statement(comparison)]
+    valid = [model for model in comparison["models"] if model["gate"]["passed"]]
+    comparison["ranking"] = ranking(valid, comparison["event_ids"])
     comparison["seconds"] = time.monotonic() - started
     write_json(folder / "compare.json", comparison)
     return comparison
@@ -142,6 +146,7 @@ def scores(
             "pareto_k_max": float(pareto_k.max()),
             "n_bad": len(unreliable),
             "pareto_k": pareto_k.tolist(),
+            "pit": loo_pit(calibration.tree, loo.log_weights),
         },
         "waic": {
             "elpd": float(information.elpd_waic),

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
+    from skred.report.shared.drawing import Picture
+
 FORMAT = 1
 """Of the documents that this version reads."""
 TREE_FORMAT = 3
@@ -88,17 +90,17 @@ def _comparison(folder: Path, beside: Path) -> list[str]:
     from skred.report.shared.document import get, listed
 
     comparison = _read_document(folder / "compare.json", "format")
-    figures: dict[str, Path] = {}
+    figures: dict[str, Picture] = {}
     possible = [f"{name}.png" for name in COMPARISON_FIGURES]
     for models, where in (
         (listed(comparison, "models"), ""),
         (listed(comparison, "pooled", "models"), "pooled"),
     ):
-        for name in (_plain_name(get(model, "id"), folder) for model in models):
+        for number, name in enumerate(_plain_name(get(model, "id"), folder) for model in models):
             place = Path(where) / name
-            drawn = _model_figures(folder / place, beside / place)
+            drawn = _model_figures(folder / place, beside / place, f"m{number}")
             possible += [str(place / figure) for figure in _possible_of_a_model()]
-            figures |= {} if where else {f"{name}/{figure.stem}": figure for figure in drawn}
+            figures |= {} if where else {f"{name}/{figure}": picture for figure, picture in drawn.items()}
     figures |= save_comparison_figures(comparison, beside)
     write_text(beside / "report.html", render_comparison(comparison, figures))
     return possible
@@ -112,17 +114,20 @@ def _plain_name(name: Any, folder: Path) -> str:
 
 
 def _calibration(folder: Path, beside: Path) -> list[str]:
-    _read_document(folder / "summary.json", "format")
-    _model_figures(folder, beside)
+    from skred.report.calibration.page import render_calibration
+
+    document = _read_document(folder / "summary.json", "format")
+    figures = _model_figures(folder, beside)
+    write_text(beside / "report.html", render_calibration(document, figures))
     return _possible_of_a_model()
 
 
-def _model_figures(folder: Path, beside: Path) -> list[Path]:
+def _model_figures(folder: Path, beside: Path, key: str = "") -> dict[str, Picture]:
     from skred.report.calibration.figures import save_model_figures
 
     beside.mkdir(parents=True, exist_ok=True)
     with _opened(folder / "posterior.nc") as tree:
-        return save_model_figures(tree, beside)
+        return save_model_figures(tree, beside, key)
 
 
 def _possible_of_a_model() -> list[str]:
@@ -135,7 +140,7 @@ def _prediction(folder: Path, beside: Path) -> list[str]:
     from skred.report.prediction.page import FIGURES, render_prediction, save_prediction_figures
 
     document = _read_document(folder / "prediction.json", "format")
-    figures: dict[str, Path] = {}
+    figures: dict[str, Picture] = {}
     if document.get("valid") is True:
         with _opened(folder / "prediction.nc") as tree:
             figures = save_prediction_figures(document, tree, beside)

@@ -22,6 +22,8 @@ from skred.report.shared.style import (
     INK,
     WIDTH,
     bare,
+    grow,
+    is_narrow,
     law_colours,
     new_figure,
     panels_in,
@@ -64,7 +66,11 @@ def trace_figure(tree: xr.DataTree) -> Figure:
     n = len(shown)
     title = "Chains: traces that overlap and ranks that are level have mixed"
     figure = new_figure(0.9 + 1.75 * n, f"{title}\n{figure_text(law.title, 80)}\n{gate_text(tree)}")
-    panels = figure.subplots(n, 2, squeeze=False, gridspec_kw={"width_ratios": [1.7, 1]})
+    if is_narrow():
+        grow(figure, 1.6)
+        panels = figure.subplots(2 * n, 1, squeeze=False).reshape(n, 2)
+    else:
+        panels = figure.subplots(n, 2, squeeze=False, gridspec_kw={"width_ratios": [1.7, 1]})
     for row, parameter in zip(panels, shown, strict=True):
         chains = chains_of(tree, parameter.name)
         colours = shades(law_colours([law.id])[law.id], len(chains))
@@ -79,7 +85,7 @@ def _trace(axes: Axes, chains: FloatArray, colours: list[str], label: str) -> No
     step = max(1, chains.shape[1] // _MAX_TRACE_POINTS)
     draw = np.arange(0, chains.shape[1], step)
     for chain, colour in zip(chains, colours, strict=True):
-        axes.plot(draw, chain[::step], color=colour, linewidth=0.4)
+        axes.plot(draw, chain[::step], color=colour, linewidth=0.4, rasterized=True)
     axes.set_xlim(0, chains.shape[1])
     axes.set_ylabel(label if "\n" in label else label.replace(" (", "\n(").replace(" [", "\n[", 1))
 
@@ -107,8 +113,9 @@ def joint_figure(tree: xr.DataTree) -> Figure:
     shown = every[:_MAX_JOINT]
     draws = [chains_of(tree, parameter.name).ravel() for parameter in shown]
     n = len(shown)
-    bins = 3 if n > 3 else 5
-    labels = [symbol_label(p) if n > 3 else _label(p, law, len(every)) for p in shown]
+    bins = 3 if n > 3 or is_narrow() else 5
+    short = n > 3 or is_narrow()
+    labels = [symbol_label(p) if short else _label(p, law, len(every)) for p in shown]
     figure = new_figure(min(WIDTH, 1.2 + 2.2 * n), _joint_title(law, every, draws))
     panels = figure.subplots(n, n, sharex="col", squeeze=False)
     colour = law_colours([law.id])[law.id]
@@ -128,7 +135,7 @@ def joint_figure(tree: xr.DataTree) -> Figure:
                     axes.set_ylabel(labels[i])
             if j <= i == n - 1:
                 axes.set_xlabel(labels[j])
-                if n > 3:  # narrow panels
+                if short:  # narrow panels
                     axes.tick_params(axis="x", labelrotation=40, labelsize=7)
                     axes.xaxis.label.set_fontsize(7.5)
     return figure
@@ -148,7 +155,7 @@ def _joint_title(law: CalibratedLaw, parameters: tuple[Parameter, ...], draws: l
 
 
 def _pair(axes: Axes, x: FloatArray, y: FloatArray, colour: str) -> None:
-    axes.hist2d(x, y, bins=50, cmap=shade_map(colour))
+    axes.hist2d(x, y, bins=50, cmap=shade_map(colour), cmin=1, rasterized=True)
     axes.plot(x.mean(), y.mean(), marker="+", color=INK, markersize=11)
 
 
@@ -158,7 +165,7 @@ def marginals_figure(tree: xr.DataTree) -> Figure:
     law = law_of(tree)
     shown = law.parameters
     n = len(shown)
-    columns = min(n, 2)
+    columns = 1 if is_narrow() else min(n, 2)
     rows = -(-n // columns)
     title = f"What the recordings say of each parameter, against the prior\n{figure_text(law.title, 80)}"
     figure = new_figure(0.9 + 2.4 * rows, title)

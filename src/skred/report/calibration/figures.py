@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,8 +11,8 @@ from skred.report.calibration.chains import joint_figure, marginals_figure, trac
 from skred.report.calibration.new_avalanches import new_avalanche_figure, new_avalanche_track_figure
 from skred.report.calibration.population import events_figure, population_figure
 from skred.report.calibration.predictive import predictive_figure
+from skred.report.shared.drawing import Picture, draw
 from skred.report.shared.law import law_of
-from skred.report.shared.style import write_png
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,8 +32,8 @@ MODEL_FIGURES = tuple(dict.fromkeys((*_OF_CHAINS, *_POOLED, *_HIERARCHICAL)))
 """Names of all figures that there may be."""
 
 
-def save_model_figures(tree: xr.DataTree, folder: Path) -> list[Path]:
-    """Write the figures of one calibration as PNG.
+def save_model_figures(tree: xr.DataTree, folder: Path, key: str = "") -> dict[str, Picture]:
+    """Make the figures of one calibration, and write them as PNG.
 
     Parameters
     ----------
@@ -40,10 +41,12 @@ def save_model_figures(tree: xr.DataTree, folder: Path) -> list[Path]:
         As made by `skred.inference.along_track.with_along_track`.
     folder : Path
         An existing folder.
+    key : str
+        Letters that tell laws apart that stand in one page.
 
     Returns
     -------
-    list of Path
+    dict of Picture
         trace, joint (where there are two or more parameters), marginals; of a pooled calibration then
         predictive and along_track, of a hierarchical one new_avalanche, population, events and along_track.
     """
@@ -52,4 +55,4 @@ def save_model_figures(tree: xr.DataTree, folder: Path) -> list[Path]:
     if len(law.parameters) < 2:
         del makers["joint"]
     makers |= _HIERARCHICAL if law.likelihood == "hierarchical" else _POOLED
-    return [write_png(make(tree), folder / f"{name}.png") for name, make in makers.items()]
+    return draw({name: partial(make, tree) for name, make in makers.items()}, folder, key)

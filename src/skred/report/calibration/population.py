@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from skred.report.shared.draws import (
 )
 from skred.report.shared.labels import figure_text, parameter_label, population_role, symbol_text, unit_text
 from skred.report.shared.law import law_of
+from skred.report.shared.marks import mark
 from skred.report.shared.numbers import decimals_for, rounded
 from skred.report.shared.recordings import recordings_of
 from skred.report.shared.style import (
@@ -26,9 +28,12 @@ from skred.report.shared.style import (
     INK,
     RECORDED,
     bare,
+    grow,
+    is_narrow,
     law_colours,
     legend_below,
     new_figure,
+    side_by_side,
     styled,
     tint,
 )
@@ -65,7 +70,11 @@ def population_figure(tree: xr.DataTree) -> Figure:
     height = 1.0 + (3.4 if rows == 1 else 2.7 * rows)
     figure = new_figure(height, f"{title}\n{figure_text(law.title, 80)}")
     layout: dict[str, Any] = {"width_ratios": [1.7, 1]} if len(pairs) == 1 else {}
-    panels = figure.subplots(rows, 2, squeeze=False, gridspec_kw=layout).ravel()
+    if is_narrow():
+        grow(figure, 1.7)
+        panels = figure.subplots(2 * rows, 1, squeeze=False).ravel()
+    else:
+        panels = figure.subplots(rows, 2, squeeze=False, gridspec_kw=layout).ravel()
     new = [_draws(tree, s.name, "new_avalanches").ravel() for s in strengths]
     own = [_draws(tree, s.name, "event_posterior") for s in strengths]
     colour = law_colours([law.id])[law.id]
@@ -239,10 +248,10 @@ def events_figure(tree: xr.DataTree) -> Figure:
     n = len(events)
     title = f"Each recorded avalanche's own friction\n{figure_text(law.title, 80)}"
     figure = new_figure(1.5 + 0.165 * min(n, _MAX_NAMED_EVENTS), title)
-    panels = figure.subplots(1, len(columns), squeeze=False, sharey=True)[0]
+    panels = side_by_side(figure, len(columns), sharey=True)
     colour = law_colours([law.id])[law.id]
     for axes, (label, own, new) in zip(panels, columns, strict=True):
-        _forest(axes, own, new, colour)
+        _forest(axes, own, new, colour, events)
         axes.set_xlabel(label)
     step = -(-n // _MAX_NAMED_EVENTS)
     places = range(0, n, step)
@@ -268,7 +277,7 @@ def _event_columns(tree: xr.DataTree, law: CalibratedLaw) -> list[tuple[str, Flo
     return columns
 
 
-def _forest(axes: Axes, own: FloatArray, new: FloatArray | None, colour: str) -> None:
+def _forest(axes: Axes, own: FloatArray, new: FloatArray | None, colour: str, events: Sequence[str]) -> None:
     quantiles = np.quantile(own, _QUANTILES, axis=0)
     low, high = float(quantiles.min()), float(quantiles.max())
     if new is not None:
@@ -289,5 +298,10 @@ def _forest(axes: Axes, own: FloatArray, new: FloatArray | None, colour: str) ->
         quantiles[2], rows, linestyle="none", marker="o", markersize=3.4, color=RECORDED,
         markerfacecolor="white", label="its median",
     )  # fmt: skip
+    told = [
+        f"{event}: {median:.4g} (90 %: {least:.4g} to {most:.4g})"
+        for event, least, median, most in zip(events, quantiles[0], quantiles[2], quantiles[4], strict=True)
+    ]
+    mark(axes, quantiles[2], rows, told, events)
     set_limits(axes, axes.xaxis, low, high, linear=new is None)
     axes.tick_params(axis="y", length=0)

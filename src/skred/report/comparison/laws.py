@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,11 +10,22 @@ import numpy as np
 
 from skred.report.comparison.likelihoods import likelihoods_figure
 from skred.report.comparison.parts import law_axis, practical_band, styles, typeset
+from skred.report.comparison.pit import pit_figure
+from skred.report.comparison.ranking import ranking_figure
 from skred.report.comparison.sensors import new_avalanches_figure, predictions_figure
 from skred.report.shared.document import Document, get, is_hierarchical, listed, pareto_k_limit, ranked
+from skred.report.shared.drawing import Picture, draw
 from skred.report.shared.labels import figure_text
-from skred.report.shared.numbers import floats, is_number
-from skred.report.shared.style import GREY, INK, legend_below, new_figure, styled, write_png
+from skred.report.shared.marks import mark
+from skred.report.shared.numbers import fixed, floats, is_number
+from skred.report.shared.style import (
+    GREY,
+    INK,
+    is_narrow,
+    legend_below,
+    new_figure,
+    styled,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,29 +33,29 @@ if TYPE_CHECKING:
 
 _MAX_NAMED_EVENTS = 45
 _LOWEST_K = -0.5
-COMPARISON_FIGURES = ("comparison_elpd", "pointwise", "pareto_k", "predictions", "evidence", "likelihoods")
+COMPARISON_FIGURES = (
+    "comparison_elpd", "pointwise", "pareto_k", "predictions", "evidence", "likelihoods", "ranking",
+    "loo_pit",
+)  # fmt: skip
 """Names of all figures that there may be."""
 
 
-def save_comparison_figures(comparison: Document, folder: Path) -> dict[str, Path]:
-    """Write the figures that the comparison has numbers for, as PNG.
+def save_comparison_figures(comparison: Document, folder: Path) -> dict[str, Picture]:
+    """Make the figures that the comparison has numbers for, and write them as PNG.
 
     Returns
     -------
-    dict of Path
-        By name: comparison_elpd, pointwise, pareto_k, predictions, evidence; of a hierarchical comparison
-        that has a pooled one beside it also likelihoods.
+    dict of Picture
+        By name, see `COMPARISON_FIGURES`; likelihoods only of a hierarchical comparison with a pooled one
+        beside it.
     """
     predictions = new_avalanches_figure if is_hierarchical(comparison) else predictions_figure
     makers = (
         elpd_figure, pointwise_figure, pareto_k_figure, predictions, evidence_figure, likelihoods_figure,
+        ranking_figure, pit_figure,
     )  # fmt: skip
-    files = {}
-    for name, make in zip(COMPARISON_FIGURES, makers, strict=True):
-        figure = make(comparison)
-        if figure is not None:
-            files[name] = write_png(figure, folder / f"{name}.png")
-    return files
+    named = zip(COMPARISON_FIGURES, makers, strict=True)
+    return draw({name: partial(make, comparison) for name, make in named}, folder)
 
 
 @styled
@@ -64,6 +76,8 @@ def elpd_figure(comparison: Document) -> Figure | None:
         axes.hlines(row, difference - doubled, difference + doubled, color=colour, linewidth=1.2)
         axes.hlines(row, difference - se, difference + se, color=colour, linewidth=4, alpha=0.55)
         axes.plot(difference, row, marker=markers[law["id"]], color=colour, markersize=6)
+        told = f"{law['id']}: {fixed(difference)} nats, standard error {fixed(se)}, doubled {fixed(doubled)}"
+        mark(axes, difference, row, [told])
         place = (difference, row)
         axes.annotate(
             typeset(difference), place, (0, 7), textcoords="offset points", ha="center", fontsize=7.5
@@ -100,6 +114,11 @@ def pointwise_figure(comparison: Document) -> Figure | None:
         colour, failed = colours[law["id"]], set(map(str, listed(law, "exact", "failed_refits")))
         axes.vlines(x, 0, difference, color=colour, linewidth=1.0, alpha=0.7)
         filled = [colour if str(event) not in failed else "#ffffff" for event in events]
+        told = [
+            f"{event}, {law['id']}: {fixed(one)} nats"
+            for event, one in zip(events, difference.tolist(), strict=True)
+        ]
+        mark(axes, x, difference, told, list(map(str, events)))
         axes.scatter(x, difference, s=20, c=filled, marker=markers[law["id"]], edgecolors=colour, zorder=3)
         total = typeset(float(np.nansum(difference)))
         axes.scatter(
@@ -120,7 +139,7 @@ def pointwise_figure(comparison: Document) -> Figure | None:
 
 def _event_axis(axes: Axes, events: list[Any]) -> None:
     """Events by name; of many only some are named."""
-    step = -(-len(events) // _MAX_NAMED_EVENTS)
+    step = -(-len(events) // (_MAX_NAMED_EVENTS // 2 if is_narrow() else _MAX_NAMED_EVENTS))
     places = range(0, len(events), step)
     axes.set_xticks(places, [figure_text(events[k], 14) for k in places], rotation=90, fontsize=7)
     axes.set_xlim(-0.7, len(events) - 0.3)
@@ -143,7 +162,13 @@ def pareto_k_figure(comparison: Document) -> Figure | None:
     axes = figure.subplots()
     axes.axhline(limit, color=INK, linewidth=1.0, linestyle="--", label=f"limit {limit:.2f}")
     for law in laws:
-        k = np.maximum(floats(listed(law, "loo", "pareto_k")), _LOWEST_K)
+        found = floats(listed(law, "loo", "pareto_k"))
+        k = np.maximum(found, _LOWEST_K)
+        told = [
+            f"{event}, {law['id']}: k = {fixed(one)}"
+            for event, one in zip(events, found.tolist(), strict=True)
+        ]
+        mark(axes, np.arange(len(events)), k, told, list(map(str, events)))
         label = figure_text(law["id"], 24)
         axes.scatter(
             np.arange(len(events)),
@@ -174,6 +199,7 @@ def evidence_figure(comparison: Document) -> Figure | None:
     for row, law in enumerate(laws):
         seeds = floats(listed(law, "evidence", "log_evidence"))
         mean = float(get(law, "evidence", "mean"))
+        mark(axes, mean, row, [f"{law['id']}: {fixed(mean)}; seeds {', '.join(map(fixed, seeds.tolist()))}"])
         colour = colours[law["id"]]
         axes.scatter(
             seeds,

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from skred.report.comparison.lay import lay_words
+from skred.report.comparison.pit import pit_rows
+from skred.report.comparison.ranking import event_rows, order_rows, rival_rows
 from skred.report.shared import document as doc
-from skred.report.shared.html import environment, picture
+from skred.report.shared.html import page
 from skred.report.shared.numbers import decimals_for, fixed, is_number, rounded
 from skred.report.shared.relative import relative_new_avalanche, relative_response
+
+if TYPE_CHECKING:
+    from skred.report.shared.drawing import Picture
 
 _TITLES = {
     "comparison_elpd": "Differences of elpd to the best law, with their standard errors, single and doubled.",
@@ -18,6 +23,12 @@ _TITLES = {
     "pareto_k": "Pareto k of each event: above the limit, importance sampling cannot be trusted.",
     "predictions": "Mean response of each law at each sensor against the mean of the recordings.",
     "evidence": "Log evidence of each law; every seed is a point.",
+    "ranking": "Difference of elpd to the best law: without each avalanche, and without more and more of"
+    " those that favour the best law most; above 0 the order has turned.",
+    "loo_pit": "Share of readings that lie below a place in their prediction, less what is expected: a line"
+    " within the band says nothing against the predictions. A hump: readings are lower than predicted; a"
+    " trough: higher. First below and then above 0: predictions are not sure enough; the other way round: too"
+    " sure.",
     "trace": "Traces of all chains, and the ranks of their draws.",
     "joint": "Joint posterior of the parameters with marginal histograms.",
     "marginals": "Posterior of each parameter against its prior density.",
@@ -39,6 +50,8 @@ _OF_A_POPULATION = ("new_avalanche", "population", "events")
 _SECTIONS = {
     "recorded": "What was recorded",
     "preferred": "Which law the recordings prefer, and by how much",
+    "change": "What would change the ranking",
+    "foretold": "Are the predictions as sure as they should be?",
     "trust": "Can the chains be trusted?",
     "population": "Every avalanche its own friction",
     "likelihoods": "Pooled and hierarchical side by side",
@@ -50,7 +63,7 @@ _SECTIONS = {
 }
 
 
-def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> str:
+def render_comparison(comparison: doc.Document, figures: Mapping[str, Picture]) -> str:
     """Render the report of a comparison.
 
     Parameters
@@ -59,42 +72,44 @@ def render_comparison(comparison: doc.Document, figures: Mapping[str, Path]) -> 
         The document that is also written as ``compare.json``; null where there is no number. Runouts in
         ``response`` and ``new_avalanche`` are arc lengths, shown relative to the campaign's reference where
         it has one. Where ``alpha_beta`` is null, ``alpha_beta_reason`` says why.
-    figures : mapping of str to Path
-        PNG files: ``comparison_elpd``, ``pointwise``, ``pareto_k``, ``predictions``, ``evidence``,
+    figures : mapping of str to Picture
+        ``comparison_elpd``, ``pointwise``, ``pareto_k``, ``predictions``, ``evidence``,
         ``likelihoods``, and those of one law as ``<law id>/trace`` and so on, see
         `skred.report.calibration.figures.save_model_figures`. What is missing is left out.
 
     Returns
     -------
     str
-        A self-contained page: style inside, pictures as data URIs.
+        A self-contained page, see `skred.report.shared.html.page`.
     """
     hierarchical = doc.is_hierarchical(comparison)
     sections = _sections(comparison)
-    return (
-        environment()
-        .get_template("compare.html.jinja")
-        .render(
-            c=comparison,
-            models=doc.models(comparison),
-            ranked=doc.ranked(comparison),
-            failed=doc.failed(comparison),
-            figures={name: picture(file) for name, file in figures.items()},
-            sensors=_sensors(comparison),
-            hierarchical=hierarchical,
-            sections=sections,
-            number={name: place for place, name in enumerate(sections, start=1)},
-            side_by_side=doc.side_by_side(comparison),
-            titles={**_TITLES, **_HIERARCHICAL_TITLES} if hierarchical else _TITLES,
-            of_a_law=_OF_A_LAW,
-            of_a_population=_OF_A_POPULATION,
-            limits=doc.get(comparison, "limits") or {},
-            k_limit=doc.pareto_k_limit(comparison),
-            counts=_counts,
-            within_factor=_within_factor,
-            relative=relative_response,
-            relative_new=relative_new_avalanche,
-        )
+    return page(
+        "compare.html.jinja",
+        figures,
+        c=comparison,
+        models=doc.models(comparison),
+        ranked=doc.ranked(comparison),
+        failed=doc.failed(comparison),
+        sensors=_sensors(comparison),
+        hierarchical=hierarchical,
+        sections=sections,
+        number={name: place for place, name in enumerate(sections, start=1)},
+        side_by_side=doc.side_by_side(comparison),
+        titles={**_TITLES, **_HIERARCHICAL_TITLES} if hierarchical else _TITLES,
+        of_a_law=_OF_A_LAW,
+        of_a_population=_OF_A_POPULATION,
+        limits=doc.get(comparison, "limits") or {},
+        k_limit=doc.pareto_k_limit(comparison),
+        counts=_counts,
+        lay=lay_words(comparison),
+        rivals=rival_rows(comparison),
+        orders=order_rows(comparison),
+        events=event_rows(comparison),
+        pits=pit_rows(comparison),
+        within_factor=_within_factor,
+        relative=relative_response,
+        relative_new=relative_new_avalanche,
     )
 
 
@@ -104,6 +119,8 @@ def _sections(comparison: doc.Document) -> dict[str, str]:
     has = {
         "population": hierarchical,
         "likelihoods": hierarchical and doc.get(comparison, "pooled") is not None,
+        "change": bool(rival_rows(comparison)),
+        "foretold": bool(pit_rows(comparison)),
         "errors": hierarchical and bool(doc.listed(comparison, "error_models")),
     }
     return {name: title for name, title in _SECTIONS.items() if has.get(name, True)}

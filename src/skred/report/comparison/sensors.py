@@ -11,7 +11,8 @@ from skred.report.comparison.parts import law_axis, styles
 from skred.report.shared.document import Document, get, listed, ranked
 from skred.report.shared.draws import MAX_SENSORS, left_out
 from skred.report.shared.labels import figure_text, unit_text
-from skred.report.shared.numbers import floats, is_number
+from skred.report.shared.marks import mark
+from skred.report.shared.numbers import fixed, floats, is_number
 from skred.report.shared.style import GREY, RECORDED, grid_for, legend_below, new_figure, panels_in, styled
 
 if TYPE_CHECKING:
@@ -104,6 +105,9 @@ def _responses(axes: Axes, comparison: Document, laws: list[Document], sensor: s
         colour = colours[law["id"]]
         axes.hlines(row, low - offset, high - offset, color=colour, linewidth=2.2)
         axes.plot(mean - offset, row, marker=markers[law["id"]], color=colour, markersize=5)
+        interval = f"{fixed(low - offset, 1)} to {fixed(high - offset, 1)}"
+        told = f"{law['id']}, {sensor}: mean response {fixed(mean - offset, 1)} ({interval})"
+        mark(axes, mean - offset, row, [f"{told}; recorded mean {fixed(recorded - offset, 1)}"])
     axes.plot([], [], color=GREY, linewidth=2.2, label=f"mean response, {_percent(comparison)}")
     law_axis(axes, laws)
     _label_sensor(axes, sensor, unit, reference)
@@ -118,6 +122,8 @@ def _new_avalanches(axes: Axes, comparison: Document, laws: list[Document], sens
         low, mean, high = floats([get(entry, key) for key in ("low", "mean", "high")]) - offset
         axes.hlines(row, low, high, color=colours[law["id"]], linewidth=2.2)
         axes.plot(mean, row, marker=markers[law["id"]], color=colours[law["id"]], markersize=5)
+        told = f"{law['id']}, {sensor}: mean {fixed(mean, 1)} ({fixed(low, 1)} to {fixed(high, 1)})"
+        mark(axes, mean, row, [told])
         if unit != "m" and is_number(get(entry, "reached")):
             _beside(axes, row, f"{100 * entry['reached']:.0f} %")
         if row == 0:

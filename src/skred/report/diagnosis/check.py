@@ -12,7 +12,13 @@ from skred.report.diagnosis.words import AFTER, MISMATCH, with_added
 from skred.report.shared import document as doc
 from skred.report.shared.html import two_digits
 from skred.report.shared.labels import figure_text
-from skred.report.shared.style import legend_below, new_figure, styled, tint
+from skred.report.shared.style import (
+    legend_below,
+    new_figure,
+    side_by_side,
+    styled,
+    tint,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,7 +35,7 @@ def check_figure(document: doc.Document, tree: xr.DataTree) -> Figure:
     simulated = np.asarray(found["simulated"].transpose("law", "campaign").values, dtype=float)
     title = "Is anything wrong? The recordings against clean campaigns simulated from the law"
     figure = new_figure(3.3, title)
-    panels = figure.subplots(1, len(simulated), squeeze=False).ravel()
+    panels = side_by_side(figure, len(simulated))
     checks = doc.listed(document, "report", "checks")
     for number, axes in enumerate(panels):
         values = simulated[number][np.isfinite(simulated[number])]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from skred.report.shared import document as doc
 from skred.report.shared.labels import figure_text, name_text, printable, unit_text
+from skred.report.shared.marks import mark
 from skred.report.shared.numbers import fixed, is_number
 from skred.report.shared.recordings import Recordings, recordings_of
 from skred.report.shared.style import (
@@ -112,11 +113,32 @@ def _panels(
             )
             outside = recorded[at][~inside], np.clip(mean[at][~inside], least, most)
             axes.plot(*outside, markerfacecolor="none", markeredgewidth=0.8, **points)
+            told = [mean[at], low[at], high[at]]
+            _tell(axes, recordings, at, recorded[at], np.clip(mean[at], least, most), told, unit)
         axes.set_title(when, fontsize=8.5)
         axes.set_xlabel(f"recorded {what} [{unit}]")
         axes.set_xlim(x.min() - 0.08 * size, x.max() + 0.08 * size)
         axes.set_ylim(*line)
     panels[0].set_ylabel(f"predicted {what} [{unit}]")
+
+
+def _tell(
+    axes: Axes, recordings: Recordings, at: BoolArray, x: FloatArray, y: FloatArray,
+    predicted: list[FloatArray], unit: str,
+) -> None:  # fmt: skip
+    """Say of each point which avalanche and sensor it is, what was recorded and what predicted."""
+    places = np.argwhere(at)
+    events = [recordings.event_ids[event] for event, _ in places]
+    names = [f"{recordings.event_ids[event]}, {recordings.sensors[column].id}" for event, column in places]
+    decimals = 0 if unit == "m" else 1
+    words = [
+        f"{name}\nrecorded {fixed(value, decimals)} {unit}\npredicted {fixed(mean, decimals)}"
+        f" (90 %: {fixed(low, decimals)} to {fixed(high, decimals)})"
+        for name, value, mean, low, high in zip(
+            names, x.tolist(), *(part.tolist() for part in predicted), strict=True
+        )
+    ]
+    mark(axes, x, y, words, events)
 
 
 def _mark(panels: Sequence[Axes], tree: xr.DataTree, recordings: Recordings, carrying: BoolArray) -> None:

@@ -23,8 +23,21 @@ from skred.report.diagnosis.words import (
 from skred.report.shared import document as doc
 from skred.report.shared.draws import chains_of, density
 from skred.report.shared.labels import figure_text, name_text, printable, symbol_text, with_units
+from skred.report.shared.marks import mark
 from skred.report.shared.numbers import fixed, floats, is_number
-from skred.report.shared.style import GREY, INK, PALE, RECORDED, legend_below, new_figure, styled, tint
+from skred.report.shared.style import (
+    GREY,
+    INK,
+    PALE,
+    RECORDED,
+    folded,
+    grow,
+    is_narrow,
+    legend_below,
+    new_figure,
+    styled,
+    tint,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,7 +58,7 @@ def probabilities_figure(document: doc.Document, comparison: doc.Document, numbe
     names = list(reversed(shares))
     which = ", given the first finding" if number else ""
     title = f"What is missing{which}: probability of each candidate\n{figure_text(law_title(document), 80)}"
-    figure = new_figure(1.25 + 0.215 * max(len(names), 1), title)
+    figure = new_figure(1.25 + (0.34 if is_narrow() else 0.215) * max(len(names), 1), title)
     axes = figure.subplots()
     rows = np.arange(len(names))
     values = [shares[name] for name in names]
@@ -53,12 +66,14 @@ def probabilities_figure(document: doc.Document, comparison: doc.Document, numbe
     prior = floats([doc.get(comparison, "prior", name) for name in names])
     for row, (value, tick) in enumerate(zip(values, prior, strict=True)):
         text = "less than 0.001" if value < 0.001 else "more than 0.999" if value > 0.999 else f"{value:.3f}"
+        told = f"{short_title(document, names[row])}: {text}, before {fixed(float(tick), 3)}"
+        mark(axes, value, row, [told])
         end = max(value, float(tick) if abs(tick - value) < 0.2 else 0.0) + 0.012
         axes.text(end, row, text, va="center", fontsize=7.5)
     axes.plot(prior, rows, linestyle="none", marker="|", markersize=9, color=INK, label="before: prior")
     for words, colour in kinds():
         axes.fill_between([], [], color=colour, linewidth=0, label=words)
-    axes.set_yticks(rows, [figure_text(short_title(document, name), 54) for name in names])
+    axes.set_yticks(rows, [folded(figure_text(short_title(document, name), 54), 27) for name in names])
     axes.tick_params(axis="y", length=0)
     axes.set_xlim(0.0, 1.16)
     axes.set_xticks(np.linspace(0.0, 1.0, 6))
@@ -77,7 +92,11 @@ def strength_figure(document: doc.Document, tree: xr.DataTree, number: int) -> F
     what = "added" if doc.get(comparison, "added") else "came closest, not added"
     title = f"{figure_text(short_title(document, name), 60)} ({what}): evidence along its coefficient"
     figure = new_figure(5.6, f"{title}\n{figure_text(_shape_text(comparison, name), 90)}")
-    panels = figure.subplot_mosaic([["evidence", "density"], ["scale", "scale"]])
+    if is_narrow():
+        grow(figure, 1.6)
+        panels = figure.subplot_mosaic([["evidence"], ["density"], ["scale"]])
+    else:
+        panels = figure.subplot_mosaic([["evidence", "density"], ["scale", "scale"]])
     curve = curves.sel(candidate=name)
     _evidence(panels["evidence"], curve)
     _densities(panels["density"], curve, _added_draws(document, tree, comparison, number))
@@ -195,7 +214,7 @@ def _scales(
         used = f" (scale {scale:g}{' ' + unit if unit else ''})" if is_number(scale) else ""
         axes.plot(
             scales, values, color=colour, linewidth=2.0 if other == name else 1.1, marker="o",
-            markersize=3, label=f"{figure_text(short_title(document, other), 44)}{used}",
+            markersize=3, label=folded(f"{figure_text(short_title(document, other), 44)}{used}", 44),
         )  # fmt: skip
     axes.axvline(1.0, color=GREY, linestyle="--", linewidth=0.9)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
@@ -206,4 +225,5 @@ def _scales(
     axes.set_xlabel("scale of the coefficient's prior, relative to the one used (dashed) [-]")
     axes.set_ylabel("log Bayes factor\nagainst nothing [nats]")
     axes.grid(axis="y", color=PALE)
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.1, fontsize=7)
+    columns = 1 if is_narrow() else 2
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.1, fontsize=7)

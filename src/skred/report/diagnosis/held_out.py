@@ -9,8 +9,16 @@ from numpy.typing import NDArray
 
 from skred.report.diagnosis.words import AFTER, BEFORE
 from skred.report.shared.labels import figure_text, unit_text
-from skred.report.shared.recordings import recordings_of
-from skred.report.shared.style import GREY, legend_below, new_figure, styled
+from skred.report.shared.marks import mark
+from skred.report.shared.numbers import fixed
+from skred.report.shared.recordings import Recordings, recordings_of
+from skred.report.shared.style import (
+    GREY,
+    legend_below,
+    new_figure,
+    side_by_side,
+    styled,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,17 +46,45 @@ def left_out_figure(tree: xr.DataTree) -> Figure:
     shown = [kind for kind in kinds if observed[:, kind[1]].any()]
     words = "before and after" if compared else "by the base law"
     figure = new_figure(4.5, f"Avalanches left out: recorded against predicted, {words}")
-    panels = figure.subplots(1, max(len(shown), 1), squeeze=False).ravel()
+    panels = side_by_side(figure, max(len(shown), 1))
     for axes, (quantity, columns, unit, zero) in zip(panels, shown, strict=False):
         seen = observed[:, columns]
         before = _predicted(tree, "before", columns, seen, zero)
         after = _predicted(tree, "after", columns, seen, zero) if compared else None
         _pairs(axes, recordings.values[:, columns][seen] - zero, before, after)
+        _tell(axes, recordings, columns, (before, after), zero, unit)
         of = "" if quantity != "runout" else " from the reference" if recordings.reference_s_m else " s"
         axes.set_xlabel(f"recorded {quantity}{of} [{unit}]")
         axes.set_ylabel(f"predicted from the other avalanches [{unit}]")
     legend_below(figure, panels, columns=2)
     return figure
+
+
+def _tell(
+    axes: Axes,
+    recordings: Recordings,
+    columns: NDArray[np.bool_],
+    bands: tuple[Band, Band | None],
+    zero: float,
+    unit: str,
+) -> None:
+    """Say of each point which avalanche and sensor it is, what was recorded and what predicted."""
+    numbers = np.flatnonzero(columns)
+    places = np.argwhere(recordings.observed[:, columns])
+    values = [recordings.values[event, numbers[column]] - zero for event, column in places]
+    decimals = 0 if unit == "m" else 1
+    before, after = bands
+    last = after or before
+    words = []
+    for k, (event, column) in enumerate(places):
+        name = f"{recordings.event_ids[event]}, {recordings.sensors[numbers[column]].id}"
+        told = f"{name}\nrecorded {fixed(float(values[k]), decimals)} {unit}"
+        told += f"\npredicted {fixed(float(before[0][k]), decimals)}"
+        told += "" if after is None else f", with what was missing {fixed(float(after[0][k]), decimals)}"
+        words.append(
+            f"{told} (90 %: {fixed(float(last[1][k]), decimals)} to {fixed(float(last[2][k]), decimals)})"
+        )
+    mark(axes, values, last[0], words, [recordings.event_ids[event] for event, _ in places])
 
 
 def _predicted(
@@ -100,13 +136,20 @@ def scores_figure(tree: xr.DataTree) -> Figure:
     axes = figure.subplots()
     colours = [AFTER if difference[k] >= 0.0 else BEFORE for k in order]
     axes.bar(np.arange(n), difference[order], color=colours, width=0.8)
+    names = [str(held["event"].values[k]) for k in order]
+    told = [f"{name}: {change:+.1f} nats" for name, change in zip(names, difference[order], strict=True)]
+    mark(axes, np.arange(n), difference[order], told, names)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     axes.set_ylabel("difference of log score [nats],\npositive: better with the new term")
     axes.grid(axis="y")
     axes.set_xlim(-0.7, n - 0.3)
     if n <= _MOST_NAMED:
-        names = [figure_text(held["event"].values[k], 14) for k in order]
-        axes.set_xticks(np.arange(n), names, rotation=90, fontsize=7 if n <= 40 else 5.5)
+        axes.set_xticks(
+            np.arange(n),
+            [figure_text(name, 14) for name in names],
+            rotation=90,
+            fontsize=7 if n <= 40 else 5.5,
+        )
     else:
         axes.set_xticks([])
     axes.set_xlabel("avalanche" if n <= _MOST_NAMED else f"{n} avalanches, in order")

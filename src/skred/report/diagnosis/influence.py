@@ -10,8 +10,15 @@ import numpy as np
 from skred.report.diagnosis.words import AFTER, MISMATCH, in_words
 from skred.report.shared import document as doc
 from skred.report.shared.labels import figure_text
+from skred.report.shared.marks import mark
 from skred.report.shared.numbers import is_number
-from skred.report.shared.style import GREY, legend_below, new_figure, styled
+from skred.report.shared.style import (
+    GREY,
+    legend_below,
+    new_figure,
+    side_by_side,
+    styled,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -36,16 +43,21 @@ def influence_figure(document: doc.Document) -> Figure:
     name = figure_text(in_words([found["answer"]])[0], 40)
     figure = new_figure(3.6, f"What the answer hangs on: {name}, again without some of the recordings")
     readings = doc.listed(found, "readings")
-    panels = figure.subplots(1, 2, sharey=True, width_ratios=[3, 1.2]).ravel()
+    panels = side_by_side(figure, 2, sharey=True, width_ratios=[3, 1.2])
     carried = set(found["carried_by"])
     without = {one["event"]: float(one["log_bayes_factor"]) for one in found["events"]}
     events = sorted(without, key=lambda event: without[event])
     _points(panels[0], found, events, [without[event] for event in events], carried)
+    told = [f"without {event}: {without[event]:.1f} nats" for event in events]
+    mark(panels[0], np.arange(len(events)), [without[event] for event in events], told, events)
     panels[0].set_xlabel(
         "without avalanche" if len(events) <= _MOST_NAMED else f"without each of {len(events)}"
     )
     panels[0].set_ylabel("log Bayes factor\nagainst nothing [nats]")
     _points(panels[1], found, [_kind(one) for one in readings], [one["log_bayes_factor"] for one in readings])
+    values = [one["log_bayes_factor"] for one in readings]
+    told = [f"without {_kind(one)}: {value:.1f} nats" for one, value in zip(readings, values, strict=True)]
+    mark(panels[1], np.arange(len(readings)), values, told)
     panels[1].set_xlabel("without readings")
     if found["without_them"] is not None:
         panels[0].plot(

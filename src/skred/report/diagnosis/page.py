@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skred.report.diagnosis import rows, unseen
 from skred.report.diagnosis.conditional import conditional_rows
 from skred.report.diagnosis.equation import equations, parameter_rows, symbol_rows
+from skred.report.diagnosis.events import MOST_OPEN, event_rows, reading_rows
 from skred.report.diagnosis.evidence import group_of
+from skred.report.diagnosis.lay import lay_words
 from skred.report.diagnosis.words import comparisons, in_words, law_id, stretch_in, verdict_words
 from skred.report.shared import document as doc
-from skred.report.shared.html import environment, picture
+from skred.report.shared import html
 from skred.report.shared.labels import name_text, unit_text
 from skred.report.shared.numbers import fixed, is_number
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from skred.report.shared.drawing import Picture
 
 _NO_FORCE = 1e-6
 """Retardation that is none [m s-2]."""
@@ -34,47 +37,48 @@ _SECTIONS = {
 }
 
 
-def page(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Path]) -> str:
+def page(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Picture]) -> str:
     """Render the report of a diagnosis, see `skred.report.diagnosis.report.render_diagnosis`."""
     locked, folds = unseen.locked(document), unseen.outer_folds(document)
     sections = _sections(document, has_unseen=locked is not None or folds is not None)
     report = doc.get(document, "report") or {}
     compared = [_comparison(document, number, one) for number, one in enumerate(comparisons(document))]
-    return (
-        environment()
-        .get_template("diagnosis.html.jinja")
-        .render(
-            d=document,
-            r=report,
-            campaign=doc.get(report, "campaign") or {},
-            limits=doc.get(report, "limits") or {},
-            law=law_id(document),
-            sections=sections,
-            number={name: place for place, name in enumerate(sections, start=1)},
-            figures={name: picture(file) for name, file in figures.items()},
-            verdict=verdict_words(document),
-            sensors=rows.sensor_rows(tree),
-            detectability=rows.detectability_rows(document),
-            work=rows.work_rows(document),
-            stretch=stretch_in(doc.get(document, "location")),
-            comparisons=compared,
-            equations=equations(document),
-            symbols=symbol_rows(document),
-            parameters=parameter_rows(document),
-            held=rows.held_out_rows(document),
-            given=conditional_rows(document),
-            difference=_difference(document),
-            locked=locked,
-            folds=folds,
-            trust=rows.trust_rows(document),
-            priors=rows.prior_rows(document),
-            settings=rows.settings_rows(document),
-            force_prior=_force_prior(doc.get(report, "profile_prior")),
-            checks=doc.listed(report, "checks"),
-            too_few=_too_few(document),
-            dropped=in_words(doc.listed(report, "not_added")),
-            flat=not _number(doc.get(report, "force", "largest"), 1.0) > _NO_FORCE,
-        )
+    return html.page(
+        "diagnosis.html.jinja",
+        figures,
+        d=document,
+        r=report,
+        campaign=doc.get(report, "campaign") or {},
+        limits=doc.get(report, "limits") or {},
+        law=law_id(document),
+        sections=sections,
+        number={name: place for place, name in enumerate(sections, start=1)},
+        verdict=verdict_words(document),
+        sensors=rows.sensor_rows(tree),
+        detectability=rows.detectability_rows(document),
+        work=rows.work_rows(document),
+        stretch=stretch_in(doc.get(document, "location")),
+        comparisons=compared,
+        equations=equations(document),
+        symbols=symbol_rows(document),
+        parameters=parameter_rows(document),
+        held=rows.held_out_rows(document),
+        given=conditional_rows(document),
+        difference=_difference(document),
+        locked=locked,
+        folds=folds,
+        trust=rows.trust_rows(document),
+        priors=rows.prior_rows(document),
+        settings=rows.settings_rows(document),
+        force_prior=_force_prior(doc.get(report, "profile_prior")),
+        lay=lay_words(document),
+        events=event_rows(document, tree),
+        readings=reading_rows(tree),
+        most_open=MOST_OPEN,
+        checks=doc.listed(report, "checks"),
+        too_few=_too_few(document),
+        dropped=in_words(doc.listed(report, "not_added")),
+        flat=not _number(doc.get(report, "force", "largest"), 1.0) > _NO_FORCE,
     )
 
 

@@ -18,6 +18,7 @@ from skred.report.diagnosis.words import (
 )
 from skred.report.shared import document as doc
 from skred.report.shared.labels import figure_text, unit_text
+from skred.report.shared.marks import mark
 from skred.report.shared.numbers import is_number
 from skred.report.shared.recordings import Recordings, recordings_of
 from skred.report.shared.style import GREY, INK, PALE, legend_below, new_figure, styled, tint
@@ -129,6 +130,10 @@ def _retardation(axes: Axes, document: doc.Document, force: xr.Dataset) -> None:
         linewidth=0, label="holds the whole profile with probability 0.9",
     )  # fmt: skip
     axes.plot(s_m, force["mean"].values, color=INK, linewidth=1.4, label="missing retardation, mean")
+    shown = slice(None, None, max(1, len(s_m) // 30))
+    rows = zip(*(force[name].values[shown].tolist() for name in ("s", "mean", "low", "high")), strict=True)
+    told = [f"s = {s:.0f} m: {mean:.2f} m/s² (band {low:.2f} to {high:.2f})" for s, mean, low, high in rows]
+    mark(axes, s_m[shown], force["mean"].values[shown], told)
     axes.axhline(0.0, color=GREY, linewidth=0.8)
     of_fast = "\nof a fast front" if doc.get(document, "report", "force", "nil_at_typical_speed") else "\n"
     axes.set_ylabel(f"missing retardation{of_fast} [{unit_text('m s-2')}],\npositive brakes")
@@ -210,6 +215,8 @@ def _at_places(axes: Axes, places: list[Place], colour: str, short_m: float) -> 
             height, one.first_m, one.last_m, color=shade, linewidth=2.6 if one.best else 1.2, zorder=order,
             label="highest" if one.best else "_other",
         )  # fmt: skip
+        told = f"s = {one.first_m:.0f} to {one.last_m:.0f} m: {one.factor:.1f} nats"
+        mark(axes, 0.5 * (one.first_m + one.last_m), height, [told])
         if one.last_m - one.first_m < short_m:
             middle = 0.5 * (one.first_m + one.last_m)
             axes.plot(middle, height, marker="o", markersize=4, color=shade, zorder=order)

@@ -16,7 +16,7 @@ from skred.report.diagnosis.places import places_figure, places_of, where_figure
 from skred.report.diagnosis.terminal import diagnosis_table
 from skred.report.diagnosis.words import comparisons, leading_name
 from skred.report.shared import document as doc
-from skred.report.shared.style import write_png
+from skred.report.shared.drawing import Picture, draw
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,8 +31,8 @@ FIGURES = (
 """Names of all figures that there may be."""
 
 
-def save_diagnosis_figures(document: doc.Document, tree: xr.DataTree, folder: Path) -> dict[str, Path]:
-    """Write the figures of a diagnosis as PNG.
+def save_diagnosis_figures(document: doc.Document, tree: xr.DataTree, folder: Path) -> dict[str, Picture]:
+    """Make the figures of a diagnosis, and write them as PNG.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def save_diagnosis_figures(document: doc.Document, tree: xr.DataTree, folder: Pa
 
     Returns
     -------
-    dict of str to Path
+    dict of str to Picture
         Those of `FIGURES` that apply; with _2 those of a second comparison.
     """
     makers: dict[str, Callable[[], Figure]] = {}
@@ -68,7 +68,7 @@ def save_diagnosis_figures(document: doc.Document, tree: xr.DataTree, folder: Pa
         makers["scores"] = partial(scores_figure, tree)
     if has_influence(document):
         makers["influence"] = partial(influence_figure, document)
-    return {name: write_png(make(), folder / f"{name}.png") for name, make in makers.items()}
+    return draw(makers, folder)
 
 
 def _has_curve(tree: xr.DataTree, comparison: doc.Document, number: int) -> bool:
@@ -77,7 +77,7 @@ def _has_curve(tree: xr.DataTree, comparison: doc.Document, number: int) -> bool
     return group in tree.children and leading_name(comparison) in tree[group].to_dataset()["candidate"].values
 
 
-def render_diagnosis(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Path]) -> str:
+def render_diagnosis(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Picture]) -> str:
     """Render the report of a diagnosis.
 
     Parameters
@@ -86,13 +86,13 @@ def render_diagnosis(document: doc.Document, tree: xr.DataTree, figures: Mapping
         The content of ``verdict.json``; anything may be null.
     tree : DataTree
         The content of ``diagnosis.nc``.
-    figures : mapping of str to Path
+    figures : mapping of str to Picture
         As `save_diagnosis_figures` returns them; what is missing is left out.
 
     Returns
     -------
     str
-        A self-contained page: style inside, pictures as data URIs.
+        A self-contained page, see `skred.report.shared.html.page`.
     """
     from skred.report.diagnosis.page import page
 

@@ -1,4 +1,4 @@
-"""Figures and table of a prediction: how far, how fast, and how sure."""
+"""Figures of a prediction: how far, how fast, and how sure."""
 
 from __future__ import annotations
 
@@ -7,14 +7,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.report.prediction.table import prediction_table
 from skred.report.shared.document import get
-from skred.report.shared.labels import figure_text, printable, shortened, unit_text
-from skred.report.shared.numbers import share, three_digits, whole
+from skred.report.shared.labels import figure_text, printable, unit_text
+from skred.report.shared.marks import mark
 from skred.report.shared.recordings import recordings_of
 from skred.report.shared.style import (
     GREY,
     INK,
     RECORDED,
+    folded,
+    grow,
+    is_narrow,
     law_colours,
     legend_below,
     new_figure,
@@ -26,11 +30,11 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from rich.table import Table
 
     from skred.report.shared.document import Document
     from skred.report.shared.recordings import Recordings
 
+__all__ = ["FIGURES", "prediction_figure", "prediction_table", "uncertainty_figure"]
 FloatArray = NDArray[np.float64]
 _DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (1.5, 1.5)))
 _LEAST_SHOWN, _FLOOR = 0.002, 0.0005
@@ -56,6 +60,8 @@ _PART_STYLES: dict[str, tuple[str, Any, str]] = {
     "residual": ("#009E73", (0, (1.5, 1.5)), "error of a reading"),
     "total": (INK, "-", "all together"),
 }
+_MOST_TOLD = 60
+"""Places of a curve that one can point at."""
 _TICKS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005)
 
 
@@ -74,9 +80,7 @@ def prediction_figure(document: Document, tree: xr.DataTree) -> Figure:
     title = f"The next avalanche on {figure_text(data.attrs['track'], 40)}: how fast, how far"
     figure = new_figure(7.6, f"{title}\n{figure_text(_subtitle(data, document), 100)}")
     windows = _windows(data)
-    panels = figure.subplots(
-        3, len(windows), sharex="col", squeeze=False, gridspec_kw={"height_ratios": [1.3, 1.15, 1.0]}
-    )
+    panels = _panels(figure, len(windows))
     colour = _colour(document)
     for column, window in enumerate(windows):
         speed, runout, profile = panels[:, column]
@@ -91,12 +95,27 @@ def prediction_figure(document: Document, tree: xr.DataTree) -> Figure:
             if last:
                 _recorded_speeds(speed, recordings, window)
         _reference((speed, runout, profile), data)
-        if column > 0:
+        if column > 0 and not is_narrow():
             for axes in (speed, runout):
                 axes.tick_params(labelleft=False)
     _titles(panels, data)
     legend_below(figure, panels[:2].T.ravel(), columns=2)
     return figure
+
+
+def _panels(figure: Figure, n: int) -> Any:
+    """Speed, runout and terrain, (3, n) panels; in a narrow figure each window below the other."""
+    ratios = [1.3, 1.15, 1.0]
+    if not is_narrow() or n == 1:
+        return figure.subplots(3, n, sharex="col", squeeze=False, gridspec_kw={"height_ratios": ratios})
+    grow(figure, 1.45)
+    panels = figure.subplots(3 * n, 1, squeeze=False, gridspec_kw={"height_ratios": n * ratios})
+    panels = panels[:, 0].reshape(n, 3).T
+    for column in range(n):
+        for axes in panels[:2, column]:
+            axes.sharex(panels[2, column])
+            axes.tick_params(labelbottom=False)
+    return panels
 
 
 def _titles(panels: Any, data: xr.Dataset) -> None:
@@ -110,8 +129,9 @@ def _titles(panels: Any, data: xr.Dataset) -> None:
         axes.set_title(title)
     panels[2, -1].set_title("Distance that 50, 10 and 1 % exceed")
     labels = (f"front speed [{unit_text('m s-1')}]", "probability", "elevation [m]")
-    for axes, label in zip(panels[:, 0], labels, strict=True):
-        axes.set_ylabel(label)
+    for column in panels.T if is_narrow() else panels.T[:1]:
+        for axes, label in zip(column, labels, strict=True):
+            axes.set_ylabel(label)
     if panels.shape[1] > 1:
         panels[2, 1].set_xlabel("s, the part where most stop [m]")
     panels[2, 0].set_xlabel(f"s [m], release at {figure_text(data.attrs['release_short'], 45)}")
@@ -155,6 +175,15 @@ def _speeds(axes: Axes, data: xr.Dataset, colour: str, *, named: bool) -> None:
         value = data["speed_quantile"].values[:, k]
         axes.fill_between(s_m, low, high, color=tone, alpha=0.28, linewidth=0)
         label = f"speed that {100 * q:g} % of avalanches exceed"
+        _tell(
+            axes,
+            s_m,
+            value,
+            [
+                f"{100 * q:g} % exceed {v:.1f} m/s ({a:.1f} to {b:.1f})"
+                for v, a, b in zip(value, low, high, strict=True)
+            ],
+        )
         axes.plot(s_m, value, color=tone, linestyle=_DASHES[k % 3], linewidth=1.6, label=label)
         if named:
             peak = int(value.argmax())
@@ -171,11 +200,24 @@ def _runout(axes: Axes, data: xr.Dataset, colour: str) -> None:
     )
     axes.fill_between(s_m, low, high, color=colour, alpha=0.28, linewidth=0)
     axes.plot(s_m, value, color=colour, linewidth=1.6, label="share that runs beyond s")
+    found = zip(*(data[f"runout_probability{end}"].values for end in ("", "_low", "_high")), strict=True)
+    _tell(
+        axes,
+        s_m,
+        value,
+        [f"{100 * v:.3g} % run farther ({100 * a:.3g} to {100 * b:.3g} %)" for v, a, b in found],
+    )
     axes.set_yscale("log")
     axes.set_ylim(_LEAST_SHOWN, 1.15)
     axes.set_yticks(_TICKS, [f"{100 * tick:g} %" for tick in _TICKS])
     axes.minorticks_off()
     axes.grid()
+
+
+def _tell(axes: Axes, s_m: FloatArray, value: FloatArray, words: list[str]) -> None:
+    """Say what a curve is at some places in the panel's window, and at few others."""
+    at = np.linspace(0, len(s_m) - 1, min(len(s_m), _MOST_TOLD)).astype(int)
+    mark(axes, s_m[at], value[at], [f"s = {s_m[k]:.0f} m\n{words[k]}" for k in at])
 
 
 def _profile(axes: Axes, data: xr.Dataset, window: tuple[float, float], *, share: float) -> None:
@@ -260,11 +302,14 @@ def uncertainty_figure(document: Document, tree: xr.DataTree) -> Figure:
     data = tree.to_dataset()
     title = f"Where the uncertainty comes from, on {figure_text(data.attrs['track'], 40)}"
     figure = new_figure(6.6, f"{title}\n{figure_text(_subtitle(data, document), 100)}")
+    if is_narrow():
+        grow(figure, 1.2)
     speed, arrival, runout = figure.subplots(3, 1, gridspec_kw={"height_ratios": [1.6, 0.7, 1.0]})
     s_m = data["s"].values
     for part, (colour, dashes, label) in _PART_STYLES.items():
         values = data[f"speed_sd_{part}"].values
         width = 1.0 if part == "total" else 1.7
+        _tell(speed, s_m, values, [f"{label}: {one:.2f} m/s" for one in values])
         speed.plot(s_m, values, color=colour, linestyle=dashes, linewidth=width, label=label)
     speed.set_ylabel(f"sd of speed [{unit_text('m s-1')}]")
     speed.set_ylim(bottom=0.0)
@@ -318,7 +363,7 @@ def _runout_parts(axes: Axes, data: xr.Dataset) -> None:
                 va="center",
                 fontsize=7.5,
             )
-    axes.set_yticks(range(len(parts)), [_PART_STYLES[part][2] for part in parts])
+    axes.set_yticks(range(len(parts)), [folded(_PART_STYLES[part][2], 22) for part in parts])
     axes.invert_yaxis()
     axes.set_xlim(0, 1.1 * highest)
     axes.set_xlabel("sd of runout [m]")
@@ -327,57 +372,3 @@ def _runout_parts(axes: Axes, data: xr.Dataset) -> None:
 
 FIGURES = {"prediction": prediction_figure, "uncertainty": uncertainty_figure}
 """Makers of all figures by their names."""
-
-
-def prediction_table(document: dict[str, Any]) -> Table:
-    """How far and how fast, with bands, for the terminal.
-
-    Parameters
-    ----------
-    document : dict
-        The content of ``prediction.json``.
-    """
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    name = shortened(document["track"]["name"], 60)
-    title = Text(f"{name}: the next avalanche, {printable(document['law']['title'])}")
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1))
-    table.add_column("predicted", overflow="fold")
-    for column in ("", "90 % band", "unit"):
-        table.add_column(column, justify="right", no_wrap=True)
-    if not document["valid"]:
-        table.add_row(Text("nothing: the chains did not converge", style="red"), "", "", "")
-        return table
-    for row in document["runout"]["exceeded_by"]:
-        what = f"runout exceeded by {100 * row['share']:g} %"
-        bound = "≥ " if row["at_least"] else ""
-        table.add_row(what, bound + whole(row["value"]), f"{whole(row['low'])} to {whole(row['high'])}", "m")
-    for place in document["at"]:
-        _place_rows(table, place)
-    return table
-
-
-def _place_rows(table: Table, place: dict[str, Any]) -> None:
-    """Arrival, thresholds, and what a tenth of all avalanches exceed, at one place."""
-    from rich.text import Text
-
-    where = f"{shortened(place['name'], 20)} (s = {place['s_m']:.0f} m)"
-    table.add_row(Text(f"{where}: reached"), *_chance(place["reached"]), "-")
-    for name, words in (("speed", "speed"), ("pressure", "impact pressure")):
-        unit = place[name]["unit"]
-        for row in place[name]["above"]:
-            what = f"{where}: {words} above {row['threshold']:g} {unit}"
-            table.add_row(Text(what), *_chance(row), "-")
-        tenth = next(row for row in place[name]["exceeded_by"] if row["share"] == 0.1)
-        value, low, high = (three_digits(tenth[key]) for key in ("value", "low", "high"))
-        table.add_row(Text(f"{where}: {words} exceeded by 10 %"), value, f"{low} to {high}", unit)
-    period = place["reached"].get("return_period_years")
-    if period is not None:
-        value, low, high = (three_digits(period[key]) for key in ("value", "low", "high"))
-        table.add_row(Text(f"{where}: return period of arrival"), value, f"{low} to {high}", "years")
-
-
-def _chance(band: dict[str, float]) -> tuple[str, str]:
-    return share(band["value"]), f"{share(band['low'])} to {share(band['high'])}"

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skred.report.prediction.figures import FIGURES as ALONG_TRACK
 from skred.report.prediction.places import has_places, places_figure
 from skred.report.shared import document as doc
-from skred.report.shared.html import environment, picture
+from skred.report.shared.drawing import Picture, draw
+from skred.report.shared.html import page
 from skred.report.shared.numbers import fixed, is_number, three_digits
-from skred.report.shared.style import write_png, write_svg
+from skred.report.shared.style import write_svg
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,32 +31,28 @@ _SECTIONS = {
 }
 
 
-def save_prediction_figures(document: doc.Document, tree: xr.DataTree, folder: Path) -> dict[str, Path]:
-    """Draw all figures as PNG, and as SVG for the page; the SVG files by name."""
-    drawn = {}
-    for name, make in FIGURES.items():
-        if name == "places" and not has_places(document):
-            continue
-        figure = make(document, tree)
-        write_png(figure, folder / f"{name}.png")
-        drawn[name] = write_svg(figure, folder / f"{name}.svg")
-    return drawn
+def save_prediction_figures(document: doc.Document, tree: xr.DataTree, folder: Path) -> dict[str, Picture]:
+    """Make all figures that there are data for, and write them as PNG and SVG."""
+    names = [name for name in FIGURES if name != "places" or has_places(document)]
+    for name in names:
+        write_svg(FIGURES[name](document, tree), folder / f"{name}.svg")
+    return draw({name: partial(FIGURES[name], document, tree) for name in names}, folder)
 
 
-def render_prediction(document: doc.Document, figures: Mapping[str, Path]) -> str:
+def render_prediction(document: doc.Document, figures: Mapping[str, Picture]) -> str:
     """Render the page of a prediction.
 
     Parameters
     ----------
     document : mapping
         The content of ``prediction.json``.
-    figures : mapping of str to Path
+    figures : mapping of str to Picture
         Figures by name, see `save_prediction_figures`.
 
     Returns
     -------
     str
-        A self-contained page: style inside, pictures as data URIs.
+        A self-contained page, see `skred.report.shared.html.page`.
     """
     has = {
         "places": has_places(document),
@@ -63,21 +61,18 @@ def render_prediction(document: doc.Document, figures: Mapping[str, Path]) -> st
     }
     valid = doc.get(document, "valid") is True
     sections = {name: title for name, title in _SECTIONS.items() if has.get(name, valid or name == "made")}
-    return (
-        environment()
-        .get_template("prediction.html.jinja")
-        .render(
-            d=document,
-            valid=valid,
-            sections=sections,
-            number={name: k for k, name in enumerate(sections, 1)},
-            figures={name: picture(file) for name, file in figures.items()},
-            lead=_lead(document) if valid else list(doc.listed(document, "statement")),
-            caveats=[line for line in doc.listed(document, "statement") if is_caveat(line)],
-            left_out=_left_out(document),
-            percent=percent,
-            period=period,
-        )
+    return page(
+        "prediction.html.jinja",
+        figures,
+        d=document,
+        valid=valid,
+        sections=sections,
+        number={name: k for k, name in enumerate(sections, 1)},
+        lead=_lead(document) if valid else list(doc.listed(document, "statement")),
+        caveats=[line for line in doc.listed(document, "statement") if is_caveat(line)],
+        left_out=_left_out(document),
+        percent=percent,
+        period=period,
     )
 
 

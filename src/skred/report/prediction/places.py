@@ -8,7 +8,15 @@ import numpy as np
 
 from skred.report.shared.document import get, listed
 from skred.report.shared.labels import figure_text, unit_text
-from skred.report.shared.style import GREY, PALETTE, legend_below, new_figure, styled
+from skred.report.shared.marks import mark
+from skred.report.shared.style import (
+    GREY,
+    PALETTE,
+    legend_below,
+    new_figure,
+    side_by_side,
+    styled,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,7 +46,7 @@ def places_figure(document: Document, tree: xr.DataTree) -> Figure:
     data = tree.to_dataset()
     title = f"At the named places of {figure_text(data.attrs['track'], 40)}"
     figure = new_figure(3.9, f"{title}\nlines: of all avalanches; bands: 90 % credible")
-    speed, pressure = figure.subplots(1, 2, sharey=True)
+    speed, pressure = side_by_side(figure, 2, sharey=True)
     for axes, name, words in ((speed, "speed", "front speed"), (pressure, "pressure", "impact pressure")):
         _curves(axes, data, name)
         unit = data[f"{name}_threshold"].attrs["units"]
@@ -71,6 +79,13 @@ def _curves(axes: Axes, data: xr.Dataset, name: str) -> None:
         colour, dashes = PALETTE[k % len(PALETTE)], _DASHES[k % len(_DASHES)]
         axes.fill_between(at, low, high, color=colour, alpha=0.16, linewidth=0)
         label = figure_text(place, 30)
+        unit = unit_text(data[f"{name}_threshold"].attrs["units"])
+        told = [
+            f"{place}: {100 * v:.3g} % exceed {t:.3g} {unit} ({100 * a:.3g} to {100 * b:.3g} %)"
+            for t, v, a, b in zip(at, value, low, high, strict=True)
+        ]
+        step = max(1, len(at) // 40)
+        mark(axes, at[::step], value[::step], told[::step])
         axes.plot(at, value, color=colour, linestyle=dashes, linewidth=1.6, label=label)
     least = [data[f"{name}_exceedance_high"].values[k] for k in range(len(data["at"]))]
     seen = np.flatnonzero(np.max(least, axis=0) >= _LEAST)

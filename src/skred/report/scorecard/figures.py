@@ -6,6 +6,7 @@ Every figure is made from the scorecard's document alone; one without data is le
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,8 +15,22 @@ from scipy.special import ndtr
 
 from skred.report.scorecard.panels import baselines_figure, gain_figure, places_figure, reliability_figure
 from skred.report.shared.document import Document, get, listed
+from skred.report.shared.drawing import Picture, draw
 from skred.report.shared.labels import figure_text, name_text
-from skred.report.shared.style import GREY, INK, legend_below, new_figure, shade_map, styled, tint, write_png
+from skred.report.shared.marks import mark
+from skred.report.shared.numbers import fixed
+from skred.report.shared.style import (
+    GREY,
+    INK,
+    folded,
+    grow,
+    is_narrow,
+    legend_below,
+    new_figure,
+    shade_map,
+    styled,
+    tint,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,21 +46,16 @@ _KINDS = ("sparse", "dense")
 _SNR = (1.5, 13.0)
 
 
-def save_scorecard_figures(document: Document, folder: Path) -> dict[str, Path]:
-    """Write the figures of a scorecard as PNG.
+def save_scorecard_figures(document: Document, folder: Path) -> dict[str, Picture]:
+    """Make the figures of a scorecard, and write them as PNG.
 
     Returns
     -------
     dict
-        Files by name: ``false_alarms``, ``power``, ``confusion``, ``confusion_classes``, ``places``,
+        By name: ``false_alarms``, ``power``, ``confusion``, ``confusion_classes``, ``places``,
         ``reliability``, ``gain`` and ``baselines``, as far as there are data for them.
     """
-    files = {}
-    for name, make in _makers().items():
-        figure = make(document)
-        if figure is not None:
-            files[name] = write_png(figure, folder / f"{name}.png")
-    return files
+    return draw({name: partial(make, document) for name, make in _makers().items()}, folder)
 
 
 def _makers() -> dict[str, Callable[[Document], Figure | None]]:
@@ -101,6 +111,8 @@ def false_alarms_figure(document: Document) -> Figure | None:
             linewidth=1.6,
             label="acceptance criterion for the upper limit",
         )
+        told = f"{rows[place][0]}: {one['hits']} of {one['n']}, upper limit {fixed(limit)}"
+        mark(axes, one["share"], place, [f"{told}, criterion {fixed(bar)}"])
         axes.text(max(limit, bar) + 0.008, place, f"{one['hits']} of {one['n']}", va="center", fontsize=7.5)
     axes.set_yticks(range(len(rows)), [figure_text(row[0], 30) for row in rows])
     axes.tick_params(axis="y", length=0)
@@ -120,7 +132,10 @@ def power_figure(document: Document) -> Figure | None:
     if not any(get(own_scores(document, kind), "detection", "all", "n") for kind in _KINDS):
         return None
     figure = new_figure(6.2, "What is found and what is named, against signal-to-noise")
-    panels = figure.subplots(2, 2, sharex=True, sharey=True)
+    if is_narrow():
+        grow(figure, 1.7)
+    rows, columns = (4, 1) if is_narrow() else (2, 2)
+    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).reshape(2, 2)
     for column, kind in enumerate(_KINDS):
         _detection(panels[0, column], document, kind)
         _names(panels[1, column], document, kind)
@@ -203,6 +218,10 @@ def _binned(
         return
     x = np.array([middle for middle, _ in known]) + shift
     value, low, high = (np.array([one[key] for _, one in known]) for key in ("share", "low", "high"))
+    told = [
+        f"{label} {fixed(y)} ({fixed(a)} to {fixed(b)})" for y, a, b in zip(value, low, high, strict=True)
+    ]
+    mark(axes, x, value, told)
     axes.errorbar(
         x,
         value,
@@ -223,7 +242,7 @@ def confusion_figure(document: Document, over: str) -> Figure | None:
     if not rows:
         return None
     words = f"What was hidden (rows) and what was said (columns), by {name_text(over)}; counts of trials"
-    figure = new_figure(1.9 + 0.27 * len(rows), words)
+    figure = new_figure(1.9 + (0.33 if is_narrow() else 0.27) * len(rows), words)
     axes = figure.subplots()
     totals = counts.sum(axis=1, keepdims=True)
     shades = counts / np.maximum(totals, 1)
@@ -235,7 +254,7 @@ def confusion_figure(document: Document, over: str) -> Figure | None:
             str(counts[row, column]),
             ha="center",
             va="center",
-            fontsize=7.5,
+            fontsize=6.5 if is_narrow() else 7.5,
             color="white" if shades[row, column] > 0.45 else INK,
         )
         if rows[row] == columns[column]:
@@ -243,12 +262,17 @@ def confusion_figure(document: Document, over: str) -> Figure | None:
     axes.set_xticks(
         range(len(columns)),
         [_short_label(name) for name in columns],
-        rotation=40,
+        rotation=90 if is_narrow() else 40,
         ha="right",
+        va="center" if is_narrow() else "top",
         rotation_mode="anchor",
+        fontsize=6.5 if is_narrow() else None,
     )
+    names = [f"{_label(name)} ({int(n)})" for name, n in zip(rows, totals[:, 0], strict=True)]
     axes.set_yticks(
-        range(len(rows)), [f"{_label(name)} ({int(n)})" for name, n in zip(rows, totals[:, 0], strict=True)]
+        range(len(rows)),
+        [folded(name, 22) for name in names],
+        fontsize=7 if is_narrow() else None,
     )
     axes.set_xticks(np.arange(len(columns) + 1) - 0.5, minor=True)
     axes.set_yticks(np.arange(len(rows) + 1) - 0.5, minor=True)

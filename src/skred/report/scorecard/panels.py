@@ -8,8 +8,17 @@ import numpy as np
 
 from skred.report.shared.document import Document, get, listed
 from skred.report.shared.labels import figure_text
+from skred.report.shared.marks import mark
 from skred.report.shared.numbers import fixed, floats
-from skred.report.shared.style import GREY, INK, legend_below, new_figure, styled
+from skred.report.shared.style import (
+    GREY,
+    INK,
+    folded,
+    legend_below,
+    new_figure,
+    side_by_side,
+    styled,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +41,7 @@ def places_figure(document: Document) -> Figure | None:
     if not lines:
         return None
     figure = new_figure(3.7, "Distance between the middles of the stated and the true stretch")
-    points, shares = figure.subplots(1, 2)
+    points, shares = side_by_side(figure, 2)
     for kind, colour in _COLOURS.items():
         those = [line for line in lines if line["kind"] == kind]
         error = np.maximum([line["place_error_m"] for line in those], _LEAST_M)
@@ -49,6 +58,11 @@ def places_figure(document: Document) -> Figure | None:
                 markerfacecolor=face,
                 label=words,
             )
+        told = [
+            f"{line['trial']}: snr {fixed(line['snr'], 1)}, error {fixed(line['place_error_m'], 0)} m"
+            for line in those
+        ]
+        mark(points, [line["snr"] for line in those], error, told, [str(line["trial"]) for line in those])
         if len(those):
             steps = np.arange(1, len(error) + 1) / len(error)
             shares.step(
@@ -83,7 +97,7 @@ def reliability_figure(document: Document) -> Figure | None:
     if found is None:
         return None
     figure = new_figure(4.5, "Do stated probabilities mean what they say?")
-    panels = figure.subplots(1, 2, sharey=True)
+    panels = side_by_side(figure, 2, sharey=True)
     for axes, key, words in zip(
         panels, ("top_id", "all_ids"), ("the most probable id", "all ids"), strict=True
     ):
@@ -111,6 +125,13 @@ def _reliability(axes: Axes, found: Document, words: str) -> None:
             label="share true, 95 % interval",
         )
     for row, place in zip(rows, x, strict=True):
+        told = f"stated {fixed(row['mean_stated'])}, true {fixed(row['share'])}"
+        mark(
+            axes,
+            place,
+            row["share"],
+            [f"{told} ({fixed(row['low'])} to {fixed(row['high'])}), n = {row['n']}"],
+        )
         axes.text(place, -0.075, str(row["n"]), ha="center", va="center", fontsize=6.5, color=GREY)
     ece, expected = fixed(found["ece"], 3), fixed(get(found, "ece_expected_if_calibrated"), 3)
     axes.set_title(f"{words}\nECE {ece}, {expected} expected if calibrated")
@@ -169,20 +190,21 @@ def baselines_figure(document: Document) -> Figure | None:
     figure = new_figure(
         1.6 + 0.42 * len(names), "Right first names at equal false alarms, on the same trials"
     )
-    shares, differences = figure.subplots(1, 2, sharey=True)
+    shares, differences = side_by_side(figure, 2, sharey=True)
     for shift, (kind, colour) in zip((-0.14, 0.14), _COLOURS.items(), strict=True):
         for row, name in enumerate(names):
             one = get(paired, name, kind, "right_first_name")
             if one["difference"] is None:
                 continue
-            y, style = row + shift, {"color": colour, "markersize": 5}
+            y = row + shift
+            style: dict[str, Any] = {"color": colour, "markersize": 5}
             shares.plot([one["theirs"], one["ours"]], [y, y], color=colour, linewidth=0.8)
             shares.plot(one["theirs"], y, "o", markerfacecolor="white", label=f"{kind}: baseline", **style)
             shares.plot(one["ours"], y, "o", label=f"{kind}: diagnosis", **style)
             differences.plot([one["low"], one["high"]], [y, y], color=colour, linewidth=1.2)
             differences.plot(one["difference"], y, _MARKERS[kind], **style)
     differences.axvline(0.0, color=INK, linewidth=0.8)
-    shares.set_yticks(range(len(names)), [figure_text(name, 34) for name in names])
+    shares.set_yticks(range(len(names)), [folded(figure_text(name, 34), 14) for name in names])
     shares.set_ylim(len(names) - 0.5, -0.5)
     shares.set(xlim=(-0.03, 1.03), xlabel="right first name [-]")
     differences.set_xlabel("diagnosis less baseline, 95 % interval [-]")

@@ -25,12 +25,15 @@ class Table:
     rows : tuple of tuples of str
     marks : tuple of str
         One for each row, a class of the page's style; none where it is empty.
+    of_trials : bool
+        Whether each row is a trial, whose id stands first.
     """
 
     caption: str
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     marks: tuple[str, ...] = ()
+    of_trials: bool = False
 
 
 def at(document: Any, path: Path) -> Any:
@@ -98,8 +101,8 @@ def bar_table(document: Document) -> Table:
             )
         )
         marks.append({"met": "met", "not met": "bad"}.get(bar["status"], "quiet"))
-    head = ("goal", "what", "criterion", "measured", "95 % interval", "n", "ceiling", "")
-    return Table("", head, tuple(rows), tuple(marks))
+    head = ("goal", "what", "criterion", "measured", "95 % interval", "n", "ceiling", "result")
+    return Table("All criteria.", head, tuple(rows), tuple(marks))
 
 
 def _bar_text(bar: Document) -> str:
@@ -148,7 +151,7 @@ def snr_table(scores: Mapping[str, Any], part: str, caption: str, key: str = "")
 def trial_table(document: Document) -> Table:
     """One line for each trial."""
     head = ("trial", "kind", "base law", "hidden", "snr", "verdict", "names", "p(nothing)", "place error [m]",
-            "wall [s]", "")  # fmt: skip
+            "wall [s]", "result")  # fmt: skip
     rows, marks = [], []
     for line in listed(document, "trials"):
         hidden = ", ".join(line["true_ids"]) or str(line["nasty"] or line["hidden"])
@@ -169,4 +172,4 @@ def trial_table(document: Document) -> Table:
         )
         wrong = line["right"] in ("failed", "false alarm", "wrong name")
         marks.append("bad" if wrong else "" if line["right"] != "not found" else "quiet")
-    return Table("", head, tuple(rows), tuple(marks))
+    return Table("All trials.", head, tuple(rows), tuple(marks), of_trials=True)

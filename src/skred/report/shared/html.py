@@ -1,13 +1,18 @@
-"""Pages that need nothing else, neither network nor script: their templates, and pictures inside them."""
+"""Pages that need nothing else: their templates, style and script, and the policy that allows only these."""
 
 from __future__ import annotations
 
 import base64
+import hashlib
+import re
+from collections.abc import Mapping
 from functools import cache
-from pathlib import Path
+from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from skred.report.shared import document as doc
+from skred.report.shared.colours import dark
+from skred.report.shared.inline import colours_in
 from skred.report.shared.labels import name_text, population_role, printable, symbol_text, unit_text
 from skred.report.shared.numbers import (
     decimals_for,
@@ -22,12 +27,116 @@ from skred.report.shared.numbers import (
 
 if TYPE_CHECKING:
     from jinja2 import Environment
+    from markupsafe import Markup
+
+    from skred.report.shared.drawing import Picture
 
 
-def picture(file: Path) -> str:
-    """A picture as a data URI."""
-    kind = "svg+xml" if file.suffix == ".svg" else "png"
-    return f"data:image/{kind};base64," + base64.b64encode(file.read_bytes()).decode("ascii")
+_MOST_DRAWN = 4_300_000
+"""Characters of drawings in a page: with tables and words it stays below 5 MB."""
+
+
+def page(template: str, figures: Mapping[str, Picture], **values: Any) -> str:
+    """Render a page: one file with all it needs, which asks no one for anything.
+
+    Its Content-Security-Policy forbids everything but its own style and script, known by their hashes, and
+    pictures that are part of it.
+
+    Parameters
+    ----------
+    template : str
+        Name of a template; it begins with ``head.html.jinja`` and ends with ``tail.html.jinja``.
+    figures : mapping of str to Picture
+    **values
+        What the template is given.
+
+    Returns
+    -------
+    str
+    """
+    from markupsafe import Markup
+
+    figures, too_large = _that_fit(figures)
+    drawings = [text for one in figures.values() for text in (one.wide, one.narrow)]
+    style = _asset("style.css") + _colours(set().union(*map(colours_in, drawings)))
+    script = _asset("report.js")
+    html = (
+        environment()
+        .get_template(template)
+        .render(
+            figures=figures,
+            style=Markup(style),
+            script=Markup(script),
+            policy=Markup(_policy(style, script)),
+            too_large=too_large,
+            **values,
+        )
+    )
+    return _reachable_tables(html)
+
+
+def _that_fit(figures: Mapping[str, Picture]) -> tuple[dict[str, Picture], list[str]]:
+    """Figures that a page has room for, the smallest first, and the names of the others."""
+    room, kept = _MOST_DRAWN, set[str]()
+    for name in sorted(figures, key=lambda name: figures[name].size):
+        room -= figures[name].size
+        kept |= {name} if room >= 0 else set()
+    return {name: one for name, one in figures.items() if name in kept}, [n for n in figures if n not in kept]
+
+
+def _policy(style: str, script: str) -> str:
+    """What the page may do: show what is in it, and nothing else."""
+    sums = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in (style, script)]
+    return (
+        f"default-src 'none'; style-src 'sha256-{sums[0]}'; script-src 'sha256-{sums[1]}';"
+        " img-src data:; base-uri 'none'; form-action 'none'"
+    )
+
+
+@cache
+def _asset(name: str) -> str:
+    """Style or script of all pages."""
+    text = files("skred.report").joinpath("templates", name).read_text(encoding="utf-8")
+    return text.replace("\r\n", "\n")
+
+
+def _colours(colours: set[str]) -> str:
+    """Colours of the drawings, and their counterparts in the dark."""
+    ordered = sorted(colours)
+    light = "".join(f"--c{colour[1:]}:{colour};" for colour in ordered)
+    night = "".join(f"--c{colour[1:]}:{dark(colour)};" for colour in ordered)
+    return f":root{{{light}}}\n@media screen and (prefers-color-scheme: dark){{:root{{{night}}}}}\n"
+
+
+def _reachable_tables(html: str) -> str:
+    """Give tables that may be wider than the screen a name and a place in the keyboard's order."""
+    number = 0
+
+    def named(found: re.Match[str]) -> str:
+        nonlocal number
+        number += 1
+        if found["caption"]:
+            name, caption = f'aria-labelledby="table-{number}"', f'<caption id="table-{number}"><span>'
+        else:
+            name, caption = f'aria-label="Table {number}"', ""
+        return f'<div class="wide" role="region" tabindex="0" {name}>{found["table"]}{caption}'
+
+    pattern = r'<div class="wide">(?P<table><table[^>]*>\s*)(?P<caption><caption>)?'
+    html = re.sub(pattern, named, html).replace("</caption>", "</span></caption>")
+    html = re.sub(
+        r"<thead>.*?</thead>",
+        lambda head: re.sub(r"<th(?=[ >])", '<th scope="col"', head[0]),
+        html,
+        flags=re.DOTALL,
+    )
+    return re.sub(r"<th(?=[ >])(?! scope=)", '<th scope="row"', html)
+
+
+def drawn(figures: Mapping[str, Picture], key: str, words: str) -> Markup:
+    """A figure as a page has it; nothing where there is none."""
+    from markupsafe import Markup
+
+    return figures[key].markup(words) if key in figures else Markup("")
 
 
 @cache
@@ -56,7 +165,9 @@ def environment() -> Environment:
         two_digits=two_digits,
         three_digits=three_digits,
     )
-    environment.globals.update(get=doc.get, listed=doc.listed, decimals_for=decimals_for, is_number=is_number)
+    environment.globals.update(
+        get=doc.get, listed=doc.listed, decimals_for=decimals_for, is_number=is_number, drawn=drawn
+    )
     return environment
 
 

@@ -7,11 +7,16 @@ must not wait for it. Figures are made through the object interface, so nothing 
 from __future__ import annotations
 
 import os
+import textwrap
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from skred.report.shared.marks import notes_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,8 +25,10 @@ if TYPE_CHECKING:
 
 DPI = 150
 _LEGEND_WIDTH = 122
-WIDTH = 7.6
-"""Width of a figure in inches: the report's column."""
+_NARROW_TITLE, _NARROW_LABEL = 42, 46
+"""Characters of a line of a title, and of a legend, in a narrow figure."""
+WIDTH, NARROW_WIDTH = 7.6, 3.7
+"""Width of a figure in inches: the report's column, and the screen of a telephone."""
 INK, GREY, PALE = "#222222", "#767676", "#e4e4e4"
 RECORDED = "#111111"
 """What was recorded is black in every figure."""
@@ -57,6 +64,35 @@ _RC: dict[Any, Any] = {
     "figure.dpi": DPI,
     "savefig.dpi": DPI,
 }
+
+
+_NARROW: ContextVar[bool] = ContextVar("narrow", default=False)
+
+
+@contextmanager
+def narrow() -> Iterator[None]:
+    """Make figures for the screen of a telephone: panels below each other, letters not smaller."""
+    token = _NARROW.set(True)
+    try:
+        yield
+    finally:
+        _NARROW.reset(token)
+
+
+def is_narrow() -> bool:
+    """Whether figures are made for a narrow screen."""
+    return _NARROW.get()
+
+
+def folded(text: str, length: int) -> str:
+    """A label of a narrow figure, in lines of at most `length` characters; as it is in a wide one."""
+    return fold(text, length) if is_narrow() else text
+
+
+def fold(text: str, length: int) -> str:
+    """Text in lines of at most `length` characters, where it already has lines as well."""
+    lines = [textwrap.wrap(line, max(length, 4), break_long_words=False) or [""] for line in text.split("\n")]
+    return "\n".join(part for line in lines for part in line)
 
 
 def styled[**P, R](make: Callable[P, R]) -> Callable[P, R]:
@@ -123,24 +159,54 @@ def shade_map(colour: str) -> Colormap:
 
 
 def new_figure(height: float, title: str, width: float = WIDTH) -> Figure:
-    """Empty figure, inches, with its title at the left."""
+    """Empty figure, inches, with its title at the left; for a narrow screen as wide as that."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    if is_narrow():
+        folded_title = fold(title, _NARROW_TITLE)
+        height += 0.16 * (folded_title.count("\n") - title.count("\n"))
+        width, title = min(width, NARROW_WIDTH), folded_title
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     figure.suptitle(title, x=0.01, ha="left", linespacing=1.35)
     return figure
 
 
+def grow(figure: Figure, factor: float) -> None:
+    """Make a figure taller."""
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(float(width), factor * float(height))
+
+
+def side_by_side(
+    figure: Figure, n: int, *, sharey: bool = False, width_ratios: Sequence[float] | None = None
+) -> list[Axes]:
+    """`n` panels beside each other; in a narrow figure below each other, and it grows as much.
+
+    In a narrow figure, panels without a label of their own at the left get that of the first.
+    """
+    if not is_narrow() or n == 1:
+        return list(figure.subplots(1, n, squeeze=False, sharey=sharey, width_ratios=width_ratios)[0])
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(width, height + (n - 1) * max(0.62 * height, 1.3))
+    panels = list(figure.subplots(n, 1, squeeze=False, sharey=sharey)[:, 0])
+    notes_of(figure).stacked.append(panels)
+    return panels
+
+
 def grid_for(n: int) -> tuple[int, int]:
     """Rows and columns of a figure with one panel for each of `n` sensors."""
+    if is_narrow():
+        return n, 1
     columns = 1 if n == 1 else 2 if n <= 4 else 3
     return -(-n // columns), columns
 
 
 def panels_in(figure: Figure, n: int, columns: int, *, sharey: bool = False) -> list[Axes]:
     """`n` panels, row by row; the last row need not be full."""
+    if is_narrow():
+        columns = 1
     panels = figure.subplots(-(-n // columns), columns, squeeze=False, sharey=sharey).ravel()
     for axes in panels[n:]:
         axes.remove()
@@ -161,7 +227,12 @@ def legend_below(figure: Figure, panels: Iterable[Axes], columns: int) -> None:
             entries.setdefault(str(label), handle)
     most = _LEGEND_WIDTH * figure.get_figwidth() / WIDTH
     columns = next((n for n in range(columns, 1, -1) if _legend_width(list(entries), n) <= most), 1)
-    figure.legend(list(entries.values()), list(entries), loc="outside lower left", ncols=columns)
+    labels = [folded(label, _NARROW_LABEL) for label in entries]
+    if is_narrow():  # the wide figure's height has room for two rows
+        rows = -(-len(labels) // columns) + sum(label.count("\n") for label in labels)
+        width, height = figure.get_size_inches()
+        figure.set_size_inches(width, height + 0.17 * max(0, rows - 2))
+    figure.legend(list(entries.values()), labels, loc="outside lower left", ncols=columns)
 
 
 def _legend_width(labels: list[str], columns: int) -> int:

@@ -9,7 +9,15 @@ import numpy as np
 
 from skred.report.shared.draws import spread
 from skred.report.shared.labels import figure_text, unit_text
-from skred.report.shared.style import GREY, INK, RECORDED, legend_below, new_figure
+from skred.report.shared.marks import mark, notes_of
+from skred.report.shared.style import (
+    GREY,
+    INK,
+    RECORDED,
+    is_narrow,
+    legend_below,
+    new_figure,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,10 +49,9 @@ def track_figure(
     start : float and str
         Where the track is shown from [m], and what is said of the release.
     """
-    figure = new_figure(5.7, title)
     shown = windows(recordings, start[0])
-    layout: dict[str, Any] = {"height_ratios": [2.1, 1]}
-    panels = figure.subplots(2, len(shown), sharex="col", sharey="row", squeeze=False, gridspec_kw=layout)
+    figure = new_figure(5.7, title)
+    panels = _panels(figure, len(shown))
     for column, (low, high) in enumerate(shown):
         in_detail = column == len(shown) - 1
         speed, profile = panels[:, column]
@@ -62,6 +69,24 @@ def track_figure(
     panels[1, 0].set_xlabel(f"s [m], {start[1]}")
     legend_below(figure, panels[0], columns=2)
     return figure
+
+
+def _panels(figure: Figure, n: int) -> Any:
+    """Speed above terrain, (2, n) panels; in a narrow figure one pair below the other."""
+    layout: dict[str, Any] = {"height_ratios": [2.1, 1]}
+    if not is_narrow() or n == 1:
+        return figure.subplots(2, n, sharex="col", sharey="row", squeeze=False, gridspec_kw=layout)
+    width, height = figure.get_size_inches()
+    figure.set_size_inches(width, 1.75 * height)
+    layout["height_ratios"] = n * [2.1, 1.2]
+    panels = figure.subplots(2 * n, 1, squeeze=False, gridspec_kw=layout)[:, 0].reshape(n, 2).T
+    for column in range(n):
+        panels[1, column].sharex(panels[0, column])
+        panels[0, column].tick_params(labelbottom=False)
+        if column:
+            panels[0, column].sharey(panels[0, 0])
+    notes_of(figure).stacked.append(list(panels[0]))
+    return panels
 
 
 def highest_recorded(recordings: Recordings) -> list[float]:
@@ -105,6 +130,12 @@ def _readings(axes: Axes, recordings: Recordings) -> None:
             x, values, errors, label=label, fmt="o", color=GREY, markersize=2.4, elinewidth=0.6, clip_on=False
         )
         label = None
+        events = [recordings.event_ids[k] for k in np.flatnonzero(rows)]
+        told = [
+            f"{event}, {sensor.id}: {value:.1f} ± {error:.1f} m/s"
+            for event, value, error in zip(events, values, errors, strict=True)
+        ]
+        mark(axes, x, values, told, events)
 
 
 def _half_width(places: list[float], length: float) -> float:
@@ -122,6 +153,12 @@ def _runouts(axes: Axes, recordings: Recordings) -> None:
             foot = axes.get_xaxis_transform()
             axes.vlines(values, 0, 0.045, transform=foot, color=RECORDED, linewidth=1.2, label=label)
             label = "_not in the legend"
+            events = [recordings.event_ids[k] for k in np.flatnonzero(recordings.observed[:, column])]
+            told = [
+                f"{event}, {sensor.id}: s = {value:.0f} m"
+                for event, value in zip(events, values, strict=True)
+            ]
+            mark(axes, values, 0.0 * values, told, events)
 
 
 def terrain_profile(axes: Axes, recordings: Recordings, window: tuple[float, float], *, named: bool) -> None:

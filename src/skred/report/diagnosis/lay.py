@@ -1,0 +1,112 @@
+"""The first paragraph of a diagnosis, for readers who know avalanches and no statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from skred.report.diagnosis.words import in_words, law_id, short_title, stretch_in
+from skred.report.shared import document as doc
+from skred.report.shared.labels import printable
+from skred.report.shared.numbers import fixed, is_number
+
+_SURE, _LIKELY = 0.95, 0.75
+
+
+def lay_words(document: doc.Document) -> list[str]:
+    """Sentences that say what was asked, what came out, and what to make of it.
+
+    No log odds, no nats, no Pareto k: numbers are counts, places, speeds and distances.
+    """
+    return [_asked(document), *_answer(document), *_hangs_on(document), *_use(document)]
+
+
+def _asked(document: doc.Document) -> str:
+    n = doc.get(document, "report", "campaign", "n_events")
+    recorded = f"the {n} avalanches" if is_number(n) else "the avalanches"
+    return (
+        f"A simple model ({law_id(document)}) was fitted to {recorded} recorded at"
+        f" {printable(doc.get(document, 'campaign') or 'this path')}."
+        " Question: do the recordings show a force, or an error of an instrument, that the model leaves out?"
+    )
+
+
+def _answer(document: doc.Document) -> list[str]:
+    verdict = str(doc.get(document, "verdict"))
+    where = _between(document)
+    if verdict == "nothing_missing":
+        return ["Answer: no. Something of a size that matters would mostly have been found here."]
+    if verdict == "unexplained":
+        told = f"Answer: yes, something is missing{where}, but no cause on the list accounts for it."
+        return [told, "The report shows how strongly it brakes or drives the avalanches, and where."]
+    if verdict in ("missing_physics", "instrument"):
+        return [_named(document, verdict, where), *_tied(document)]
+    return [
+        "Answer: these recordings cannot tell. That does not mean that nothing is missing.",
+        *_more(document),
+    ]
+
+
+def _named(document: doc.Document, verdict: str, where: str) -> str:
+    name = short_title(document, doc.get(document, "mechanism") or "something")
+    what = "something in the recordings is off" if verdict == "instrument" else "a force is missing"
+    if doc.get(document, "report", "disputed"):
+        what = "a force is missing, or the recordings are off"
+    seconds = doc.listed(document, "mechanisms")[1:]
+    more = "".join(f", and {short_title(document, doc.get(one, 'id'))}" for one in seconds)
+    return f"Answer: {_how_sure(document)}, {what}: {name}{where}{more}."
+
+
+def _how_sure(document: doc.Document) -> str:
+    """How probable the name is, in words."""
+    probability = doc.get(document, "probability", str(doc.get(document, "mechanism")))
+    if not is_number(probability) or probability < _LIKELY:
+        return "most probably" if not doc.listed(document, "indistinguishable") else "yes"
+    return "almost surely" if probability >= _SURE else "very probably"
+
+
+def _tied(document: doc.Document) -> list[str]:
+    tied = doc.listed(document, "indistinguishable")
+    if not tied:
+        return []
+    return [f"These recordings cannot tell it from {_either(in_words(tied))}."]
+
+
+def _between(document: doc.Document) -> str:
+    stretch = stretch_in(doc.get(document, "location"))
+    return "" if stretch is None else f" between {stretch[0]:.0f} and {stretch[1]:.0f} m along the track"
+
+
+def _hangs_on(document: doc.Document) -> list[str]:
+    """Whether few avalanches carry the answer."""
+    carried = list(map(printable, doc.listed(document, "influence", "carried_by")))
+    if not carried:
+        return []
+    n, are = len(carried), "avalanche carries" if len(carried) == 1 else "avalanches carry"
+    them = "it" if n == 1 else "them"
+    names = ", ".join(carried)
+    return [f"Take it with care: only {n} {are} this answer ({names}). Without {them} it would not be given."]
+
+
+def _use(document: doc.Document) -> list[str]:
+    """What the new term buys, and what it is."""
+    if not doc.listed(document, "mechanisms") and not doc.get(document, "profile"):
+        return []
+    parts = []
+    for key, words, unit, decimals in (("velocity", "speeds", "m/s", 1), ("runout", "runouts", "m", 0)):
+        before, after = (doc.get(document, "held_out", f"rmse_{key}_{when}") for when in ("before", "after"))
+        if is_number(before) and is_number(after):
+            parts.append(f"from {fixed(before, decimals)} to {fixed(after, decimals)} {unit} for {words}")
+    told = []
+    if parts:
+        told = [f"With it, the typical error for avalanches that were left out goes {' and '.join(parts)}."]
+    return [*told, "A name is the best of a list of simple causes. It is no proof of a cause."]
+
+
+def _more(document: doc.Document) -> list[str]:
+    where = doc.get(document, "detection_sensor", "s_from_m")
+    return [f"One more speed sensor would help most at s = {where:.0f} m."] if is_number(where) else []
+
+
+def _either(names: Sequence[Any]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(map(str, names[:-1]))} or {names[-1]}"

@@ -1,0 +1,92 @@
+"""Figures of a result: as files beside the page, and as markup inside it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from skred.report.shared.inline import inline_svg
+from skred.report.shared.labels import printable
+from skred.report.shared.style import narrow, write_png
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+    from matplotlib.figure import Figure
+
+_UNLABELLED = 'aria-label=""'
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure that was made.
+
+    Attributes
+    ----------
+    file : Path
+        PNG, for slides and papers.
+    wide, narrow : str
+        Markup for the page: one of the two is shown, by the width of the screen.
+    """
+
+    file: Path
+    wide: str
+    narrow: str
+
+    @property
+    def size(self) -> int:
+        """Characters that it takes in a page."""
+        return len(self.wide) + len(self.narrow)
+
+    def markup(self, words: str) -> Markup:
+        """Both for the page, with what they show told to those who cannot see it."""
+        from markupsafe import Markup, escape
+
+        label = f'aria-label="{escape(" ".join(printable(words).split()))}"'
+        parts = zip(("wide", "narrow"), (self.wide, self.narrow), strict=True)
+        return Markup("").join(
+            Markup(f'<div class="{name}-figure">{text.replace(_UNLABELLED, label, 1)}</div>')
+            for name, text in parts
+        )
+
+
+def draw(
+    makers: Mapping[str, Callable[[], Figure | None]], folder: Path, key: str = ""
+) -> dict[str, Picture]:
+    """Make figures, each wide and narrow, and write the wide one as PNG.
+
+    Parameters
+    ----------
+    makers : mapping of str to callable
+        By name; one that makes None has nothing to show and is left out.
+    folder : Path
+        An existing folder.
+    key : str
+        Letters that tell figures of the same name in one page apart.
+    """
+    drawn = {}
+    for number, (name, make) in enumerate(makers.items()):
+        figure = make()
+        if figure is None:
+            continue
+        own = f"{key}f{number}"
+        file = write_png(figure, folder / f"{name}.png")
+        wide = inline_svg(figure, f"{own}w")
+        drawn[name] = Picture(file, wide, _for_telephones(make, f"{own}n") or inline_svg(figure, f"{own}n"))
+    return drawn
+
+
+def _for_telephones(make: Callable[[], Figure | None], key: str) -> str:
+    """The figure for a narrow screen; empty where its names are so long that nothing else has room there."""
+    with narrow(), warnings.catch_warnings():
+        warnings.filterwarnings("error", message="constrained_layout not applied")
+        figure = make()
+        assert figure is not None
+        try:
+            return inline_svg(figure, key)
+        except UserWarning as warning:
+            if "constrained_layout" not in str(warning):
+                raise
+            return ""
