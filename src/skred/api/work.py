@@ -14,13 +14,19 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from skred.api.problems import campaign_of, chosen_laws, hierarchical_of, pooled_or_reason, problem_of
 from skred.api.results import Result, fresh_folder
+from skred.errors import InputError
 
 if TYPE_CHECKING:
     from skred.campaign import Campaign
+    from skred.inference.calibrate import Calibration
     from skred.inference.hierarchical.problem import HierarchicalProblem
     from skred.inference.pooled.problem import PooledProblem
+    from skred.inference.problem import Problem
     from skred.inference.sampling import SamplerSettings
     from skred.physics.law import Law
+    from skred.prediction.source import Source
+    from skred.prediction.track import PredictionTrack
+    from skred.prediction.wanted import Wanted
 
 Tell = Callable[[str], None]
 Likelihood = Literal["pooled", "hierarchical"]
@@ -72,8 +78,6 @@ def calibrate(
     skred.errors.InputError
         If the campaign, the law, the priors or an option cannot be used.
     """
-    from skred.inference.calibrate import calibrate as sample
-    from skred.inference.calibrate import write_calibration
     from skred.inference.fit import calibration_statement
     from skred.inference.sampling import KINKED
 
@@ -81,13 +85,24 @@ def calibrate(
     problem = problem_of(campaign, likelihood, errors, smoothing_m)
     if sampler == "nuts":
         warnings.warn(KINKED, UserWarning, stacklevel=2)
-    calibration = sample(problem, chosen, _settings(likelihood, draws, tune, chains, seed, sampler))
-    folder = fresh_folder()
-    write_calibration(calibration, folder)
+    folder, settings = fresh_folder(), _settings(likelihood, draws, tune, chains, seed, sampler)
+    calibration = calibrate_to(problem, chosen, settings, folder)
     document = _read(folder / "summary.json")
     document["statement"] = calibration_statement(calibration.entry())
     subject = f"{chosen.title}, {likelihood}, on {problem.campaign.name}"
     return Result("calibrate", subject, document, calibration.tree, folder)
+
+
+def calibrate_to(
+    problem: Problem, law: Law, settings: SamplerSettings, folder: Path, *, progress: bool = False
+) -> Calibration:
+    """Calibrate, and write the documents into a folder."""
+    from skred.inference.calibrate import calibrate as sample
+    from skred.inference.calibrate import write_calibration
+
+    calibration = sample(problem, law, settings, progress=progress)
+    write_calibration(calibration, folder)
+    return calibration
 
 
 def compare(
@@ -206,13 +221,22 @@ def diagnose(
 
 
 def predict(
-    law: str | Law = "pcm",
-    campaign: str | Path | Campaign = "ryggfonn",
+    law: str | Law | None = None,
+    campaign: str | Path | Campaign | None = None,
     *,
+    from_folder: str | Path | None = None,
     track: str | Path | None = None,
-    release_s_m: float | None = None,
+    release_s_m: float | Sequence[tuple[float, float]] | None = None,
+    at: Mapping[str, float] | None = None,
+    speeds_m_s: Sequence[float] = (10.0, 20.0, 30.0),
+    pressures_kpa: Sequence[float] = (),
+    density_kg_m3: tuple[float, float] = (100.0, 300.0),
+    drag_coefficient: tuple[float, float] = (1.0, 2.0),
+    per_year: float | tuple[float, float] | None = None,
+    return_periods_years: Sequence[float] = (),
     errors: str | None = None,
     smoothing_m: float | None = None,
+    priors: Mapping[str, float] | None = None,
     draws: int = 1000,
     tune: int | None = None,
     chains: int = 4,
@@ -221,20 +245,96 @@ def predict(
 ) -> Result:
     """Say how fast and how far the next avalanche goes along a track, and how sure that is.
 
-    Parameters and errors as of `calibrate`; `track` is a table like a campaign's ``track.csv``, by default
-    that of the campaign, and `release_s_m` where fronts start there [m]. The document is ``prediction.json``.
+    Parameters and errors as of `calibrate`; ``pcm`` on Ryggfonn unless others are given. The document is
+    ``prediction.json``.
+
+    Parameters
+    ----------
+    from_folder : str or Path, optional
+        Folder of a calibration, a prediction or a diagnosis: nothing is sampled then, and neither law,
+        campaign, errors, smoothing nor priors may be given.
+    track : str or Path, optional
+        A table like a campaign's ``track.csv``, by default that of the campaign.
+    release_s_m : float or sequence of (float, float), m, optional
+        Where fronts start: one place, or several with their weights.
+    at : mapping of str to float, m, optional
+        Places by name; by default the campaign's sensors of speed and its reference.
+    speeds_m_s, pressures_kpa : sequence of float
+        Thresholds.
+    density_kg_m3, drag_coefficient : (float, float)
+        Lowest and highest, for impact pressures.
+    per_year : float or (float, float), 1/year, optional
+        How often avalanches like those recorded start, and the standard deviation of that.
+    return_periods_years : sequence of float
+        Of the runouts that are passed once in that time; they need `per_year`.
     """
+    from skred.prediction.source import source_of
+    from skred.prediction.track import prediction_track
+    from skred.prediction.wanted import Rate, Wanted
+
+    rate = (
+        None if per_year is None else Rate(*([per_year] if isinstance(per_year, (int, float)) else per_year))
+    )
+    wanted = Wanted(
+        tuple((at or {}).items()),
+        tuple(speeds_m_s),
+        tuple(pressures_kpa),
+        (density_kg_m3[0], density_kg_m3[1]),
+        (drag_coefficient[0], drag_coefficient[1]),
+        rate,
+        tuple(return_periods_years),
+    )
+    if from_folder is None:
+        source = None
+        [chosen] = chosen_laws([law or "pcm"], priors)
+        problem = hierarchical_of(campaign_of(campaign or "ryggfonn"), errors, smoothing_m)
+    else:
+        given = {
+            "law": law,
+            "campaign": campaign,
+            "errors": errors,
+            "smoothing_m": smoothing_m,
+            "priors": priors,
+        }
+        for name, value in given.items():
+            if value is not None:
+                raise InputError(
+                    f"predict: the calibration in {from_folder} is made already; leave out {name}"
+                )
+        source = source_of(Path(from_folder))
+        chosen, problem = source.stored.calibration.law, source.stored.problem
+    where = prediction_track(problem, None if track is None else Path(track), release_s_m)
+    wanted.check_on(where.length_m)
+    folder = fresh_folder()
+    settings = _settings("hierarchical", draws, tune, chains, seed)
+    document, calibration = predict_to(
+        problem, chosen, settings, folder, tell, where=where, wanted=wanted, source=source
+    )
+    return Result("predict", f"{chosen.title}, on {where.name}", document, calibration.tree, folder)
+
+
+def predict_to(
+    problem: HierarchicalProblem,
+    law: Law,
+    settings: SamplerSettings,
+    folder: Path,
+    tell: Tell,
+    *,
+    where: PredictionTrack,
+    wanted: Wanted,
+    source: Source | None = None,
+    progress: bool = False,
+) -> tuple[dict[str, Any], Calibration]:
+    """Predict, after a calibration where none is given, and write the documents into a folder."""
     from skred.inference.calibrate import calibrate as sample
     from skred.prediction.predict import predict as predict_avalanches
-    from skred.prediction.track import prediction_track
 
-    [chosen] = chosen_laws([law], None)
-    problem = hierarchical_of(campaign_of(campaign), errors, smoothing_m)
-    where = prediction_track(problem, None if track is None else Path(track), release_s_m)
-    calibration = sample(problem, chosen, _settings("hierarchical", draws, tune, chains, seed))
-    folder = fresh_folder()
-    document = predict_avalanches(calibration, folder, where, tell)
-    return Result("predict", f"{chosen.title}, on {where.name}", document, calibration.tree, folder)
+    if source is None:
+        tell(f"{law.id}: calibrating on {problem.campaign.name}")
+        calibration = sample(problem, law, settings, progress=progress)
+    else:
+        calibration = source.stored.calibration
+    return predict_avalanches(calibration, folder, where, tell, wanted=wanted, source=source), calibration
 
 
 def _settings(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from cyclopts import App
 
+from skred.api.work import calibrate_to
 from skred.cli.exit_codes import DONE, NOT_CONVERGED
 from skred.cli.hints import tell_hints
 from skred.cli.inputs import law_of, problem_of
@@ -67,15 +68,13 @@ def calibrate_law(
     with output.results("calibrate", law.id) as results:
         output.tell(f"{law.id}: sampling")
 
-        from skred.inference.calibrate import calibrate, write_calibration
         from skred.inference.fit import calibration_statement
         from skred.report.folders import write_reports
         from skred.report.shared.tables import summary_table
 
         settings = sampling.settings(problem.likelihood, sampler)
-        calibration = calibrate(problem, law, settings, progress=output.progress)
+        calibration = calibrate_to(problem, law, settings, results.unfinished, progress=output.progress)
         output.tell(f"{law.id}: writing {results.path}")
-        write_calibration(calibration, results.unfinished)
         write_reports(results.unfinished)
     entry = calibration.entry()
     output.show(entry, summary_table, calibration_statement(entry), results.path)

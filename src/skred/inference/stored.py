@@ -20,6 +20,7 @@ from skred.inference.calibrate import Calibration
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.gate import Gate
 from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.priors import laws_with_priors
 from skred.inference.results import FORMAT
 from skred.inference.sampling import SamplerSettings
 from skred.physics.law import Law
@@ -94,6 +95,10 @@ def _stored(tree: xr.DataTree) -> Stored:
     attributes = tree.attrs
     law = load_law(str(attributes["law"]))
     _check_equation(law, attributes)
+    changed = json.loads(str(attributes.get("changed_priors", "{}")))
+    [law] = laws_with_priors(
+        [law], {name: scale for name, scale in changed.items() if name in law.parameter_names}
+    )
     campaign = _campaign(tree)
     constant = tree["constant_data"].to_dataset()
     terrain = _terrain(campaign.track, constant, float(attributes["smoothing_m"]))

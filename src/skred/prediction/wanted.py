@@ -36,7 +36,12 @@ SOURCES = (
 )
 _KPA = 1e-3
 MOST_PLACES = 20
+AVALANCHES = 1024
+"""Of each population, simulated."""
+_FEWEST_BEYOND = 3
+"""Of these, those that must run farther than a runout for a return period."""
 _NAME = re.compile(r"\w[\w .-]{0,39}")
+_LONGEST_YEARS = 100_000.0
 _LARGEST_DENSITY, _LARGEST_DRAG, _LARGEST_RATE, _LARGEST = 917.0, 20.0, 1000.0, 1e5
 
 
@@ -83,6 +88,8 @@ class Wanted:
     density_kg_m3, drag_coefficient : (float, float)
         Lowest and highest; in between all are as likely.
     rate : Rate or None
+    return_periods_years : tuple of float
+        Times in which a runout is reached once on average; they need a rate.
     """
 
     places: tuple[tuple[str, float], ...] = ()
@@ -91,6 +98,7 @@ class Wanted:
     density_kg_m3: tuple[float, float] = DENSITY_KG_M3
     drag_coefficient: tuple[float, float] = DRAG_COEFFICIENT
     rate: Rate | None = field(default=None)
+    return_periods_years: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse what cannot be meant."""
@@ -109,20 +117,42 @@ class Wanted:
             for value in values:
                 if not 0.0 <= value <= _LARGEST:
                     raise InputError(f"{option} {value:g}: expected a number from 0 to {_LARGEST:g}")
+        self._check_periods()
         _check_range("--density", self.density_kg_m3, _LARGEST_DENSITY)
         _check_range("--drag-coefficient", self.drag_coefficient, _LARGEST_DRAG)
 
-    def check_on(self, length_m: float) -> None:
-        """Refuse places that are not on a track.
+    def _check_periods(self) -> None:
+        """Refuse times that are none, and times without a frequency."""
+        for years in self.return_periods_years:
+            if not 0.0 < years <= _LONGEST_YEARS:
+                raise InputError(
+                    f"--return-period {years:g}: expected years, above 0 and at most {_LONGEST_YEARS:g}"
+                )
+        if self.return_periods_years and self.rate is None:
+            raise InputError("--return-period: needs --per-year, how often avalanches start")
+        if len(self.return_periods_years) > MOST_PLACES:
+            raise InputError(
+                f"--return-period: at most {MOST_PLACES}, found {len(self.return_periods_years)}"
+            )
+
+    def check_on(self, length_m: float, avalanches: int = AVALANCHES) -> None:
+        """Refuse places that are not on a track, and return periods that a simulation cannot tell.
 
         Raises
         ------
         InputError
-            If one lies outside.
+            If a place lies outside, or a time is too long.
         """
         for name, s_m in self.places:
             if not 0.0 <= s_m <= length_m:
                 raise InputError(f"--at {name}={s_m:g}: expected a place on the track, 0 to {length_m:.1f} m")
+        rarest = max(self.return_periods_years, default=0.0)
+        if self.rate is not None and self.rate.mean * rarest > avalanches / _FEWEST_BEYOND:
+            longest = avalanches / (_FEWEST_BEYOND * self.rate.mean)
+            raise InputError(
+                f"--return-period {rarest:g}: with {self.rate.mean:g} avalanches a year, such runouts are"
+                f" rarer than the simulation can tell; at most {longest:.3g} years"
+            )
 
     def as_dict(self) -> dict[str, Any]:
         """What was asked for besides places, as plain data."""

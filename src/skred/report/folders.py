@@ -22,6 +22,7 @@ FORMAT = 1
 """Of the documents that this version reads."""
 TREE_FORMAT = 2
 """Of the netCDF files."""
+_MOST_TRACKS = 100
 _AGAIN = "run the command that wrote it again"
 
 
@@ -38,7 +39,8 @@ def write_reports(folder: Path) -> list[Path]:
     Parameters
     ----------
     folder : Path
-        Of ``skred diagnose``, ``compare``, ``predict`` or ``prove``, or of a law that was calibrated.
+        Of ``skred diagnose``, ``compare``, ``predict`` or ``prove``, of a law that was calibrated, or with
+        the table of a track and what ``skred track`` wrote beside it.
 
     Returns
     -------
@@ -55,8 +57,13 @@ def write_reports(folder: Path) -> list[Path]:
     for document, make in _KINDS.items():
         if (folder / document).is_file():
             return _in_place(folder, make)
+    if any(_track_documents(folder)):
+        return _in_place(folder, _tracks)
     names = ", ".join(_KINDS)
-    raise ReportError(f"{folder}: no results to report on; a folder of results holds one of {names}")
+    raise ReportError(
+        f"{folder}: no results to report on; a folder of results holds one of {names}, or the table of a"
+        " track with its .json beside it"
+    )
 
 
 def _in_place(folder: Path, make: Callable[[Path, Path], list[str]]) -> list[Path]:
@@ -151,6 +158,28 @@ def _scorecard(folder: Path, beside: Path) -> list[str]:
     figures = save_scorecard_figures(document, beside)
     write_text(beside / "scorecard.html", render_scorecard(document, figures))
     return [f"{name}.png" for name in SCORECARD_FIGURES]
+
+
+def _tracks(folder: Path, beside: Path) -> list[str]:
+    """Figures of the tracks in a folder; nothing else in it is touched."""
+    from skred.report.shared.style import write_png
+    from skred.report.track.figures import track_figure
+
+    for file in _track_documents(folder):
+        document = _read_document(file, "format")
+        try:
+            figure = track_figure(document)
+        except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+            lacks = f"{type(error).__name__}: {error}"
+            raise ReportError(f"{file}: no track that can be drawn ({lacks:.80}); {_AGAIN}") from error
+        write_png(figure, beside / f"{file.stem}.png")
+    return []
+
+
+def _track_documents(folder: Path) -> list[Path]:
+    """The documents that ``skred track`` wrote: each has the name of a table beside it."""
+    tables = sorted(folder.glob("*.csv"))[:_MOST_TRACKS]
+    return [file for table in tables if (file := table.with_suffix(".json")).is_file()]
 
 
 _KINDS: dict[str, Callable[[Path, Path], list[str]]] = {
