@@ -212,3 +212,34 @@ def test_what_is_shown_names_the_file_of_each_column(
     assert [line.split()[0] for line in out.splitlines() if "front velocity" in line] == ["speeds.csv"] * 2
     rows = list(csv.reader(io.StringIO(written(RUNOUTS))))
     assert len(rows) == 4 and "runouts.csv" in out
+
+
+def test_all_sheets_are_those_with_cells(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    book = workbook(tmp_path / "book.xlsx", {"1999": without_bounds(), "Sheet2": [], "Sheet3": []})
+    code, err = imported(capsys, tmp_path, [book], "--sheet", "*")
+    assert code == 0, err
+    assert same(tmp_path / "out", whole(capsys, tmp_path, without_bounds()))
+    code, err = imported(capsys, tmp_path, [book], "--sheet", "Sheet2")
+    assert code == 2 and "book.xlsx (Sheet2): the sheet is empty" in err
+    empty = workbook(tmp_path / "empty.xlsx", {"a": [], "b": []})
+    code, err = imported(capsys, tmp_path, [empty], "--sheet", "*")
+    assert code == 2 and "empty.xlsx: every sheet is empty" in err
+
+
+def test_a_cell_is_told_once(tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Merged cells leave a blank id, which stands in two tables of the campaign."""
+    rows = without_bounds()
+    rows[2][0] = ""
+    code, err = imported(capsys, tmp_path, [wide_file(tmp_path, rows)])
+    assert code == 2 and err.count("row 3, column Date: found ''") == 1 and "1 problem" in err
+
+
+def test_a_word_that_is_a_sign(tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = without_bounds()
+    rows[3][1] = ">="
+    code, err = imported(capsys, tmp_path, [wide_file(tmp_path, rows)])
+    assert code == 2 and '--word ">==missing|not_reached"' in err
+    code, err = imported(capsys, tmp_path, [wide_file(tmp_path, rows)], "--word", ">==missing")
+    assert code == 0, err

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from skred.api import arguments
 from skred.api.problems import campaign_of, chosen_laws, hierarchical_of, pooled_or_reason, problem_of
 from skred.api.results import Result, fresh_folder
 from skred.errors import InputError
@@ -81,6 +82,7 @@ def calibrate(
     from skred.inference.fit import calibration_statement
     from skred.inference.sampling import KINKED
 
+    arguments.sampling(draws, tune, chains, seed, sampler)
     [chosen] = chosen_laws([law], priors)
     problem = problem_of(campaign, likelihood, errors, smoothing_m)
     if sampler == "nuts":
@@ -128,6 +130,9 @@ def compare(
     """
     import xarray as xr
 
+    arguments.sampling(draws, tune, chains, seed)
+    if isinstance(laws, (str, bytes)) or not hasattr(laws, "__iter__"):
+        raise InputError(f"laws: expected several, as ['pcm', 'coulomb'], found {laws!r:.60}")
     chosen = chosen_laws(list(laws), priors)
     problem = problem_of(campaign, likelihood, errors, smoothing_m)
     folder = fresh_folder()
@@ -207,6 +212,11 @@ def diagnose(
     from skred.diagnosis.effort import SAMPLING, effort_of
     from skred.diagnosis.run import diagnose_to
 
+    if max_mechanisms is not None:
+        arguments.whole("max_mechanisms", max_mechanisms, 1, 2)
+    arguments.whole("lock", lock, 0, 10_000)
+    arguments.whole("outer_folds", outer_folds, 0, 10_000)
+    arguments.whole("seed", seed, 0, arguments.SEEDS - 1)
     [chosen] = chosen_laws([law], priors)
     problem = hierarchical_of(campaign_of(campaign), errors, smoothing_m)
     effort = replace(effort_of(quick), exact_loo=exact_loo)
@@ -270,20 +280,21 @@ def predict(
     """
     from skred.prediction.source import source_of
     from skred.prediction.track import prediction_track
-    from skred.prediction.wanted import Rate, Wanted
 
-    rate = (
-        None if per_year is None else Rate(*([per_year] if isinstance(per_year, (int, float)) else per_year))
+    arguments.sampling(draws, tune, chains, seed)
+    wanted = _wanted(
+        arguments.mapping("at", at, "names to places"),
+        arguments.numbers("speeds_m_s", speeds_m_s),
+        arguments.numbers("pressures_kpa", pressures_kpa),
+        arguments.numbers("density_kg_m3", density_kg_m3, 2),
+        arguments.numbers("drag_coefficient", drag_coefficient, 2),
+        per_year,
+        arguments.numbers("return_periods_years", return_periods_years),
     )
-    wanted = Wanted(
-        tuple((at or {}).items()),
-        tuple(speeds_m_s),
-        tuple(pressures_kpa),
-        (density_kg_m3[0], density_kg_m3[1]),
-        (drag_coefficient[0], drag_coefficient[1]),
-        rate,
-        tuple(return_periods_years),
-    )
+    scenarios = _scenarios(release_s_m)
+    for name, path in (("from_folder", from_folder), ("track", track)):
+        if path is not None and not isinstance(path, (str, Path)):
+            raise InputError(f"{name}: expected a path, found {path!r:.60}")
     if from_folder is None:
         source = None
         [chosen] = chosen_laws([law or "pcm"], priors)
@@ -303,7 +314,7 @@ def predict(
                 )
         source = source_of(Path(from_folder))
         chosen, problem = source.stored.calibration.law, source.stored.problem
-    where = prediction_track(problem, None if track is None else Path(track), release_s_m)
+    where = prediction_track(problem, None if track is None else Path(track), scenarios)
     wanted.check_on(where.length_m)
     folder = fresh_folder()
     settings = _settings("hierarchical", draws, tune, chains, seed)
@@ -311,6 +322,40 @@ def predict(
         problem, chosen, settings, folder, tell, where=where, wanted=wanted, source=source
     )
     return Result("predict", f"{chosen.title}, on {where.name}", document, calibration.tree, folder)
+
+
+def _wanted(
+    at: Mapping[str, float],
+    speeds: tuple[float, ...],
+    pressures: tuple[float, ...],
+    density: tuple[float, ...],
+    drag: tuple[float, ...],
+    per_year: Any,
+    years: tuple[float, ...],
+) -> Wanted:
+    """What is asked of a prediction."""
+    from skred.prediction.wanted import Rate, Wanted
+
+    rate = None
+    if per_year is not None:
+        pair = per_year if hasattr(per_year, "__iter__") else (per_year, 0.0)
+        rate = Rate(*arguments.numbers("per_year", pair, 2))
+    places = tuple((name, arguments.number(f"at[{name!r:.40}]", place)) for name, place in at.items())
+    return Wanted(places, speeds, pressures, (density[0], density[1]), (drag[0], drag[1]), rate, years)
+
+
+def _scenarios(release_s_m: Any) -> list[tuple[float, float]] | None:
+    """Releases with their weights."""
+    if release_s_m is None:
+        return None
+    if not hasattr(release_s_m, "__iter__"):
+        return [(arguments.number("release_s_m", release_s_m), 1.0)]
+    if isinstance(release_s_m, (str, bytes)):
+        raise InputError(
+            f"release_s_m: expected a place, or pairs of place and weight, found {release_s_m!r:.60}"
+        )
+    pairs = [arguments.numbers("release_s_m", pair, 2) for pair in release_s_m]
+    return [(place, weight) for place, weight in pairs]
 
 
 def predict_to(

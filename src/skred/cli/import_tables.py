@@ -97,7 +97,9 @@ class Declared:
         if self.encoding is not None:
             found["track", "encoding"] = self.encoding
         for text in self.word:
-            word, value = _pair(text, "--word")
+            word, sign, value = text.rpartition("=")  # a word may be a sign, such as >=
+            if not sign or not word:
+                raise InputError(f"--word '{text}': expected WORD=missing or WORD=not_reached")
             found["cells", "words", word] = value
         for text in self.set_:
             key, value = _pair(text, "--set")

@@ -101,7 +101,10 @@ class Draft:
             try:
                 return read_campaign(folder)
             except CampaignError as error:
-                raise CampaignError([self._told(problem) for problem in error.problems]) from None
+                # A cell of a wide table is a cell of several of the draft's tables: it is told once.
+                raise CampaignError(
+                    dict.fromkeys(self._told(problem) for problem in error.problems)
+                ) from None
 
     def _told(self, problem: Problem) -> Problem:
         """A problem of the draft as one of the file that it came from."""

@@ -1,6 +1,7 @@
 """Which tables there are: the campaign format's own by their names, all others wide ones."""
 
 from collections import Counter
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +10,7 @@ from skred.importing.mapping import Mapping, TableWriting
 from skred.importing.questions import Unclear
 from skred.importing.sheet import TABLE, TRACK, Grid, Section, Sheet, sheet_of
 from skred.importing.sources import TABLES, Source, Sources, refuse
-from skred.importing.workbook import read_workbook, sheet_names, which_sheet
+from skred.importing.workbook import EmptySheet, read_workbook, sheet_names, which_sheet
 
 MOST_TABLES = 100
 ALL_SHEETS = "*"
@@ -50,6 +51,8 @@ def sheets_of(sources: Sources, declared: Mapping) -> tuple[dict[str, Sheet], li
             }
         else:
             wide += _wide(other, declared, several=several)
+    if sources.others and not wide and "recordings" not in grids:
+        raise refuse(sources.others[0].name, "every sheet is empty; write a table")
     if len(wide) > MOST_TABLES:
         raise refuse(wide[MOST_TABLES].file, f"more than {MOST_TABLES} tables; import fewer at a time")
     _require_tables(grids, wide)
@@ -102,8 +105,14 @@ def _wide(source: Source, declared: Mapping, *, several: bool) -> list[Grid]:
     names, wanted = sheet_names(source), declared.table.sheets
     if len(names) > 1 and not wanted:
         raise Unclear([which_sheet(source, names, section)])
-    chosen = names if ALL_SHEETS in wanted or len(names) == 1 else [one for one in names if one in wanted]
-    return [read_workbook(source, name, section) for name in chosen]
+    if ALL_SHEETS not in wanted or len(names) == 1:
+        chosen = names if len(names) == 1 else [one for one in names if one in wanted]
+        return [read_workbook(source, name, section) for name in chosen]
+    grids = []
+    for name in names:
+        with suppress(EmptySheet):  # of those that programs put behind the first
+            grids.append(read_workbook(source, name, section))
+    return grids
 
 
 def _require_sheets(sources: tuple[Source, ...], table: TableWriting) -> None:

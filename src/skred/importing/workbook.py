@@ -20,6 +20,10 @@ MOST_PARTS = 1000
 MOST_CELLS = 5_000_000
 
 
+class EmptySheet(CampaignError):
+    """A sheet without cells."""
+
+
 def sheet_names(source: Source) -> tuple[str, ...]:
     """Names of a workbook's sheets.
 
@@ -50,6 +54,8 @@ def read_workbook(source: Source, name: str | None, section: Section) -> Grid:
     ------
     CampaignError
         If the workbook cannot be read safely, the sheet is not there, or a formula has no stored value.
+    EmptySheet
+        If the sheet has no cells.
     Unclear
         If there are several sheets and none is named.
     """
@@ -69,7 +75,7 @@ def read_workbook(source: Source, name: str | None, section: Section) -> Grid:
         file, key = f"{source.name} ({chosen})", chosen
     filled = tuple((line, cells) for line, cells in lines if any(cells))
     if not filled:
-        raise refuse(file, "the sheet is empty; write its header and rows")
+        raise EmptySheet([Problem(file, None, None, None, "the sheet is empty; write its header and rows")])
     return Grid(file, filled, "Excel", None, key)
 
 

@@ -22,17 +22,21 @@ FloatArray = NDArray[np.float64]
 DENSITY_KG_M3 = (100.0, 300.0)
 """Range of the density of flowing dry snow: from the denser fluidised fronts to a dense core."""
 DRAG_COEFFICIENT = (1.0, 2.0)
-"""Range of the drag coefficient: from a round mast to a flat one."""
+"""Range of the drag coefficient: an assumption, about from a round body across a flow to a flat one."""
 FORMULA = "p = 0.5 C_d rho U^2"
 SOURCES = (
-    "Formula and measured pressures: McClung and Schaerer (1985), Annals of Glaciology 6, 9-14,"
-    " doi 10.3189/1985AoG6-1-9-14.",
-    "Density: 35 to 100 kg/m3 in fluidised fronts, Issler, Gauer, Schaer and Keller (2020), Geosciences 10,"
-    " 2, doi 10.3390/geosciences10010002; about 300 kg/m3 in a dense core, Johannesson, Gauer, Issler and"
-    " Lied, eds (2009), The design of avalanche protection dams, European Commission, EUR 23339.",
-    "Drag coefficient: 1 for a round mast to 2 for a flat one, Salm, Burkard and Gubler (1990), Berechnung"
-    " von Fliesslawinen, Mitteilungen des SLF 47. Slow, wet snow loads narrow obstacles several times as"
-    " much.",
+    "Formula: the drag equation of fluid mechanics.",
+    "Measured pressures and speeds: McClung and Schaerer (1985), Characteristics of flowing snow and"
+    " avalanche impact pressures, Annals of Glaciology. Small load cells read more than a large plate.",
+    "Density: 35 to 100 kg/m3 in the fluidised layer, Issler, Gauer, Schaer and Keller (2020), Inferences on"
+    " mixed snow avalanches from field observations, Geosciences 10(1), 2, doi 10.3390/geosciences10010002;"
+    " about 300 kg/m3 in a dense core, Johannesson, Gauer, Issler and Lied, eds (2009), The design of"
+    " avalanche protection dams, European Commission, EUR 23339.",
+    "Drag coefficient: an assumption without a source in avalanches: about that of a round to that of a flat"
+    " body across a flow.",
+    "Slow wet snow presses considerably more on a mast than such formulas say, and not by its speed: Sovilla,"
+    " Kern and Schaer (2010), Slow drag in wet-snow avalanche flow, Journal of Glaciology, doi"
+    " 10.3189/002214310793146287.",
 )
 _KPA = 1e-3
 MOST_PLACES = 20
@@ -179,7 +183,7 @@ def _check_range(option: str, limits: tuple[float, float], largest: float) -> No
 
 
 def impact_pressure_kpa(speed_m_s: Any, density_kg_m3: Any, drag_coefficient: Any) -> Any:
-    """Impact pressure [kPa] p = 0.5 C_d rho U^2 of snow on an obstacle (McClung and Schaerer, 1985).
+    """Impact pressure [kPa] p = 0.5 C_d rho U^2 of snow on an obstacle, the drag equation.
 
     Parameters
     ----------
