@@ -140,3 +140,20 @@ def test_a_folder_from_python(problem: HierarchicalProblem, tmp_path: Path) -> N
     assert (result.report(tmp_path / "out") / "x").parent.name == "report.html"
     with pytest.raises(InputError, match="leave out law"):
         skred.predict("pcm", from_folder=folder)
+
+
+def test_another_track_is_checked_as_validate_does(
+    problem: HierarchicalProblem, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What smoothing takes from a zigzag, and a track that does not begin at 0, are told."""
+    folder = folder_of(tmp_path / "made", tree_of(problem, "coulomb"))
+    x = 7.0 + 5.0 * np.arange(240)
+    z = 800.0 - 0.5 * x + 1.5 * (-1.0) ** np.arange(240)
+    file = tmp_path / "other.csv"
+    file.write_text("x_m,z_m\n" + "".join(f"{a},{b}\n" for a, b in zip(x, z, strict=True)))
+    assert run(["predict", "--from", str(folder), "--track", str(file), "--out", str(tmp_path / "out")]) == 0
+    told = " ".join(capsys.readouterr().err.split())
+    assert "warning: other.csv" in told and "x_m" in told and "% longer than the track smoothed over 10 m" in told
+    file.write_text("x_m,z_m\n0,300\n10,200\n500,14000\n")
+    assert run(["predict", "--from", str(folder), "--track", str(file)]) == 2
+    assert "other.csv, row 3" in capsys.readouterr().err
