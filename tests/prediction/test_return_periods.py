@@ -153,7 +153,11 @@ def test_another_track_is_checked_as_validate_does(
     file.write_text("x_m,z_m\n" + "".join(f"{a},{b}\n" for a, b in zip(x, z, strict=True)))
     assert run(["predict", "--from", str(folder), "--track", str(file), "--out", str(tmp_path / "out")]) == 0
     told = " ".join(capsys.readouterr().err.split())
-    assert "warning: other.csv" in told and "x_m" in told and "% longer than the track smoothed over 10 m" in told
+    assert (
+        "warning: other.csv" in told
+        and "x_m" in told
+        and "% longer than the track smoothed over 10 m" in told
+    )
     file.write_text("x_m,z_m\n0,300\n10,200\n500,14000\n")
     assert run(["predict", "--from", str(folder), "--track", str(file)]) == 2
     assert "other.csv, row 3" in capsys.readouterr().err
