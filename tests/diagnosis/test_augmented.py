@@ -163,7 +163,7 @@ def test_finer_tables_cover_what_chains_visited(problem: AugmentedProblem) -> No
     """
     law, grid = problem.base.law, problem.tables.grid
     strength = grid.points[grid.nearest(problem.tables.mean[None])[0], 0]
-    far = 0.3 * np.exp(0.45 + np.array([-0.02, 0.0, 0.02]))
+    far = 0.3 * np.exp(0.5 + np.array([-0.02, 0.0, 0.02]))
     samples = {"dry_friction": far, "dry_friction_spread": np.full(3, 0.02)}
     samples["turbulent_drag"] = np.full(3, strength)
     chains = {name: (("chain", "draw"), np.tile(values, (4, 1))) for name, values in samples.items()}

@@ -144,4 +144,5 @@ def recorded(campaign: Campaign) -> object:
         repr(campaign.values.tolist()),
         campaign.status.tolist(),
         repr(campaign.stated_sd.tolist()),
+        repr(campaign.values_to.tolist()),
     )

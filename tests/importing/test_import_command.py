@@ -205,7 +205,7 @@ def test_json_tells_the_same(tmp_path: Path, capsys: pytest.CaptureFixture[str])
         ([], "no files"),
         (["nowhere.csv"], "there is no such file"),
         (["{folder}"], "the folder holds none of"),
-        (["{table}", "{table}"], "import one at a time"),
+        (["{table}", "{table}"], "given twice"),
         (["{table}"], "add --track FILE"),
         (["{table}", "--track", "{folder}"], "expected an ordinary file"),
         (["{campaign}", "{table}"], "a wide table beside events or recordings"),

@@ -54,12 +54,6 @@ def test_at_least(bound: str, tmp_path: Path, track: Path, capsys: pytest.Captur
     assert "2002-02-27,runout,250,at_least" in (tmp_path / "out" / "recordings.csv").read_text()
 
 
-def test_a_velocity_is_no_bound(tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    rows = [WIDE[0], ["1999-02-03", "> 30", *WIDE[1][2:]]]
-    code, err = imported(capsys, tmp_path, rows)
-    assert code == 2 and "row 2, column v upper [m/s]: found '> 30': only a runout" in err
-
-
 def test_kilometres_per_hour(tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = without_bounds()
     rows[0] = [name.replace("m/s", "km/h") for name in rows[0]]

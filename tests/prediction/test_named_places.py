@@ -142,7 +142,14 @@ def test_the_table_and_the_page(problem: HierarchicalProblem, tmp_path: Path) ->
     assert [row[0] for row in rows if row[2] == "avalanche comes: return period"] == ["Brücke", "hut"]
     assert all(float(number) >= 0.0 for row in rows[1:] for number in row[5:])
     page = (out / "report.html").read_text(encoding="utf-8")
-    for said in ("hut", "Brücke", "0.5 C_d rho U^2", "10.3189/1985AoG6-1-9-14", "selection", "return period"):
+    for said in (
+        "hut",
+        "Brücke",
+        "0.5 C_d rho U^2",
+        "10.3390/geosciences10010002",
+        "selection",
+        "return period",
+    ):
         assert said in page
     check_page(page)
     assert page.count("<figure") == 3 and page.count("<svg") == 6 and page.count("<script>") == 1

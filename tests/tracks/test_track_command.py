@@ -54,6 +54,25 @@ def test_table_document_and_figure_are_written(
     np.testing.assert_allclose(track.s_m, document["profile"]["s_m"], atol=1e-3)
 
 
+def test_the_figure_is_made_again(
+    maps: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "tracks" / "path.csv"
+    assert run([*maps, "--out", str(out), "--quiet"]) == 0
+    figure = out.with_suffix(".png")
+    before, table = figure.read_bytes(), out.read_bytes()
+    figure.unlink()
+    assert run(["report", str(out.parent)]) == 0
+    assert figure.read_bytes() == before and out.read_bytes() == table
+    assert str(figure) in capsys.readouterr().out.replace("\n", "")
+    out.with_suffix(".json").write_text('{"format": 1, "profile": []}')
+    assert run(["report", str(out.parent)]) == 2
+    assert "path.json: no track that can be drawn" in capsys.readouterr().err
+    out.with_suffix(".json").write_text('{"format": 7}')
+    assert run(["report", str(out.parent)]) == 2
+    assert "another version of skred" in capsys.readouterr().err
+
+
 def test_the_table_is_a_campaigns_track(maps: list[str], tmp_path: Path) -> None:
     folder = tmp_path / "campaign"
     assert run([*maps, "--out", str(folder / "track.csv"), "--quiet"]) == 0

@@ -8,6 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from skred.api.arguments import LIKELIHOODS, mapping, one_of
+from skred.api.arguments import smoothing as smoothing_length
 from skred.errors import InputError
 
 if TYPE_CHECKING:
@@ -38,7 +40,7 @@ def read_campaign(name: str | Path) -> Campaign:
     skred.campaign.CampaignError
         With every problem of the files.
     """
-    return campaign_of(str(name))
+    return campaign_of(name)
 
 
 def laws() -> dict[str, Law]:
@@ -72,23 +74,39 @@ def mechanisms() -> dict[str, Mechanism]:
 def chosen_laws(given: list[str | Law], priors: Mapping[str, float] | None) -> list[Law]:
     """Laws by id or as they are, with the scales of priors that are given."""
     from skred.inference.priors import laws_with_priors
+    from skred.physics.law import Law
     from skred.physics.laws import load_law
 
-    return laws_with_priors([load_law(law) if isinstance(law, str) else law for law in given], priors)
+    laws = list[str | Law]()
+    for law in given:
+        if not isinstance(law, (str, Law)):
+            raise InputError(f"law: expected an id or a law of skred.laws(), found {law!r:.60}")
+        if law not in laws:
+            laws.append(law)
+    if not laws:
+        raise InputError("laws: expected at least one")
+    scales = mapping("priors", priors, "parameters to scales")
+    return laws_with_priors([load_law(law) if isinstance(law, str) else law for law in laws], scales)
 
 
 def campaign_of(given: str | Path | Campaign) -> Campaign:
     """A campaign that passed every check."""
-    from skred.campaign import find_campaign, read_campaign
+    from skred.campaign import Campaign, find_campaign, read_campaign
 
-    return read_campaign(find_campaign(str(given))) if isinstance(given, (str, Path)) else given
+    if isinstance(given, Campaign):
+        return given
+    if not isinstance(given, (str, Path)):
+        raise InputError(f"campaign: expected a folder, a name or a campaign, found {given!r:.60}")
+    return read_campaign(find_campaign(str(given)))
 
 
 def problem_of(
     campaign: str | Path | Campaign, likelihood: str, errors: str | None, smoothing: float | None
 ) -> PooledProblem | HierarchicalProblem:
     """The problem of a campaign, or what is wrong with it."""
+    one_of("likelihood", likelihood, LIKELIHOODS)
     checked = campaign_of(campaign)
+    smoothing_length(smoothing)
     if likelihood == "hierarchical":
         return hierarchical_of(checked, errors, smoothing)
     if errors is not None:
@@ -105,9 +123,12 @@ def hierarchical_of(
     campaign: Campaign, errors: str | None = None, smoothing: float | None = None
 ) -> HierarchicalProblem:
     """The hierarchical problem of a campaign, or what is wrong with it."""
-    from skred.inference.error_model import DEFAULT_ERRORS
+    from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
     from skred.inference.hierarchical.problem import hierarchical_problem
 
+    if errors is not None:
+        one_of("errors", errors, tuple(ERROR_MODELS))
+    smoothing_length(smoothing)
     try:
         return hierarchical_problem(campaign, error_model=errors or DEFAULT_ERRORS, smoothing_m=smoothing)
     except ValueError as error:

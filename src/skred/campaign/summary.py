@@ -44,8 +44,19 @@ def _events(summary: dict[str, Any]) -> str:
     return f"{summary['events']}{f', {moving} released with a speed' if moving else ''}"
 
 
+def _smoothing(cost: dict[str, float] | None) -> str | None:
+    """What smoothing the terrain changes, where it was looked at."""
+    if cost is None:
+        return None
+    return (
+        f"by {cost['smoothing_m']:.3g} m: changes the fall between releases and sensors by up to "
+        f"{cost['change_of_fall_m']:.2g} m; steepest slope {cost['steepest_deg']:.1f} degrees, smoothed "
+        f"{cost['steepest_smoothed_deg']:.1f}"
+    )
+
+
 def summary_table(summary: dict[str, Any]) -> Table:
-    """Show a summary as a table."""
+    """Show a summary as a table; ``smoothing`` in it, if it is there, says what that changes of the track."""
     usual = [status.name.lower() for status in Status if not status.is_bound]
     readings = ", ".join(
         f"{count} {status.replace('_', ' ')}"
@@ -60,10 +71,13 @@ def summary_table(summary: dict[str, Any]) -> Table:
         "readings": readings,
         "covariates": ", ".join(summary["covariates"]) or "none",
         "track": f"{summary['track_length_m']:.1f} m, {summary['track_points']} points",
+        "smoothing": _smoothing(summary.get("smoothing")),
         "reference": "none" if reference is None else f"s = {reference:.1f} m",
     }
     table = Table(box=None, show_header=False)
     for name, text in rows.items():
+        if text is None:
+            continue
         # Text, because names come from a file and may look like rich's markup.
         table.add_row(Text(name, style="bold"), Text(text))
     return table

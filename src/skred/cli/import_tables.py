@@ -4,6 +4,7 @@ Everything heavy is imported inside the functions, so that ``--help`` is instant
 """
 
 import sys
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,7 @@ from skred.errors import InputError
 if TYPE_CHECKING:
     from skred.importing import Files, Imported, Mapping, Question, Unclear
 
+LONGEST_KEY = 500
 Silences = Literal["missing", "not_reached"]
 
 
@@ -61,7 +63,12 @@ class Declared:
         str | None, Parameter(help="Between columns, where the first row does not tell.")
     ] = None
     decimal: Annotated[str | None, Parameter(help="Decimal sign, where the numbers do not tell.")] = None
-    sheet: Annotated[str | None, Parameter(help="Of a workbook with several.")] = None
+    sheet: Annotated[
+        tuple[str, ...],
+        Parameter(
+            negative="", show_default=False, help="Of a workbook with several; * for all. May be repeated."
+        ),
+    ] = ()
     name: Annotated[str | None, Parameter(help="The campaign's name; by default the file's.")] = None
     set_: Annotated[
         tuple[str, ...],
@@ -84,25 +91,44 @@ class Declared:
             ("table", "encoding"): self.encoding,
             ("table", "separator"): self.separator.replace("\\t", "\t") if self.separator else None,
             ("table", "decimal"): self.decimal,
-            ("table", "sheet"): self.sheet,
+            ("table", "sheet"): list(self.sheet) or None,
         }
         found: dict[tuple[str, ...], Any] = {k: value for k, value in own.items() if value is not None}
         if self.encoding is not None:
             found["track", "encoding"] = self.encoding
         for text in self.word:
-            word, value = _pair(text, "--word")
+            word, sign, value = text.rpartition("=")  # a word may be a sign, such as >=
+            if not sign or not word:
+                raise InputError(f"--word '{text}': expected WORD=missing or WORD=not_reached")
             found["cells", "words", word] = value
         for text in self.set_:
             key, value = _pair(text, "--set")
-            found[tuple(key.split("."))] = value
+            found[_parts(key)] = value
         return found
+
+
+def _parts(key: str) -> tuple[str, ...]:
+    """The parts of a mapping file's key; parts with points in them stand in quotes, as in TOML."""
+    try:
+        content: Any = tomllib.loads(f"{key} = 0") if len(key) <= LONGEST_KEY and "\n" not in key else {}
+    except tomllib.TOMLDecodeError:
+        content = {}
+    parts = list[str]()
+    while isinstance(content, dict) and content:
+        [(part, content)] = content.items()
+        parts.append(part)
+    if not parts:
+        raise InputError(f"--set {key[:LONGEST_KEY]}: expected a key of a mapping file, such as release.s_m")
+    return tuple(parts)
 
 
 DECLARED = Declared()
 
 
 def import_(
-    *files: Annotated[Path, Parameter(help="One table, or files of the campaign format, or their folder.")],
+    *files: Annotated[
+        Path, Parameter(help="One or several tables, or files of the campaign format, or their folder.")
+    ],
     out: Annotated[
         Path | None, Parameter(help="Folder for the campaign; without it nothing is written.")
     ] = None,
@@ -116,8 +142,9 @@ def import_(
 ) -> int:
     """Make a campaign from CSV or Excel tables; shows what was understood before it writes.
 
-    A wide table has a row for each avalanche and a column for each sensor. Beside the campaign a mapping file
-    is written: with --mapping the next table imports without questions.
+    A wide table has a row for each avalanche and a column for each sensor. Several tables become one
+    campaign, and rows of one avalanche belong together. Beside the campaign a mapping file is written: with
+    --mapping the next table imports without questions.
     """
     from skred.campaign.writing import require_free
     from skred.importing import Files, write_imported

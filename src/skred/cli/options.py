@@ -88,6 +88,16 @@ PerYear = Annotated[
         " return periods."
     ),
 ]
+ReturnPeriods = Annotated[
+    list[float] | None,
+    Parameter(
+        name="--return-period",
+        negative="",
+        consume_multiple=True,
+        help="Years, one or several: the runout that is passed once in that time on average. Needs"
+        " --per-year.",
+    ),
+]
 Samplers = Annotated[
     Literal["metropolis", "nuts", "smc"],
     Parameter(help="PyMC's Metropolis with joint adapted proposals, NUTS, or sequential Monte Carlo."),
@@ -270,6 +280,7 @@ class Asked:
     density: Density = "100,300"
     drag_coefficient: DragCoefficient = "1,2"
     per_year: PerYear = None
+    return_period: ReturnPeriods = None
 
     def wanted(self) -> "Wanted":
         """The same, checked."""
@@ -288,6 +299,7 @@ class Asked:
             density_kg_m3=density,
             drag_coefficient=drag,
             rate=rate,
+            return_periods_years=tuple(self.return_period or ()),
             **speeds,
         )
 

@@ -6,9 +6,10 @@ Everything heavy is imported inside the functions, so that ``--help`` is instant
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from skred.api.work import predict_to
 from skred.cli.exit_codes import DONE, NOT_CONVERGED
 from skred.cli.hints import tell_hints, tell_track_hints
-from skred.cli.inputs import campaign_of, hierarchical_of
+from skred.cli.inputs import campaign_of, hierarchical_of, law_of
 from skred.cli.options import (
     ASKED,
     HIERARCHICAL,
@@ -18,6 +19,7 @@ from skred.cli.options import (
     From,
     Hierarchical,
     PredictedCampaign,
+    Priors,
     Releases,
     Sampling,
     TrackFile,
@@ -37,6 +39,7 @@ def predict(
     base_model: BaseModel = None,
     track: TrackFile = None,
     release: Releases = None,
+    priors: Priors = None,
     asked: Asked = ASKED,
     likelihood: Hierarchical = HIERARCHICAL,
     sampling: Sampling = SAMPLING,
@@ -48,16 +51,13 @@ def predict(
     wanted, scenarios = asked.wanted(), [release_of(text) for text in release or ()]
     source = None
     if from_ is not None:
-        source = _source(from_, campaign, base_model, likelihood, sampling)
+        source = _source(from_, campaign, base_model, priors, likelihood, sampling)
         law, problem = source.stored.calibration.law, source.stored.problem
     else:
-        from skred.physics.laws import load_law
-
-        law = load_law(base_model or "pcm")
+        law = law_of(base_model or "pcm", priors)
         checked = campaign_of(campaign or "ryggfonn")
         problem = hierarchical_of(checked, likelihood.errors, likelihood.smoothing)
 
-    from skred.prediction.predict import predict as predict_avalanches
     from skred.prediction.statement import source_sentences
     from skred.prediction.terms import added_rows
     from skred.prediction.track import prediction_track
@@ -74,16 +74,16 @@ def predict(
             output.tell(line)
     tell_track_hints(where, track, output.tell)
     with output.results("predict") as results:
-        if source is None:
-            from skred.inference.calibrate import calibrate
-
-            output.tell(f"{law.id}: calibrating on {problem.campaign.name}")
-            settings = sampling.settings("hierarchical")
-            calibration = calibrate(problem, law, settings, progress=output.progress)
-        else:
-            calibration = source.stored.calibration
-        prediction = predict_avalanches(
-            calibration, results.unfinished, where, output.tell, wanted=wanted, source=source
+        prediction, _ = predict_to(
+            problem,
+            law,
+            sampling.settings("hierarchical"),
+            results.unfinished,
+            output.tell,
+            where=where,
+            wanted=wanted,
+            source=source,
+            progress=output.progress,
         )
         write_reports(results.unfinished)
     output.show(prediction, prediction_table, prediction["statement"], results.path)
@@ -91,7 +91,12 @@ def predict(
 
 
 def _source(
-    folder: Path, campaign: str | None, base_model: str | None, likelihood: Hierarchical, sampling: Sampling
+    folder: Path,
+    campaign: str | None,
+    base_model: str | None,
+    priors: Path | None,
+    likelihood: Hierarchical,
+    sampling: Sampling,
 ) -> "Source":
     """The calibration of a folder; what would calibrate otherwise is refused beside it."""
     from skred.prediction.source import source_of
@@ -99,6 +104,7 @@ def _source(
     beside = {
         "a campaign": campaign is not None,
         "--base-model": base_model is not None,
+        "--priors": priors is not None,
         "--errors or --smoothing": likelihood != HIERARCHICAL,
         "--draws, --tune, --chains or --seed": sampling != SAMPLING,
     }

@@ -14,7 +14,9 @@ from skred.cli.output import write_json
 
 Results = Annotated[
     Path,
-    Parameter(help="A folder written by diagnose, compare, predict, prove, or a law that was calibrated."),
+    Parameter(
+        help="A folder written by diagnose, compare, predict, prove, a law that was calibrated, or track."
+    ),
 ]
 
 

@@ -20,18 +20,24 @@ def validate(campaign: Campaigns, /, *, as_json: Json = False, quiet: Quiet = Fa
             raise
         write_json({"valid": False, "problems": [problem.as_dict() for problem in error.problems]})
         return BAD_INPUT
-    from skred.campaign.summary import campaign_summary, summary_table
+    from dataclasses import asdict
 
-    hints = hints_of(checked)
+    from skred.campaign.summary import campaign_summary, summary_table
+    from skred.physics.terrain import build_terrain
+    from skred.physics.terrain_hints import campaign_places, smoothing_cost
+
+    terrain = build_terrain(checked.track.x_m, checked.track.z_m)
+    hints = hints_of(checked, terrain)
+    cost = asdict(smoothing_cost(checked.track, terrain, campaign_places(checked)))
+    summary = campaign_summary(checked) | {"smoothing": cost}
     if as_json:
-        warnings = [hint.as_dict() for hint in hints]
-        write_json({"valid": True, "problems": [], "warnings": warnings, **campaign_summary(checked)})
+        write_json({"valid": True, "problems": [], "warnings": [hint.as_dict() for hint in hints], **summary})
     elif not quiet:
         from rich.console import Console
         from rich.text import Text
 
         console = Console()
-        console.print(summary_table(campaign_summary(checked)))
+        console.print(summary_table(summary))
         for hint in hints:
             console.print(Text(f"warning: {hint}"), soft_wrap=True)
     return DONE

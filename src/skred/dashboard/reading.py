@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skred.dashboard.run import Run, shown
+from skred.documents import FORMAT, TREE_FORMAT
 from skred.errors import InputError
-from skred.report.folders import FORMAT, TREE_FORMAT
 
 if TYPE_CHECKING:
     import xarray as xr

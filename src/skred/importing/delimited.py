@@ -8,7 +8,7 @@ import re
 from skred.campaign.problems import shown
 from skred.campaign.tables import MOST_LINES
 from skred.importing.questions import Question, Unclear
-from skred.importing.sheet import Grid, Section, in_one_line
+from skred.importing.sheet import TABLE, TRACK, Grid, Section, in_one_line
 from skred.importing.sources import Source, refuse
 
 ENCODINGS = ("utf-8", "latin-1", "cp1252", "cp1250", "mac-roman", "cp850")
@@ -27,7 +27,7 @@ def read_delimited(source: Source, encoding: str | None, separator: str | None, 
         Used where the text is not UTF-8.
     separator : str or None
         Between cells; by default the one sign in the header that can be meant.
-    section : {"table", "track"}
+    section : tuple of str
         Of the mapping file, for questions.
 
     Raises
@@ -48,7 +48,7 @@ def read_delimited(source: Source, encoding: str | None, separator: str | None, 
     if not lines:
         raise refuse(source.name, "the file is empty; write its header and rows")
     written = f"{found}, {SEPARATORS.get(separator, separator)}"
-    return Grid(source.name, tuple(lines), written, separator)
+    return Grid(source.name, tuple(lines), written, separator, source.key)
 
 
 def _decoded(source: Source, encoding: str | None, section: Section) -> tuple[str, str]:
@@ -75,8 +75,15 @@ def _decoded(source: Source, encoding: str | None, section: Section) -> tuple[st
         around = content[start : error.start + 25].splitlines()[0].decode("latin-1")
         text = f"byte 0x{content[error.start]:02x} is not UTF-8; as latin-1 it reads '{shown(around)}'"
         where = f"{source.name}, row {row}"
-        option = "--encoding" if section == "table" else ""
-        question = Question((section, "encoding"), where, text, ENCODINGS[1:], "latin-1", option)
+        option = "" if section == TRACK else "--encoding"  # of all tables: it is used only where UTF-8 fails
+        question = Question(
+            (*(TRACK if section == TRACK else TABLE), "encoding"),
+            where,
+            text,
+            ENCODINGS[1:],
+            "latin-1",
+            option,
+        )
         raise Unclear([question]) from None
 
 
@@ -92,8 +99,8 @@ def _separator(file: str, text: str, section: Section) -> str:
         return candidates[0]
     found = " and ".join(SEPARATORS[sign] for sign in candidates) or "none of ; , tab |"
     question = f"what separates the columns is not clear from the first row (found {found})"
-    option = "--separator" if section == "table" else ""
-    raise Unclear([Question((section, "separator"), file, question, (), '";"', option)])
+    option = "--separator" if section == TABLE else ""
+    raise Unclear([Question((*section, "separator"), file, question, (), '";"', option)])
 
 
 def _unquoted(line: str) -> str:

@@ -9,11 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from skred.campaign import Campaign, CampaignError, Problem, Status, read_campaign
-from skred.importing.readings import OBSERVED, STATUSES
+from skred.campaign import Campaign, CampaignError, Problem, read_campaign
 from skred.importing.sheet import Sheet
 
-_ROW = re.compile(r"\brow (\d+)")
+_ROW = re.compile(r"\b(?:(?P<table>track|sensors|events|recordings)\.csv, )?row (?P<row>\d+)")
 
 
 @dataclass(frozen=True)
@@ -29,12 +28,19 @@ class Where:
         For each column of the draft, the one that it was taken from.
     texts : mapping
         The row's cells as they stand in the file, by its columns.
+    others : mapping
+        Where columns of the draft came from that another table holds.
     """
 
     file: str
     line: int
     columns: Mapping[str, str] = field(default_factory=dict)
     texts: Mapping[str, str] = field(default_factory=dict)
+    others: Mapping[str, "Where"] = field(default_factory=dict)
+
+    def of(self, column: str | None) -> "Where":
+        """Where one column of the draft came from."""
+        return self.others.get(column or "", self)
 
 
 @dataclass(frozen=True)
@@ -51,14 +57,6 @@ class DraftTable:
         writer.writerow(self.columns)
         writer.writerows([cells.get(column, "") for column in self.columns] for _, cells in self.rows)
         return written.getvalue()
-
-    def with_status(self, old: frozenset[str], new: str) -> "DraftTable":
-        """The table with some statuses written as another."""
-        rows = tuple(
-            (where, {**cells, "status": new if cells.get("status") in old else cells.get("status", "")})
-            for where, cells in self.rows
-        )
-        return replace(self, rows=rows)
 
 
 @dataclass(frozen=True)
@@ -80,57 +78,59 @@ class Draft:
 
     def texts(self) -> dict[str, str]:
         """The five files by name."""
-        return self._texts(self.recordings)
+        return {
+            "campaign.toml": self.description,
+            "track.csv": self.track.text(),
+            "sensors.csv": self.sensors.text(),
+            "events.csv": self.events.text(),
+            "recordings.csv": self.recordings.text(),
+        }
 
     def check(self) -> Campaign:
         """Read the draft as any campaign is read.
-
-        Statuses that this version's reader does not know yet are checked as observed ones, which have the
-        same rules.
 
         Raises
         ------
         CampaignError
             With every problem, told by the file, row and column that it came from.
         """
-        known = {status.name.lower() for status in Status}
-        unknown = frozenset(STATUSES) - known
-        texts = self._texts(self.recordings.with_status(unknown, OBSERVED))
         with tempfile.TemporaryDirectory(prefix="skred-import-") as name:
             folder = Path(name)
-            for file, text in texts.items():
+            for file, text in self.texts().items():
                 (folder / file).write_bytes(text.encode("utf-8", "backslashreplace"))
             try:
                 return read_campaign(folder)
             except CampaignError as error:
-                raise CampaignError([self._told(problem) for problem in error.problems]) from None
-
-    def _texts(self, recordings: DraftTable) -> dict[str, str]:
-        return {
-            "campaign.toml": self.description,
-            "track.csv": self.track.text(),
-            "sensors.csv": self.sensors.text(),
-            "events.csv": self.events.text(),
-            "recordings.csv": recordings.text(),
-        }
+                # A cell of a wide table is a cell of several of the draft's tables: it is told once.
+                raise CampaignError(
+                    dict.fromkeys(self._told(problem) for problem in error.problems)
+                ) from None
 
     def _told(self, problem: Problem) -> Problem:
         """A problem of the draft as one of the file that it came from."""
-        table = getattr(self, problem.file.removesuffix(".csv"), None)
+        name = problem.file.removesuffix(".csv")
+        table = getattr(self, name, None)
         if not isinstance(table, DraftTable):
             return problem
 
-        def origin(line: int | None) -> Where | None:
-            return table.rows[line - 2][0] if line is not None and 2 <= line < len(table.rows) + 2 else None
+        def origin(table: str, line: int | None) -> Where | None:
+            rows = getattr(self, table).rows
+            return rows[line - 2][0] if line is not None and 2 <= line < len(rows) + 2 else None
 
         def other_row(found: re.Match[str]) -> str:
-            there = origin(int(found.group(1)))
-            return found.group() if there is None else f"row {there.line}"
+            there = origin(found["table"] or name, int(found["row"]))
+            if there is None:
+                return found.group()
+            if found["table"] == "events":  # rules on readings speak of an avalanche's release
+                there = there.of("release_s_m")
+            return f"row {there.line}" if there.file == file else f"{there.file}, row {there.line}"
 
-        where = origin(problem.row)
+        where = origin(name, problem.row)
         first = table.rows[0][0] if table.rows else None
         if where is None:
             return problem if first is None else replace(problem, file=first.file)
+        where = where.of(problem.column)
+        file = where.file
         column, found = problem.column, problem.found
         if column is not None:
             column = where.columns.get(column, column)

@@ -13,7 +13,8 @@ from skred.importing.mapping import Place
 from skred.importing.numbers import Notation, notation_of
 from skred.importing.places import Places
 from skred.importing.questions import Question, Unclear
-from skred.importing.sheet import Sheet
+from skred.importing.readings import BOUNDS, bound_question
+from skred.importing.sheet import TABLE, Sheet
 
 TEXT = frozenset(("sensor", "quantity", "event", "status"))
 """Columns of the format that hold words; all others hold numbers."""
@@ -59,7 +60,7 @@ def read_five_files(
         cells = ((line, written[new], text) for new in numeric for line, text in sheet.cells(written[new]))
         try:
             writing = (declared.table.decimal, declared.table.thousands)
-            notations[table] = notation_of(cells, sheet.file, sheet.separator, writing, "table")
+            notations[table] = notation_of(cells, sheet.file, sheet.separator, writing, TABLE)
         except Unclear as error:
             questions += error.questions
             continue
@@ -188,4 +189,22 @@ def _turn(
         for key in ("value", "sd", "value_to") if factor is not None else ():
             turner.turn(key, lambda value, factor=factor: value * factor)  # type: ignore[misc]
         if kind == "runout":
-            turner.turn_place("value", "sd", places, declared.runout.place)
+            _turn_runout(turner, declared, places)
+
+
+def _turn_runout(turner: _Turner, declared: Declared, places: Places) -> None:
+    """Turn a runout and its bounds; of two altitudes the higher is the nearer place."""
+    place, row = declared.runout.place, turner.row
+    if place in (None, "s"):
+        return
+    status = row.get("status", "")
+    if place == "altitude" and status in BOUNDS and row.get("value"):
+        if declared.runout.bounds is None:
+            where = f"{turner.where.file}, row {turner.where.line}, column status"
+            raise Unclear([bound_question(where, status)])
+        if declared.runout.bounds == "altitude":
+            row["status"] = BOUNDS[status]
+    turner.turn("value_to", lambda value: places.arc_length(value, place))
+    turner.turn_place("value", "sd", places, place)
+    if place == "altitude" and row.get("value") and row.get("value_to"):
+        row["value"], row["value_to"] = sorted((row["value"], row["value_to"]), key=float)

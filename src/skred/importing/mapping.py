@@ -51,7 +51,6 @@ class Writing(_Part):
     separator: Annotated[str, Field(min_length=1, max_length=1)] | None = None
     decimal: Literal[".", ","] | None = None
     thousands: Literal[".", ",", "'", " "] | None = None
-    sheet: Word | None = None
     header_row: Annotated[int, Field(ge=1, le=MOST_ROWS)] | None = None
 
     @model_validator(mode="after")
@@ -62,9 +61,23 @@ class Writing(_Part):
         return self
 
 
+class TableWriting(Writing):
+    """How wide tables are written; of workbooks also which sheets are tables, ``*`` for all."""
+
+    sheet: Word | Annotated[list[Word], Field(min_length=1)] | None = None
+
+    @property
+    def sheets(self) -> tuple[str, ...]:
+        """The sheets that were named; empty where none was."""
+        return (
+            () if self.sheet is None else (self.sheet,) if isinstance(self.sheet, str) else tuple(self.sheet)
+        )
+
+
 class TrackWriting(Writing):
     """Where the track is, and how it is written."""
 
+    sheet: Word | None = None
     file: Word | None = None
     x: Word | None = None
     z: Word | None = None
@@ -92,6 +105,7 @@ class Runout(_Part):
 
     unit: Literal["m", "km"] | None = None
     place: Place | None = None
+    bounds: Literal["runout", "altitude"] | None = None
     relative_sd: NotNegative | None = None
     absolute_sd: NotNegative | None = None
 
@@ -109,9 +123,9 @@ _KEYS: dict[str, frozenset[str]] = {
     "release": frozenset({"place"}),
     "release_sd": frozenset(),
     "front_velocity": frozenset(
-        {"sensor", "at", "from_", "to", "place", "place_sd_m", "unit", "relative_sd", "absolute_sd"}
+        {"sensor", "at", "from_", "to", "place", "place_sd_m", "unit", "bound", "relative_sd", "absolute_sd"}
     ),
-    "runout": frozenset({"sensor", "place", "unit", "relative_sd", "absolute_sd"}),
+    "runout": frozenset({"sensor", "place", "unit", "bound", "relative_sd", "absolute_sd"}),
     "sd": frozenset({"of"}),
     "covariate": frozenset({"name"}),
     "ignore": frozenset(),
@@ -133,6 +147,9 @@ class Column(_Part):
     place_sd_m : float or None
         How well the place is known, along the track, m.
     unit : {"m/s", "km/h", "m", "km"} or None
+    bound : {"at_least", "at_most"} or None
+        Where plain numbers of the column are bounds. Columns of one sensor make one reading together: two
+        bounds an interval.
     relative_sd, absolute_sd : float or None
         Of a reading: a share of its value, and m/s or m along the track.
     of : str or None
@@ -149,6 +166,7 @@ class Column(_Part):
     place: Place | None = None
     place_sd_m: NotNegative | None = None
     unit: Literal["m/s", "km/h", "m", "km"] | None = None
+    bound: Literal["at_least", "at_most"] | None = None
     relative_sd: NotNegative | None = None
     absolute_sd: NotNegative | None = None
     of: Word | None = None
@@ -172,12 +190,19 @@ class Column(_Part):
         return self
 
 
+class OneTable(Writing):
+    """What one of several wide tables has otherwise: how it is written, and what its columns are."""
+
+    columns: dict[str, Column] = Field(default_factory=dict)
+
+
 class Mapping(_Part):
     """Everything that can be declared about the tables of an import."""
 
     format: Literal[1] = 1
     campaign: Describing = Field(default_factory=Describing)
-    table: Writing = Field(default_factory=Writing)
+    table: TableWriting = Field(default_factory=TableWriting)
+    tables: dict[str, OneTable] = Field(default_factory=dict)
     track: TrackWriting = Field(default_factory=TrackWriting)
     cells: Cells = Field(default_factory=Cells)
     velocity: Velocity = Field(default_factory=Velocity)
@@ -206,8 +231,17 @@ class Mapping(_Part):
                 place = place.setdefault(part, {})
                 if not isinstance(place, dict):
                     raise InputError(f"--set {'.'.join(key)}: no such key")
-            place[key[-1]] = meaning(key[-1], value) if key[0] == "columns" else value
+            place[key[-1]] = meaning(key[-1], value) if "columns" in key[:-1] else value
         return _validated(content, "the options")
+
+    def writing(self, table: str) -> Writing:
+        """How a wide table is written: as all are, but for what is declared of this one."""
+        own = self.tables.get(table, OneTable()).model_dump(exclude_none=True, exclude={"columns"})
+        return self.table.model_copy(update=own)
+
+    def columns_of(self, table: str) -> dict[str, Column]:
+        """What is declared of the columns of a wide table."""
+        return {**self.columns, **self.tables.get(table, OneTable()).columns}
 
     def content(self) -> dict[str, Any]:
         """What is declared, as a mapping file holds it."""

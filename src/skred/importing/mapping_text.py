@@ -9,10 +9,12 @@ from skred.importing.mapping import Mapping
 _COMMENTS = {
     "campaign": "keys of campaign.toml that the tables do not hold",
     "table": "how tables are written: encoding, separator, decimal, thousands, sheet, header_row",
+    "tables": "what one of several tables has otherwise: how it is written, and its columns",
     "track": "the track: file (beside this one), its columns x and z, and how it is written",
     "cells": "what a cell without a number says of a velocity: missing or not_reached",
     "velocity": "holds for every velocity: unit, place (s, x, altitude, reference), relative_sd, absolute_sd",
-    "runout": "holds for every runout: unit, place (s, x, altitude, reference), absolute_sd along the track",
+    "runout": "holds for every runout: unit, place (s, x, altitude, reference), absolute_sd along the track, "
+    "and with altitudes whether bounds speak of the runout or of the altitude",
     "release": "where avalanches start: s_m for all of them, or the place that a column gives",
     "columns": "every column: event, release, release_sd, front_velocity, runout, sd, covariate or ignore",
 }
@@ -41,5 +43,6 @@ def _item(value: Any) -> Any:
     if not isinstance(value, dict):
         return tomlkit.item(value)
     inline = tomlkit.inline_table()
-    inline.update(value)
+    for key, one in value.items():
+        inline.add(key, _item(one))
     return inline

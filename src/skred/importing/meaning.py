@@ -32,6 +32,11 @@ _EVENT = (
 )
 _RUNOUT = re.compile(r"run-?\s?out|auslauf|stopp?(ed)?( at)?|utløp|arr[eê]t", re.IGNORECASE)
 _RELEASE = re.compile(r"release|anriss|start(ing)?( point)?|d[eé]part|utløsning", re.IGNORECASE)
+_BOUND_WORDS = {
+    "at_least": re.compile(r"[\s_]*(at least|at_least|>=|≥|mindestens|minst)[\s_]*", re.IGNORECASE),
+    "at_most": re.compile(r"[\s_]*(at most|at_most|<=|≤|höchstens)[\s_]*", re.IGNORECASE),
+}
+"""Only what can be nothing but a bound: "max runout" mostly is the runout itself."""
 _ALTITUDE = re.compile(r"altitude|elevation|height|m ?a\.? ?s\.? ?l\.?|masl|höhe|h\.? ?ü\.? ?m\.?|moh", re.I)
 _SD = re.compile(r"(?:sd|σ|std|sigma)[\s_]+(?P<a>.+)|(?P<b>.+?)[\s_]+(?:sd|σ|std|sigma)", re.IGNORECASE)
 
@@ -81,9 +86,10 @@ def recognised(name: str, cells: Iterable[str], sensors: Iterable[str] = ()) -> 
     ):
         if re.fullmatch(rf"({_RELEASE.pattern})([ _](s|x|z|m|altitude|elevation|höhe))*", word, re.I):
             return Column.model_validate({"is": "release"} | place)
-    if _RUNOUT.match(word):
-        kilometres = {"unit": "km"} if unit.casefold() == "km" else {}
-        return Column.model_validate({"is": "runout", "sensor": "runout"} | place | kilometres)
+    bound = next((key for key, words in _BOUND_WORDS.items() if words.search(base)), None)
+    if _RUNOUT.match(word if bound is None else _BOUND_WORDS[bound].sub(" ", base).strip()):
+        extra = ({"unit": "km"} if unit.casefold() == "km" else {}) | ({"bound": bound} if bound else {})
+        return Column.model_validate({"is": "runout", "sensor": "runout"} | place | extra)
     return _covariate(name, base, unit, cells)
 
 

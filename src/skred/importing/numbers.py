@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from skred.campaign.cells import CellError, number
 from skred.campaign.problems import CampaignError, Problem
 from skred.importing.questions import Question, Unclear
-from skred.importing.sheet import NumberText, Section
+from skred.importing.sheet import TABLE, NumberText, Section
 
 THOUSANDS = (".", ",", "'", " ")
 _WITH_SIGN = re.compile(r"(?<![\d.,])\d*([.,])\d+(?![\d.,])")
@@ -84,7 +84,7 @@ def notation_of(
         Between cells; None for a workbook.
     declared : (str or None, str or None)
         Decimal sign and sign between thousands, where they were declared.
-    section : {"table", "track"}
+    section : tuple of str
         Of the mapping file, for questions.
 
     Raises
@@ -121,8 +121,8 @@ def notation_of(
     doubt = (
         f"'{text}' can be a decimal number or thousands, and no other number tells which: the decimal sign is"
     )
-    option = "--decimal" if section == "table" else ""
-    raise Unclear([Question((section, "decimal"), where, doubt, (".", ","), f'"{sign}"', option)])
+    option = "--decimal" if section == TABLE else ""
+    raise Unclear([Question((*section, "decimal"), where, doubt, (".", ","), f'"{sign}"', option)])
 
 
 def _mixed(file: str, first: dict[str, tuple[int, str, str]]) -> list[Problem]:

@@ -1,5 +1,8 @@
 """What a table leaves open, and the words that would settle it."""
 
+import json
+import re
+import shlex
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -42,16 +45,19 @@ class Question:
             return f'--column "{shown(self.key[1], 200)}={answer}"'
         if self.key[:2] == ("cells", "words"):
             return f'--word "{shown(self.key[2], 200)}={answer}"'
-        return f"{self.option} {answer}" if self.option else f"--set {'.'.join(self.key)}={answer}"
+        if self.option:
+            return f"{self.option} {answer}"
+        key = dotted(self.key)
+        return f"--set {key}={answer}" if '"' not in key else f"--set {shlex.quote(f'{key}={answer}')}"
 
     @property
     def mapping_line(self) -> str:
         """What to add to the mapping file."""
-        *table, key = (shown(part, 200) for part in self.key)
+        *table, key = self.key
         answer = self.example.strip('"') or "|".join(self.choices)
         if self.key[0] == "columns":
-            return f'[columns] "{key}" = {inline_table(answer)}'
-        return f'[{".".join(table)}] {key} = "{answer}"'
+            return f'[columns] "{shown(key, 200)}" = {inline_table(answer)}'
+        return f'[{dotted(table)}] {dotted((key,))} = "{answer}"'
 
     def __str__(self) -> str:
         """Where and what, and below it how to answer."""
@@ -59,6 +65,15 @@ class Question:
             f"{self.where}: {self.text}\n      add {self.option_line}\n      or, in a mapping file, "
             f"{self.mapping_line}"
         )
+
+
+def dotted(key: Iterable[str]) -> str:
+    """A key of several parts as TOML has it; parts that are no plain words are quoted."""
+    parts = (shown(part, 200) for part in key)
+    return ".".join(
+        part if re.fullmatch(r"[A-Za-z0-9_-]+", part) else json.dumps(part, ensure_ascii=False)
+        for part in parts
+    )
 
 
 def inline_table(meaning: str) -> str:

@@ -3,23 +3,38 @@
 import re
 from dataclasses import dataclass
 
-from skred.campaign.cells import CellError
+from skred.campaign.cells import CellError, number
+from skred.campaign.problems import shown
 from skred.importing.mapping import Cells
 from skred.importing.numbers import Notation
+from skred.importing.questions import Question
 from skred.importing.sheet import NumberText
 
 OBSERVED, NOT_REACHED, MISSING = "observed", "not_reached", "missing"
-AT_LEAST, AT_MOST = "at_least", "at_most"
-STATUSES = (OBSERVED, NOT_REACHED, MISSING, AT_LEAST, AT_MOST)
-"""Every status that an import writes; the last two are additions to version 1 of the format."""
+AT_LEAST, AT_MOST, BETWEEN = "at_least", "at_most", "between"
+BOUNDS = {AT_LEAST: AT_MOST, AT_MOST: AT_LEAST}
+"""Each bound, and what it is of a quantity that falls where its own rises."""
 DASHES = frozenset(("-", "\u2013", "\u2014", "\u2212", "--", "---"))
 _BOUNDS = (
     (AT_LEAST, r">=|=>|>|≥|⩾|at least|at-least|min\.?|mind\.?|mindestens|minst|au moins|almeno"),
-    (AT_MOST, r"<=|=<|<|≤|⩽|at most|at-most|max\.?|höchstens|maks\.?|au plus|al massimo"),
+    (AT_MOST, r"<=|=<|<|≤|⩽|at most|at-most|max\.?|höchstens|maks\.?|au plus|al massimo|up to"),
 )
 _BOUND = re.compile(
     f"(?:{'|'.join(f'(?P<{name}>{words})' for name, words in _BOUNDS)})" + r"(?=[\s\d])", re.IGNORECASE
 )
+_NUMBER = r"[+\-\u2212]?\s*\d[\d.,' \u00a0\u202f\u2019]*"
+_TO = (
+    r"\.\.\.?|\u2026|-|\u2013|\u2014|\u2212"
+    r"|(?<=\s)(?:to|and|bis|und|til|og|à|et|a|e)(?=\s)"
+)
+_RANGE = re.compile(
+    rf"(?:(?:between|from|zwischen|von|mellom|fra|entre|de|tra|da)\s+)?"
+    rf"(?P<low>{_NUMBER}?)\s*(?:{_TO})\s*(?P<high>{_NUMBER})",
+    re.IGNORECASE,
+)
+"""Two numbers and what stands between them; a date has three and is none."""
+_LONGEST_RANGE = 100  # the pattern takes time that grows with the square of a cell's length
+_DATE = re.compile(r"\d{4}-\d{2}-\d{2}( .*)?")
 _WITH_SD = re.compile(r"\s*(?:±|\+/-|\+-)\s*")
 _NUMBER_LIKE = re.compile(r"\d")
 
@@ -31,14 +46,21 @@ class Reading:
     Attributes
     ----------
     status : str
-        One of `STATUSES`.
-    value, sd : str
+        As in recordings.csv.
+    value, sd, value_to : str
         Numbers with a decimal point, in the cell's own unit; empty where there is none.
     """
 
     status: str
     value: str = ""
     sd: str = ""
+    value_to: str = ""
+
+
+def bound_question(where: str, text: str) -> Question:
+    """Whether a bound that stands beside an altitude speaks of the runout: what is higher is less far."""
+    what = f"'{shown(text, 40)}' as an altitude: is the bound of the runout or of the altitude?"
+    return Question(("runout", "bounds"), where, what, ("runout", "altitude"))
 
 
 def silence(text: str, cells: Cells) -> tuple[tuple[str, ...], str | None] | None:
@@ -68,7 +90,7 @@ def silence(text: str, cells: Cells) -> tuple[tuple[str, ...], str | None] | Non
 
 
 def number_of(text: str, notation: Notation) -> Reading:
-    """Read a cell with a number: ``50``, ``50 ± 5``, ``>= 2140``, ``at least 2140``.
+    """Read a cell with a number: ``50``, ``50 ± 5``, ``>= 2140``, ``at least 2140``, ``12-18``.
 
     Raises
     ------
@@ -77,6 +99,8 @@ def number_of(text: str, notation: Notation) -> Reading:
     """
     if isinstance(text, NumberText):
         return Reading(OBSERVED, notation.with_point(text))
+    if _DATE.fullmatch(text):
+        raise CellError("a date stands here; if a program made it of two numbers such as 3-12, write 3 to 12")
     status = OBSERVED
     bound = _BOUND.match(text)
     if bound is not None:
@@ -85,4 +109,13 @@ def number_of(text: str, notation: Notation) -> Reading:
     value, *sd = _WITH_SD.split(text)
     if len(sd) > 1:
         raise CellError("expected one number, and one standard deviation after ±; correct it")
-    return Reading(status, notation.with_point(value), notation.with_point(sd[0]) if sd else "")
+    sd_text = notation.with_point(sd[0]) if sd else ""
+    ends = _RANGE.fullmatch(value.strip()) if len(value) <= _LONGEST_RANGE else None
+    if ends is None:
+        return Reading(status, notation.with_point(value), sd_text)
+    if bound is not None:
+        raise CellError("a bound is one number; write the interval alone, or one bound")
+    low, high = (notation.with_point(ends.group(name).strip()) for name in ("low", "high"))
+    if number(low) == number(high):
+        raise CellError("both ends of the interval are the same; write the number once")
+    return Reading(BETWEEN, low, sd_text, high)

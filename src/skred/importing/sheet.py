@@ -3,7 +3,6 @@
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
 
 from skred.campaign.cells import LONGEST_WORD
 from skred.campaign.problems import CampaignError, Problem
@@ -11,8 +10,10 @@ from skred.campaign.tables import MOST_COLUMNS, MOST_ROWS
 from skred.importing.questions import Question, Unclear
 from skred.importing.sources import refuse
 
-Section = Literal["table", "track"]
-"""Where a mapping file declares how a table is written: the recordings, or the track."""
+Section = tuple[str, ...]
+"""Where a mapping file says how a table is written: ``("table",)``, ``("tables", NAME)``, ``("track",)``."""
+TABLE: Section = ("table",)
+TRACK: Section = ("track",)
 _UNITS = re.compile(r"[\[(].*[\])]|m|km|m/s|km/h|m\^?[23]|m[²³]|°\s?C|degC|%|kg/m3|kg/m³|masl|m a\.?s\.?l\.?")
 
 
@@ -41,12 +42,15 @@ class Grid:
         Encoding and separator in words.
     separator : str or None
         None for a workbook.
+    key : str
+        The table's name in a mapping file.
     """
 
     file: str
     lines: tuple[tuple[int, tuple[str, ...]], ...]
     written: str
     separator: str | None
+    key: str = ""
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,7 @@ class Sheet:
     lines: tuple[tuple[int, tuple[str, ...]], ...]
     written: str
     separator: str | None
+    key: str = ""
 
     def cells(self, column: str) -> Iterator[tuple[int, str]]:
         """Row numbers and cells of a column."""
@@ -78,7 +83,7 @@ def sheet_of(grid: Grid, header_row: int | None, section: Section) -> Sheet:
     grid : Grid
     header_row : int or None
         Row that holds the columns' names; by default the first that is not empty.
-    section : {"table", "track"}
+    section : tuple of str
         Of the mapping file, for questions.
 
     Raises
@@ -109,7 +114,7 @@ def sheet_of(grid: Grid, header_row: int | None, section: Section) -> Sheet:
     if not lines:
         raise refuse(grid.file, "no rows under the header; write at least one", line)
     names = tuple(header[k] for k in kept)
-    return Sheet(grid.file, line, names, lines, grid.written, grid.separator)
+    return Sheet(grid.file, line, names, lines, grid.written, grid.separator, grid.key)
 
 
 def renamed(sheet: Sheet, names: dict[str, str]) -> Sheet:
@@ -123,7 +128,9 @@ def _start(grid: Grid, header_row: int | None, section: Section) -> int:
         for k, (line, _) in enumerate(grid.lines):
             if line == header_row:
                 return k
-        raise refuse(grid.file, f"row {header_row} is empty or not there; correct {section}.header_row")
+        raise refuse(
+            grid.file, f"row {header_row} is empty or not there; correct {'.'.join(section)}.header_row"
+        )
     filled = [sum(bool(cell) for cell in cells) for _, cells in grid.lines[:10]]
     if len(filled) > 1 and filled[0] == 1 and max(filled) > 1:
         likely = grid.lines[next(k for k, n in enumerate(filled) if n > 1)][0]
@@ -131,7 +138,7 @@ def _start(grid: Grid, header_row: int | None, section: Section) -> int:
         text = (
             f"the first row looks like a title ('{next(filter(None, title))[:40]}'): which row has the names?"
         )
-        raise Unclear([Question((section, "header_row"), grid.file, text, (), str(likely))])
+        raise Unclear([Question((*section, "header_row"), grid.file, text, (), str(likely))])
     return 0
 
 

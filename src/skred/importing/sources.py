@@ -1,8 +1,9 @@
 """Files as they are given: bounded, opened once, and told apart by their names."""
 
 import stat
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from skred.campaign.problems import CampaignError, Problem
@@ -22,12 +23,17 @@ class Source:
     Attributes
     ----------
     name : str
-        As messages tell it.
+        As messages tell it; with its folder's where several files have the same.
     content : bytes
     """
 
     name: str
     content: bytes
+
+    @property
+    def key(self) -> str:
+        """The table's name in a mapping file: the file's, without its ending."""
+        return self.name.rpartition(".")[0] or self.name
 
     @property
     def is_workbook(self) -> bool:
@@ -102,18 +108,35 @@ def sort_out(files: Sequence[Path]) -> Sources:
         If a file cannot be read, or one of the format's files is given twice.
     """
     of_format = dict[str, Source]()
-    others = list[Source]()
+    others = list[tuple[Source, Path]]()
     for path in files:
         for file, inside in _files_of(path):
             source = open_source(file, inside)
             key = file.stem.lower() if file.name.lower() != CAMPAIGN else CAMPAIGN
             if key not in (*TABLES, CAMPAIGN):
-                others.append(source)
+                others.append((source, file))
             elif key in of_format:
                 raise refuse(source.name, "given twice; leave one of them out")
             else:
                 of_format[key] = source
-    return Sources(of_format, tuple(others))
+    return Sources(of_format, _told_apart(others))
+
+
+def _told_apart(others: Sequence[tuple[Source, Path]]) -> tuple[Source, ...]:
+    """Tables, those of one name with the names of their folders."""
+    count = Counter(source.name for source, _ in others)
+    named = [
+        source
+        if count[source.name] == 1
+        else replace(source, name=f"{file.resolve().parent.name}/{file.name}")
+        for source, file in others
+    ]
+    for name, times in Counter(source.name for source in named).items():
+        if times > 1:
+            raise refuse(
+                name, "given twice, or another file and folder of the same names; rename one of them"
+            )
+    return tuple(named)
 
 
 def _files_of(path: Path) -> list[tuple[Path, Path | None]]:

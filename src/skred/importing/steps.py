@@ -3,21 +3,22 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import tomlkit
 
 from skred.campaign import Campaign, CampaignError, Problem
 from skred.campaign.writing import write_files
-from skred.importing.delimited import read_delimited
 from skred.importing.draft import Draft, DraftTable, description_text, with_where
 from skred.importing.five_files import COLUMNS, read_five_files, rows_with_points
-from skred.importing.mapping import FILE, Column, Mapping, split_column
+from skred.importing.joined import joined
+from skred.importing.mapping import FILE, Mapping, split_column
 from skred.importing.mapping_text import mapping_text
-from skred.importing.numbers import Notation, notation_of
+from skred.importing.next_mapping import mapping_of_five, mapping_of_wide
+from skred.importing.numbers import notation_of
 from skred.importing.places import Places
-from skred.importing.sheet import Grid, Section, Sheet, sheet_of
-from skred.importing.sources import CAMPAIGN, TABLES, Source, Sources, open_source, refuse, sort_out
+from skred.importing.sheet import TABLE, Sheet
+from skred.importing.sheets import section_of, sheets_of
+from skred.importing.sources import CAMPAIGN, Source, Sources, open_source, refuse, sort_out
 from skred.importing.track_table import TrackRead, read_track_table
 from skred.importing.understanding import (
     ShownColumn,
@@ -27,9 +28,9 @@ from skred.importing.understanding import (
     preview_of,
     wide_columns_shown,
 )
+from skred.importing.wide import Open
 from skred.importing.wide_columns import meanings
 from skred.importing.wide_table import read_wide_table
-from skred.importing.workbook import read_workbook, sheet_names
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Imported:
     ----------
     draft : Draft
     campaign : Campaign
-        The draft as it was read; bounds count as observed where this version's reader does not know them.
+        The draft as it was read.
     understanding : Understanding
     mapping : Mapping
         With what the tables' names said declared too, for the next table.
@@ -59,7 +60,7 @@ class Files:
     Attributes
     ----------
     tables : sequence of Path
-        One wide table, or the campaign format's files, or a folder of these.
+        Wide tables, or the campaign format's files, or a folder of these.
     track, sensors : Path or None
         Tables that go with a wide one.
     mapping : Path or None
@@ -101,17 +102,18 @@ def import_tables(files: Files, declared: Mapping, columns: Sequence[str] = ()) 
     if files.mapping is not None and declared.track.file is not None and "track" not in of_format:
         folder = files.mapping.resolve().parent
         of_format["track"] = open_source(folder / declared.track.file, folder)
-    sheets = _sheets(Sources(of_format, sources.others), declared)
-    names = [name for key in ("", "events") if key in sheets for name in sheets[key].columns]
+    sheets, wide = sheets_of(Sources(of_format, sources.others), declared)
     if columns:
+        tables = [*wide, *(sheet for key, sheet in sheets.items() if key == "events")]
+        names = list(dict.fromkeys(name for sheet in tables for name in sheet.columns))
         pairs = (split_column(text, names) for text in columns)
         declared = declared.with_values({("columns", name): value for name, value in pairs})
-    track = _track(sheets, declared)
+    track = _track(sheets["track"], declared, is_wide=bool(wide))
     places = Places(track.track, _reference(of_format.get(CAMPAIGN), declared))
-    name = _name(files)
-    description = _description(of_format.get(CAMPAIGN), declared, name, sheets)
-    if "" in sheets:
-        return _wide(sheets, declared, track, places, description)
+    files_read = [sheet.file for sheet in (*wide, *(sheets[key] for key in sorted(sheets)))]
+    description = _description(of_format.get(CAMPAIGN), declared, _name(files), files_read)
+    if wide:
+        return _wide(wide, sheets, declared, track, places, description)
     return _five(sheets, declared, track, places, description)
 
 
@@ -135,64 +137,12 @@ def write_imported(imported: Imported, folder: Path, *, force: bool = False) -> 
     write_files(texts, folder, force=force)
 
 
-def _sheets(sources: Sources, declared: Mapping) -> dict[str, Sheet]:
-    """The sheets by the format's table; the wide table's key is empty."""
-    of_format = {key: source for key, source in sources.of_format.items() if key in TABLES}
-    if len(sources.others) > 1:
-        names = ", ".join(source.name for source in sources.others)
-        raise refuse(
-            sources.others[1].name, f"several tables ({names}); import one at a time, each to its folder"
-        )
-    grids = {key: _grid(source, declared, key) for key, source in of_format.items()}
-    for other in sources.others:
-        parts = _parts_of_workbook(other)
-        if parts and declared.table.sheet is None:
-            grids |= {
-                key: read_workbook(other, sheet, "table") for key, sheet in parts.items() if key not in grids
-            }
-        else:
-            grids[""] = _grid(other, declared, "")
-    needed = ("track",) if "" in grids else TABLES
-    for key in needed:
-        if key not in grids:
-            what = "--track FILE" if key == "track" else f"{key}.csv, or one wide table"
-            raise refuse(f"{key}.csv", f"the {key} table was not given; add {what}")
-    if "" in grids and {"events", "recordings"} & set(grids):
-        raise refuse(grids[""].file, "a wide table beside events or recordings; import one of the two")
-    rows = {key: _writing(declared, key).header_row if key in ("", "track") else None for key in grids}
-    return {key: sheet_of(grid, rows[key], _section(key)) for key, grid in grids.items()}
-
-
-def _parts_of_workbook(source: Source) -> dict[str, str]:
-    """Sheets of a workbook that are named as the format's tables, if it holds recordings so."""
-    if not source.is_workbook:
-        return {}
-    parts = {name.lower(): name for name in sheet_names(source) if name.lower() in TABLES}
-    return parts if "recordings" in parts else {}
-
-
-def _section(key: str) -> Section:
-    return "track" if key == "track" else "table"
-
-
-def _writing(declared: Mapping, key: str) -> Any:
-    return declared.track if key == "track" else declared.table
-
-
-def _grid(source: Source, declared: Mapping, key: str) -> Grid:
-    """Cells of one file."""
-    section, writing = _section(key), _writing(declared, key)
-    if source.is_workbook:
-        return read_workbook(source, writing.sheet if key in ("", "track") else None, section)
-    return read_delimited(source, writing.encoding, writing.separator, section)
-
-
-def _track(sheets: dict[str, Sheet], declared: Mapping) -> TrackRead:
+def _track(sheet: Sheet, declared: Mapping, *, is_wide: bool) -> TrackRead:
     writing = declared.track
-    if "" not in sheets and declared.table.decimal is not None and writing.decimal is None:
+    if not is_wide and declared.table.decimal is not None and writing.decimal is None:
         # Of five files that were declared to be written one way, the track is one.
         writing = writing.model_copy(update={"decimal": declared.table.decimal})
-    return read_track_table(sheets["track"], writing)
+    return read_track_table(sheet, writing)
 
 
 def _reference(description: Source | None, declared: Mapping) -> float | None:
@@ -211,11 +161,11 @@ def _name(files: Files) -> str:
     return files.tables[0].resolve().stem if files.tables else "campaign"
 
 
-def _description(source: Source | None, declared: Mapping, name: str, sheets: dict[str, Sheet]) -> str:
+def _description(source: Source | None, declared: Mapping, name: str, sheets: Sequence[str]) -> str:
     """The text of campaign.toml: as given, with what was declared otherwise."""
     own = declared.campaign.model_dump(exclude_none=True)
     if source is None:
-        files = ", ".join(dict.fromkeys(sheets[key].file for key in sorted(sheets)))
+        files = ", ".join(dict.fromkeys(sheets))
         default = {"name": name, "description": "", "source": f"Imported from {files}.", "origin": "measured"}
         return description_text(default | own)
     try:
@@ -252,7 +202,7 @@ def _sensor_table(sheet: Sheet) -> DraftTable:
     """The sensors that go with a wide table, as the format's sensors.csv."""
     numeric = [name for name in sheet.columns if name not in ("sensor", "quantity")]
     cells = ((line, name, text) for name in numeric for line, text in sheet.cells(name))
-    notation = notation_of(cells, sheet.file, sheet.separator, (None, None), "table")
+    notation = notation_of(cells, sheet.file, sheet.separator, (None, None), TABLE)
     missing = [
         column.name for column in COLUMNS["sensors"] if column.required and column.name not in sheet.columns
     ]
@@ -267,20 +217,40 @@ def _sensor_table(sheet: Sheet) -> DraftTable:
 
 
 def _wide(
-    sheets: dict[str, Sheet], declared: Mapping, track: TrackRead, places: Places, description: str
+    wide: Sequence[Sheet],
+    sheets: dict[str, Sheet],
+    declared: Mapping,
+    track: TrackRead,
+    places: Places,
+    description: str,
 ) -> Imported:
-    """Import a wide table."""
-    sheet = sheets[""]
+    """Import wide tables."""
     sensors = _sensor_table(sheets["sensors"]) if "sensors" in sheets else None
-    found = meanings(sheet, declared, sensors)
-    tables, notation = read_wide_table(sheet, found, declared, places)
+    found = meanings(wide, declared, sensors)
+    releases = any(one.column.is_ == "release" for columns in found for one in columns.values())
+    open_ = Open()
+    read = [
+        read_wide_table(
+            sheet, columns, declared, places, open_, section=section_of(sheet, wide), releases=releases
+        )
+        for sheet, columns in zip(wide, found, strict=True)
+    ]
+    open_.settle()
+    tables = joined([tables for tables, _ in read], declared.release.s_m, open_.problems)
+    open_.settle()
     draft = Draft(description, track.table, **tables)
     campaign = draft.check()
-    columns = wide_columns_shown(sheet, found) + _track_columns(sheets["track"], track)
-    written = [how_written(sheet, notation), how_written(sheets["track"], track.notation)]
-    understanding = Understanding(tuple(written), columns, preview_of(draft))
-    complete = {name: one.column for name, one in found.items()}
-    mapping = _for_the_next(declared, complete, notation, track, is_wide=True)
+    columns = [shown for pair in zip(wide, found, strict=True) for shown in wide_columns_shown(*pair)]
+    columns += _track_columns(sheets["track"], track)
+    written = [how_written(sheet, notation) for sheet, (_, notation) in zip(wide, read, strict=True)]
+    written.append(how_written(sheets["track"], track.notation))
+    understanding = Understanding(tuple(written), tuple(columns), preview_of(draft), len(wide) > 1)
+    notations = {sheet.key: notation for sheet, (_, notation) in zip(wide, read, strict=True)}
+    complete = {
+        sheet.key: {name: one.column for name, one in columns_.items()}
+        for sheet, columns_ in zip(wide, found, strict=True)
+    }
+    mapping = mapping_of_wide(declared, complete, notations, track)
     return Imported(draft, campaign, understanding, mapping)
 
 
@@ -305,7 +275,7 @@ def _five(
             unit = new.rpartition("_")[2] if new is not None and new.endswith(("_m", "_m_s")) else ""
             columns.append(ShownColumn(sheet.file, name, meaning, unit, filled(sheet, name), True))
     understanding = Understanding(tuple(written), tuple(columns), preview_of(draft))
-    mapping = _for_the_next(declared, dict(declared.columns), notations["recordings"], track, is_wide=False)
+    mapping = mapping_of_five(declared, notations["recordings"], track)
     return Imported(draft, campaign, understanding, mapping)
 
 
@@ -324,26 +294,3 @@ def _turned(column: str, declared: Mapping) -> str:
     elif column == "release_s_m" and declared.release.place not in (None, "s"):
         said.append(f"as {declared.release.place}")
     return f", {', '.join(said)}" if said else ""
-
-
-def _for_the_next(
-    declared: Mapping, columns: dict[str, Column], notation: Notation, track: TrackRead, *, is_wide: bool
-) -> Mapping:
-    """Everything that was declared and understood, as the next table of the kind needs it."""
-    campaign = declared.campaign.model_copy(update={"name": None})
-    table = declared.table
-    if notation.decimal == ",":
-        table = table.model_copy(update={"decimal": ","})
-    own = {} if track.x == "x_m" and track.z == "z_m" else {"x": track.x, "z": track.z}
-    if is_wide:
-        own["file"] = "track.csv"  # the campaign's own, which lies beside the mapping file
-    content = {
-        **declared.content(),
-        "campaign": campaign.model_dump(exclude_none=True),
-        "table": table.model_dump(exclude_none=True),
-        "track": own,
-        "columns": {
-            name: column.model_dump(by_alias=True, exclude_none=True) for name, column in columns.items()
-        },
-    }
-    return Mapping.model_validate(content)

@@ -10,7 +10,7 @@ from skred.importing.draft import DraftTable, Where
 from skred.importing.mapping import TrackWriting
 from skred.importing.numbers import Notation, notation_of
 from skred.importing.questions import Question, Unclear
-from skred.importing.sheet import Sheet
+from skred.importing.sheet import TRACK, Sheet
 
 X_NAMES = ("distance", "dist", "x", "chainage", "station", "horizontal distance", "distanz")
 Z_NAMES = ("elevation", "z", "altitude", "height", "höhe", "elev")
@@ -61,7 +61,7 @@ def read_track_table(sheet: Sheet, writing: TrackWriting) -> TrackRead:
     ignored = tuple(name for name in sheet.columns if name not in kept)
     cells = ((line, name, text) for name in kept for line, text in sheet.cells(name))
     declared = (writing.decimal, writing.thousands)
-    notation = notation_of(cells, sheet.file, sheet.separator, declared, "track")
+    notation = notation_of(cells, sheet.file, sheet.separator, declared, TRACK)
     problems, rows = list[Problem](), list[tuple[Where, dict[str, str]]]()
     sources = {names.get(name, name): name for name in kept}
     for line, row in sheet.rows():

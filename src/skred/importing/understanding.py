@@ -9,7 +9,7 @@ from skred.campaign.problems import shown
 from skred.importing.draft import Draft, DraftTable
 from skred.importing.mapping import Column
 from skred.importing.numbers import Notation
-from skred.importing.readings import AT_LEAST, AT_MOST, OBSERVED
+from skred.importing.readings import AT_LEAST, AT_MOST, BETWEEN, OBSERVED
 from skred.importing.sheet import Sheet
 from skred.importing.wide_columns import Meaning, sensor_id
 
@@ -54,11 +54,14 @@ class Understanding:
     columns : tuple of ShownColumn
     preview : tuple of mapping
         The first avalanches: event, release and readings as they will be written.
+    several : bool
+        Whether there are several wide tables, whose columns are told apart by their files.
     """
 
     files: tuple[tuple[str, str], ...]
     columns: tuple[ShownColumn, ...]
     preview: tuple[Mapping[str, str], ...]
+    several: bool = False
 
     @property
     def guessed(self) -> tuple[ShownColumn, ...]:
@@ -83,12 +86,13 @@ class Understanding:
         for one in self.files:
             files.add_row(*(Text(shown(text)) for text in one))
         columns = Table(box=None, title="Columns", title_justify="left")
-        for head in ("column", "is", "unit", "cells", ""):
+        for head in (*(("file",) if self.several else ()), "column", "is", "unit", "cells", ""):
             columns.add_column(head, justify="right" if head == "cells" else "left")
         for column in self.columns:
-            texts = (column.column, column.meaning, column.unit, str(column.cells))
+            texts: tuple[str, ...] = (column.column, column.meaning, column.unit, str(column.cells))
             note = "" if column.declared else "taken from its name"
             # Text, because names come from a file and may look like rich's markup.
+            texts = (column.file, *texts) if self.several else texts
             columns.add_row(*(Text(shown(text, 80)) for text in texts), Text(note))
         heads = list(dict.fromkeys(key for row in self.preview for key in row))
         preview = Table(box=None, title="The first avalanches, as they will be written", title_justify="left")
@@ -122,17 +126,19 @@ def _in_words(name: str, column: Column) -> tuple[str, str]:
     places = {"s": "arc length s", "x": "horizontal distance x", "altitude": "altitude on the track"}
     places["reference"] = "distance from the reference"
     where = places.get(column.place or "", "")
+    bound = "" if column.bound is None else f" ({column.bound.replace('_', ' ')})"
     if column.is_ == "front_velocity":
         kind = {"s": "s", "x": "x", "altitude": "altitude", "reference": "reference +"}[column.place or "s"]
         at = f"{column.at:g}" if column.at is not None else f"{column.from_:g} to {column.to:g}"
         sd = f"sd {_sd(column)}"
         return (
-            f"front velocity, sensor {sensor_id(name, column)} at {kind} = {at} m, {sd} m/s",
+            f"front velocity{bound}, sensor {sensor_id(name, column)} at {kind} = {at} m, {sd} m/s",
             column.unit or "m/s",
         )
     if column.is_ == "runout":
-        return f"runout as {where}, sensor {sensor_id(name, column)}, sd {_sd(column)} m along the track", (
-            column.unit or "m"
+        return (
+            f"runout{bound} as {where}, sensor {sensor_id(name, column)}, sd {_sd(column)} m along the track",
+            (column.unit or "m"),
         )
     if column.is_ == "covariate":
         unit = str(column.name).rpartition("_")[2] if has_unit(column.name or "") else "words"
@@ -174,11 +180,12 @@ def _sensors(table: DraftTable) -> Iterable[str]:
 def _reading(row: Mapping[str, str]) -> str:
     """A reading in a word."""
     status = row.get("status", "")
-    if status not in (OBSERVED, AT_LEAST, AT_MOST):
+    if status not in (OBSERVED, AT_LEAST, AT_MOST, BETWEEN):
         return status.replace("_", " ")
-    bound = {OBSERVED: "", AT_LEAST: "at least ", AT_MOST: "at most "}[status]
+    bound = {AT_LEAST: "at least ", AT_MOST: "at most "}.get(status, "")
     sd = f" ± {_short(row['sd'])}" if row.get("sd") else ""
-    return f"{bound}{_short(row.get('value', ''))}{sd}"
+    to = f" to {_short(row.get('value_to', ''))}" if status == BETWEEN else ""
+    return f"{bound}{_short(row.get('value', ''))}{to}{sd}"
 
 
 def _short(text: str) -> str:

@@ -1,6 +1,6 @@
 """What each column of a wide table is: as declared, as the sensors' table has it, or as its name says."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,8 @@ from skred.importing.sheet import Sheet
 
 FORMS = (
     "event, release, release_sd, front_velocity at=S, front_velocity from=S to=S, "
-    "runout place=s|x|altitude|reference, sd of=SENSOR, covariate name=NAME_UNIT, ignore"
+    "runout place=s|x|altitude|reference (bound=at_least|at_most for bounds), sd of=SENSOR, "
+    "covariate name=NAME_UNIT, ignore"
 )
 """The meanings that a column can have, as the option takes them."""
 
@@ -28,12 +29,14 @@ class Meaning:
     declared: bool
 
 
-def meanings(sheet: Sheet, declared: Declared, sensors: DraftTable | None) -> dict[str, Meaning]:
-    """The meaning of every column.
+def meanings(
+    sheets: Sequence[Sheet], declared: Declared, sensors: DraftTable | None
+) -> list[dict[str, Meaning]]:
+    """The meaning of every column of every table.
 
     Parameters
     ----------
-    sheet : Sheet
+    sheets : sequence of Sheet
     declared : Mapping
     sensors : DraftTable or None
         A table as sensors.csv; a column named as one of its sensors is that sensor.
@@ -41,29 +44,79 @@ def meanings(sheet: Sheet, declared: Declared, sensors: DraftTable | None) -> di
     Raises
     ------
     CampaignError
-        If a declared column is not in the table, no column or several name the avalanches, or a column of
-        standard deviations belongs to no sensor.
+        If a declared column is in no table, no column or several name the avalanches, a column of standard
+        deviations belongs to no sensor, or several columns hold the same readings.
     Unclear
         With every column whose meaning is open.
     """
     known = _of_sensors(sensors)
-    _require_declared(sheet, declared)
-    first = {name: _meaning(name, sheet, declared, known, tuple(known)) for name in sheet.columns}
-    # Once the sensors are known, columns of their standard deviations are.
-    ids = tuple(
-        sensor_id(name, one.column)
-        for name, one in first.items()
-        if one is not None and one.column.is_ in ("front_velocity", "runout")
-    )
-    found = {name: _meaning(name, sheet, declared, known, ids) for name in sheet.columns}
-    questions = _questions(sheet, found, declared)
-    settled = {name: one for name, one in found.items() if one is not None}
-    problems = _problems(sheet, settled, ids)
+    _require_declared(sheets, declared)
+    found = [_of_sheet(sheet, declared.columns_of(sheet.key), known) for sheet in sheets]
+    questions = [
+        question
+        for sheet, columns in zip(sheets, found, strict=True)
+        for question in _questions(sheet, columns, declared)
+    ]
+    questions += _release_question(sheets, found, declared)
+    settled = [{name: one for name, one in columns.items() if one is not None} for columns in found]
+    problems = [
+        problem
+        for sheet, columns in zip(sheets, settled, strict=True)
+        for problem in _problems(sheet, columns)
+    ]
+    if not any(_ids(columns) for columns in settled):
+        message = "no column is a front velocity or a runout; declare one with --column"
+        problems.append(Problem(sheets[0].file, sheets[0].header_line, None, None, message))
     if problems and not questions:
         raise CampaignError(problems)
     if questions:
         raise Unclear(questions)
-    return {name: _with_defaults(one, declared) for name, one in settled.items()}
+    return [{name: _with_defaults(one, declared) for name, one in columns.items()} for columns in settled]
+
+
+def by_sensor(meanings: Mapping[str, Meaning]) -> dict[str, dict[str, Column]]:
+    """The columns of readings by their sensors' ids."""
+    found = dict[str, dict[str, Column]]()
+    for name, one in meanings.items():
+        if one.column.is_ in ("front_velocity", "runout"):
+            found.setdefault(sensor_id(name, one.column), {})[name] = one.column
+    return found
+
+
+def _ids(columns: Mapping[str, Meaning]) -> tuple[str, ...]:
+    return tuple(by_sensor(columns))
+
+
+def _of_sheet(
+    sheet: Sheet, declared: Mapping[str, Column], known: Mapping[str, Column]
+) -> dict[str, Meaning | None]:
+    """What each column of one table is; None where that is not clear."""
+    first = {name: _meaning(name, sheet, declared, known, tuple(known)) for name in sheet.columns}
+    # Once the sensors are known, columns of their standard deviations are.
+    ids = _ids({name: one for name, one in first.items() if one is not None})
+    found = {name: _meaning(name, sheet, declared, known, ids) for name in sheet.columns}
+    return _described_alike(found)
+
+
+def _described_alike(found: Mapping[str, Meaning | None]) -> dict[str, Meaning | None]:
+    """Columns of one sensor: what only one of them says of it holds for all."""
+    shared = ("at", "from_", "to", "place", "place_sd_m", "unit", "relative_sd", "absolute_sd")
+    settled = {name: one for name, one in found.items() if one is not None}
+    filled = dict(found)
+    for columns in by_sensor(settled).values():
+        if len(columns) == 1:
+            continue
+        said: dict[str, Any] = {}
+        for column in columns.values():
+            said |= {
+                key: value
+                for key in shared
+                if (value := getattr(column, key)) is not None and key not in said
+            }
+        for name, column in columns.items():
+            update = {key: value for key, value in said.items() if getattr(column, key) is None}
+            filled[name] = Meaning(column.model_copy(update=update), settled[name].declared)
+    return filled
 
 
 def sensor_id(name: str, column: Column) -> str:
@@ -89,11 +142,15 @@ def _of_sensors(sensors: DraftTable | None) -> dict[str, Column]:
 
 
 def _meaning(
-    name: str, sheet: Sheet, declared: Declared, known: Mapping[str, Column], ids: tuple[str, ...]
+    name: str,
+    sheet: Sheet,
+    declared: Mapping[str, Column],
+    known: Mapping[str, Column],
+    ids: tuple[str, ...],
 ) -> Meaning | None:
     """What one column is; None where that is not clear."""
-    if name in declared.columns:
-        return Meaning(declared.columns[name], True)
+    if name in declared:
+        return Meaning(declared[name], True)
     cells = [text for _, text in sheet.cells(name)]
     by_name = recognised(name, cells, ids)
     sensor, is_exact = _sensor_of(name, known)
@@ -122,20 +179,23 @@ def _sensor_of(name: str, known: Mapping[str, Column]) -> tuple[Column | None, b
     return None, False
 
 
-def _require_declared(sheet: Sheet, declared: Declared) -> None:
-    """Refuse a table without a column that was declared and holds recordings."""
+def _require_declared(sheets: Sequence[Sheet], declared: Declared) -> None:
+    """Refuse tables without a column that was declared and holds recordings."""
     needed = ("event", "release", "front_velocity", "runout")
+    there = {name for sheet in sheets for name in sheet.columns}
+    message = "declared, and not in the table; correct one of the two"
     problems = [
-        Problem(
-            sheet.file,
-            sheet.header_line,
-            name,
-            None,
-            "declared, and not in the table; correct one of the two",
-        )
+        Problem(sheets[0].file, sheets[0].header_line, name, None, message)
         for name, column in declared.columns.items()
-        if name not in sheet.columns and column.is_ in needed
+        if name not in there and column.is_ in needed
     ]
+    for sheet in sheets:
+        own = declared.columns_of(sheet.key)
+        problems += [
+            Problem(sheet.file, sheet.header_line, name, None, message)
+            for name, column in own.items()
+            if name not in declared.columns and name not in sheet.columns and column.is_ in needed
+        ]
     if problems:
         raise CampaignError(problems)
 
@@ -151,7 +211,6 @@ def _questions(sheet: Sheet, found: Mapping[str, Meaning | None], declared: Decl
         option = "--runout" if key == ("runout", "place") else ""
         questions.append(Question(key, where, text, choices, example, option))
 
-    kinds = {one.column.is_ for one in found.values() if one is not None}
     for name, one in found.items():
         if one is None:
             sample = next((text for _, text in sheet.cells(name) if text), "nothing")
@@ -193,15 +252,26 @@ def _questions(sheet: Sheet, found: Mapping[str, Meaning | None], declared: Decl
         elif column.is_ == "release" and column.place is None and declared.release.place is None:
             text = "how is the release given: arc length s, horizontal distance x or altitude on the track?"
             ask(("release", "place"), name, text, "", ("s", "x", "altitude", "reference"))
-    if "release" not in kinds and declared.release.s_m is None and None not in found.values():
-        text = "no column says where avalanches start: arc length of their release [m], the same for all"
-        ask(("release", "s_m"), "", text, "0")
     return questions
 
 
-def _problems(sheet: Sheet, found: Mapping[str, Meaning], ids: tuple[str, ...]) -> list[Problem]:
+def _release_question(
+    sheets: Sequence[Sheet], found: Sequence[Mapping[str, Meaning | None]], declared: Declared
+) -> list[Question]:
+    """Where avalanches start, if no column of any table says so."""
+    columns = [one for table in found for one in table.values()]
+    if None in columns or declared.release.s_m is not None:
+        return []
+    if any(one is not None and one.column.is_ == "release" for one in columns):
+        return []
+    text = "no column says where avalanches start: arc length of their release [m], the same for all"
+    return [Question(("release", "s_m"), ", ".join(sheet.file for sheet in sheets), text, (), "0")]
+
+
+def _problems(sheet: Sheet, found: Mapping[str, Meaning]) -> list[Problem]:
     """What cannot be as it is declared or recognised."""
     problems = []
+    ids = _ids(found)
     for kind, what in (
         ("event", "names the avalanches"),
         ("release", "is the release"),
@@ -216,9 +286,15 @@ def _problems(sheet: Sheet, found: Mapping[str, Meaning], ids: tuple[str, ...]) 
         if one.column.is_ == "sd" and one.column.of not in ids:
             message = f"of='{one.column.of}' is no sensor; there are: {', '.join(ids) or 'none'}"
             problems.append(Problem(sheet.file, sheet.header_line, name, None, message))
-    if not ids:
-        message = "no column is a front velocity or a runout; declare one with --column"
-        problems.append(Problem(sheet.file, sheet.header_line, None, None, message))
+    for sensor, columns in by_sensor(found).items():
+        bounds = [column.bound for column in columns.values()]
+        if len(set(bounds)) < len(bounds):
+            listed = ", ".join(f"'{shown(name)}'" for name in columns)
+            message = (
+                f"the columns {listed} are all readings of sensor '{sensor}'; give them different ids with "
+                "sensor=, or where they hold bounds add bound=at_least and bound=at_most"
+            )
+            problems.append(Problem(sheet.file, sheet.header_line, None, None, message))
     return problems
 
 

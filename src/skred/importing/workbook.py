@@ -11,13 +11,17 @@ from typing import Any
 from skred.campaign.problems import CampaignError, Problem
 from skred.campaign.tables import MOST_COLUMNS, MOST_LINES, MOST_PROBLEMS
 from skred.importing.questions import Question, Unclear
-from skred.importing.sheet import Grid, NumberText, Section, in_one_line
+from skred.importing.sheet import TABLE, TRACK, Grid, NumberText, Section, in_one_line
 from skred.importing.sources import Source, refuse
 
 LARGEST_UNPACKED_BYTES = 100_000_000
 """Five times the largest file: tables of text shrink so much when packed, bombs far more."""
 MOST_PARTS = 1000
 MOST_CELLS = 5_000_000
+
+
+class EmptySheet(CampaignError):
+    """A sheet without cells."""
 
 
 def sheet_names(source: Source) -> tuple[str, ...]:
@@ -43,21 +47,21 @@ def read_workbook(source: Source, name: str | None, section: Section) -> Grid:
     source : Source
     name : str or None
         The sheet; by default the only one.
-    section : {"table", "track"}
+    section : tuple of str
         Of the mapping file, for questions.
 
     Raises
     ------
     CampaignError
         If the workbook cannot be read safely, the sheet is not there, or a formula has no stored value.
+    EmptySheet
+        If the sheet has no cells.
     Unclear
         If there are several sheets and none is named.
     """
     names = sheet_names(source)
     if name is None and len(names) != 1:
-        option = "--sheet" if section == "table" else ""
-        text = f"the workbook has the sheets {', '.join(names)}; which of them?"
-        raise Unclear([Question((section, "sheet"), source.name, text, names, f'"{names[0]}"', option)])
+        raise Unclear([which_sheet(source, names, section)])
     if name is not None and name not in names:
         raise refuse(source.name, f"no sheet named '{name}'; there are: {', '.join(names)}")
     chosen = name or names[0]
@@ -66,11 +70,22 @@ def read_workbook(source: Source, name: str | None, section: Section) -> Grid:
     problems = _without_value(source, chosen, lines)
     if problems:
         raise CampaignError(problems)
-    file = source.name if len(names) == 1 else f"{source.name} ({chosen})"
+    file, key = source.name, source.key
+    if len(names) > 1:
+        file, key = f"{source.name} ({chosen})", chosen
     filled = tuple((line, cells) for line, cells in lines if any(cells))
     if not filled:
-        raise refuse(file, "the sheet is empty; write its header and rows")
-    return Grid(file, filled, "Excel", None)
+        raise EmptySheet([Problem(file, None, None, None, "the sheet is empty; write its header and rows")])
+    return Grid(file, filled, "Excel", None, key)
+
+
+def which_sheet(source: Source, names: tuple[str, ...], section: Section) -> Question:
+    """The question which of a workbook's sheets is meant."""
+    text = f"the workbook has the sheets {', '.join(names)}; which of them?"
+    if section == TRACK:
+        return Question((*section, "sheet"), source.name, text, names, f'"{names[0]}"')
+    text += " (* for all; --sheet may be repeated)"
+    return Question((*TABLE, "sheet"), source.name, text, (*names, "*"), f'"{names[0]}"', "--sheet")
 
 
 def _opened(source: Source, *, values: bool) -> Any:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from skred.documents import TREE_FORMAT
 from skred.inference.by_sensor import joint_terms
 from skred.inference.gate import Gate
 from skred.inference.problem import Problem
@@ -22,7 +23,7 @@ from skred.inference.sampling import SamplerSettings
 from skred.output import write_bytes
 from skred.physics.law import Law, Parameter, parameter_of
 
-FORMAT = 3
+FORMAT = TREE_FORMAT
 """Of the files with trees; figures are made from no other."""
 _PACKAGES = ("skred", "pymc", "pytensor", "arviz", "numba", "numpy", "scipy", "xarray")
 

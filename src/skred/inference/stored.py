@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,20 +12,20 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign, Event, Sensor, Status, Track
+from skred.documents import AGAIN, opened_tree
 from skred.errors import InputError
 from skred.inference.added_terms import AddedTerm, added_terms
 from skred.inference.calibrate import Calibration
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.gate import Gate
 from skred.inference.hierarchical.problem import HierarchicalProblem
-from skred.inference.results import FORMAT
+from skred.inference.priors import laws_with_priors
 from skred.inference.sampling import SamplerSettings
 from skred.physics.law import Law
 from skred.physics.laws import load_law
 from skred.physics.terrain import Terrain, build_terrain
 
 FloatArray = NDArray[np.float64]
-_AGAIN = "run the command that wrote it again"
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,11 +56,8 @@ def read_stored(file: Path) -> Stored:
     InputError
         If it is not there, not netCDF, of another version, or not hierarchical.
     """
-    with _opened(file) as opened:
+    with opened_tree(file) as opened:
         tree = opened.load()
-    if tree.attrs.get("format") != FORMAT:
-        found = tree.attrs.get("format")
-        raise InputError(f"{file}: written by another version of skred, format {found!r:.20}; {_AGAIN}")
     if tree.attrs.get("likelihood", "hierarchical") != "hierarchical":
         raise InputError(
             f"{file}: calibrated with --likelihood {tree.attrs['likelihood']}, which has no population to"
@@ -73,27 +68,18 @@ def read_stored(file: Path) -> Stored:
     except (KeyError, TypeError, ValueError, IndexError) as error:
         lacks = f"{type(error).__name__}: {error}"
         raise InputError(
-            f"{file}: lacks what a prediction needs ({lacks:.80}): of an older version? Then {_AGAIN}"
+            f"{file}: lacks what a prediction needs ({lacks:.80}): of an older version? Then {AGAIN}"
         ) from error
-
-
-@contextmanager
-def _opened(file: Path) -> Iterator[xr.DataTree]:
-    """A netCDF file; variables of objects, which would need pickle, are not netCDF and are refused."""
-    if not file.is_file():
-        raise InputError(f"{file}: not there; {_AGAIN}")
-    try:
-        opened = xr.open_datatree(file, engine="h5netcdf")
-    except (OSError, ValueError) as error:
-        raise InputError(f"{file}: not a netCDF file that can be read ({error})") from error
-    with opened as tree:
-        yield tree
 
 
 def _stored(tree: xr.DataTree) -> Stored:
     attributes = tree.attrs
     law = load_law(str(attributes["law"]))
     _check_equation(law, attributes)
+    changed = json.loads(str(attributes.get("changed_priors", "{}")))
+    [law] = laws_with_priors(
+        [law], {name: scale for name, scale in changed.items() if name in law.parameter_names}
+    )
     campaign = _campaign(tree)
     constant = tree["constant_data"].to_dataset()
     terrain = _terrain(campaign.track, constant, float(attributes["smoothing_m"]))
@@ -112,7 +98,7 @@ def _check_equation(law: Law, attributes: Any) -> None:
     if stored != law.equation:
         raise InputError(
             f"the law {law.id} has another equation now ({law.equation}) than in the folder ({stored});"
-            f" {_AGAIN}"
+            f" {AGAIN}"
         )
 
 

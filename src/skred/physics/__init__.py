@@ -1,1 +1,1 @@
-"""Ring 1, physics: terrain, mechanisms and the kernel (numpy, numba; scipy for the spline)."""
+"""Ring 1, physics: terrain, mechanisms and the kernel (numpy, numba; scipy for the smoothing)."""

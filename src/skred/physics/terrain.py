@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from skred.errors import InputError
 
 FloatArray = NDArray[np.float64]
 
@@ -18,6 +18,10 @@ CELL_M = 6.0
 USUAL_PATH_M = 600.0
 """Length of a track [m] below which both become shorter in proportion, down to a chute in a laboratory."""
 MAX_CELLS = 100_000
+SD_PER_SMOOTHING = float(np.sqrt(2.0 * np.log(2.0)))
+"""Standard deviation of the Gaussian weights, by which a wave of ``2 pi`` smoothing lengths is halved."""
+PARTS_PER_SD, MOST_PARTS = 8, 16
+"""Into so many stretches a standard deviation of the weights, and at most a cell, is cut to be averaged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,18 +93,19 @@ def build_terrain(
     smoothing_m: float | None = None,
     cell_m: float | None = None,
 ) -> Terrain:
-    """Terrain from a surveyed track by one cubic smoothing spline z(x).
+    """Terrain from a surveyed track, smoothed along its arc length.
 
-    The penalty is chosen so that undulations of wavelength ``2 pi smoothing_m`` lose half their
-    amplitude. Drop and angle change of every cell are taken from the spline's values and slopes
-    at the cell's edges, so the fall of potential energy along the track is exact.
+    The slope of the polyline is averaged with Gaussian weights (`smoothed_slopes`). Nothing overshoots: the
+    smoothed slope lies within the surveyed ones nearby, ground that only falls still does, and length and
+    fall of the whole track are kept.
 
     Parameters
     ----------
     x_m, z_m : (n_points,) array, m
         Horizontal distance (strictly increasing) and elevation, at least three points.
     smoothing_m : float, m, optional
-        Smoothing length; 0 interpolates. By default `default_smoothing`.
+        Smoothing length: undulations of wavelength ``2 pi smoothing_m`` lose half their amplitude; 0 leaves
+        the polyline as it is. By default `default_smoothing`.
     cell_m : float, m, optional
         Largest length of a cell. By default `default_cell`.
 
@@ -113,6 +118,8 @@ def build_terrain(
     ------
     ValueError
         If a length is not positive or the track would need more than 100 000 cells.
+    InputError
+        If the smoothing length is longer than the track.
 
     """
     polyline_s = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x_m), np.diff(z_m)))])
@@ -123,40 +130,59 @@ def build_terrain(
     n_cells = int(np.ceil(polyline_s[-1] / cell_m))
     if n_cells > MAX_CELLS:
         raise ValueError(f"the track needs {n_cells} cells of {cell_m} m; choose longer cells")
-    edge_s = np.linspace(0.0, polyline_s[-1], n_cells + 1)
-    edge_x = np.interp(edge_s, polyline_s, x_m)
-    spline, derivative = smoothing_spline(np.asarray(x_m, float), np.asarray(z_m, float), smoothing_m)
-    elevation, gradient = spline(edge_x), derivative(edge_x)
-    length = np.diff(edge_s)
-    sin_slope = np.clip(-np.diff(elevation) / length, -1.0, 1.0)
+    length, sd_m = polyline_s[-1] / n_cells, smoothing_m * SD_PER_SMOOTHING
+    # Edges of cells are edges of the stretches, so that a cell's mean slope is exact.
+    parts = 1 if sd_m == 0 else int(np.clip(np.ceil(PARTS_PER_SD * length / sd_m), 1, MOST_PARTS))
+    sines = smoothed_slopes(polyline_s, np.asarray(z_m, float), smoothing_m, n_cells * parts)
+    sines = np.clip(sines, -1.0, 1.0)
+    sin_slope = sines.reshape(n_cells, parts).mean(axis=1)
+    before, after = np.append(sines[0], sines), np.append(sines, sines[-1])
+    at_edges = np.arcsin(0.5 * (before + after))[::parts]
     return Terrain(
-        edge_s_m=edge_s,
+        edge_s_m=np.linspace(0.0, polyline_s[-1], n_cells + 1),
         sin_slope=sin_slope,
         cos_slope=np.sqrt(1.0 - sin_slope**2),
-        curvature=np.diff(np.arctan(gradient)) / length,
+        curvature=-np.diff(at_edges) / length,
         smoothing_m=smoothing_m,
     )
 
 
-def smoothing_spline(
-    x: FloatArray, z: FloatArray, smoothing_m: float
-) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Natural cubic spline minimising sum (z - f)^2 + smoothing^4 / spacing * int f''^2, and f'.
+def smoothed_slopes(along_m: FloatArray, z_m: FloatArray, smoothing_m: float, n: int) -> FloatArray:
+    """Fall per metre of a smoothed polyline, as means over stretches of equal length.
+
+    It is the polyline's own, averaged with Gaussian weights of standard deviation ``sqrt(2 ln 2)
+    smoothing_m``; beyond its ends the track goes on as its mirror image, so that what smoothing takes from
+    one place another gets. Elevation, the integral of it, is averaged alike.
 
     Parameters
     ----------
-    x, z : (n_points,) array, m
-        Horizontal distance (strictly increasing) and elevation.
+    along_m, z_m : (n_points,) array, m
+        Distance along which it is smoothed, from 0, and elevation. Of arc length it is the slope's sine.
     smoothing_m : float, m
-        Undulations of wavelength ``2 pi smoothing_m`` lose half their amplitude; 0 interpolates.
+        Undulations of wavelength ``2 pi smoothing_m`` lose half their amplitude; 0 leaves all as it is.
+    n : int
+        Number of stretches.
+
+    Returns
+    -------
+    (n,) array
+        Downhill positive; their sum times the stretches' length is the whole fall.
+
+    Raises
+    ------
+    InputError
+        If the smoothing length is longer than the track.
     """
     # Here, because laws and their command lines import this module and scipy takes half a second.
-    from scipy.interpolate import make_smoothing_spline
+    from scipy.ndimage import gaussian_filter1d
 
-    if len(x) < 5:
-        # The penalised spline needs five points; a campaign may have three.
-        dense = np.linspace(x[0], x[-1], 5)
-        x, z = dense, np.interp(dense, x, z)
-    spacing = float(np.mean(np.diff(x)))
-    spline = make_smoothing_spline(x, z, lam=smoothing_m**4 / spacing)
-    return spline, spline.derivative()
+    if smoothing_m > along_m[-1]:
+        raise InputError(
+            f"smoothed over {smoothing_m:g} m, and the track has {along_m[-1]:.4g} m; choose a shorter one"
+        )
+    length = along_m[-1] / n
+    slopes: FloatArray = -np.diff(np.interp(np.linspace(0.0, along_m[-1], n + 1), along_m, z_m)) / length
+    if smoothing_m == 0.0:
+        return slopes
+    smoothed: FloatArray = gaussian_filter1d(slopes, smoothing_m * SD_PER_SMOOTHING / length, mode="reflect")
+    return smoothed

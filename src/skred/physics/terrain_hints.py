@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,8 +18,6 @@ MOST_LOST = 0.02
 """Share of the fall between two places that smoothing may change."""
 _LEAST_OF_DROP = 0.002
 """Share of the track's whole drop below which a change of fall is no loss: level ground has none to lose."""
-_LEAST_ANGLE = np.radians(2.0)
-"""How much steeper than anything surveyed the smoothed track may be, uphill or down [rad]."""
 
 
 def terrain_hints(track: Track, terrain: Terrain, places_m: FloatArray, file: str = TRACK) -> list[Problem]:
@@ -36,7 +36,6 @@ def terrain_hints(track: Track, terrain: Terrain, places_m: FloatArray, file: st
     return [
         *_longer(track, terrain, file),
         *_lost_fall(track, terrain, places_m, file),
-        *_overshoot(track, terrain, file),
     ]
 
 
@@ -63,11 +62,56 @@ def _longer(track: Track, terrain: Terrain, file: str) -> list[Problem]:
     return [Problem(file, None, None, None, message)]
 
 
+@dataclass(frozen=True)
+class SmoothingCost:
+    """What smoothing changes of a track.
+
+    Attributes
+    ----------
+    smoothing_m : float
+    change_of_fall_m : float
+        Largest change of the fall between two places.
+    steepest_deg, steepest_smoothed_deg : float
+        Largest slope angle, as given and smoothed.
+    """
+
+    smoothing_m: float
+    change_of_fall_m: float
+    steepest_deg: float
+    steepest_smoothed_deg: float
+
+
+def smoothing_cost(track: Track, terrain: Terrain, places_m: FloatArray) -> SmoothingCost:
+    """What smoothing changes of a track.
+
+    Parameters
+    ----------
+    track : Track
+    terrain : Terrain
+        Made from it.
+    places_m : (n,) array, m
+        Places between which the fall counts: sensors and releases.
+    """
+    given, smoothed = _elevations(track, terrain, places_m)
+    slopes = np.arctan2(-np.diff(track.z_m), np.diff(track.x_m))
+    return SmoothingCost(
+        terrain.smoothing_m,
+        float(np.ptp(smoothed - given)) if given.size else 0.0,
+        float(np.degrees(slopes.max())),
+        float(np.degrees(terrain.slope_rad.max())),
+    )
+
+
+def _elevations(track: Track, terrain: Terrain, places_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Elevations of places, as given and smoothed [m]."""
+    fallen = np.concatenate([[0.0], np.cumsum(terrain.sin_slope * np.diff(terrain.edge_s_m))])
+    smoothed = track.z_m[0] - np.interp(places_m, terrain.edge_s_m, fallen)
+    return np.interp(places_m, track.s_m, track.z_m), smoothed
+
+
 def _lost_fall(track: Track, terrain: Terrain, places_m: FloatArray, file: str) -> list[Problem]:
     """Whether fronts fall as far between two places as the survey says; the worst pair."""
-    given = np.interp(places_m, track.s_m, track.z_m)
-    fallen = np.concatenate([[0.0], np.cumsum(terrain.sin_slope * np.diff(terrain.edge_s_m))])
-    smoothed = -np.interp(places_m, terrain.edge_s_m, fallen)
+    given, smoothed = _elevations(track, terrain, places_m)
     fall, change = np.subtract.outer(given, given), np.subtract.outer(smoothed, smoothed)
     change = np.abs(change - fall)
     lost = change - np.maximum(MOST_LOST * np.abs(fall), _LEAST_OF_DROP * np.ptp(track.z_m))
@@ -86,21 +130,3 @@ def _lost_fall(track: Track, terrain: Terrain, places_m: FloatArray, file: str) 
 def _signed(smoothed: FloatArray, fall: FloatArray, first: int, last: int) -> float:
     """Change of the fall from one place to another."""
     return float(smoothed[first] - smoothed[last] - fall[first, last])
-
-
-def _overshoot(track: Track, terrain: Terrain, file: str) -> list[Problem]:
-    """Whether the smoothed track has slopes that nobody surveyed."""
-    given = -np.arctan2(np.diff(track.z_m), np.diff(track.x_m))
-    found = terrain.slope_rad
-    beyond = np.maximum(given.min() - found, found - given.max())
-    worst = int(beyond.argmax())
-    if beyond[worst] <= _LEAST_ANGLE:
-        return []
-    middle = 0.5 * (terrain.edge_s_m[worst] + terrain.edge_s_m[worst + 1])
-    message = (
-        f"smoothed over {terrain.smoothing_m:.3g} m the track slopes {np.degrees(found[worst]):.1f} degrees"
-        f" at s = {middle:.4g} m; the given points slope {np.degrees(given.min()):.1f} to"
-        f" {np.degrees(given.max()):.1f}: the curve overshoots"
-        " at a bend; round the bend with a few points, and compare values of --smoothing"
-    )
-    return [Problem(file, None, None, None, message)]

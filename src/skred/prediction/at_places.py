@@ -28,7 +28,7 @@ class _Here(NamedTuple):
     pressure: FloatArray
 
 
-class _Draws(NamedTuple):
+class Unrecorded(NamedTuple):
     """What the recordings do not know: density by avalanche, drag coefficient and rate by population."""
 
     density: FloatArray
@@ -37,7 +37,7 @@ class _Draws(NamedTuple):
 
 
 def at_places(
-    fronts: NewFronts, named: list[tuple[str, float]], wanted: Wanted, seed: int
+    fronts: NewFronts, named: list[tuple[str, float]], wanted: Wanted, draws: Unrecorded
 ) -> tuple[list[dict[str, Any]], xr.Dataset | None]:
     """Rows as plain data, one a place, and curves of exceedance for figures.
 
@@ -48,7 +48,7 @@ def at_places(
     named : list of (str, float)
         Names and arc lengths [m].
     wanted : Wanted
-    seed : int
+    draws : Unrecorded
 
     Returns
     -------
@@ -60,7 +60,6 @@ def at_places(
     """
     if not named:
         return [], None
-    draws = _draws(fronts, wanted, seed)
     rows, curves = [], []
     for k, (name, s_m) in enumerate(named):
         speed = fronts.kept[:, :, k]
@@ -70,13 +69,14 @@ def at_places(
     return rows, _curves([name for name, _ in named], curves)
 
 
-def _draws(fronts: NewFronts, wanted: Wanted, seed: int) -> _Draws:
+def unrecorded(fronts: NewFronts, wanted: Wanted, seed: int) -> Unrecorded:
+    """Draw what the recordings do not know, for every avalanche and every population."""
     rng = np.random.default_rng([seed, 17])
-    n_populations, n_avalanches, _ = fronts.kept.shape
+    n_populations, n_avalanches = fronts.runout.shape
     density = _within(wanted.density_kg_m3, _spread(rng, n_avalanches))
     drag = _within(wanted.drag_coefficient, _spread(rng, n_populations))
     uniform = _spread(rng, n_populations)
-    return _Draws(density, drag, None if wanted.rate is None else wanted.rate.drawn(uniform))
+    return Unrecorded(density, drag, None if wanted.rate is None else wanted.rate.drawn(uniform))
 
 
 def _spread(rng: np.random.Generator, n: int) -> FloatArray:

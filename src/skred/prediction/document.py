@@ -63,6 +63,8 @@ def prediction_document(
             "n_events": campaign.n_events,
         },
         "law": {"id": law.id, "title": law.title, "equation": law.equation},
+        "changed_priors": dict(law.changed_priors),
+        "prior_note": law.prior_note,
         "track": {
             "name": track.name,
             "is_own": track.is_own,
@@ -113,6 +115,7 @@ def _numbers(problem: HierarchicalProblem, track: PredictionTrack, data: xr.Data
         "runout": {
             "exceeded_by": quantiles,
             "end_of_track": {"s_m": track.length_m, **_banded(data, "runout_probability", s=last)},
+            "once_in": json.loads(data.attrs["runout_once_in"]),
             "does_not_start": float(data.attrs["share_that_does_not_start"]),
             "beyond_recorded": [
                 {"s_m": s, **_banded(data, "runout_probability", s=_nearest(data, s))}

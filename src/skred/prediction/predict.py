@@ -24,16 +24,17 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY
 from skred.inference.results import FORMAT, save
 from skred.physics.law import Law
-from skred.prediction.at_places import at_places
+from skred.prediction.at_places import at_places, unrecorded
 from skred.prediction.document import named_places, prediction_document, recorded_runouts, shown_places
 from skred.prediction.files import write_prediction
 from skred.prediction.fronts import new_fronts
 from skred.prediction.probabilities import prediction_dataset, simulation_errors
 from skred.prediction.reading_errors import reading_error
+from skred.prediction.return_periods import runouts_once_in
 from skred.prediction.source import Source
 from skred.prediction.terms import moved
 from skred.prediction.track import PredictionTrack, prediction_track
-from skred.prediction.wanted import Wanted
+from skred.prediction.wanted import AVALANCHES, Wanted
 
 FloatArray = NDArray[np.float64]
 Tell = Callable[[str], None]
@@ -54,7 +55,7 @@ class Simulation:
     """
 
     populations: int = 400
-    avalanches: int = 1024
+    avalanches: int = AVALANCHES
 
 
 def predict(
@@ -95,14 +96,13 @@ def predict(
     assert isinstance(problem, HierarchicalProblem)
     track = prediction_track(problem) if track is None else track
     wanted = wanted or Wanted()
-    wanted.check_on(track.length_m)
+    simulation = simulation or Simulation()
+    wanted.check_on(track.length_m, simulation.avalanches)
     save(calibration.tree, folder / "posterior.nc")
     data, added = None, () if source is None else source.stored.added
     if calibration.gate.passed:
         tell(f"{law.id}: predicting on {track.name}")
-        data = prediction_of(
-            problem, law, calibration.tree, track, simulation or Simulation(), added=added, wanted=wanted
-        )
+        data = prediction_of(problem, law, calibration.tree, track, simulation, added=added, wanted=wanted)
     else:
         tell(f"{law.id}: the chains did not converge: {'; '.join(calibration.gate.problems)}")
     document = prediction_document(calibration, track, data, wanted, source)
@@ -165,7 +165,12 @@ def prediction_of(
     recorded = recorded_runouts(problem, track)
     shortest = recorded[0] if recorded else None
     data = prediction_dataset(fronts, velocity, runout, shortest)
-    rows, curves = at_places(fronts, named, wanted, seed)
+    draws_of_rest = unrecorded(fronts, wanted, seed)
+    rows, curves = at_places(fronts, named, wanted, draws_of_rest)
+    rare: list[dict[str, Any]] = []
+    if draws_of_rest.rate is not None:
+        end_m = float(places[-1])
+        rare = runouts_once_in(wanted.return_periods_years, fronts.runout, draws_of_rest.rate, end_m)
     data = data if curves is None else data.merge(curves)
     points = track.track
     for name, values, what in (("x", points.x_m, "horizontal distance"), ("z", points.z_m, "elevation")):
@@ -182,6 +187,7 @@ def prediction_of(
         ),
         "share_that_does_not_start": stays,
         "at": json.dumps(rows),
+        "runout_once_in": json.dumps(rare),
         "added": json.dumps(law_here.added),
         **({} if shortest is None else {"shortest_recorded_runout_m": shortest}),
         "reading_error_velocity": json.dumps(_plain_error(velocity._asdict())),
@@ -232,8 +238,8 @@ def _attributes(
     problem: HierarchicalProblem, law: Law, tree: xr.DataTree, track: PredictionTrack
 ) -> dict[str, Any]:
     copied = (
-        "law", "equation", "campaign", "campaign_fingerprint", "smoothing_m", "settings", "seed", "gate",
-        "versions",
+        "law", "equation", "changed_priors", "campaign", "campaign_fingerprint", "smoothing_m", "settings",
+        "seed", "gate", "versions",
     )  # fmt: skip
     attributes = {
         "format": FORMAT,

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from skred.documents import read_document
 from skred.errors import InputError
 from skred.inference.stored import Stored, read_stored
 
 _KINDS = {"verdict.json": "diagnosis", "prediction.json": "prediction", "summary.json": "calibration"}
-_FORMAT = 1
 _NO_PROFILE = (
     "the verdict is `unexplained`: a force that is in no list is missing, and the folder has no draws of it"
     " (profile.nc); diagnose again"
@@ -78,12 +77,12 @@ def source_of(folder: Path) -> Source:
 
 
 def _source(folder: Path, document: str, kind: str) -> Source:
-    content = _read(folder / document)
     file, verdict = "posterior.nc", None
-    if kind == "diagnosis":
-        verdict = str(content.get("verdict"))
-        file = _file_of_diagnosis(folder, verdict)
     try:
+        content = read_document(folder / document)
+        if kind == "diagnosis":
+            verdict = str(content.get("verdict"))
+            file = _file_of_diagnosis(folder, verdict)
         stored = read_stored(folder / file)
     except InputError as error:
         raise InputError(f"--from {error}") from error
@@ -95,21 +94,7 @@ def _file_of_diagnosis(folder: Path, verdict: str) -> str:
         if (folder / file).is_file():
             return file
     if verdict == "unexplained":
-        raise InputError(f"--from {folder}: {_NO_PROFILE}")
+        raise InputError(f"{folder}: {_NO_PROFILE}")
     if not (folder / "base.nc").is_file():
-        raise InputError(f"--from {folder}: this diagnosis has no calibration: it ended before one")
+        raise InputError(f"{folder}: this diagnosis has no calibration: it ended before one")
     return "base.nc"
-
-
-def _read(file: Path) -> dict[str, Any]:
-    try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError(f"--from {file}: not a JSON document ({error})") from error
-    found = content.get("format") if isinstance(content, dict) else None
-    if found != _FORMAT:
-        raise InputError(
-            f"--from {file}: written by another version of skred, format {found!r:.20} instead of {_FORMAT};"
-            " run the command that wrote it again"
-        )
-    return dict(content)

@@ -14,6 +14,7 @@ def prediction_statement(document: dict[str, Any]) -> list[str]:
     return [
         *source_sentences(document),
         *_distances(document),
+        *_once_in(document),
         *_at_places(document),
         _parts(document),
         *_conditions(document),
@@ -23,6 +24,7 @@ def prediction_statement(document: dict[str, Any]) -> list[str]:
 def source_sentences(document: dict[str, Any]) -> list[str]:
     """Which calibration this is, and what of it is left out here: before everything else."""
     told = [] if document["from"] is None else [document["from"]["told"]]
+    told += [document["prior_note"]] if document.get("prior_note") else []
     apart: dict[str, list[dict[str, Any]]] = {}
     for row in document["added"]:
         apart.setdefault(row["title"], []).append(row)
@@ -64,6 +66,24 @@ def _distances(document: dict[str, Any]) -> list[str]:
             f"{_percent(runout['does_not_start'])} do not start: friction holds them at the release."
         )
     return sentences
+
+
+def _once_in(document: dict[str, Any]) -> list[str]:
+    """Runouts for the return periods that were asked for."""
+    length = document["track"]["length_m"]
+    told = []
+    for row in document["runout"]["once_in"]:
+        ends = [row[key] for key in ("value", "low", "high")]
+        value, low, high = ("none" if end is None else _end_or(end, length) for end in ends)
+        if row["value"] is None:
+            told.append(f"in {row['years']:g} years fewer than one avalanche starts")
+        else:
+            told.append(f"once in {row['years']:g} years an avalanche passes s = {value} m ({low} to {high})")
+    if not told:
+        return []
+    rare = any(row["low"] is None and row["value"] is not None for row in document["runout"]["once_in"])
+    more = " None: by what is as likely of the frequency, fewer than one starts in that time."
+    return [f"On average, with the frequency that you gave: {'; '.join(told)}.{more if rare else ''}"]
 
 
 def _at_places(document: dict[str, Any]) -> list[str]:

@@ -22,21 +22,30 @@ FloatArray = NDArray[np.float64]
 DENSITY_KG_M3 = (100.0, 300.0)
 """Range of the density of flowing dry snow: from the denser fluidised fronts to a dense core."""
 DRAG_COEFFICIENT = (1.0, 2.0)
-"""Range of the drag coefficient: from a round mast to a flat one."""
+"""Range of the drag coefficient: an assumption, about from a round body across a flow to a flat one."""
 FORMULA = "p = 0.5 C_d rho U^2"
 SOURCES = (
-    "Formula and measured pressures: McClung and Schaerer (1985), Annals of Glaciology 6, 9-14,"
-    " doi 10.3189/1985AoG6-1-9-14.",
-    "Density: 35 to 100 kg/m3 in fluidised fronts, Issler, Gauer, Schaer and Keller (2020), Geosciences 10,"
-    " 2, doi 10.3390/geosciences10010002; about 300 kg/m3 in a dense core, Johannesson, Gauer, Issler and"
-    " Lied, eds (2009), The design of avalanche protection dams, European Commission, EUR 23339.",
-    "Drag coefficient: 1 for a round mast to 2 for a flat one, Salm, Burkard and Gubler (1990), Berechnung"
-    " von Fliesslawinen, Mitteilungen des SLF 47. Slow, wet snow loads narrow obstacles several times as"
-    " much.",
+    "Formula: the drag equation of fluid mechanics.",
+    "Measured pressures and speeds: McClung and Schaerer (1985), Characteristics of flowing snow and"
+    " avalanche impact pressures, Annals of Glaciology. Small load cells read more than a large plate.",
+    "Density: 35 to 100 kg/m3 in the fluidised layer, Issler, Gauer, Schaer and Keller (2020), Inferences on"
+    " mixed snow avalanches from field observations, Geosciences 10(1), 2, doi 10.3390/geosciences10010002;"
+    " about 300 kg/m3 in a dense core, Johannesson, Gauer, Issler and Lied, eds (2009), The design of"
+    " avalanche protection dams, European Commission, EUR 23339.",
+    "Drag coefficient: an assumption without a source in avalanches: about that of a round to that of a flat"
+    " body across a flow.",
+    "Slow wet snow presses considerably more on a mast than such formulas say, and not by its speed: Sovilla,"
+    " Kern and Schaer (2010), Slow drag in wet-snow avalanche flow, Journal of Glaciology, doi"
+    " 10.3189/002214310793146287.",
 )
 _KPA = 1e-3
 MOST_PLACES = 20
+AVALANCHES = 1024
+"""Of each population, simulated."""
+_FEWEST_BEYOND = 3
+"""Of these, those that must run farther than a runout for a return period."""
 _NAME = re.compile(r"\w[\w .-]{0,39}")
+_LONGEST_YEARS = 100_000.0
 _LARGEST_DENSITY, _LARGEST_DRAG, _LARGEST_RATE, _LARGEST = 917.0, 20.0, 1000.0, 1e5
 
 
@@ -83,6 +92,8 @@ class Wanted:
     density_kg_m3, drag_coefficient : (float, float)
         Lowest and highest; in between all are as likely.
     rate : Rate or None
+    return_periods_years : tuple of float
+        Times in which a runout is reached once on average; they need a rate.
     """
 
     places: tuple[tuple[str, float], ...] = ()
@@ -91,6 +102,7 @@ class Wanted:
     density_kg_m3: tuple[float, float] = DENSITY_KG_M3
     drag_coefficient: tuple[float, float] = DRAG_COEFFICIENT
     rate: Rate | None = field(default=None)
+    return_periods_years: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse what cannot be meant."""
@@ -109,20 +121,42 @@ class Wanted:
             for value in values:
                 if not 0.0 <= value <= _LARGEST:
                     raise InputError(f"{option} {value:g}: expected a number from 0 to {_LARGEST:g}")
+        self._check_periods()
         _check_range("--density", self.density_kg_m3, _LARGEST_DENSITY)
         _check_range("--drag-coefficient", self.drag_coefficient, _LARGEST_DRAG)
 
-    def check_on(self, length_m: float) -> None:
-        """Refuse places that are not on a track.
+    def _check_periods(self) -> None:
+        """Refuse times that are none, and times without a frequency."""
+        for years in self.return_periods_years:
+            if not 0.0 < years <= _LONGEST_YEARS:
+                raise InputError(
+                    f"--return-period {years:g}: expected years, above 0 and at most {_LONGEST_YEARS:g}"
+                )
+        if self.return_periods_years and self.rate is None:
+            raise InputError("--return-period: needs --per-year, how often avalanches start")
+        if len(self.return_periods_years) > MOST_PLACES:
+            raise InputError(
+                f"--return-period: at most {MOST_PLACES}, found {len(self.return_periods_years)}"
+            )
+
+    def check_on(self, length_m: float, avalanches: int = AVALANCHES) -> None:
+        """Refuse places that are not on a track, and return periods that a simulation cannot tell.
 
         Raises
         ------
         InputError
-            If one lies outside.
+            If a place lies outside, or a time is too long.
         """
         for name, s_m in self.places:
             if not 0.0 <= s_m <= length_m:
                 raise InputError(f"--at {name}={s_m:g}: expected a place on the track, 0 to {length_m:.1f} m")
+        rarest = max(self.return_periods_years, default=0.0)
+        if self.rate is not None and self.rate.mean * rarest > avalanches / _FEWEST_BEYOND:
+            longest = avalanches / (_FEWEST_BEYOND * self.rate.mean)
+            raise InputError(
+                f"--return-period {rarest:g}: with {self.rate.mean:g} avalanches a year, such runouts are"
+                f" rarer than the simulation can tell; at most {longest:.3g} years"
+            )
 
     def as_dict(self) -> dict[str, Any]:
         """What was asked for besides places, as plain data."""
@@ -149,7 +183,7 @@ def _check_range(option: str, limits: tuple[float, float], largest: float) -> No
 
 
 def impact_pressure_kpa(speed_m_s: Any, density_kg_m3: Any, drag_coefficient: Any) -> Any:
-    """Impact pressure [kPa] p = 0.5 C_d rho U^2 of snow on an obstacle (McClung and Schaerer, 1985).
+    """Impact pressure [kPa] p = 0.5 C_d rho U^2 of snow on an obstacle, the drag equation.
 
     Parameters
     ----------

@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Callable, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+from skred.documents import AGAIN, FORMAT, check_format, opened_tree, read_document
 from skred.errors import InputError
 from skred.output import write_text
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    import xarray as xr
-
     from skred.report.shared.drawing import Picture
 
-FORMAT = 1
-"""Of the documents that this version reads."""
-TREE_FORMAT = 3
-"""Of the netCDF files."""
-_AGAIN = "run the command that wrote it again"
+_MOST_TRACKS = 100
 
 
 class ReportError(InputError):
@@ -40,7 +31,8 @@ def write_reports(folder: Path) -> list[Path]:
     Parameters
     ----------
     folder : Path
-        Of ``skred diagnose``, ``compare``, ``predict`` or ``prove``, or of a law that was calibrated.
+        Of ``skred diagnose``, ``compare``, ``predict`` or ``prove``, of a law that was calibrated, or with
+        the table of a track and what ``skred track`` wrote beside it.
 
     Returns
     -------
@@ -57,8 +49,13 @@ def write_reports(folder: Path) -> list[Path]:
     for document, make in _KINDS.items():
         if (folder / document).is_file():
             return _in_place(folder, make)
+    if any(_track_documents(folder)):
+        return _in_place(folder, _tracks)
     names = ", ".join(_KINDS)
-    raise ReportError(f"{folder}: no results to report on; a folder of results holds one of {names}")
+    raise ReportError(
+        f"{folder}: no results to report on; a folder of results holds one of {names}, or the table of a"
+        " track with its .json beside it"
+    )
 
 
 def _in_place(folder: Path, make: Callable[[Path, Path], list[str]]) -> list[Path]:
@@ -76,9 +73,9 @@ def _in_place(folder: Path, make: Callable[[Path, Path], list[str]]) -> list[Pat
 def _diagnosis(folder: Path, beside: Path) -> list[str]:
     from skred.report.diagnosis.report import FIGURES, render_diagnosis, save_diagnosis_figures
 
-    document = _read_document(folder / "verdict.json", "format")
-    _check_format(folder / "verdict.json", document.get("report"), "report.format")
-    with _opened(folder / "diagnosis.nc") as tree:
+    document = read_document(folder / "verdict.json", ReportError)
+    check_format(folder / "verdict.json", document.get("report"), "report.format", FORMAT, ReportError)
+    with opened_tree(folder / "diagnosis.nc", ReportError) as tree:
         figures = save_diagnosis_figures(document, tree, beside)
         write_text(beside / "report.html", render_diagnosis(document, tree, figures))
     return [f"{name}.png" for name in FIGURES]
@@ -89,7 +86,7 @@ def _comparison(folder: Path, beside: Path) -> list[str]:
     from skred.report.comparison.page import render_comparison
     from skred.report.shared.document import get, listed
 
-    comparison = _read_document(folder / "compare.json", "format")
+    comparison = read_document(folder / "compare.json", ReportError)
     figures: dict[str, Picture] = {}
     possible = [f"{name}.png" for name in COMPARISON_FIGURES]
     for models, where in (
@@ -116,7 +113,7 @@ def _plain_name(name: Any, folder: Path) -> str:
 def _calibration(folder: Path, beside: Path) -> list[str]:
     from skred.report.calibration.page import render_calibration
 
-    document = _read_document(folder / "summary.json", "format")
+    document = read_document(folder / "summary.json", ReportError)
     figures = _model_figures(folder, beside)
     write_text(beside / "report.html", render_calibration(document, figures))
     return _possible_of_a_model()
@@ -126,7 +123,7 @@ def _model_figures(folder: Path, beside: Path, key: str = "") -> dict[str, Pictu
     from skred.report.calibration.figures import save_model_figures
 
     beside.mkdir(parents=True, exist_ok=True)
-    with _opened(folder / "posterior.nc") as tree:
+    with opened_tree(folder / "posterior.nc", ReportError) as tree:
         return save_model_figures(tree, beside, key)
 
 
@@ -139,10 +136,10 @@ def _possible_of_a_model() -> list[str]:
 def _prediction(folder: Path, beside: Path) -> list[str]:
     from skred.report.prediction.page import FIGURES, render_prediction, save_prediction_figures
 
-    document = _read_document(folder / "prediction.json", "format")
+    document = read_document(folder / "prediction.json", ReportError)
     figures: dict[str, Picture] = {}
     if document.get("valid") is True:
-        with _opened(folder / "prediction.nc") as tree:
+        with opened_tree(folder / "prediction.nc", ReportError) as tree:
             figures = save_prediction_figures(document, tree, beside)
     write_text(beside / "report.html", render_prediction(document, figures))
     return [f"{name}.{kind}" for name in FIGURES for kind in ("png", "svg")]
@@ -152,10 +149,32 @@ def _scorecard(folder: Path, beside: Path) -> list[str]:
     from skred.report.scorecard.figures import SCORECARD_FIGURES, save_scorecard_figures
     from skred.report.scorecard.page import render_scorecard
 
-    document = _read_document(folder / "scorecard.json", "format")
+    document = read_document(folder / "scorecard.json", ReportError)
     figures = save_scorecard_figures(document, beside)
     write_text(beside / "scorecard.html", render_scorecard(document, figures))
     return [f"{name}.png" for name in SCORECARD_FIGURES]
+
+
+def _tracks(folder: Path, beside: Path) -> list[str]:
+    """Figures of the tracks in a folder; nothing else in it is touched."""
+    from skred.report.shared.style import write_png
+    from skred.report.track.figures import track_figure
+
+    for file in _track_documents(folder):
+        document = read_document(file, ReportError)
+        try:
+            figure = track_figure(document)
+        except (AttributeError, IndexError, KeyError, TypeError, ValueError) as error:
+            lacks = f"{type(error).__name__}: {error}"
+            raise ReportError(f"{file}: no track that can be drawn ({lacks:.80}); {AGAIN}") from error
+        write_png(figure, beside / f"{file.stem}.png")
+    return []
+
+
+def _track_documents(folder: Path) -> list[Path]:
+    """The documents that ``skred track`` wrote: each has the name of a table beside it."""
+    tables = sorted(folder.glob("*.csv"))[:_MOST_TRACKS]
+    return [file for table in tables if (file := table.with_suffix(".json")).is_file()]
 
 
 _KINDS: dict[str, Callable[[Path, Path], list[str]]] = {
@@ -166,37 +185,3 @@ _KINDS: dict[str, Callable[[Path, Path], list[str]]] = {
     "summary.json": _calibration,
 }
 """What a folder holds, and what makes its report; returns the figures that there may be."""
-
-
-def _read_document(file: Path, key: str) -> dict[str, Any]:
-    """A JSON document of the format that this version reads."""
-    try:
-        document = json.loads(file.read_text(encoding="utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise ReportError(f"{file}: not a JSON document ({error})") from error
-    _check_format(file, document, key)
-    return dict(document)
-
-
-def _check_format(file: Path, document: Any, key: str, expected: int = FORMAT) -> None:
-    """Refuse what was written by another version of the format."""
-    found = document.get("format") if isinstance(document, Mapping) else None
-    if found != expected:
-        told = f"with {key} {found!r} instead of {expected}" if found is not None else f"without {key!r}"
-        raise ReportError(f"{file}: written by another version of skred, {told}; {_AGAIN}")
-
-
-@contextmanager
-def _opened(file: Path) -> Iterator[xr.DataTree]:
-    """A netCDF file of results, read as far as it is needed."""
-    import xarray as xr
-
-    if not file.is_file():
-        raise ReportError(f"{file}: not there; {_AGAIN}")
-    try:
-        opened = xr.open_datatree(file, engine="h5netcdf")
-    except (OSError, ValueError) as error:
-        raise ReportError(f"{file}: not a netCDF file that can be read ({error})") from error
-    with opened as tree:
-        _check_format(file, tree.attrs, "format", TREE_FORMAT)
-        yield tree

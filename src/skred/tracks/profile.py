@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -9,12 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.errors import InputError
-from skred.physics.terrain import smoothing_spline
+from skred.physics.terrain import smoothed_slopes
 from skred.tracks.elevations import Elevations
 from skred.tracks.plan import Plan
 
 FloatArray = NDArray[np.float64]
 _SHOWN_STRETCHES = 3
+_STEP = 0.1
+"""Length of the stretches by which slopes are averaged, in smoothing lengths."""
+_MOST_STEPS = 1_000_000
 _RISES_M = 0.5
 """A rise that is told of is higher."""
 
@@ -138,28 +142,28 @@ def shape(along: FloatArray, z: FloatArray) -> Shape:
 
 
 def smoothed(along: FloatArray, z: FloatArray, smoothing_m: float) -> FloatArray:
-    """Elevations smoothed as every command smooths the terrain of a track; see `skred.physics.terrain`.
+    """Elevations averaged with the weights of `skred.physics.terrain.smoothed_slopes`.
 
     Parameters
     ----------
     along, z : (n,) array, m
-        Horizontal distance and elevation.
+        Distance along which they are averaged, from 0, and elevation. A track that is written is smoothed
+        over horizontal distance, so that its points stay where they are on the map; commands that read it
+        smooth along the arc length.
     smoothing_m : float, m
         Waves of ``2 pi smoothing_m`` lose half their height; 0 changes nothing.
     """
     if smoothing_m == 0.0:
         return z.copy()
-    return np.asarray(smoothing_spline(along, z, smoothing_m)[0](along), dtype=float)
+    n = int(np.clip(along[-1] / (_STEP * smoothing_m), len(along), _MOST_STEPS))
+    edges = np.linspace(0.0, along[-1], n + 1)
+    falls = smoothed_slopes(along, z, smoothing_m, n) * np.diff(edges)
+    return np.asarray(z[0] - np.interp(along, edges, np.append(0.0, np.cumsum(falls))), dtype=float)
 
 
 def smoothed_twice_as_m(first_m: float, second_m: float) -> float:
-    """Length of the one smoothing [m] after which the same wave keeps half its height as after two.
+    """Length of the one smoothing [m] that does what two do one after the other, on gentle ground.
 
-    A smoothing of length l leaves 1 / (1 + (q l)^4) of a wave of wave number q.
+    Both average with Gaussian weights, whose variances add.
     """
-    a, b = first_m**4, second_m**4
-    if a == 0.0 or b == 0.0:
-        return max(first_m, second_m)
-    # (1 + a p)(1 + b p) = 2 for p = q^4
-    p = (-(a + b) + ((a + b) ** 2 + 4 * a * b) ** 0.5) / (2 * a * b)
-    return float(p**-0.25)
+    return math.hypot(first_m, second_m)

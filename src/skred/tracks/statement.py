@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from skred.physics.terrain import SMOOTHING_M
 from skred.tracks.releases import release_sentences
 
 
@@ -44,11 +43,12 @@ def _smoothing(document: Mapping[str, Any]) -> Iterator[str]:
         changes = " and ".join(_change(smoothing, what) for what in ("fall", "length"))
         shift = smoothing["largest_shift_m"]
         yield f"Smoothing by {length:g} m changes {changes}. It moves the ground by up to {shift:.1f} m."
-    together, later = smoothing["with_the_commands_m"], smoothing["as_read"]
+    own, together = smoothing["smoothing_of_commands_m"], smoothing["with_the_commands_m"]
+    later = smoothing["as_read"]
     yield (
-        f"Commands that read the track smooth it by {SMOOTHING_M:g} m themselves; both together are as once "
-        f"by {together:.1f} m. The steepest slope is then {later['steepest_deg']:.1f} degrees, the fall "
-        f"{later['fall_m']:.1f} m."
+        f"Commands that read the track smooth it by {own:.3g} m along its arc "
+        f"length; on gentle ground both together are as once by {together:.1f} m. The steepest slope is then "
+        f"{later['steepest_deg']:.1f} degrees, the fall {later['fall_m']:.1f} m."
     )
 
 

@@ -71,26 +71,9 @@ class PooledLogDensityPullback(ArrayOp):
 @register_funcify_default_op_cache_key(PooledLogDensity)
 def _funcify_density(op: PooledLogDensity, node: Any = None, **kwargs: Any) -> Any:
     @numba_njit
-    def pooled_density(  # type: ignore[no-untyped-def]
-        response,
-        release_of_event,
-        readings,
-        whiten,
-        constant,
-        n_stopped,
-        stopped,
-        regression,
-        conditional,
-        sign,
-        cut,
-        width,
-    ):
+    def pooled_density(response, *data):  # type: ignore[no-untyped-def]
         # PyTensor passes the inputs of an Op one by one.
-        data = PooledArrays(
-            release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional,
-            sign, cut, width,
-        )  # fmt: skip
-        return pooled_log_density(response, data)
+        return pooled_log_density(response, PooledArrays(*data))
 
     return pooled_density, cache_key(pooled_log_density)
 
@@ -98,26 +81,7 @@ def _funcify_density(op: PooledLogDensity, node: Any = None, **kwargs: Any) -> A
 @register_funcify_default_op_cache_key(PooledLogDensityPullback)
 def _funcify_pullback(op: PooledLogDensityPullback, node: Any = None, **kwargs: Any) -> Any:
     @numba_njit
-    def pooled_density_pullback(  # type: ignore[no-untyped-def]
-        cotangent,
-        response,
-        release_of_event,
-        readings,
-        whiten,
-        constant,
-        n_stopped,
-        stopped,
-        regression,
-        conditional,
-        sign,
-        cut,
-        width,
-    ):
-        # PyTensor passes the inputs of an Op one by one.
-        data = PooledArrays(
-            release_of_event, readings, whiten, constant, n_stopped, stopped, regression, conditional,
-            sign, cut, width,
-        )  # fmt: skip
-        return pooled_log_density_pullback(cotangent, response, data)
+    def pooled_density_pullback(cotangent, response, *data):  # type: ignore[no-untyped-def]
+        return pooled_log_density_pullback(cotangent, response, PooledArrays(*data))
 
     return pooled_density_pullback, cache_key(pooled_log_density_pullback)

@@ -56,7 +56,7 @@ def render_prediction(document: doc.Document, figures: Mapping[str, Picture]) ->
     """
     has = {
         "places": has_places(document),
-        "years": has_places(document) and doc.get(document, "rate") is not None,
+        "years": doc.get(document, "rate") is not None and (has_places(document) or bool(_once_in(document))),
         "pressure": has_places(document),
     }
     valid = doc.get(document, "valid") is True
@@ -71,12 +71,20 @@ def render_prediction(document: doc.Document, figures: Mapping[str, Picture]) ->
         lead=_lead(document) if valid else list(doc.listed(document, "statement")),
         caveats=[line for line in doc.listed(document, "statement") if is_caveat(line)],
         left_out=_left_out(document),
+        once_in=_once_in(document),
         percent=percent,
         period=period,
     )
 
 
-_CAVEATS = ("Probabilities ", "Recorded avalanches ", "Intervals ", "Impact pressure ", "The population ")
+_CAVEATS = (
+    "Priors ",
+    "Probabilities ",
+    "Recorded avalanches ",
+    "Intervals ",
+    "Impact pressure ",
+    "The population ",
+)
 
 
 def is_caveat(line: Any) -> bool:
@@ -119,6 +127,11 @@ def _period(place: doc.Document) -> str:
     return (
         "" if band is None else f" With the given frequency one comes every {period(band)} years on average."
     )
+
+
+def _once_in(document: doc.Document) -> list[doc.Document]:
+    """Runouts for return periods, if some were asked for."""
+    return doc.listed(document, "runout", "once_in") if doc.get(document, "valid") is True else []
 
 
 def _left_out(document: doc.Document) -> list[doc.Document]:

@@ -36,6 +36,14 @@ def prediction_table(document: dict[str, Any]) -> Table:
         what = f"runout exceeded by {100 * row['share']:g} %"
         bound = "≥ " if row["at_least"] else ""
         table.add_row(what, bound + whole(row["value"]), f"{whole(row['low'])} to {whole(row['high'])}", "m")
+    for row in document["runout"].get("once_in", ()):
+        value, low, high = (
+            "none" if row[key] is None else whole(row[key]) for key in ("value", "low", "high")
+        )
+        bound = "≥ " if row["at_least"] else ""
+        table.add_row(
+            f"runout reached once in {row['years']:g} years", bound + value, f"{low} to {high}", "m"
+        )
     for place in document["at"]:
         _place_rows(table, place)
     return table

@@ -74,7 +74,10 @@ def _slope(axes: Axes, profile: Mapping[str, Any]) -> None:
         "z_read_m": {"color": _READ, "linewidth": 1.1, "linestyle": "--", "label": _AS_READ},
     }
     for name, look in looks.items():
-        slope = np.degrees(np.arctan2(-np.diff(profile[name]), np.diff(x_m)))
+        if name == "z_read_m":  # smoothed along the arc length, not over the distance on the map
+            slope = np.degrees(np.arcsin(np.clip(-np.diff(profile[name]) / np.diff(s_m), -1.0, 1.0)))
+        else:
+            slope = np.degrees(np.arctan2(-np.diff(profile[name]), np.diff(x_m)))
         axes.plot(middle, slope, **look)
     axes.axhline(0.0, color=INK, linewidth=0.6)
     axes.set_ylabel("degrees")
