@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from hierarchical_cases import hierarchical_calibration, hierarchical_ryggfonn
 
+from skred.diagnosis.augment.added_strength import AddedStrength
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import Decision, blamed
@@ -262,9 +263,7 @@ def _steps(problem, comparison, names, clean, *, second):
         candidate = its_comparison.under_each[0].candidates[name]
         best = candidate.best
         strength = best.mechanism.strength.name
-        added += (
-            SimpleNamespace(name=strength, mechanism=best.mechanism, shape=best.shape, direction=Direction()),
-        )
+        added += (AddedStrength(strength, best.mechanism, best.shape, Direction()),)
         steps.append(
             Step(
                 candidate, tuple(tied), its_comparison, calibration(problem, added), BootstrapTest(0.1, clean)
