@@ -18,6 +18,9 @@ from typing import Any
 
 from skred.parallel.threads import threads
 
+_ENVIRONMENT = {"OMP_NUM_THREADS": "1", "LOKY_MAX_MEMORY_LEAK_SIZE": "2e9"}
+"""Of workers: one thread each; they keep what they compiled and read, which loky else takes for a leak, and
+starts them anew with warnings."""
 _MOST = 3
 """Most workers; each holds all packages in memory."""
 _seat = threading.local()
@@ -39,7 +42,7 @@ def helpers(*modules: str) -> Iterator[None]:
         return
     from loky import ProcessPoolExecutor  # it does not run the caller's script again, as others do
 
-    executor = ProcessPoolExecutor(n, env={"OMP_NUM_THREADS": "1"})
+    executor = ProcessPoolExecutor(n, env=_ENVIRONMENT)
     _there.append(executor)
     try:
         for _ in range(n):
