@@ -103,12 +103,26 @@ def _added_rows(document: doc.Document, mechanism: doc.Document, added: doc.Docu
         percent = 100.0 * (math.exp(mean) - 1.0)
         high = "high" if percent > 0 else "low"
         meaning += f": {printable(sensor)} reads {abs(percent):.0f} % too {high}"
-    rows = [_of_facts(facts, meaning, new=True)]
+    rows = [_of_facts(facts, meaning, new=True), *_between_rows(mechanism)]
     rows += _place_rows(stretch_in(doc.get(mechanism, "location")), str(doc.get(mechanism, "equation") or ""))
     rows += _constant_rows(doc.get(mechanism, "constants") or {}, doc.get(added, "shape", "opposed") is True)
     if covariate:
         what = "logarithm standardised" if doc.get(added, "by_logarithm") else "standardised"
         rows.append(_row("x", "1", f"{printable(covariate)}, {what}", new=True))
+    return rows
+
+
+def _between_rows(mechanism: doc.Document) -> list[dict[str, Any]]:
+    """What says how avalanches differ in a coefficient, where they do."""
+    words = {
+        "spread": ("omega", "standard deviation of its logarithm between avalanches: it is their median"),
+        "share": ("pi", "share of the avalanches that it is present in"),
+    }
+    rows = []
+    for key, (symbol, meaning) in words.items():
+        mean, sd = (doc.get(mechanism, "strength", key, part) for part in ("mean", "sd"))
+        if is_number(mean):
+            rows.append(_row(symbol, "1", f"{meaning}, here {rounded(mean, 2)} ± {rounded(sd, 2)}", new=True))
     return rows
 
 

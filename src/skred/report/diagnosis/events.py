@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from skred.report.shared import document as doc
 from skred.report.shared.labels import printable, unit_text
-from skred.report.shared.numbers import fixed
+from skred.report.shared.numbers import fixed, share
 from skred.report.shared.recordings import recordings_of
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ def event_rows(document: doc.Document, tree: xr.DataTree) -> Rows:
             values = held["log_score"].sel(when=when).values.tolist()
             scores[when] = dict(zip(map(printable, held["event"].values), values, strict=True))
     carried = set(map(printable, doc.listed(document, "influence", "carried_by")))
+    own = {printable(doc.get(one, "event")): one for one in doc.listed(document, "strength", "events")}
     names = list(dict.fromkeys([*scores.get("before", {}), *without]))
     rows = []
     for name in names:
@@ -46,6 +47,7 @@ def event_rows(document: doc.Document, tree: xr.DataTree) -> Rows:
             {
                 "event": name,
                 "carries": "yes" if name in carried else "",
+                "own": _own(own.get(name)),
                 "without": fixed(without.get(name), 1),
                 "before": fixed(before, 1),
                 "after": fixed(after, 1),
@@ -53,6 +55,14 @@ def event_rows(document: doc.Document, tree: xr.DataTree) -> Rows:
             }
         )
     return rows
+
+
+def _own(found: doc.Document | None) -> str:
+    """How probably an avalanche has what was added, or how many times the median of it."""
+    if found is None:
+        return ""
+    probability, multiple = (doc.get(found, key) for key in ("probability", "multiple"))
+    return fixed(multiple, 1) if probability is None else share(probability)
 
 
 def reading_rows(tree: xr.DataTree) -> Rows:

@@ -73,6 +73,7 @@ def page(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Pictur
         force_prior=_force_prior(doc.get(report, "profile_prior")),
         lay=lay_words(document),
         events=event_rows(document, tree),
+        own=_way(document),
         readings=reading_rows(tree),
         most_open=MOST_OPEN,
         checks=doc.listed(report, "checks"),
@@ -84,6 +85,12 @@ def page(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Pictur
 
 def _number(value: Any, otherwise: float) -> float:
     return float(value) if is_number(value) else otherwise
+
+
+def _way(document: doc.Document) -> str:
+    """How avalanches differ in what was added, where their table says what each has."""
+    way = str(doc.get(document, "strength", "between_events") or "")
+    return way if doc.listed(document, "strength", "events") else ""
 
 
 def _sections(document: doc.Document, *, has_unseen: bool) -> dict[str, str]:

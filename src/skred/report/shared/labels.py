@@ -7,7 +7,18 @@ from typing import Any
 
 from skred import units
 
-_GREEK = {"mu": "μ", "xi": "ξ", "kappa": "κ", "phi": "φ", "alpha": "α", "beta": "β", "sigma": "σ", "tau": "τ"}
+_GREEK = {
+    "mu": "μ",
+    "xi": "ξ",
+    "kappa": "κ",
+    "phi": "φ",
+    "alpha": "α",
+    "beta": "β",
+    "sigma": "σ",
+    "tau": "τ",
+    "omega": "ω",
+    "pi": "π",
+}
 
 
 def printable(text: Any) -> str:
