@@ -58,20 +58,14 @@ def predict(
         checked = campaign_of(campaign or "ryggfonn")
         problem = hierarchical_of(checked, likelihood.errors, likelihood.smoothing)
 
-    from skred.prediction.statement import source_sentences
-    from skred.prediction.terms import added_rows
     from skred.prediction.track import prediction_track
     from skred.report.folders import write_reports
-    from skred.report.prediction.figures import prediction_table
+    from skred.report.prediction.table import prediction_table
 
     where = prediction_track(problem, track, scenarios)
     wanted.check_on(where.length_m)
     if source is None:
         tell_hints(problem, output.tell)
-    else:
-        added = added_rows(source.stored.added, where)
-        for line in source_sentences({"from": source.as_dict(), "added": added}):
-            output.tell(line)
     tell_track_hints(where, track, output.tell)
     with output.results("predict") as results:
         prediction, _ = predict_to(

@@ -84,6 +84,9 @@ def prediction_document(
     document |= {"from": None if source is None else source.as_dict(), **(wanted or Wanted()).as_dict()}
     added = () if source is None else source.stored.added
     document["added"] = added_rows(added, track)
+    used = dict.fromkeys(row["title"].partition(":")[0] for row in document["added"] if row["used"])
+    if used:
+        document["law"]["title"] += f", with {' and '.join(used)}"
     empty = ("simulation", "reading_errors", "runout", "places", "at")
     document |= dict.fromkeys(empty) if data is None else _numbers(problem, track, data)
     document["statement"] = prediction_statement(document)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from skred.inference.between_events import BetweenEvents
+
 
 def prediction_statement(document: dict[str, Any]) -> list[str]:
     """Sentences on runout, speed and uncertainty, and on the assumptions."""
@@ -38,6 +40,8 @@ def source_sentences(document: dict[str, Any]) -> list[str]:
                 f"Used: {title}{where}, at the most probable place; how uncertain the place is does not widen"
                 " the intervals."
             )
+        if rows[0]["used"] and rows[0]["between_events"] != BetweenEvents.COMMON:
+            told.append("Each new avalanche has its own strength of it, as those recorded differ.")
     return told
 
 

@@ -173,6 +173,7 @@ def added_rows(terms: Sequence[AddedTerm], track: PredictionTrack) -> list[dict[
                 "mechanism": term.mechanism,
                 "title": term.title,
                 "parameter": term.name,
+                "between_events": str(term.between),
                 "place_m": place,
                 "used": not why,
                 "why": why,

@@ -35,7 +35,7 @@ def identify_table(document: dict[str, Any]) -> Table:
             share(row["power"]),
             *numbers[1:],
         )
-        table.add_row(*map(plain_text, (*words, *numbers[1:], where)))
+        table.add_row(*map(plain_text, (*words, where)))
     table.caption = plain_text(
         "Kept: share of the information left after the base law, its scatter and releases. Relevant: the"
         " median size under the prior, found in that share of cases, over all places. Seen from: the strength"
