@@ -165,6 +165,7 @@ def test_what_was_added_acts_as_in_a_law_that_has_it(given: Any) -> None:
         tree=with_groups(
             run,
             posterior=posterior.assign(turbulent_drag=xr.full_like(posterior["dry_friction"], drag)),
+            event_posterior=events.assign(turbulent_drag=xr.full_like(events["release"], drag)),
             added=added_group([term]),
         ),
     )

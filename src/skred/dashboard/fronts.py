@@ -57,8 +57,8 @@ def event_speeds(run: Run) -> EventSpeeds:
     own = "event_posterior" in run.tree.children
     strengths, releases, begin = _of_events(run, law) if own else _of_path(run, law)
     n_draws, n_events = releases.shape
-    added = _added(run, terms, n_draws)
-    rows = np.concatenate([strengths, np.repeat(added[:, None], n_events, axis=1)], axis=2)
+    added = _added(run, terms, (n_draws, n_events))
+    rows = np.concatenate([strengths, added], axis=2)
     speed = front_speeds(
         np.ascontiguousarray(rows.reshape(n_draws * n_events, -1)),
         releases.ravel(),
@@ -112,14 +112,14 @@ def _of_path(run: Run, law: Law) -> tuple[FloatArray, FloatArray, FloatArray]:
     )
 
 
-def _added(run: Run, terms: tuple[AddedTerm, ...], n: int) -> FloatArray:
-    """Strengths of the columns of the added terms, (n, n_columns), of the same draws as the events'."""
+def _added(run: Run, terms: tuple[AddedTerm, ...], shape: tuple[int, int]) -> FloatArray:
+    """What each event has of the columns of the added terms, (n, n_events, n_columns), of the same draws."""
     if not any(term.direction.columns for term in terms):
-        return np.empty((n, 0))
-    group, events = run.group("posterior"), run.group("event_posterior")
-    data = group.sel(draw=events["draw"].values).transpose("chain", "draw", ...)
-    at = _chosen(events.sizes["chain"], events.sizes["draw"], events.sizes["event"])
-    return np.column_stack([data[term.name].values[at] for term in terms for _ in term.direction.columns])
+        return np.empty((*shape, 0))
+    data = run.group("event_posterior").transpose("chain", "draw", "event", ...)
+    at = _chosen(data.sizes["chain"], data.sizes["draw"], data.sizes["event"])
+    columns = [data[term.name].values[at] for term in terms for _ in term.direction.columns]
+    return np.stack(columns, axis=-1)
 
 
 def _contributions(law: Law, terrain: Terrain, terms: tuple[AddedTerm, ...]) -> Contributions:

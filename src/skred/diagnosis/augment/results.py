@@ -51,7 +51,7 @@ def augmented_predictive(
     new = _predict(problem, law, kept, rng)
     before = _predict(problem, law, thinned(prior, n_events), rng)
     return {
-        "event_posterior": avalanche_dataset(problem, law, kept, recorded, fronts),
+        "event_posterior": _with_added(problem, avalanche_dataset(problem, law, kept, recorded, fronts), own),
         "new_avalanches": new,
         "posterior_predictive": readings_by_sensor(problem, new, seed),
         "prior_predictive": readings_by_sensor(problem, before, seed),
@@ -92,9 +92,19 @@ def _predict(problem: AugmentedProblem, law: Law, draws: xr.Dataset, rng: np.ran
     points = np.concatenate([np.log(drawn.strengths), deviation[..., None]], axis=-1)
     own = new_rows(problem.added, samples, rng, problem.campaign.n_events)
     avalanches, fronts = fronts_of(problem, points, own)
-    dataset = avalanche_dataset(problem, law, draws, avalanches, fronts)
+    dataset = _with_added(problem, avalanche_dataset(problem, law, draws, avalanches, fronts), own)
     add_readings(problem, dataset, fronts, rng)
     return dataset
+
+
+def _with_added(problem: AugmentedProblem, avalanches: xr.Dataset, own: FloatArray) -> xr.Dataset:
+    """Avalanches with what each has of what is added, (n, n_events, n_added)."""
+    dims = ("chain", "draw", "event")
+    sizes = tuple(avalanches.sizes[dim] for dim in dims)
+    units = [{"units": one.mechanism.strength.unit} for one in problem.added]
+    return avalanches.assign(
+        {one.name: (dims, own[..., k].reshape(sizes), units[k]) for k, one in enumerate(problem.added)}
+    )
 
 
 def _deviations(problem: AugmentedProblem, avalanches: Avalanches) -> FloatArray:
