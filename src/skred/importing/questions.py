@@ -57,7 +57,8 @@ class Question:
         answer = self.example.strip('"') or "|".join(self.choices)
         if self.key[0] == "columns":
             return f'[columns] "{shown(key, 200)}" = {inline_table(answer)}'
-        return f'[{dotted(table)}] {dotted((key,))} = "{answer}"'
+        value = answer if re.fullmatch(r"-?\d+(\.\d+)?", answer) else f'"{answer}"'
+        return f"[{dotted(table)}] {dotted((key,))} = {value}"
 
     def __str__(self) -> str:
         """Where and what, and below it how to answer."""

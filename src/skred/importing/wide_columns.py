@@ -149,10 +149,13 @@ def _meaning(
     ids: tuple[str, ...],
 ) -> Meaning | None:
     """What one column is; None where that is not clear."""
-    if name in declared:
-        return Meaning(declared[name], True)
     cells = [text for _, text in sheet.cells(name)]
     by_name = recognised(name, cells, ids)
+    if name in declared:
+        column = declared[name]
+        if column.unit is None and by_name is not None and by_name.is_ == column.is_:
+            column = column.model_copy(update={"unit": by_name.unit})  # it stands in the name
+        return Meaning(column, True)
     sensor, is_exact = _sensor_of(name, known)
     if sensor is not None and (by_name is None or by_name.is_ in (sensor.is_, "event")):
         # The unit and the kind of place are not in the sensors' table: they stand in the column's name.
