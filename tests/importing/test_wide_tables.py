@@ -118,7 +118,7 @@ def test_standard_deviations_and_releases_in_columns(
         ["a", "300", "5", "30", "2.5", "240"],
         ["b", "260", "", "25", "", "180"],
     ]
-    code, err = imported(capsys, tmp_path, rows, columns=("v [m/s]=front_velocity at=100 sensor=v unit=m/s",))
+    code, err = imported(capsys, tmp_path, rows, columns=("v [m/s]=front_velocity at=100 sensor=v",))
     assert code == 0, err
     campaign = read_campaign(tmp_path / "out")
     assert [event.release_s_m for event in campaign.events] == [0.0, 50.0]
