@@ -92,6 +92,7 @@ def _answers(one: Found) -> dict[str, str]:
     if one["next_sensor"] and one["next_sensor"]["splits"]:
         place, splits = one["next_sensor"]["s_from_m"], one["next_sensor"]["splits"]
         said["speed that would split the tie best"] = f"at s = {place:.0f} m ({' from '.join(splits)})"
+    said["avalanches differ in it: common, spread, some"] = _differ(one)
     said["carried by"] = _carried(one["influence"])
     said["held-out log score"] = (
         f"{evidence['elpd_diff']:+.1f} (doubled standard error {2.0 * evidence['elpd_se']:.1f})"
@@ -259,7 +260,8 @@ def _robust(found: Mapping[str, Found]) -> str:
         )
         said = one["verdict"] + _named(one) + (f": {one['reason']}" if one.get("reason") else "")
         share = _share(one["probability"].get("unlisted", 0.0))
-        rows.append(f"| {name} | {said} | {_number(one['evidence']['p_value'])} | {what} | {share} |")
+        p_value = _number(one["evidence"]["p_value"])
+        rows.append(f"| {name} | {said} | {p_value} | {what} | {share} | {_differ(one)} |")
     scales = found["pcm"].get("prior_scales", {})
     priors = "\n".join(
         f"| `{name}` | {values['0.5']:.1f} | {values['1.0']:.1f} | {values['2.0']:.1f} |"
@@ -278,9 +280,13 @@ Base M2 under other choices:
 uncertain: both up, both down, towards each other |
 | `pcm-with-dam` | the surveyed terrain, with the dam in it |
 
-| case | verdict | p of the check | leading candidates, log Bayes factor | probability of `unlisted` |
-| --- | --- | --- | --- | --- |
+| case | verdict | p of the check | leading candidates, log Bayes factor | probability of `unlisted` | \
+common, spread, some |
+| --- | --- | --- | --- | --- | --- |
 {chr(10).join(rows)}
+
+The last column: how probably all avalanches have the same strength, differ log-normally, or have it only in
+part.
 
 Log Bayes factor of the best shape with the prior of the coefficient half, once and twice as wide:
 
@@ -288,6 +294,12 @@ Log Bayes factor of the best shape with the prior of the coefficient half, once 
 | --- | --- | --- | --- |
 {priors}
 """
+
+
+def _differ(one: Found) -> str:
+    """How probable each way is in which avalanches may differ in what was added first."""
+    ways = (one.get("strength") or {}).get("ways")
+    return "" if not ways else ", ".join(_share(ways[name]) for name in ("common", "spread", "some"))
 
 
 def _left(found: Mapping[str, Found]) -> str:
@@ -329,6 +341,9 @@ def _unseen(found: Mapping[str, Found]) -> str:
             )
     k = found["pcm" + UNSEEN]["outer_folds"]["k"]
     return f"""## On avalanches that did not choose it
+
+The last two columns and the folds are results that were made before strengths could differ between avalanches,
+and before the terrain was smoothed along its arc length; delete `*-unseen.json` to have them made again.
 
 All avalanches chose what was added, and then judge it. So the whole diagnosis, its naming included, is
 repeated without each of {k} parts of them. Each part then judges what was added without it
