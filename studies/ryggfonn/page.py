@@ -342,8 +342,9 @@ def _unseen(found: Mapping[str, Found]) -> str:
     k = found["pcm" + UNSEEN]["outer_folds"]["k"]
     return f"""## On avalanches that did not choose it
 
-The last two columns and the folds are results that were made before strengths could differ between avalanches,
-and before the terrain was smoothed along its arc length; delete `*-unseen.json` to have them made again.
+The last two columns and the folds are results that were made before strengths could differ between
+avalanches, and before the terrain was smoothed along its arc length; delete `*-unseen.json` to have them
+made again.
 
 All avalanches chose what was added, and then judge it. So the whole diagnosis, its naming included, is
 repeated without each of {k} parts of them. Each part then judges what was added without it
