@@ -168,7 +168,7 @@ def _climbed(target: BetweenTarget, start: FloatArray) -> FloatArray:
         n = len(x)
         return -float(heights[0]), -(heights[1 : n + 1] - heights[n + 1 :]) / (2.0 * _DIFFERENCE)
 
-    found = minimize(value_and_slope, start, jac=True, method="BFGS", options={"maxiter": 60, "gtol": 0.02})
+    found = minimize(value_and_slope, start, jac=True, method="L-BFGS-B", options={"maxiter": 100})
     return np.asarray(found.x)
 
 
