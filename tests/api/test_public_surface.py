@@ -114,6 +114,7 @@ def test_a_prediction() -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(1500)
+@pytest.mark.filterwarnings("ignore:Estimated shape parameter of Pareto")  # of one avalanche, rightly
 def test_a_diagnosis_tells_of_its_priors_and_arviz_takes_both_laws(tmp_path: Path) -> None:
     found = skred.diagnose("coulomb", quick=True, priors={"dry_friction": 0.4})
     assert found.document["changed_priors"] == {"dry_friction": 0.4}
