@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 from skred.dashboard.run import Run
 from skred.dashboard.view import NotShownError
 from skred.errors import InputError
-from skred.inference.added_terms import AddedTerm, added_terms
+from skred.inference.added_terms import AddedTerm, added_terms, contributions_with
 from skred.physics.geometry import contributions_of, path_of
-from skred.physics.kernel.columns import Column
 from skred.physics.kernel.fronts import front_speeds
-from skred.physics.kernel.inputs import Contributions, make_contributions
 from skred.physics.law import Law
 from skred.physics.laws import load_law
 from skred.physics.terrain import Terrain
@@ -63,7 +61,7 @@ def event_speeds(run: Run) -> EventSpeeds:
         np.ascontiguousarray(rows.reshape(n_draws * n_events, -1)),
         releases.ravel(),
         path_of(terrain),
-        _contributions(law, terrain, terms),
+        contributions_with(contributions_of(law.mechanisms, terrain), [term.direction for term in terms]),
         begin.ravel(),
     )
     return EventSpeeds(edges, speed.reshape(n_draws, n_events, -1), own)
@@ -120,21 +118,3 @@ def _added(run: Run, terms: tuple[AddedTerm, ...], shape: tuple[int, int]) -> Fl
     at = _chosen(data.sizes["chain"], data.sizes["draw"], data.sizes["event"])
     columns = [data[term.name].values[at] for term in terms for _ in term.direction.columns]
     return np.stack(columns, axis=-1)
-
-
-def _contributions(law: Law, terrain: Terrain, terms: tuple[AddedTerm, ...]) -> Contributions:
-    """The law with what was added, as the kernel reads it."""
-    base = contributions_of(law.mechanisms, terrain)
-    entering = [term.direction for term in terms if term.direction.columns]
-    if not entering:
-        return base
-    columns = [base.columns, *(np.array([int(c) for c in one.columns]) for one in entering)]
-    profiles = [base.profiles, *(one.profiles for one in entering)]
-    speeds = [one.weakening_speed for one in entering if one.weakening_speed is not None]
-    weakening = speeds[0] if speeds and Column.WEAKENING not in base.columns else base.weakening_speed
-    made: Contributions = make_contributions(
-        np.concatenate(columns).astype(np.int64),
-        np.ascontiguousarray(np.concatenate(profiles)),
-        float(weakening),
-    )
-    return made

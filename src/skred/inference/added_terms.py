@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from skred.inference.between_events import BetweenEvents
 from skred.physics.kernel.columns import Column
+from skred.physics.kernel.inputs import Contributions, make_contributions
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import BoundTo, Direction, Group, Setting, Shape
@@ -82,6 +83,21 @@ class AddedTerm:
         empty = np.zeros(terrain.n_cells + 1)
         setting = Setting(terrain, base, (0.0, terrain.length_m), (), (), {}, 0, empty)
         return direction_of(mechanisms()[self.mechanism], setting, self.shape)
+
+
+def contributions_with(base: Contributions, directions: Sequence[Direction]) -> Contributions:
+    """How a law's strengths and what was added to it enter the equation of motion."""
+    entering = [d for d in directions if d.columns]
+    columns = [base.columns, *(np.array([int(c) for c in d.columns]) for d in entering)]
+    profiles = [base.profiles, *(d.profiles for d in entering)]
+    speeds = [d.weakening_speed for d in directions if d.weakening_speed is not None]
+    weakening = speeds[0] if speeds and Column.WEAKENING not in base.columns else base.weakening_speed
+    contributions: Contributions = make_contributions(
+        np.concatenate(columns).astype(np.int64),
+        np.ascontiguousarray(np.concatenate(profiles)),
+        float(weakening),
+    )
+    return contributions
 
 
 def added_group(terms: Sequence[AddedTerm]) -> xr.Dataset:

@@ -10,12 +10,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from skred.inference.added_terms import GROUP, AddedTerm
+from skred.inference.added_terms import GROUP, AddedTerm, contributions_with
 from skred.inference.between_events import BetweenEvents, own_multiples
 from skred.inference.hierarchical.releases import Releases
 from skred.physics.geometry import contributions_of
-from skred.physics.kernel.columns import Column
-from skred.physics.kernel.inputs import Contributions, make_contributions
+from skred.physics.kernel.inputs import Contributions
 from skred.physics.law import Law
 from skred.physics.mechanisms.spec import BoundTo, Direction, Group
 from skred.physics.terrain import Terrain
@@ -127,7 +126,7 @@ def moved(
     between = tuple(
         (term.between, _draws(posterior, term.between_name or term.name)[chosen]) for term in used
     )
-    motion = Motion(_contributions(base, directions), tuple(directions), strengths, between)
+    motion = Motion(contributions_with(base, directions), tuple(directions), strengths, between)
     return Moved(motion, releases, weights, told)
 
 
@@ -146,20 +145,6 @@ def _draws(posterior: xr.Dataset, name: str) -> FloatArray:
     if name in posterior:
         return np.asarray(posterior[name].transpose("chain", "draw").values.ravel(), dtype=float)
     return np.asarray(posterior["added_strengths"].sel({GROUP: name}).values, dtype=float)
-
-
-def _contributions(base: Contributions, directions: Sequence[Direction]) -> Contributions:
-    entering = [d for d in directions if d.columns]
-    columns = [base.columns, *(np.array([int(c) for c in d.columns]) for d in entering)]
-    profiles = [base.profiles, *(d.profiles for d in entering)]
-    speeds = [d.weakening_speed for d in directions if d.weakening_speed is not None]
-    weakening = speeds[0] if speeds and Column.WEAKENING not in base.columns else base.weakening_speed
-    contributions: Contributions = make_contributions(
-        np.concatenate(columns).astype(np.int64),
-        np.ascontiguousarray(np.concatenate(profiles)),
-        float(weakening),
-    )
-    return contributions
 
 
 def added_rows(terms: Sequence[AddedTerm], track: PredictionTrack) -> list[dict[str, Any]]:
