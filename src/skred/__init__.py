@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any
 from skred.parallel.folders import let_pytensor_write
 
 if TYPE_CHECKING:
+    from skred.api.calibration import calibrate, compare
+    from skred.api.diagnosis import diagnose, identify
     from skred.api.fronts import front_readings
+    from skred.api.prediction import predict
     from skred.api.problems import laws, mechanisms, read_campaign
     from skred.api.results import Result
-    from skred.api.work import calibrate, compare, diagnose, identify, predict
 
 let_pytensor_write()  # before anything imports it
 
@@ -32,10 +34,12 @@ __all__ = [
     "read_campaign",
 ]
 _ROOMS = {
+    "calibration": ("calibrate", "compare"),
+    "diagnosis": ("diagnose", "identify"),
     "fronts": ("front_readings",),
+    "prediction": ("predict",),
     "problems": ("laws", "mechanisms", "read_campaign"),
     "results": ("Result",),
-    "work": ("calibrate", "compare", "diagnose", "identify", "predict"),
 }
 
 

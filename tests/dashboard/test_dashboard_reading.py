@@ -136,7 +136,8 @@ def test_a_missing_package_is_told_with_the_command(monkeypatch: Any, results: P
     monkeypatch.setitem(sys.modules, "panel", None)  # what import takes for a package that is not there
     assert run(["dashboard", str(results / "pcm")]) == 2
     told = capsys.readouterr().err
-    assert told.count("\n") == 1 and "pip install 'skred[dashboard]'" in told
+    assert '\n  python -m pip install "bokeh>=3.10" "panel>=1.10"\n' in told
+    assert "\n  python -m uv sync --extra dashboard\n" in told
 
 
 def test_a_page_needs_a_name_and_a_folder(results: Path, tmp_path: Path) -> None:

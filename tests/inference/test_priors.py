@@ -61,7 +61,12 @@ def test_what_is_no_scale_is_refused(value: Any) -> None:
 
 @pytest.mark.parametrize(
     ("text", "told"),
-    [("dry_friction = 'wide'", "a number above 0"), ("[scales]\na = 1", "a number above 0"), ("=", "TOML")],
+    [
+        ("dry_friction = 'wide'", "a number above 0"),
+        ("[scales]\na = 1", "a number above 0"),
+        ("=", "TOML"),
+        ("#" * 100_001, "longer than 100000 bytes"),
+    ],
 )
 def test_a_file_says_what_is_wrong_with_it(text: str, told: str, tmp_path: Path) -> None:
     file = tmp_path / "priors.toml"

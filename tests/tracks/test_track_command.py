@@ -14,8 +14,8 @@ import pytest
 from map_cases import on_map, plane, shapely, write_dem, write_line, write_shapes
 
 from skred.cli.main import run
+from skred.extras import REQUIREMENTS
 from skred.prediction.track import read_track
-from skred.tracks.extra import REQUIREMENTS
 from skred.tracks.files import track_files
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -230,7 +230,7 @@ def test_the_example_of_the_page_runs(tmp_path: Path) -> None:
     page = (ROOT / "docs" / "tracks.md").read_text(encoding="utf-8")
     assert "of {:.0f} degrees is {:.0f} degrees after both".format(*steepest) in page
     assert f"{document['smoothing']['with_the_commands_m']:.1f} m by default" in page
-    quoted = " ".join(f'"{one}"' for one in REQUIREMENTS)
+    quoted = " ".join(f'"{one}"' for one in REQUIREMENTS["gis"])
     assert f"python -m pip install {quoted}\n" in page
 
 
@@ -255,7 +255,7 @@ def blocked(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
 
 def test_without_the_extra_the_command_that_installs_it_is_told(maps: list[str], tmp_path: Path) -> None:
     done = blocked(*maps, "--out", str(tmp_path / "track.csv"), cwd=tmp_path)
-    quoted = " ".join(f'"{one}"' for one in REQUIREMENTS)
+    quoted = " ".join(f'"{one}"' for one in REQUIREMENTS["gis"])
     assert done.returncode == 2 and "Traceback" not in done.stderr
     assert f"\n  python -m pip install {quoted}\n" in done.stderr
     assert "\n  python -m uv sync --extra gis\n" in done.stderr
@@ -279,8 +279,9 @@ def test_help_imports_nothing_heavy() -> None:
     assert done.stdout.strip().endswith("[]")
 
 
-def test_the_extra_is_what_the_message_installs() -> None:
+def test_an_extra_is_what_the_message_installs() -> None:
     import tomllib
 
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert sorted(project["optional-dependencies"]["gis"]) == sorted(REQUIREMENTS)
+    for extra, requirements in REQUIREMENTS.items():
+        assert sorted(project["optional-dependencies"][extra]) == sorted(requirements)

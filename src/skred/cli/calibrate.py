@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from skred.api.work import calibrate_to
+from skred.api.calibration import calibrate_to
 from skred.cli.exit_codes import DONE, NOT_CONVERGED
 from skred.cli.hints import tell_hints
 from skred.cli.inputs import law_of, problem_of

@@ -3,7 +3,7 @@
 Everything heavy is imported inside the functions, so that ``--help`` is instant.
 """
 
-from skred.api.work import compare_to
+from skred.api.calibration import compare_to
 from skred.cli.exit_codes import DONE, NOT_CONVERGED
 from skred.cli.hints import tell_hints
 from skred.cli.inputs import laws_of, problem_of

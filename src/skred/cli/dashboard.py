@@ -38,11 +38,11 @@ def dashboard(
     The page is served to this machine only, until Ctrl-C. One event can be followed through all views.
     Needs the extra `dashboard`: pip install 'skred[dashboard]'.
     """
-    from skred.dashboard.extra import require_dashboard
+    from skred.extras import require
 
     if not places:
         raise InputError("nothing to show; give folders of results, or netCDF files of ArviZ")
-    require_dashboard()
+    require("dashboard")
     from skred.dashboard.export import check_target
     from skred.dashboard.export import export as write_page
     from skred.dashboard.reading import read_given

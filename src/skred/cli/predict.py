@@ -6,7 +6,7 @@ Everything heavy is imported inside the functions, so that ``--help`` is instant
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from skred.api.work import predict_to
+from skred.api.prediction import predict_to
 from skred.cli.exit_codes import DONE, NOT_CONVERGED
 from skred.cli.hints import tell_hints, tell_track_hints
 from skred.cli.inputs import campaign_of, hierarchical_of, law_of

@@ -73,8 +73,8 @@ def track(
     quiet: Quiet = False,
 ) -> int:
     """Make a track from a terrain model and a line on the map."""
+    from skred.extras import require
     from skred.tracks.avaframe import find_inputs
-    from skred.tracks.extra import require_gis
     from skred.tracks.files import require_free
 
     require_free(out, force=force)
@@ -86,7 +86,7 @@ def track(
         raise InputError(
             "expected --dem with a terrain model and --line with a line, or --avaframe with a folder"
         )
-    require_gis()
+    require("gis")
 
     from skred.tracks.build import Wanted, make_track
 

@@ -14,6 +14,10 @@ from skred.errors import InputError
 from skred.physics.law import Law
 
 
+MOST_BYTES = 100_000
+"""Of a file: a line a parameter."""
+
+
 class PriorsError(InputError):
     """Scales of priors that cannot be used."""
 
@@ -27,7 +31,11 @@ def read_priors(file: Path) -> dict[str, float]:
         If it cannot be read, or holds anything but positive numbers.
     """
     try:
-        content = tomllib.loads(file.read_text(encoding="utf-8"))
+        with file.open("rb") as stream:
+            text = stream.read(MOST_BYTES + 1)
+        if len(text) > MOST_BYTES:
+            raise PriorsError(f"{file}: longer than {MOST_BYTES} bytes; no file of priors")
+        content = tomllib.loads(text.decode("utf-8"))
     except OSError as error:
         raise PriorsError(f"{file}: cannot be read ({error.strerror or error})") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
