@@ -13,6 +13,8 @@ PAGES = [
     *sorted(DOCS.glob("notebooks/*.py")),
 ]
 """All that is read by people."""
+ISSUES = "../../issues"
+"""Seen from the README, where the usual hosts of code have the issues of whatever repository it lies in."""
 
 
 def text_of(page: Path) -> str:
@@ -37,7 +39,7 @@ def anchors_of(text: str) -> set[str]:
 
 def is_external(target: str) -> bool:
     """Whether another host has it."""
-    return re.match(r"[a-z]+:", target) is not None
+    return target == ISSUES or re.match(r"[a-z]+:", target) is not None
 
 
 def problems_of(page: Path, text: str) -> list[str]:
