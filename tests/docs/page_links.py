@@ -39,14 +39,14 @@ def anchors_of(text: str) -> set[str]:
 
 def is_external(target: str) -> bool:
     """Whether another host has it."""
-    return target == ISSUES or re.match(r"[a-z]+:", target) is not None
+    return re.match(r"[a-z]+:", target) is not None
 
 
 def problems_of(page: Path, text: str) -> list[str]:
     """Links of a page that lead nowhere."""
     found = []
     for target in links_of(text):
-        if is_external(target):
+        if is_external(target) or target == ISSUES:
             continue
         name, _, anchor = target.partition("#")
         file = (page.parent / name).resolve() if name else page
