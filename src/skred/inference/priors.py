@@ -13,7 +13,6 @@ from typing import Any
 from skred.errors import InputError
 from skred.physics.law import Law
 
-
 MOST_BYTES = 100_000
 """Of a file: a line a parameter."""
 

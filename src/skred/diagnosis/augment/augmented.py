@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 import skred.diagnosis.augment.results  # noqa: F401 - registers what it says of readings
 from skred.diagnosis.augment.added_strength import AddedStrength, added_strengths
-from skred.diagnosis.augment.components import components_of
 from skred.diagnosis.augment.problem import (
     CHECKED_EVENTS,
     CLAIM_LIMIT,
@@ -87,11 +86,7 @@ def _differing(base: Base, curve: Curve, way: BetweenEvents) -> AugmentedProblem
     found, added = ways_of(base, curve)[way], added_strengths([curve], [way])
     strength, near = found.draws[:, -2], populations_of(found)
     mean, sd = float(strength.mean()), float(strength.std())
-    for budget in BUDGETS:
-        problem = _with_tables(base, added, wide_tables(base, curve, near, budget, mean, sd))
-        if _rough_error(problem) < _ENOUGH * CLAIM_LIMIT:
-            break
-    return problem
+    return _with_tables(base, added, wide_tables(base, curve, near, BUDGETS[0], mean, sd))
 
 
 def _with_tables(base: Base, added: tuple[AddedStrength, ...], tables: Tables) -> AugmentedProblem:
@@ -104,19 +99,12 @@ def _with_tables(base: Base, added: tuple[AddedStrength, ...], tables: Tables) -
 def _rough_error(problem: AugmentedProblem) -> float:
     """Error of the log likelihood per event [nats], at populations and strengths as chains start from."""
     rng, law, located = np.random.default_rng(17), problem.base.law, problem.tables.located
-    n = max(_ROUGH_DRAWS // problem.n_components, 2)  # each draw takes as many integrals
-    reach = rng.uniform(-2.0, 2.0, (n, len(located.mean))) @ located.factor.T
+    reach = rng.uniform(-2.0, 2.0, (_ROUGH_DRAWS, len(located.mean))) @ located.factor.T
     added = np.clip(located.mean + reach, *problem.range)
     psi = located.populations_near(added, rng)
     means, covariances = population_at(psi, len(law.mechanisms))
     factors = np.linalg.cholesky(covariances)
     chosen = np.sort(rng.permutation(problem.campaign.n_events)[:CHECKED_EVENTS])
-    own, log_shares = components_of(problem.added, _medians(problem, added))
+    own, log_shares = added[:, None], np.zeros((len(added), 1))
     errors = problem.errors_at(means, factors, own, log_shares, chosen, _ROUGH_RUNS)
     return float(np.abs(errors.mean(axis=1)).max())
-
-
-def _medians(problem: AugmentedProblem, added: FloatArray) -> dict[str, FloatArray]:
-    """Parameters of what is added, by name: what says how avalanches differ at a moderate value."""
-    samples = {one.name: added[:, k] for k, one in enumerate(problem.added)}
-    return samples | {one.between_name: np.full(len(added), 0.5) for one in problem.added}

@@ -32,6 +32,7 @@ from skred.inference.hierarchical.population import population_of, population_sa
 from skred.inference.hierarchical.problem import COARSER, HierarchicalProblem
 from skred.inference.hierarchical.rough_population import moments_of
 from skred.inference.hierarchical.surface import Surfaces
+from skred.parallel.threads import in_parts, side_by_side
 from skred.physics.kernel.fronts import front_speeds
 from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
@@ -160,16 +161,23 @@ class AugmentedProblem(HierarchicalProblem):
     def log_likelihood(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
         """Log density of each event for many parameter vectors: arrays by name to (n, n_events)."""
         self._check(law.mechanisms)
-        return self._tabulated(*population_of(law, samples), *components_of(self.added, samples))
+        parts = self._parts(*population_of(law, samples), *components_of(self.added, samples))
+        together: FloatArray = np.logaddexp.reduce(parts, axis=1)
+        return together
 
-    def _tabulated(
+    def _parts(
         self, means: FloatArray, factors: FloatArray, own: FloatArray, log_shares: FloatArray
     ) -> FloatArray:
-        n_events, tables = self.campaign.n_events, self.tables
-        densities: FloatArray = tabulated_log_densities(
-            means, factors, own, log_shares, n_events, *tables.arrays.values()
-        )
-        return densities
+        """Log of each event's density with a component, times its share, (n, n_components, n_events)."""
+        n_events, tables = self.campaign.n_events, self.tables.arrays.values()
+
+        def densities(draws: slice) -> FloatArray:
+            found: FloatArray = tabulated_log_densities(
+                means[draws], factors[draws], own[draws], n_events, *tables
+            )
+            return found
+
+        return np.concatenate(side_by_side(densities, in_parts(len(own)))) + log_shares[:, :, None]
 
     def added_rows(self, samples: Mapping[str, Any]) -> FloatArray:
         """Added strengths of many parameter vectors: arrays by name to (n, n_added)."""
@@ -177,16 +185,9 @@ class AugmentedProblem(HierarchicalProblem):
 
     def probability_of_each(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
         """How probable each recorded avalanche has each component, (n, n_events, n_components)."""
-        own, log_shares = components_of(self.added, samples)
-        population = population_of(law, samples)
-        n_components = own.shape[1]
-        alone = [
-            self._tabulated(*population, own[:, k : k + 1], log_shares[:, k : k + 1])
-            for k in range(n_components)
-        ]
-        log_parts = np.stack(alone, axis=2)
-        parts: FloatArray = np.exp(log_parts - np.logaddexp.reduce(log_parts, axis=2, keepdims=True))
-        return parts
+        log_parts = self._parts(*population_of(law, samples), *components_of(self.added, samples))
+        parts: FloatArray = np.exp(log_parts - np.logaddexp.reduce(log_parts, axis=1, keepdims=True))
+        return np.moveaxis(parts, 1, 2)
 
     def to_start_from(self, law: Law, prior: dict[str, FloatArray], seed: int) -> dict[str, FloatArray]:
         """Parameter vectors from around the posterior, wider.
@@ -264,7 +265,8 @@ class AugmentedProblem(HierarchicalProblem):
             )
         parts = exact.reshape(n, n_components, -1) + log_shares[:, :, None]
         together: FloatArray = np.logaddexp.reduce(parts, axis=1)
-        return self._tabulated(means, factors, own, log_shares)[:, chosen] - together
+        tabulated = np.logaddexp.reduce(self._parts(means, factors, own, log_shares), axis=1)
+        return tabulated[:, chosen] - together
 
     def speeds(
         self,

@@ -109,10 +109,11 @@ class BetweenTarget:
         factors = np.linalg.cholesky(population.covariance)
         own, log_shares = components(self.kind, strength[inside], parameter[inside])
         densities = tabulated_log_densities(
-            population.mean, factors, np.ascontiguousarray(own[:, :, None]), log_shares,
-            len(self.base.rows.event), *self.tables.arrays.values(),
+            population.mean, factors, np.ascontiguousarray(own[:, :, None]), len(self.base.rows.event),
+            *self.tables.arrays.values(),
         )  # fmt: skip
-        total = densities.sum(axis=1) + log_priors(psi[inside], n, self.base.log_scale)
+        of_events = np.logaddexp.reduce(densities + log_shares[:, :, None], axis=1)
+        total = of_events.sum(axis=1) + log_priors(psi[inside], n, self.base.log_scale)
         result[inside] = np.nan_to_num(total + log_p[inside], nan=-np.inf) + log_correlation_constant(n)
         return result
 

@@ -80,6 +80,20 @@ def _interpolated(  # type: ignore[no-untyped-def]
         density[event] -= _WALL * outside / n_events
 
 
+@inner()
+def _components(  # type: ignore[no-untyped-def]
+    means, factor, strengths, origin, steps, size, first, points, log_weights, densities
+):
+    """Fill the log density of each event with each of some added strengths, (n_components, n_events)."""
+    n_tables = (first.size - 1) // means.shape[0]
+    known, at_tables = np.zeros(n_tables, np.bool_), np.empty((n_tables, means.shape[0]))
+    for component in range(len(strengths)):
+        _interpolated(
+            strengths[component], known, at_tables, means, factor, origin, steps, size, first, points,
+            log_weights, densities[component],
+        )  # fmt: skip
+
+
 @compiled()
 def tabulated_log_density(  # type: ignore[no-untyped-def]
     means, factor, strengths, log_shares, origin, steps, size, first, points, log_weights
@@ -113,30 +127,29 @@ def tabulated_log_density(  # type: ignore[no-untyped-def]
         Outside the tables those at their edge, less what turns a chain back.
     """
     n_events, n_components = means.shape[0], log_shares.size
-    n_tables = (first.size - 1) // n_events
-    known, at_tables = np.zeros(n_tables, np.bool_), np.empty((n_tables, n_events))
-    total, density = np.full(n_events, -np.inf), np.empty(n_events)
+    densities = np.empty((n_components, n_events))
+    _components(means, factor, strengths, origin, steps, size, first, points, log_weights, densities)
+    total = np.full(n_events, -np.inf)
     for component in range(n_components):
-        _interpolated(
-            strengths[component], known, at_tables, means, factor, origin, steps, size, first, points,
-            log_weights, density,
-        )  # fmt: skip
         for event in range(n_events):
-            total[event] = np.logaddexp(total[event], log_shares[component] + density[event])
+            total[event] = np.logaddexp(total[event], log_shares[component] + densities[component, event])
     return total
 
 
 @compiled()
 def tabulated_log_densities(  # type: ignore[no-untyped-def]
-    means, factors, strengths, log_shares, n_events, origin, steps, size, first, points, log_weights
+    means, factors, strengths, n_events, origin, steps, size, first, points, log_weights
 ):
-    """As `tabulated_log_density` for many draws: strengths (n, n_components, n_added), to (n, n_events)."""
-    result = np.empty((len(means), n_events))
+    """Each event's log density with each component, for many draws: (n, n_components, n_events).
+
+    As `tabulated_log_density`, with a mean, a factor and strengths (n_components, n_added) for each draw.
+    """
+    result = np.empty((len(means), strengths.shape[1], n_events))
     of_event = np.empty((n_events, means.shape[1]))
     for k in range(len(means)):
         of_event[:] = means[k]
-        result[k] = tabulated_log_density(
-            of_event, factors[k], strengths[k], log_shares[k], origin, steps, size, first, points, log_weights
+        _components(
+            of_event, factors[k], strengths[k], origin, steps, size, first, points, log_weights, result[k]
         )
     return result
 
