@@ -3,8 +3,7 @@
 ``python -m benchmarks.evidence_reference --n 150 --seed 1 --seconds 3000 [--also DIR]`` draws pairs of a
 campaign and a candidate, computes both numbers for each, and writes a table and
 ``results/evidence_reference.json``. Each pair has a file of its own in ``--out``, and the same command goes
-on with a run that was ended, or in a fresh clone with what the result file holds. ``--pair K`` computes one
-pair. ``--engine-again`` keeps what the reference
+on with a run that was ended. ``--pair K`` computes one pair. ``--engine-again`` keeps what the reference
 found and asks the diagnosis anew. Recordings of ``--also`` are named in the results and are not copied.
 
 The reference is `benchmarks.reference`. Each avalanche is a sum over a lattice at each coefficient, laid
@@ -25,7 +24,7 @@ from typing import Annotated, Any
 import cyclopts
 
 from benchmarks.commit import commit
-from benchmarks.files import RESULTS, ROOT, read, write
+from benchmarks.files import RESULTS, ROOT, write
 from benchmarks.reference.pairs import (
     campaigns_in,
     draw_candidate,
@@ -112,7 +111,6 @@ def main(
     started, folders = time.monotonic(), campaigns_in(also or [])
     out = out / f"seed-{seed}"
     out.mkdir(parents=True, exist_ok=True)
-    _lay_out(result, seed, out)
     for number in [pair] if pair is not None else range(1, n + 1):
         file = out / f"pair-{number:04d}.json"
         before = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None
@@ -131,14 +129,6 @@ def main(
     print(table(found))
     write(result, {"commit": commit(), **found, "pairs": records})
     return 0
-
-
-def _lay_out(result: Path, seed: int, out: Path) -> None:
-    """A file for each pair of the result that has none: a clone goes on where the result ends."""
-    for record in read(result)["pairs"] if result.is_file() else []:
-        file = out / f"pair-{record['pair']:04d}.json"
-        if record["seed"] == seed and not file.is_file():
-            write_json(file, record)
 
 
 def _line(record: dict[str, Any]) -> str:
