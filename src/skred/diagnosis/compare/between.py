@@ -16,7 +16,7 @@ import numpy as np
 
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.evidence.coefficient import Base, Curve
-from skred.diagnosis.evidence.event_quadrature import Budget
+from skred.diagnosis.evidence.event_quadrature import FINE, Budget
 from skred.diagnosis.evidence.marginal import Evidence
 from skred.diagnosis.tabulated.between_evidence import BetweenTarget, Way, between_evidence
 from skred.diagnosis.tabulated.wide_tables import wide_tables
@@ -26,7 +26,7 @@ from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism
 _LOOKED_AT = 4
 """Mechanisms that are looked at, the most probable ones with the strength in common: one that is far behind
 would have to gain more by what avalanches differ in than these do."""
-TABLES = Budget(64, 64, 128, 1.5, 1.8), Budget(128, 128, 256, 1.5, 1.8)
+TABLES = Budget(64, 64, 128, 1.5, 1.8), FINE
 """Nodes of an event in each table: to find where populations are, and then there."""
 
 

@@ -66,10 +66,11 @@ class Candidate:
     log_weights : (n_curves,) array
         Prior weight of each shape; they sum to 1.
     correction : float
-        What many more nodes, and importance sampling over the population, change at the top of the best
-        curve, in nats; 0 where not looked at.
+        What many more nodes, and importance sampling over the population, change along the best curve, in
+        nats; 0 where not looked at.
     disagreement : float or None
-        Importance sampling less Laplace's formula there, nothing's subtracted; None where not looked at.
+        Importance sampling less Laplace's formula at its maximum, nothing's subtracted; None where not
+        looked at.
     residue : float or None
         Log Bayes factor of a force not in the list beside it; None where not looked at.
     ways : mapping of BetweenEvents to float, or None

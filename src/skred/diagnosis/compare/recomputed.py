@@ -5,21 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.discrepancy.profile import KINDS, Profile
 from skred.diagnosis.discrepancy.sampled_evidence import sampled_log_factor
-from skred.diagnosis.evidence.coefficient import Base
-from skred.diagnosis.evidence.conditional_map import EventLikelihood, event_modes
-from skred.diagnosis.evidence.event_quadrature import FINE, event_nodes
-from skred.diagnosis.evidence.extension import Extension, extended
-from skred.diagnosis.evidence.marginal import evidence, importance_evidence
-from skred.diagnosis.evidence.refit import Fit, Rounds, refit
+from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
+from skred.diagnosis.evidence.event_quadrature import FINE
 
-FloatArray = NDArray[np.float64]
 _CHECKED = 5
 """Mechanisms re-computed at most, which bounds the time."""
 _DRAWS = 500
@@ -43,8 +38,8 @@ def recomputed(
 ) -> tuple[dict[str, Candidate], list[Profile]]:
     """All candidates under one error model, those that lead with re-computed evidence.
 
-    A mechanism's is re-computed at the maximum of its best curve, if that was computed with fronts: a rough
-    one is wrong in its own way. A profile's is computed by sampling its values.
+    A mechanism's is re-computed along its best curve, if that was computed with fronts: a rough one is wrong
+    in its own way. A profile's is computed by sampling its values.
 
     Parameters
     ----------
@@ -75,36 +70,22 @@ def recomputed(
 def _looked_at(
     base: Base, candidates: Mapping[str, Candidate], leading: Sequence[str], pool: ThreadPoolExecutor
 ) -> dict[str, Candidate]:
-    """All mechanisms, those that lead with many more quadrature points at the maximum of their best curve."""
-    looked = {name: pool.submit(_at_top, base, candidates[name]) for name in leading}
-    plain = extended(base.problem, base.law, base.directions)
-    nothing = pool.submit(_finely, base, plain, base.strengths, base.fit) if leading else None
+    """All mechanisms, those that lead with their best curve computed again."""
     found = dict(candidates)
-    for name, one in looked.items():
-        assert nothing is not None
-        (laplace, fine), without = one.result(), nothing.result()
-        correction = fine - without[1] - float(candidates[name].best.log_evidence.max())
-        disagreement = (fine - laplace) - (without[1] - without[0])
+    again = pool.map(partial(_again, base), [candidates[name].best for name in leading])
+    for name, (log_factor, disagreement) in zip(leading, again, strict=True):
+        correction = log_factor - candidates[name].best.log_bayes_factor
         found[name] = replace(candidates[name], correction=correction, disagreement=disagreement)
     return found
 
 
-def _at_top(base: Base, candidate: Candidate) -> tuple[float, float]:
-    """At the maximum of a mechanism's best curve."""
-    best = candidate.best
-    top = int(np.argmax(best.log_evidence))
-    extension = extended(base.problem, base.law, (*base.directions, best.direction))
-    return _finely(base, extension, np.append(base.strengths, best.strengths[top]), best.fits[top])
+def _again(base: Base, curve: Curve) -> tuple[float, float]:
+    """A curve's log Bayes factor by many more quadrature points and importance sampling.
 
-
-def _finely(base: Base, extension: Extension, strengths: FloatArray, fit: Fit) -> tuple[float, float]:
-    """Log evidence with many quadrature points: by the Laplace approximation, and by importance sampling."""
-    start = (fit.found.population(len(base.law.mechanisms)), fit.points)
-    fits = refit(extension, base.rows, strengths[None, :], start, Rounds(FINE))
-    population = fits[0].found.population(len(base.law.mechanisms))
-    likelihood = EventLikelihood(extension, base.rows, strengths)
-    modes = event_modes(likelihood, fits[0].points, population)
-    nodes = event_nodes(likelihood, population, modes, FINE, base.population).nodes
-    found = evidence(nodes, base.log_scale, fits[0].found.psi)
-    sampled, _ = importance_evidence(nodes, base.log_scale, found, _DRAWS, seed=0)
-    return found.log_evidence, sampled
+    And what sampling changes of Laplace's formula at its maximum, nothing's subtracted.
+    """
+    strengths = curve.strengths[curve.strengths != 0.0]
+    fine = curve_at(base, curve.mechanism, curve.shape, strengths, FINE, curve.known, draws=_DRAWS)
+    changed = np.array([one.found.sampling_changed for one in fine.fits])
+    disagreement = changed[int(np.argmax(fine.log_evidence))] - changed[fine.strengths == 0.0][0]
+    return fine.log_bayes_factor, float(disagreement)

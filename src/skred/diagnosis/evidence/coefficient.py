@@ -37,8 +37,10 @@ from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
 FloatArray = NDArray[np.float64]
 _NEAR = (-3.5, -2.0, -1.0, 0.0, 1.0, 2.0, 3.5)
 """Strengths around what was found before, in its standard deviations: to two thousandths of the density."""
-_PASSES = 4
+_PASSES = 6
 """Times that strengths are put around what was found at most, which bounds the time."""
+_CUT = 5.0
+"""Nats below the maximum at which a posterior may end: what is beyond is a hundredth of it or so."""
 _BETWEEN = 60
 """Points at which a curve is integrated between each two strengths."""
 _DEEP = 40.0
@@ -153,6 +155,13 @@ class Curve:
             log_prior = log_prior + math.log(2.0)
         return strengths, spline(strengths) + log_prior
 
+    @property
+    def is_cut(self) -> bool:
+        """Whether the posterior goes on beyond the strengths at an end that is not 0."""
+        strengths, log_density = self.fine()
+        ends = log_density[[0, -1]][strengths[[0, -1]] != 0.0]
+        return bool((ends > log_density.max() - _CUT).any())
+
     @cached_property
     def log_bayes_factor(self) -> float:
         """Against strength 0, in nats."""
@@ -195,7 +204,8 @@ def curve_near(base: Base, mechanism: Mechanism, shape: Shape, near: Curve, firs
         near = curve_at(base, mechanism, shape, _strengths_near(near), budget, near.known)
         after = near.moments
         sd = max(before[1], least), max(after[1], least)
-        if budget is USUAL and abs(after[0] - before[0]) < sd[0] and 0.5 < sd[1] / sd[0] < 2.0:
+        settled = abs(after[0] - before[0]) < sd[0] and 0.5 < sd[1] / sd[0] < 2.0
+        if budget is USUAL and settled and not near.is_cut:
             break
     return near
 
@@ -205,7 +215,7 @@ def _strengths_near(near: Curve) -> FloatArray:
     added = near.mechanism.added
     assert added is not None
     mean, sd = near.moments
-    sd = max(sd, 0.03 * added.scale_of(near.shape))
+    sd = max(sd, 0.03 * added.scale_of(near.shape)) * (2.0 if near.is_cut else 1.0)
     strengths = mean + sd * np.array(_NEAR)
     if abs(mean) > 2.0 * abs(_NEAR[0]) * sd:  # nothing between 0 and there otherwise
         strengths = np.append(strengths, 0.5 * (mean - math.copysign(abs(_NEAR[0]) * sd, mean)))
@@ -220,6 +230,7 @@ def curve_at(
     budget: Budget = USUAL,
     known: Mapping[float, Fit] | None = None,
     begin: Mapping[float, Fit] | None = None,
+    draws: int = 0,
 ) -> Curve:
     """Evidence along the strength of a mechanism, at some strengths and at 0.
 
@@ -231,6 +242,8 @@ def curve_at(
     begin : mapping of float to Fit, optional
         The same, of other places or of a linear model: where refits begin that go all their rounds; else they
         begin with the base's.
+    draws : int
+        Populations drawn for the evidence, of fits that begin at known ones; 0 for Laplace's formula.
     """
     added = mechanism.added
     assert added is not None
@@ -247,7 +260,7 @@ def curve_at(
     else:
         strengths = np.insert(strengths, place, 0.0)
         fits = [_closest(known, strength) for strength in strengths]
-        found = _refit_from(base, extension, strengths, budget, fits, least=1)
+        found = _refit_from(base, extension, strengths, budget, fits, Rounds(budget, least=1, draws=draws))
     heights = np.array([fit.found.log_evidence for fit in found])
     heights = np.nan_to_num(heights - heights[strengths == 0.0], nan=-1e3, neginf=-1e3)
     return Curve(mechanism, shape, direction, strengths, heights, tuple(found), budget.linear)
@@ -264,15 +277,15 @@ def _refit_from(
     strengths: FloatArray,
     budget: Budget,
     fits: list[Fit] | None = None,
-    least: int = 2,
+    rounds: Rounds | None = None,
 ) -> list[Fit]:
     """Fits at strengths of the extension's last direction, or without it; begun at fits or at the base's."""
     given = base.strengths[None, :]
     if len(strengths):
         given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
     start = (base.population, base.fit.points)
-    first = None if budget.linear or least == 1 else FIRST
-    return refit(extension, base.rows, given, start, Rounds(budget, first, least), fits)
+    rounds = rounds or Rounds(budget, None if budget.linear else FIRST)
+    return refit(extension, base.rows, given, start, rounds, fits)
 
 
 def fit_base(

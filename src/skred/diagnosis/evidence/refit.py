@@ -12,7 +12,13 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population
 from skred.diagnosis.evidence.event_quadrature import USUAL, Budget, event_nodes
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.linear_mixed_model import mean_prior
-from skred.diagnosis.evidence.marginal import Evidence, coordinates, evidence, prior_log_scale
+from skred.diagnosis.evidence.marginal import (
+    Evidence,
+    coordinates,
+    evidence,
+    importance_evidence,
+    prior_log_scale,
+)
 from skred.inference.hierarchical.surface import Nodes
 
 FloatArray = NDArray[np.float64]
@@ -48,11 +54,14 @@ class Rounds(NamedTuple):
         Of the rounds before, which only move the population there; None for the same.
     least : int
         Rounds that there are in any case; more where the population has moved far.
+    draws : int
+        Populations drawn for the evidence by importance sampling; 0 for Laplace's formula.
     """
 
     budget: Budget = USUAL
     first: Budget | None = None
     least: int = 2
+    draws: int = 0
 
 
 USUAL_ROUNDS = Rounds()
@@ -99,9 +108,12 @@ def refit(
         ):
             before = state[k].found.psi
             found = evidence(part, log_scale, before)
-            state[k] = Fit(found, own)
             if number + 1 < rounds.least or _moved(before, found.psi, n):
                 moved.append(k)
+            if rounds.draws:
+                sampled, _ = importance_evidence(part, log_scale, found, rounds.draws, seed=0)
+                found = found._replace(log_evidence=sampled, sampling_changed=sampled - found.log_evidence)
+            state[k] = Fit(found, own)
         active = moved
         if not active:
             break

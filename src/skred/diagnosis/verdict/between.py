@@ -58,24 +58,27 @@ def _events(calibration: Calibration, added: AddedStrength) -> list[dict[str, An
 
 def between_sentence(strength: dict[str, Any]) -> str:
     """How avalanches differ in it, in plain words; empty where they do not."""
-    way, likely = strength["between_events"], 1.0 - strength["ways"][BetweenEvents.COMMON]
-    differs = percent(likely)
+    way, ways = strength["between_events"], strength["ways"]
+    likely = 1.0 - ways[BetweenEvents.COMMON]
+    by_degree, in_some = percent(ways[BetweenEvents.SPREAD]), percent(ways[BetweenEvents.SOME])
     if way == BetweenEvents.COMMON:
         if likely < 0.5:
             return ""
-        return f"Avalanches probably differ in it ({differs}); a law in which they do was not calibrated."
+        return (
+            f"Avalanches probably differ in it ({percent(likely)}); no law in which they do was calibrated."
+        )
+    differs = (
+        f"Avalanches differ in it with a probability of {percent(likely)}: by degree {by_degree}, or in that"
+        f" some have none of it {in_some}."
+    )
     if way == BetweenEvents.SPREAD:
         spread = strength["spread"]
         factor = float(np.exp(spread["mean"]))
         return (
-            f"Avalanches differ in it (probability {differs}): the strength is their median, and two of three"
-            f" are within a factor of {factor:.1f} of it (sd of the logarithm"
-            f" {spread['mean']:.2f} ± {spread['sd']:.2f})."
+            f"{differs} By degree, the strength is their median, and two of three are within a factor of"
+            f" {factor:.1f} of it (sd of the logarithm {spread['mean']:.2f} ± {spread['sd']:.2f})."
         )
     share = strength["share"]
     having = [one["event"] for one in strength["events"] if one["probability"] > 0.5]
     who = f": more probably than not {enumerated(having)}" if 0 < len(having) <= _MOST_NAMED else ""
-    return (
-        f"It is present in some avalanches only (probability that they differ {differs}), a share of"
-        f" {share['mean']:.2f} ± {share['sd']:.2f}{who}."
-    )
+    return f"{differs} If some have none, a share of {share['mean']:.2f} ± {share['sd']:.2f} has it{who}."
