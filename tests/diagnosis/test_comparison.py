@@ -67,6 +67,20 @@ def test_what_tangents_promise_counts_by_what_fronts_say() -> None:
     assert all(one.rough and one.log_evidence[one.strengths == 0.0][0] == 0.0 for one in found)
 
 
+def test_a_curve_goes_on_where_its_posterior_would_be_cut(base: Base) -> None:
+    """Begun at strengths far too small, it comes to what it is from all strengths."""
+    job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == "viscous_drag")
+    assert job.mechanism.added is not None
+    scale = job.mechanism.added.scale_of(job.shape)
+    whole = curve_at(base, job.mechanism, job.shape, scale * np.linspace(0.05, 4.5, 60), USUAL)
+    start = curve_at(base, job.mechanism, job.shape, scale * np.array([0.01, 0.02, 0.03]), USUAL)
+    assert start.is_cut and not whole.is_cut
+    near = curve_near(base, job.mechanism, job.shape, start, USUAL)
+    assert not near.is_cut
+    assert near.log_bayes_factor == pytest.approx(whole.log_bayes_factor, abs=0.2)
+    assert near.moments == pytest.approx(whole.moments, rel=0.15)
+
+
 def test_only_what_fronts_computed_is_corrected(base: Base) -> None:
     """What is wrong with a rough curve is its own, and not its mechanism's."""
     job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == "turbulent_drag")
