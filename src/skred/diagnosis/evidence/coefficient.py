@@ -41,6 +41,8 @@ _PASSES = 6
 """Times that strengths are put around what was found at most, which bounds the time."""
 _CUT = 5.0
 """Nats below the maximum at which a posterior may end: what is beyond is a hundredth of it or so."""
+_SMALLEST = 1e-3
+"""Strength, and standard deviation of one, below which nothing is told apart, in scales of the prior."""
 _BETWEEN = 60
 """Points at which a curve is integrated between each two strengths."""
 _DEEP = 40.0
@@ -197,7 +199,7 @@ def curve_near(base: Base, mechanism: Mechanism, shape: Shape, near: Curve, firs
         For finding where to look; what counts is computed there with fronts.
     """
     assert mechanism.added is not None
-    least = 0.03 * mechanism.added.scale_of(shape)
+    least = _SMALLEST * mechanism.added.scale_of(shape)
     for number in range(_PASSES):
         budget = first if number == 0 and first.linear else USUAL
         before = near.moments
@@ -215,7 +217,7 @@ def _strengths_near(near: Curve) -> FloatArray:
     added = near.mechanism.added
     assert added is not None
     mean, sd = near.moments
-    sd = max(sd, 0.03 * added.scale_of(near.shape)) * (2.0 if near.is_cut else 1.0)
+    sd = max(sd, _SMALLEST * added.scale_of(near.shape)) * (2.0 if near.is_cut else 1.0)
     strengths = mean + sd * np.array(_NEAR)
     if abs(mean) > 2.0 * abs(_NEAR[0]) * sd:  # nothing between 0 and there otherwise
         strengths = np.append(strengths, 0.5 * (mean - math.copysign(abs(_NEAR[0]) * sd, mean)))
@@ -249,7 +251,7 @@ def curve_at(
     assert added is not None
     direction = direction_of(mechanism, base.setting, shape)
     extension = extended(base.problem, base.law, (*base.directions, direction))
-    strengths = np.sort(strengths[np.abs(strengths) > 1e-3 * added.scale_of(shape)])
+    strengths = np.sort(strengths[np.abs(strengths) > _SMALLEST * added.scale_of(shape)])
     place = int(np.searchsorted(strengths, 0.0))
     # Strength 0 like all others, so that what is left of integration errors is the same there.
     if known is None:
