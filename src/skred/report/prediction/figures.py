@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.report.prediction.axis import probability_axis
 from skred.report.prediction.table import prediction_table
 from skred.report.shared.document import get
 from skred.report.shared.labels import figure_text, printable, unit_text
@@ -62,7 +63,6 @@ _PART_STYLES: dict[str, tuple[str, Any, str]] = {
 }
 _MOST_TOLD = 60
 """Places of a curve that one can point at."""
-_TICKS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005)
 
 
 @styled
@@ -207,10 +207,7 @@ def _runout(axes: Axes, data: xr.Dataset, colour: str) -> None:
         value,
         [f"{100 * v:.3g} % run farther ({100 * a:.3g} to {100 * b:.3g} %)" for v, a, b in found],
     )
-    axes.set_yscale("log")
-    axes.set_ylim(_LEAST_SHOWN, 1.15)
-    axes.set_yticks(_TICKS, [f"{100 * tick:g} %" for tick in _TICKS])
-    axes.minorticks_off()
+    probability_axis(axes, _LEAST_SHOWN)
     axes.grid()
 
 

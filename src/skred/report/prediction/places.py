@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from skred.report.prediction.axis import probability_axis
 from skred.report.shared.document import get, listed
 from skred.report.shared.labels import figure_text, unit_text
 from skred.report.shared.marks import mark
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
 MOST_SHOWN = 7
 """Places drawn at most: more lines are not told apart."""
 _FLOOR, _LEAST = 0.0005, 0.005
-_TICKS = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005)
 _DASHES = ("-", (0, (6, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
 
 
@@ -55,10 +55,7 @@ def places_figure(document: Document, tree: xr.DataTree) -> Figure:
         for row in _thresholds(document, name):
             axes.axvline(row, color=GREY, linewidth=0.7, linestyle=(0, (2, 2)))
     speed.set_ylabel("probability for an avalanche")
-    speed.set_yscale("log")
-    speed.set_ylim(_LEAST, 1.15)
-    speed.set_yticks(_TICKS, [f"{100 * tick:g} %" for tick in _TICKS])
-    speed.minorticks_off()
+    probability_axis(speed, _LEAST)
     legend_below(figure, (speed,), columns=3)
     return figure
 

@@ -141,7 +141,7 @@ def _names(scores: Mapping[str, Any]) -> Section:
         ("single names over the ceiling's expectation", ("honesty", "named_over_ceiling")),
     ]
     tables.append(
-        by_kind("Honesty: is it so when it is said? All trials, nulls and unlisted too.", scores, honest)
+        by_kind("Selectivity: is it so when it is said? All trials, nulls and unlisted too.", scores, honest)
     )
     words = ("Of two hidden mechanisms the leading name may be either. A right class is a right name or one "
              "that no recordings tell from it: drag, friction and entrainment on the same stretch; viscous "
