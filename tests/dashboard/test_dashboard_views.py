@@ -14,7 +14,7 @@ from dashboard_cases import named
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skred.dashboard.answer import answer, entries
-from skred.dashboard.catalogue import VIEWS, view_of
+from skred.dashboard.catalogue import VIEWS
 from skred.dashboard.fronts import event_speeds
 from skred.dashboard.view import Asked, Panel
 from skred.inference.added_terms import AddedTerm, added_group
@@ -26,8 +26,7 @@ from skred.physics.terrain import Terrain
 
 
 def panels(given: Any, view: str, run: str | None = None, **asked: Any) -> list[Panel]:
-    kind = view_of(view)
-    assert kind is not None
+    (kind,) = [one for one in VIEWS if one.id == view]
     of = None if run is None else named(given, run)
     return kind.make(of, given, Asked(**asked))
 

@@ -135,8 +135,3 @@ VIEWS: tuple[ViewKind, ...] = (
         _posterior, rank_panels, by_parameter=True,
     ),
 )  # fmt: skip
-
-
-def view_of(name: str) -> ViewKind | None:
-    """A view by its id."""
-    return next((view for view in VIEWS if view.id == name), None)

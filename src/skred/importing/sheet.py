@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from skred.campaign.cells import LONGEST_WORD
 from skred.campaign.problems import CampaignError, Problem
@@ -115,11 +115,6 @@ def sheet_of(grid: Grid, header_row: int | None, section: Section) -> Sheet:
         raise refuse(grid.file, "no rows under the header; write at least one", line)
     names = tuple(header[k] for k in kept)
     return Sheet(grid.file, line, names, lines, grid.written, grid.separator, grid.key)
-
-
-def renamed(sheet: Sheet, names: dict[str, str]) -> Sheet:
-    """The same table with other names for some columns."""
-    return replace(sheet, columns=tuple(names.get(name, name) for name in sheet.columns))
 
 
 def _start(grid: Grid, header_row: int | None, section: Section) -> int:
