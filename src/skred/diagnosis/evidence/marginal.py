@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
 
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.linear_mixed_model import MeanPrior
@@ -21,12 +20,13 @@ from skred.diagnosis.evidence.population_target import (
     log_targets,
     slopes,
 )
+from skred.diagnosis.evidence.student import Weighted, weighted_draws
 from skred.inference.hierarchical.surface import Nodes
 
 FloatArray = NDArray[np.float64]
 _LOG_2PI = math.log(2.0 * math.pi)
-_DEGREES = 5.0
-"""Degrees of freedom of the importance proposal: tails heavy enough to bound the weights."""
+_WIDER = 1.15
+"""How much wider than the Laplace approximation the proposal is."""
 _RESAMPLED_FROM = 8
 """Draws for each population that is kept: so many that resampling repeats few."""
 
@@ -130,38 +130,26 @@ def importance_evidence(
     nodes: Nodes, log_scale: FloatArray, found: Evidence, n_draws: int, seed: int
 ) -> tuple[float, float]:
     """Evidence by importance sampling around the Laplace approximation, and its standard error in nats."""
-    _, log_w = _weighted(nodes, log_scale, found, n_draws, np.random.default_rng([seed, 11]))
-    most = float(log_w.max())
-    weights = np.exp(log_w - most)
-    mean = float(weights.mean())
-    error = float(weights.std() / math.sqrt(n_draws) / mean)
-    return most + math.log(mean) + log_correlation_constant(len(log_scale)), error
+    weighted = _weighted(nodes, log_scale, found, n_draws, np.random.default_rng([seed, 11]))
+    return weighted.log_integral + log_correlation_constant(len(log_scale)), weighted.error
 
 
 def importance_draws(
     nodes: Nodes, log_scale: FloatArray, found: Evidence, n: int, rng: np.random.Generator
 ) -> FloatArray:
     """Draws of the population, (n, n_psi): the Laplace approximation's, many more, weighted and resampled."""
-    draws, log_w = _weighted(nodes, log_scale, found, _RESAMPLED_FROM * n, rng)
-    weights = np.exp(log_w - log_w.max())
-    return draws[rng.choice(len(draws), size=n, p=weights / weights.sum())]
+    return _weighted(nodes, log_scale, found, _RESAMPLED_FROM * n, rng).resampled(n, rng)
 
 
 def _weighted(
     nodes: Nodes, log_scale: FloatArray, found: Evidence, n_draws: int, rng: np.random.Generator
-) -> tuple[FloatArray, FloatArray]:
-    """Draws around the Laplace approximation, from a wider and heavier-tailed density; log weights."""
-    n = len(found.psi)
-    factor = 1.15 * np.linalg.cholesky(found.covariance)
-    normal = rng.standard_normal((n_draws, n))
-    stretch = np.sqrt(_DEGREES / rng.chisquare(_DEGREES, n_draws))
-    white = normal * stretch[:, None]
-    draws = found.psi + white @ factor.T
-    targets = log_targets(draws, len(log_scale), log_scale, *nodes)
-    log_t = float(gammaln(0.5 * (_DEGREES + n)) - gammaln(0.5 * _DEGREES))
-    log_t -= 0.5 * n * math.log(_DEGREES * math.pi) + float(np.log(np.diag(factor)).sum())
-    log_q = log_t - 0.5 * (_DEGREES + n) * np.log1p(np.sum(white**2, axis=1) / _DEGREES)
-    return draws, np.nan_to_num(targets - log_q, nan=-np.inf)
+) -> Weighted:
+    """Draws around the Laplace approximation, from a somewhat wider density."""
+
+    def log_density(psi: FloatArray) -> FloatArray:
+        return log_targets(psi, len(log_scale), log_scale, *nodes)
+
+    return weighted_draws(log_density, found.psi, _WIDER * np.linalg.cholesky(found.covariance), n_draws, rng)
 
 
 def prior_log_scale(prior: MeanPrior) -> FloatArray:

@@ -15,18 +15,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.special import gammaln
 
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.marginal import Evidence, population_at
 from skred.diagnosis.evidence.population_target import NARROWEST, log_correlation_constant, log_priors
+from skred.diagnosis.evidence.student import Weighted, weighted_draws
 from skred.diagnosis.tabulated.tables import Tables
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.between_events import BetweenEvents, components, from_unbounded
 
 FloatArray = NDArray[np.float64]
-_DEGREES = 5.0
-"""Degrees of freedom of the proposals: tails heavy enough to bound the weights."""
 _WIDER = 1.2
 """How much wider than the mode's curvature, or the first draws, proposals are."""
 _DRAWS = 400, 1600
@@ -138,26 +136,26 @@ def between_evidence(target: BetweenTarget, near: Evidence, strength: float, see
     top = max(tops, key=lambda x: float(target(x[None])[0]))
     covariance = _curvature(target, top)
     rng = np.random.default_rng([seed, 71])
-    draws, log_w = _weighted(target, top, covariance, _DRAWS[0], rng)
-    weights = _normalised(log_w)
-    mean = weights @ draws
-    deviation = draws - mean
+    first = _weighted(target, top, covariance, _DRAWS[0], rng)
+    weights = first.shares
+    mean = weights @ first.draws
+    deviation = first.draws - mean
     adapted = deviation.T @ (weights[:, None] * deviation)
     effective = 1.0 / float(np.sum(weights**2))
     share = effective / (effective + 3.0 * len(top))
     centre, width = share * mean + (1.0 - share) * top, share * adapted + (1.0 - share) * covariance
-    draws, log_w = _weighted(target, centre, width, _DRAWS[1], rng)
-    weights = _normalised(log_w)
-    log_evidence = float(np.logaddexp.reduce(log_w)) - math.log(len(log_w))
-    error = float(len(log_w) * weights.std() / math.sqrt(len(log_w)))
-    drawn = draws[rng.choice(len(draws), size=len(draws), p=weights)]
+    second = _weighted(target, centre, width, _DRAWS[1], rng)
+    drawn = second.resampled(len(second.draws), rng)
     psi, strengths, parameter, _ = target.split(drawn)
-    return Way(log_evidence, error, np.column_stack([psi, strengths, parameter]))
+    return Way(second.log_integral, second.error, np.column_stack([psi, strengths, parameter]))
 
 
-def _normalised(log_w: FloatArray) -> FloatArray:
-    weights = np.exp(log_w - log_w.max())
-    return weights / weights.sum()
+def _weighted(
+    target: BetweenTarget, centre: FloatArray, covariance: FloatArray, n: int, rng: np.random.Generator
+) -> Weighted:
+    """Draws from a somewhat wider density than the normal one of a covariance."""
+    factor = _WIDER * np.linalg.cholesky(covariance + 1e-9 * np.eye(len(centre)))
+    return weighted_draws(target, centre, factor, n, rng)
 
 
 def _climbed(target: BetweenTarget, start: FloatArray) -> FloatArray:
@@ -189,17 +187,3 @@ def _curvature(target: BetweenTarget, top: FloatArray) -> FloatArray:
     values, axes = np.linalg.eigh(hessian)
     covariance: FloatArray = (axes / np.maximum(values, _LEAST_CURVATURE)) @ axes.T
     return covariance
-
-
-def _weighted(
-    target: BetweenTarget, centre: FloatArray, covariance: FloatArray, n_draws: int, rng: np.random.Generator
-) -> tuple[FloatArray, FloatArray]:
-    """Draws from a Student t, and their log weights."""
-    n = len(centre)
-    factor = _WIDER * np.linalg.cholesky(covariance + 1e-9 * np.eye(n))
-    white = rng.standard_normal((n_draws, n)) * np.sqrt(_DEGREES / rng.chisquare(_DEGREES, n_draws))[:, None]
-    draws = centre + white @ factor.T
-    log_t = float(gammaln(0.5 * (_DEGREES + n)) - gammaln(0.5 * _DEGREES))
-    log_t -= 0.5 * n * math.log(_DEGREES * math.pi) + float(np.log(np.diag(factor)).sum())
-    log_q = log_t - 0.5 * (_DEGREES + n) * np.log1p(np.sum(white**2, axis=1) / _DEGREES)
-    return draws, np.nan_to_num(target(draws) - log_q, nan=-np.inf)
