@@ -13,6 +13,8 @@ from skred.diagnosis.words import enumerated, percent
 from skred.inference.between_events import BetweenEvents
 from skred.inference.calibrate import Calibration
 
+_OUT_OF_QUESTION = 0.005
+"""Probability below which a way is not told: it would be rounded to less than 1 %."""
 _MOST_NAMED = 8
 """Avalanches that a sentence names at most."""
 
@@ -56,21 +58,26 @@ def _events(calibration: Calibration, added: AddedStrength) -> list[dict[str, An
     ]
 
 
+def _in_which_ways(ways: dict[str, float]) -> str:
+    """By degree, or in that some have none: both with their probabilities, unless one is out of question."""
+    said = {BetweenEvents.SPREAD: "by degree", BetweenEvents.SOME: "some have none of it"}
+    likely = {kind: words for kind, words in said.items() if ways[kind] >= _OUT_OF_QUESTION}
+    if len(likely) == 1:
+        return next(iter(likely.values()))
+    return ", or ".join(f"{words} ({percent(ways[kind])})" for kind, words in said.items())
+
+
 def between_sentence(strength: dict[str, Any]) -> str:
     """How avalanches differ in it, in plain words; empty where they do not."""
     way, ways = strength["between_events"], strength["ways"]
     likely = 1.0 - ways[BetweenEvents.COMMON]
-    by_degree, in_some = percent(ways[BetweenEvents.SPREAD]), percent(ways[BetweenEvents.SOME])
     if way == BetweenEvents.COMMON:
         if likely < 0.5:
             return ""
         return (
             f"Avalanches probably differ in it ({percent(likely)}); no law in which they do was calibrated."
         )
-    differs = (
-        f"Avalanches differ in it with a probability of {percent(likely)}: by degree {by_degree}, or in that"
-        f" some have none of it {in_some}."
-    )
+    differs = f"Avalanches differ in it with a probability of {percent(likely)}: {_in_which_ways(ways)}."
     if way == BetweenEvents.SPREAD:
         spread = strength["spread"]
         factor = float(np.exp(spread["mean"]))
