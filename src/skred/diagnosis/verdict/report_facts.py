@@ -33,6 +33,7 @@ from skred.diagnosis.verdict.mechanisms import candidate_documents
 from skred.inference.calibrate import Calibration
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
+from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import PRACTICAL_DIFFERENCE, interval
 from skred.physics.law import Law
 from skred.physics.mechanisms import mechanisms
@@ -202,7 +203,12 @@ def _calibrations(found: Outcome) -> list[dict[str, Any]]:
     """Convergence of each calibration, and of the predictions of avalanches left out."""
     if isinstance(found, NotDiagnosed):
         return [] if found.calibration is None else [_calibration([], found.calibration, None)]
-    entries = [_calibration([], found.calibration, found.before)]
+    alone, same_errors = found.calibration, found.reference
+    entries = [_calibration([], alone, found.before if same_errors is alone else None)]
+    if same_errors is not alone:
+        assert isinstance(same_errors.problem, HierarchicalProblem)
+        errors = same_errors.problem.error_model.title
+        entries.append(_calibration([], same_errors, found.before) | {"errors": errors})
     names = [step.candidate.mechanism.id for step in found.steps]
     for number, step in enumerate(found.steps, start=1):
         finding, last = found.finding, number == len(found.steps)
@@ -224,11 +230,12 @@ def _calibration(added: Sequence[str], calibration: Calibration, held: HeldOut |
 
 
 def _parameters(found: Outcome) -> list[dict[str, Any]]:
-    """All parameters, by the base law and by the augmented one."""
+    """All parameters, by the base law and by the augmented one, both under one error model."""
     after = found.steps[-1].calibration if isinstance(found, Diagnosis) and found.steps else None
+    before = found.reference if isinstance(found, Diagnosis) else found.calibration
     added = set() if after is None else {one.name for one in augmented_of(after).added}
     rows: dict[str, dict[str, Any]] = {}
-    for when, calibration in (("before", found.calibration), ("after", after)):
+    for when, calibration in (("before", before), ("after", after)):
         if calibration is None:
             continue
         problem, posterior = calibration.problem, calibration.tree["posterior"].to_dataset()

@@ -183,6 +183,23 @@ def parameter_rows(document: doc.Document) -> list[dict[str, Any]]:
     ]
 
 
+def held_places(document: doc.Document) -> list[str]:
+    """Where the calibration holds each added strength, which over all places is another number."""
+    sentences = []
+    strengths = {doc.get(one, "id"): doc.get(one, "strength") for one in doc.listed(document, "mechanisms")}
+    for one in doc.listed(document, "report", "added"):
+        stretch, strength = stretch_in(doc.get(one, "shape")), strengths.get(doc.get(one, "id"))
+        mean, sd = (doc.get(strength, key) for key in ("mean", "sd"))
+        if stretch and is_number(mean) and is_number(sd):
+            decimals = decimals_for(sd)
+            sentences.append(
+                f"{name_text(doc.get(one, 'parameter')).capitalize()} is calibrated at its most probable"
+                f" place, s = {whole(stretch[0])} to {whole(stretch[1])} m. Over all places, and with an"
+                f" uncertain form of the term, it is {rounded(mean, decimals)} ± {rounded(sd, decimals)}."
+            )
+    return sentences
+
+
 def _role(parameter: doc.Document) -> str:
     name = doc.get(parameter, "name")
     if doc.get(parameter, "added"):

@@ -62,7 +62,7 @@ def influence_figure(document: doc.Document) -> Figure:
     if found["without_them"] is not None:
         panels[0].plot(
             [(len(carried) - 1) / 2.0], [found["without_them"]], linestyle="none", marker="D", color=MISMATCH,
-            label=f"without the {len(carried)} avalanches that carry it",
+            label="without all that carry it",
         )  # fmt: skip
     legend_below(figure, panels, columns=2)
     return figure

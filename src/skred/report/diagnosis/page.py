@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from skred.report.diagnosis import rows, unseen
 from skred.report.diagnosis.conditional import conditional_rows
-from skred.report.diagnosis.equation import equations, parameter_rows, symbol_rows
+from skred.report.diagnosis.equation import equations, held_places, parameter_rows, symbol_rows
 from skred.report.diagnosis.events import MOST_OPEN, event_rows, reading_rows
 from skred.report.diagnosis.evidence import group_of
 from skred.report.diagnosis.lay import lay_words
@@ -62,6 +62,7 @@ def page(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Pictur
         equations=equations(document),
         symbols=symbol_rows(document),
         parameters=parameter_rows(document),
+        held_places=held_places(document),
         held=rows.held_out_rows(document),
         given=conditional_rows(document),
         difference=_difference(document),

@@ -213,7 +213,7 @@ def trust_rows(document: doc.Document) -> Rows:
         bulk, tail = (whole(value) for value in ess)
         rows.append(
             {
-                "name": with_added(document, doc.listed(entry, "added")),
+                "name": _calibrated(document, entry),
                 "passed": doc.get(gate, "passed") is True,
                 "r_hat": fixed(doc.get(gate, "r_hat_max"), 4),
                 "ess_bulk": bulk,
@@ -227,6 +227,13 @@ def trust_rows(document: doc.Document) -> Rows:
             }
         )
     return rows
+
+
+def _calibrated(document: doc.Document, entry: doc.Document) -> str:
+    """What was calibrated; the base law a second time under the errors of what was added."""
+    errors = doc.get(entry, "errors")
+    name = with_added(document, doc.listed(entry, "added"))
+    return f"{name}, {printable(errors)}" if errors else name
 
 
 def _names(entry: doc.Document | None, key: str) -> str:
