@@ -17,6 +17,7 @@ from skred.diagnosis.evidence.predictive import Predicted
 from skred.diagnosis.outcome import Diagnosis, MechanismsAdded, NothingAdded
 from skred.diagnosis.predict.held_out import HeldOut, errors, paired
 from skred.diagnosis.verdict.document import verdict
+from skred.diagnosis.verdict.report_facts import report_facts
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.inference.leave_one_out import exact_leave_one_out
@@ -148,8 +149,20 @@ def test_before_and_after_stand_under_one_error_model(biased: Diagnosis, name: s
     assert problem.error_model.id == name
     assert (found is calibration) == (name == "robust")
     assert isinstance(biased.finding, MechanismsAdded)
-    finding = replace(biased.finding, steps=(step,))
-    assert verdict(replace(biased, finding=finding))["error_model"] == name
+    finding = replace(biased.finding, steps=(step,), reference=found)
+    diagnosis = replace(biased, finding=finding)
+    assert verdict(diagnosis)["error_model"] == name
+    facts = report_facts(diagnosis)
+    for row in facts["parameters"]:
+        if row["before"] is not None:
+            draws = found.tree["posterior"].to_dataset()[row["name"]].values
+            assert row["before"]["mean"] == pytest.approx(draws.mean())
+    told = [(one["added"], one.get("errors"), one["left_out"] is not None) for one in facts["calibrations"]]
+    if name == "robust":
+        assert told[0] == ([], None, True)
+    else:
+        # What is predicted of avalanches left out stands by the calibration that predicts it.
+        assert told[:2] == [([], None, False), ([], ERROR_MODELS[name].title, True)]
     if name != "robust":
         # Fewer than the 400 effective draws the gate asks for, even sixteen times as many from four chains.
         few = replace(calibration, settings=replace(calibration.settings, draws=5, tune=5))
