@@ -47,8 +47,7 @@ class Question:
             return f'--word "{shown(self.key[2], 200)}={answer}"'
         if self.option:
             return f"{self.option} {answer}"
-        key = dotted(self.key)
-        return f"--set {key}={answer}" if '"' not in key else f"--set {shlex.quote(f'{key}={answer}')}"
+        return set_option(self.key, answer)
 
     @property
     def mapping_line(self) -> str:
@@ -75,6 +74,12 @@ def dotted(key: Iterable[str]) -> str:
         part if re.fullmatch(r"[A-Za-z0-9_-]+", part) else json.dumps(part, ensure_ascii=False)
         for part in parts
     )
+
+
+def set_option(key: Iterable[str], answer: str) -> str:
+    """The option that declares a key of the mapping file, as a shell takes it."""
+    text = f"{dotted(key)}={answer}"
+    return f"--set {shlex.quote(text) if '"' in dotted(key) else text}"
 
 
 def inline_table(meaning: str) -> str:
