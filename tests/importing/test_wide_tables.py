@@ -125,8 +125,8 @@ def test_standard_deviations_and_releases_in_columns(
     assert campaign.stated_sd[0, 0] == 2.5 and np.isnan(campaign.stated_sd[1, 0])
     half = (campaign.track.s_m[3] + campaign.track.s_m[4]) / 2
     np.testing.assert_allclose(campaign.values[:, 1], [half, campaign.track.s_m[3]])
-    # On the first segment, 5 m of altitude are 6.25 m of track; nothing lies above its first point.
-    np.testing.assert_allclose(campaign.events[0].release_sd_m, 6.25 / 2)
+    # On the first segment, 5 m of altitude are 6.25 m of track, at its first point too.
+    np.testing.assert_allclose(campaign.events[0].release_sd_m, 6.25)
 
 
 def test_covariates_without_a_unit_are_asked_about_once(
