@@ -21,7 +21,11 @@ from import_cases import (
     without_bounds,
     workbook,
 )
+from openpyxl.worksheet.formula import ArrayFormula, DataTableFormula
 from small_campaign import TEXTS, write_texts
+
+TYPED = '<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'
+"""A part that declares a type and an entity of its own."""
 
 
 def test_workbook_and_text_of_one_table_are_one_campaign(
@@ -84,6 +88,25 @@ def test_a_formula_without_a_result_is_not_a_blank(
     file = workbook(tmp_path / "table.xlsx", {"Sheet1": rows})
     code, _, err = skred(capsys, "import", file, "--track", track, *options(), "--out", tmp_path / "out")
     assert code == 2 and "row 2, column number 2: found '=15+15': a formula without a stored result" in err
+
+
+@pytest.mark.parametrize(
+    ("formula", "told"),
+    [
+        (ArrayFormula("B2:B3", "=B9:B10*2"), "found '=B9:B10*2': a formula without a stored result"),
+        (DataTableFormula("B2:B3", r1="A1"), "a formula without a stored result"),
+    ],
+)
+def test_no_kind_of_formula_without_a_result_is_a_blank(
+    formula: object, told: str, tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = workbook(tmp_path / "table.xlsx", {"Sheet1": without_bounds()})
+    book = openpyxl.load_workbook(file)
+    book.active["B2"] = formula
+    book.save(file)
+    code, _, err = skred(capsys, "import", file, "--track", track, *options(), "--out", tmp_path / "out")
+    assert code == 2 and "row 2, column number 2: " in err and told in err, err
+    assert not (tmp_path / "out").exists()
 
 
 def test_an_error_value_is_no_number(tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -153,17 +153,23 @@ def _cells(source: Source, name: str, *, values: bool) -> Iterator[tuple[int, tu
 
 
 def _without_value(source: Source, name: str, lines: list[tuple[int, tuple[str, ...]]]) -> list[Problem]:
-    """Formulas whose result is not stored: they would look like blanks."""
+    """Formulas whose result is not stored: they would look like blanks.
+
+    They are what stands in a cell that has no value. Of what kind they are (text, one of several cells, a
+    table of data) does not matter.
+    """
     known = dict(lines)
     problems = []
     for line, row in _cells(source, name, values=False):
+        values = known.get(line, ())
         for k, cell in enumerate(row):
-            is_formula = isinstance(cell, str) and cell.startswith("=")
-            if is_formula and not (known.get(line, ())[k : k + 1] > ("",)):
-                message = "a formula without a stored result; open and save the workbook, or paste values"
-                problems.append(Problem(source.name, line, f"number {k + 1}", str(cell), message))
-                if len(problems) == MOST_PROBLEMS:
-                    return problems
+            if values[k : k + 1] > ("",) or not _text(cell):
+                continue
+            text = cell if isinstance(cell, str) else getattr(cell, "text", None)
+            message = "a formula without a stored result; open and save the workbook, or paste values"
+            problems.append(Problem(source.name, line, f"number {k + 1}", text, message))
+            if len(problems) == MOST_PROBLEMS:
+                return problems
     return problems
 
 
