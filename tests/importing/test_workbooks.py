@@ -131,7 +131,10 @@ def repacked(file: Path, change: dict[str, bytes]) -> None:
     [
         ({"xl/bomb.xml": bytes(210_000_000)}, "unpacks to more than is read"),
         ({f"xl/{number}.xml": b"" for number in range(1001)}, "unpacks to more than is read"),
-        ({"xl/workbook.xml": b'<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'}, "declares a document type"),
+        ({"xl/workbook.xml": TYPED.encode()}, "declares a document type"),
+        ({"xl/workbook.xml": f"<!--{'z' * 200_000}-->{TYPED}".encode()}, "declares a document type"),
+        ({"xl/styles.xml": b"<?a" + b" " * 70_000 + b"?>" + TYPED.encode()}, "declares a document type"),
+        ({"xl/workbook.xml": TYPED.encode("utf-16")}, "declares a document type"),
         ({"xl/workbook.xml": b"<workbook"}, "not a workbook that can be read"),
         ({"xl/worksheets/sheet1.xml": b"<worksheet><sheetData><row><c>"}, "not a workbook that can be read"),
         ({"[Content_Types].xml": b""}, "not a workbook that can be read"),
@@ -144,6 +147,17 @@ def test_hostile_workbooks(
     repacked(file, change)
     code, _, err = skred(capsys, "import", file, "--track", track, *options(), "--out", tmp_path / "out")
     assert code == 2 and told in err, err
+
+
+def test_words_of_xml_in_cells_declare_nothing(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = without_bounds()
+    rows[1][5], rows[2][5] = "<!DOCTYPE html>", "<!ENTITY wet>"
+    file = workbook(tmp_path / "table.xlsx", {"Sheet1": rows})
+    repacked(file, {"xl/media/drawing.bin": b"\x89<!DOCTYPE", "xl/note.xml": b"<a><![CDATA[<!DOCTYPE]]></a>"})
+    code, _, err = skred(capsys, "import", file, "--track", track, *options(), "--out", tmp_path / "out")
+    assert code == 0, err
 
 
 def test_a_sheet_of_no_end_is_refused(
