@@ -142,6 +142,20 @@ def test_covariates_without_a_unit_are_asked_about_once(
     assert [event.covariates["volume_m3"] for event in events] == [12000.0, 8000.5, None]
 
 
+def test_covariates_of_one_name_are_told_by_their_columns(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [[*row, "3"] for row in without_bounds()]
+    rows[0][6] = "volume [m³]"
+    code, err = imported(capsys, tmp_path, rows)
+    told = "table.csv, row 1, column volume [m³]: it would be called 'volume_m3', as is column 'Volume [m3]'"
+    assert code == 2 and told in err, err
+    code, err = imported(capsys, tmp_path, rows, "--column", "volume [m³]=covariate name=fracture_volume_m3")
+    assert code == 0, err
+    code, err = imported(capsys, tmp_path, rows, "--column", "volume [m³]=covariate name=release_sd_m")
+    assert code == 2 and "'release_sd_m', as is the column of that name in events.csv" in err
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [

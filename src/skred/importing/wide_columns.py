@@ -21,6 +21,10 @@ FORMS = (
 """The meanings that a column can have, as the option takes them."""
 
 
+RESERVED = ("event", "release_s_m", "release_sd_m")
+"""Columns of events.csv that have meanings of their own here; its release speeds are given by their names."""
+
+
 @dataclass(frozen=True)
 class Meaning:
     """What a column is, and whether somebody said so."""
@@ -289,6 +293,7 @@ def _problems(sheet: Sheet, found: Mapping[str, Meaning]) -> list[Problem]:
         if one.column.is_ == "sd" and one.column.of not in ids:
             message = f"of='{one.column.of}' is no sensor; there are: {', '.join(ids) or 'none'}"
             problems.append(Problem(sheet.file, sheet.header_line, name, None, message))
+    problems += _covariate_problems(sheet, found)
     for sensor, columns in by_sensor(found).items():
         bounds = [column.bound for column in columns.values()]
         if len(set(bounds)) < len(bounds):
@@ -298,6 +303,24 @@ def _problems(sheet: Sheet, found: Mapping[str, Meaning]) -> list[Problem]:
                 "sensor=, or where they hold bounds add bound=at_least and bound=at_most"
             )
             problems.append(Problem(sheet.file, sheet.header_line, None, None, message))
+    return problems
+
+
+def _covariate_problems(sheet: Sheet, found: Mapping[str, Meaning]) -> list[Problem]:
+    """Covariates that would become one column of events.csv, or one that has another meaning there."""
+    taken = dict.fromkeys(RESERVED, "the column of that name in events.csv")
+    problems = []
+    for name, one in found.items():
+        if one.column.is_ != "covariate":
+            continue
+        new = one.column.name or name
+        if new in taken:
+            message = (
+                f"it would be called '{shown(new)}', as is {taken[new]}; give it another name with --column "
+                '"NAME=covariate name=OTHER", or leave one out with "NAME=ignore"'
+            )
+            problems.append(Problem(sheet.file, sheet.header_line, name, None, message))
+        taken.setdefault(new, f"column '{shown(name)}'")
     return problems
 
 
