@@ -84,7 +84,7 @@ def set_option(key: Iterable[str], answer: str) -> str:
 
 def inline_table(meaning: str) -> str:
     """A column's meaning in a mapping file: ``release place=x`` as ``{is = "release", place = "x"}``."""
-    kind, *keys = meaning.split()
+    kind, *keys = shlex.split(meaning)
     pairs = [("is", kind), *(tuple(key.split("=", 1)) for key in keys)]
     return "{" + ", ".join(f'{key} = "{value}"' for key, value in pairs) + "}"
 

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 from skred.campaign.cells import has_unit
 from skred.campaign.problems import shown
+from skred.importing.column_meaning import Meaning, sensor_id
 from skred.importing.draft import Draft, DraftTable
 from skred.importing.mapping import Column
 from skred.importing.numbers import Notation
 from skred.importing.readings import AT_LEAST, AT_MOST, BETWEEN, OBSERVED
 from skred.importing.sheet import Sheet
-from skred.importing.wide_columns import Meaning, sensor_id
 
 if TYPE_CHECKING:
     from rich.console import Group

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from skred.campaign.cells import CellError, number
 from skred.campaign.problems import shown
+from skred.importing.column_meaning import by_sensor
 from skred.importing.draft import DraftTable, Where
 from skred.importing.five_files import FACTORS
 from skred.importing.mapping import Column
@@ -23,7 +24,6 @@ from skred.importing.readings import (
     silence,
 )
 from skred.importing.wide import Wide
-from skred.importing.wide_columns import by_sensor
 
 RECORDINGS = ("event", "sensor", "value", "value_to", "sd", "status")
 
