@@ -142,3 +142,66 @@ def test_a_sensor_whose_id_looks_like_a_property_is_a_sensor(
     code, err = imported(capsys, tmp_path, ["event", "mast_1"], ["a", "18"], *more)
     assert code == 0, err
     assert read_campaign(tmp_path / "out").sensor_ids == ("mast_1",)
+
+
+@pytest.mark.parametrize(
+    ("reading", "name", "sd"),
+    [
+        ("v [km/h]", "sd v [m/s]", 1.5),
+        ("v [km/h]", "sd_v (km/h)", 1.5 / 3.6),
+        ("v [m/s]", "v sd [km/h]", 1.5 / 3.6),
+        ("v [m/s]", "sd v", 1.5),
+    ],
+)
+def test_standard_deviations_have_units_of_their_own(
+    reading: str, name: str, sd: float, tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    header, row = ["event", reading, name], ["a", "54", "1.5"]
+    columns = ("event=event", f"{reading}=front_velocity at=90 sensor=v")
+    code, err = imported(capsys, tmp_path, header, row, columns=columns)
+    assert code == 0, err
+    np.testing.assert_allclose(read_campaign(tmp_path / "out").stated_sd, [[sd]])
+    mapping, track_file = tmp_path / "out" / "import.toml", tmp_path / "profile.csv"
+    arguments = ["--mapping", mapping, "--track", track_file, "--out", tmp_path / "again", "--quiet"]
+    code, _, err = skred(capsys, "import", tmp_path / "table.csv", *arguments)
+    assert (code, err) == (0, "")
+    np.testing.assert_allclose(read_campaign(tmp_path / "again").stated_sd, [[sd]])
+
+
+def test_the_sd_of_a_runout_in_kilometres(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, sd in (("sd runout [m]", 25.0), ("sd runout [km]", 25_000.0)):
+        code, err = imported(capsys, tmp_path, ["event", "runout [km]", name], ["a", "0.24", "25"])
+        assert code == 0, err
+        np.testing.assert_allclose(read_campaign(tmp_path / "out").stated_sd, [[sd]])
+    rows = ["event", "runout [km]", "sd runout"], ["a", "0.24", "25"]
+    code, err = imported(capsys, tmp_path, *rows)
+    assert code == 2 and "column sd runout: the unit of these standard deviations; the readings of" in err
+    assert '--column "sd runout=sd of=runout unit=m|km"' in err and not err.count("what is it?")
+    code, err = imported(capsys, tmp_path, *rows, "--column", "sd runout=sd of=runout unit=m")
+    assert code == 0, err
+    assert read_campaign(tmp_path / "out").stated_sd.tolist() == [[25.0]]
+
+
+@pytest.mark.parametrize("unit", ["%", "mph", "ft"])
+def test_other_units_of_standard_deviations_are_asked_about(
+    unit: str, tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    header, row = ["event", "v [km/h]", f"sd v [{unit}]"], ["a", "54", "3"]
+    columns = ("event=event", "v [km/h]=front_velocity at=90 sensor=v")
+    code, err = imported(capsys, tmp_path, header, row, columns=columns)
+    assert code == 2 and f"column sd v [{unit}]: its unit '{unit}' is none of m/s, km/h" in err, err
+    assert "relative_sd= of 'v'" in err and f'--column "sd v [{unit}]=sd of=v unit=m/s|km/h' in err
+    code, err = imported(capsys, tmp_path, header, row, columns=(*columns, f"sd v [{unit}]=sd of=v unit=m"))
+    assert code == 2 and "its unit is m, and sensor 'v' is a front_velocity: expected m/s or km/h" in err
+
+
+def test_the_unit_of_standard_deviations_is_shown(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = wide_file(tmp_path, [["event", "v [km/h]", "sd v [m/s]"], ["a", "54", "1.5"]])
+    columns = [word for word in options("v [km/h]=front_velocity at=90 sensor=v") if word != "--quiet"]
+    _, out, _ = skred(capsys, "import", file, "--track", track, *columns)
+    [line] = [line for line in out.splitlines() if "sd v [m/s]" in line]
+    assert line.count("m/s") == 2, line

@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Iterator, Mapping, Sequence
 
 from skred.campaign.problems import shown
-from skred.importing.column_meaning import Meaning
+from skred.importing.column_meaning import Meaning, by_sensor
 from skred.importing.mapping import Column
 from skred.importing.mapping import Mapping as Declared
 from skred.importing.questions import Question
@@ -13,8 +13,8 @@ from skred.importing.units import OF_KIND
 
 FORMS = (
     "event, release, release_sd, front_velocity at=S, front_velocity from=S to=S, "
-    "runout place=s|x|altitude|reference (bound=at_least|at_most for bounds), sd of=SENSOR, "
-    "covariate name=NAME_UNIT, ignore"
+    "runout place=s|x|altitude|reference (bound=at_least|at_most for bounds), "
+    "sd of=SENSOR (unit=m/s|km/h|m|km), covariate name=NAME_UNIT, ignore"
 )
 """The meanings that a column can have, as the option takes them."""
 PLACES = ("s", "x", "altitude", "reference")
@@ -22,12 +22,24 @@ PLACES = ("s", "x", "altitude", "reference")
 
 def column_questions(sheet: Sheet, found: Mapping[str, Meaning | None], declared: Declared) -> list[Question]:
     """What is open of the columns of one table."""
-    return [question for name, one in found.items() for question in _of_column(sheet, name, one, declared)]
+    questions = [
+        question for name, one in found.items() for question in _of_column(sheet, name, one, declared)
+    ]
+    settled = {name: one for name, one in found.items() if one is not None}
+    for sensor, columns in by_sensor(settled).items():
+        for name, one in settled.items():
+            if one.column.is_ == "sd" and one.column.of == sensor and not one.foreign_unit:
+                questions += _unit_of_sd(_where(sheet, name), name, one.column, [*columns.values()], declared)
+    return questions
+
+
+def _where(sheet: Sheet, name: str) -> str:
+    return f"{sheet.file}, column {shown(name)}"
 
 
 def _of_column(sheet: Sheet, name: str, one: Meaning | None, declared: Declared) -> Iterator[Question]:
     """What is open of one column."""
-    where = f"{sheet.file}, column {shown(name)}"
+    where = _where(sheet, name)
     if one is None:
         sample = next((text for _, text in sheet.cells(name) if text), "nothing")
         text = f"what is it? (first cell: '{shown(sample, 30)}'; one of: {FORMS})"
@@ -53,7 +65,22 @@ def _unit_question(where: str, name: str, one: Meaning) -> Question:
         f"its unit '{shown(one.foreign_unit, 30)}' is none of {', '.join(units)}: turn its numbers into one "
         "of these and say which, say what else it is (covariate name=NAME_UNIT), or leave it out (ignore)"
     )
+    if one.column.is_ == "sd":
+        text += f"; a share of every reading is relative_sd= of '{shown(one.column.of or '')}'"
     return Question(("columns", name), where, text, (), f"{_as_option(one.column)} unit={'|'.join(units)}")
+
+
+def _unit_of_sd(
+    where: str, name: str, column: Column, readings: Sequence[Column], declared: Declared
+) -> Iterator[Question]:
+    """The unit of standard deviations, where neither they nor the format say it."""
+    kind = readings[0].is_
+    of_all = declared.velocity.unit if kind == "front_velocity" else declared.runout.unit
+    unit = readings[0].unit or of_all
+    if column.unit is not None or unit in (None, OF_KIND[kind][0]):
+        return  # of velocities without a unit, that is asked about first
+    text = f"the unit of these standard deviations; the readings of '{shown(column.of or '')}' are in {unit}"
+    yield Question(("columns", name), where, text, (), f"{_as_option(column)} unit={'|'.join(OF_KIND[kind])}")
 
 
 def _as_option(column: Column) -> str:

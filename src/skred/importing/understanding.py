@@ -147,7 +147,7 @@ def _in_words(name: str, column: Column) -> tuple[str, str]:
         "event": ("the avalanche's id", ""),
         "release": (f"release as {where}", "m"),
         "release_sd": ("standard deviation of the release", "m"),
-        "sd": (f"standard deviation of each reading of {column.of}", ""),
+        "sd": (f"standard deviation of each reading of {column.of}", column.unit or ""),
         "ignore": ("left out", ""),
     }
     return simple[column.is_]

@@ -17,7 +17,7 @@ METRES = r"m|met(?:er|re)s?|m ?a\.? ?s\.? ?l\.?|masl|m ?ü\.? ?m\.?|m ?ü\.? ?nn
 _METRES = re.compile(METRES, re.IGNORECASE)
 _NO_UNIT = re.compile(r"altitude|elevation|height|höhe", re.IGNORECASE)
 """What stands in brackets and is a kind of place."""
-OF_KIND = {"front_velocity": ("m/s", "km/h"), "runout": ("m", "km")}
+OF_KIND = {"front_velocity": ("m/s", "km/h"), "runout": ("m", "km"), "sd": ("m/s", "km/h", "m", "km")}
 """Units that readings can have, the format's own first."""
 
 
@@ -33,7 +33,7 @@ def base_and_unit(name: str) -> tuple[str, str]:
 
 
 def unit_of(kind: str, name: str) -> str | None:
-    """The unit of a column of readings, by its name.
+    """The unit of a column of readings, or of their standard deviations, by its name.
 
     Returns
     -------

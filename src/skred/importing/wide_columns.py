@@ -14,7 +14,7 @@ from skred.importing.mapping import Mapping as Declared
 from skred.importing.meaning import place_in, recognised, says_where
 from skred.importing.questions import Unclear
 from skred.importing.sheet import Sheet
-from skred.importing.units import base_and_unit, unit_of
+from skred.importing.units import OF_KIND, base_and_unit, unit_of
 
 RESERVED = ("event", "release_s_m", "release_sd_m")
 """Columns of events.csv that have meanings of their own here; its release speeds are given by their names."""
@@ -62,7 +62,8 @@ def meanings(
         raise CampaignError(problems)
     if questions:
         raise Unclear(questions)
-    return [{name: _with_defaults(one, declared) for name, one in columns.items()} for columns in settled]
+    complete = [{name: _with_defaults(one, declared) for name, one in columns.items()} for columns in settled]
+    return [_with_units_of_sds(columns) for columns in complete]
 
 
 def _ids(columns: Mapping[str, Meaning]) -> tuple[str, ...]:
@@ -204,6 +205,7 @@ def _problems(sheet: Sheet, found: Mapping[str, Meaning]) -> list[Problem]:
         if one.column.is_ == "sd" and one.column.of not in ids:
             message = f"of='{one.column.of}' is no sensor; there are: {', '.join(ids) or 'none'}"
             problems.append(Problem(sheet.file, sheet.header_line, name, None, message))
+    problems += _unit_problems(sheet, found)
     problems += _covariate_problems(sheet, found)
     for sensor, columns in by_sensor(found).items():
         bounds = [column.bound for column in columns.values()]
@@ -214,6 +216,21 @@ def _problems(sheet: Sheet, found: Mapping[str, Meaning]) -> list[Problem]:
                 "sensor=, or where they hold bounds add bound=at_least and bound=at_most"
             )
             problems.append(Problem(sheet.file, sheet.header_line, None, None, message))
+    return problems
+
+
+def _unit_problems(sheet: Sheet, found: Mapping[str, Meaning]) -> list[Problem]:
+    """Standard deviations in a unit that their readings cannot have."""
+    kinds = {sensor: next(iter(columns.values())).is_ for sensor, columns in by_sensor(found).items()}
+    problems = []
+    for name, one in found.items():
+        kind = kinds.get(one.column.of or "")
+        if one.column.is_ == "sd" and kind and one.column.unit not in (None, *OF_KIND[kind]):
+            message = (
+                f"its unit is {one.column.unit}, and sensor '{one.column.of}' is a {kind}: expected "
+                f"{' or '.join(OF_KIND[kind])}; correct the unit, or of="
+            )
+            problems.append(Problem(sheet.file, sheet.header_line, name, None, message))
     return problems
 
 
@@ -255,3 +272,14 @@ def _with_defaults(one: Meaning, declared: Declared) -> Meaning:
                 update[key] = value
                 break
     return replace(one, column=one.column.model_copy(update=update))
+
+
+def _with_units_of_sds(found: Mapping[str, Meaning]) -> dict[str, Meaning]:
+    """Standard deviations whose unit nobody said have that of their readings: it is the format's own."""
+    units = {sensor: next(iter(columns.values())).unit for sensor, columns in by_sensor(found).items()}
+    return {
+        name: replace(one, column=one.column.model_copy(update={"unit": units[one.column.of or ""]}))
+        if one.column.is_ == "sd" and one.column.unit is None
+        else one
+        for name, one in found.items()
+    }
