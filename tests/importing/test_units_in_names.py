@@ -98,6 +98,7 @@ def test_what_only_begins_like_a_runout_is_none(
         ("mast_mph", "mph", "front_velocity sensor=mast at=140 place=s relative_sd=0.07 absolute_sd=2"),
         ("mast (°C)", "°C", "front_velocity sensor=mast at=140 place=s relative_sd=0.07 absolute_sd=2"),
         ("rest [ft]", "ft", "runout sensor=rest relative_sd=0 absolute_sd=9"),
+        ("rest_ft", "ft", "runout sensor=rest relative_sd=0 absolute_sd=9"),
         ("rest altitude [ft]", "ft", "runout sensor=rest place=altitude relative_sd=0 absolute_sd=9"),
     ],
 )
@@ -205,3 +206,50 @@ def test_the_unit_of_standard_deviations_is_shown(
     _, out, _ = skred(capsys, "import", file, "--track", track, *columns)
     [line] = [line for line in out.splitlines() if "sd v [m/s]" in line]
     assert line.count("m/s") == 2, line
+
+
+def test_speeds_named_as_the_format_names_units(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """``_m_s`` and ``_km_h`` are no covariates in seconds and hours."""
+    header, row = ["event", "high_m_s", "low km_h", "runout_s_m"], ["a", "21", "36", "240"]
+    code, err = imported(capsys, tmp_path, header, row)
+    assert code == 2 and "column high_m_s: a front velocity: where is its sensor?" in err, err
+    assert '--column "high_m_s=front_velocity at=PLACE unit=m/s"' in err
+    assert '--column "low km_h=front_velocity at=PLACE unit=km/h"' in err
+    columns = ("event=event", "high_m_s=front_velocity at=90", "low km_h=front_velocity at=150")
+    code, err = imported(capsys, tmp_path, header, row, columns=columns)
+    assert code == 0, err
+    campaign = read_campaign(tmp_path / "out")
+    assert campaign.sensor_ids == ("high", "low", "runout") and not campaign.events[0].covariates
+    np.testing.assert_allclose(campaign.values, [[21, 10, 240]])
+
+
+def test_a_sensor_is_found_by_a_name_with_the_formats_unit(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    header, row = ["event", "mast_km_h", "sd_mast_m_s", "rest_m"], ["a", "72", "3", "240"]
+    code, err = imported(capsys, tmp_path, header, row, *with_sensors(tmp_path))
+    assert code == 0, err
+    campaign = read_campaign(tmp_path / "out")
+    np.testing.assert_allclose(campaign.values, [[20, 240]])
+    assert campaign.stated_sd[0, 0] == 3
+
+
+def test_other_speeds_stay_what_they_are(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The format's own columns of release speeds; a wind can only be told by its owner."""
+    header = ["event", "release_s_m", "release_speed_m_s", "release_speed_sd_m_s", "runout [m]"]
+    row = ["a", "20", "4", "0.5", "240"]
+    code, err = imported(capsys, tmp_path, header, row)
+    assert code == 0, err
+    event = read_campaign(tmp_path / "out").events[0]
+    assert (event.release_speed_m_s, event.release_speed_sd_m_s) == (4, 0.5)
+    header[3], row[3] = "wind_speed_m_s", "11"
+    code, err = imported(capsys, tmp_path, header, row)
+    assert code == 2 and "column wind_speed_m_s" in err and "covariate name=NAME_UNIT" in err
+    wind = ("event=event", "wind_speed_m_s=covariate name=wind_speed_m_s")
+    code, err = imported(capsys, tmp_path, header, row, columns=wind)
+    assert code == 0, err
+    assert read_campaign(tmp_path / "out").events[0].covariates == {"wind_speed_m_s": 11}

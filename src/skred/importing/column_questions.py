@@ -48,7 +48,7 @@ def _of_column(sheet: Sheet, name: str, one: Meaning | None, declared: Declared)
     if one.foreign_unit:
         yield _unit_question(where, name, one)
     elif one.column.is_ == "front_velocity":
-        yield from _place_and_unit(where, name, one.column, declared)
+        yield from _place_and_unit(where, name, one, declared)
     if one.column.is_ == "front_velocity":
         yield from _sd_of_velocity(where, one.column, declared)
     elif one.column.is_ == "runout":
@@ -92,14 +92,17 @@ def _as_option(column: Column) -> str:
     return shlex.join([str(kind[1]), *words])
 
 
-def _place_and_unit(where: str, name: str, column: Column, declared: Declared) -> Iterator[Question]:
+def _place_and_unit(where: str, name: str, one: Meaning, declared: Declared) -> Iterator[Question]:
     """Where a velocity is read, and its unit."""
+    column = one.column
     if column.at is None and column.from_ is None:
         unit = f" unit={column.unit}" if column.unit else ""
         text = (
             "a front velocity: where is its sensor? Arc length s [m], for a span from=S to=S "
             "(or give --sensors FILE with an id for each column)"
         )
+        if not one.declared:
+            text += "; if it is another speed, such as of the wind: covariate name=NAME_UNIT"
         yield Question(("columns", name), where, text, (), f"front_velocity at=PLACE{unit}")
     elif column.unit is None and declared.velocity.unit is None:
         yield Question(("velocity", "unit"), where, "the unit of velocities", ("m/s", "km/h"))

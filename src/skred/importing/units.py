@@ -5,12 +5,15 @@ import re
 from skred.campaign.reading import EVENTS
 
 _BRACKETS = re.compile(r"(.*?)[\s_]*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*")
-_TRAILING = re.compile(r"(.+?)[\s_]+(m/s|km/h|kmh|m s-1|km h-1|km|cm|mm|ft|mph|kn|deg)", re.IGNORECASE)
+_TRAILING = re.compile(
+    r"(.+?)[\s_]+(m/s|km/h|kmh|m s-1|km h-1|m_s|km_h|km|cm|mm|ft|mph|kn|deg)", re.IGNORECASE
+)
 """Units without brackets; those that no reading has are here so that they are asked about."""
 _RESERVED = frozenset(column.name for column in EVENTS)
 _VELOCITY = {
-    "m/s": "m/s", "m s-1": "m/s", "m s^-1": "m/s", "ms-1": "m/s", "m s⁻¹": "m/s",
+    "m/s": "m/s", "m s-1": "m/s", "m s^-1": "m/s", "ms-1": "m/s", "m s⁻¹": "m/s", "m_s": "m/s",
     "km/h": "km/h", "kmh": "km/h", "kph": "km/h", "km h-1": "km/h", "km/t": "km/h", "km h⁻¹": "km/h",
+    "km_h": "km/h",
 }  # fmt: skip
 METRES = r"m|met(?:er|re)s?|m ?a\.? ?s\.? ?l\.?|masl|m ?ü\.? ?m\.?|m ?ü\.? ?nn|m\.? ?o\.? ?h\.?"
 """Metres, and metres above the sea; a part of a pattern."""

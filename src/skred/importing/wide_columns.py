@@ -131,7 +131,7 @@ def _meaning(
     if name in declared:
         return _in_its_unit(name, declared[name], is_declared=True)
     sensor, is_exact = _sensor_of(name, known)
-    if sensor is not None and (is_exact or by_name is None or by_name.is_ == sensor.is_):
+    if sensor is not None:
         # The kind of place is not in the sensors' table: it stands in the column's name.
         place = place_in(name) if sensor.is_ == "runout" else {}
         return _in_its_unit(name, sensor.model_copy(update=place), is_declared=is_exact)
