@@ -142,6 +142,19 @@ def test_covariates_without_a_unit_are_asked_about_once(
     assert [event.covariates["volume_m3"] for event in events] == [12000.0, 8000.5, None]
 
 
+@pytest.mark.parametrize("name", ["w" * 196 + " [%]", "İ" * 150])
+def test_a_covariate_whose_name_would_be_too_long_is_asked_about(
+    name: str, tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The header itself is as long as one may be; with its unit in words, or in small letters, it is longer."""
+    rows = [[*row, "wet"] for row in without_bounds()]
+    rows[0][6] = name
+    code, err = imported(capsys, tmp_path, rows)
+    assert code == 2 and "what is it?" in err and name[:20] in err, err
+    code, err = imported(capsys, tmp_path, rows, "--column", f"{name}=covariate name=wetness")
+    assert code == 0, err
+
+
 def test_covariates_of_one_name_are_told_by_their_columns(
     tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable
 
-from skred.campaign.cells import has_unit
+from skred.campaign.cells import LONGEST_WORD, has_unit
 from skred.importing.mapping import Column
 from skred.importing.units import METRES, base_and_unit, unit_of
 
@@ -102,14 +102,17 @@ def place_in(name: str) -> dict[str, str]:
 
 def _covariate(name: str, base: str, unit: str, cells: Iterable[str]) -> Column | None:
     """A property of the avalanche, where its name has a unit or its cells are words."""
-    if has_unit(name):
-        return Column(is_="covariate", name=name)
     known = _COVARIATE_UNITS.get(unit.casefold())
-    if known is not None:
-        return Column(is_="covariate", name=f"{_plain(base)}_{known}")
-    if unit == "" and not any(map(_is_like_a_number, cells)) and not has_unit(_plain(name)):
-        return Column(is_="covariate", name=_plain(name))
-    return None
+    if has_unit(name):
+        new = name
+    elif known is not None:
+        new = f"{_plain(base)}_{known}"
+    elif unit == "" and not any(map(_is_like_a_number, cells)) and not has_unit(_plain(name)):
+        new = _plain(name)
+    else:
+        return None
+    # With its unit in words, a name can become longer than one may be: then a person gives it another.
+    return Column(is_="covariate", name=new) if len(new) <= LONGEST_WORD else None
 
 
 def _is_like_a_number(text: str) -> bool:
