@@ -146,7 +146,7 @@ def test_covariates_without_a_unit_are_asked_about_once(
 def test_a_covariate_whose_name_would_be_too_long_is_asked_about(
     name: str, tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The header itself is as long as one may be; with its unit in words, or in small letters, it is longer."""
+    """The header is as long as one may be; with its unit in words, or in small letters, it is longer."""
     rows = [[*row, "wet"] for row in without_bounds()]
     rows[0][6] = name
     code, err = imported(capsys, tmp_path, rows)
