@@ -93,6 +93,35 @@ def test_what_can_be_thousands_is_asked_about(
     assert read_campaign(tmp_path / "out").values[:, 0].tolist() == [1234.0, 2000.0]
 
 
+@pytest.mark.parametrize("sign", [".", ","])
+def test_the_line_to_copy_does_not_answer_what_is_asked(
+    sign: str, tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Elevations as 1.240: pasting what the message shows must not make 1.24 m of them."""
+    track.write_text("x_m;z_m\n0;1.240\n60;1.212\n130;1.190\n".replace(".", sign))
+    file = wide_file(tmp_path, [["Date", "Runout s [m]"], ["a", "120"]], separator=";")
+    arguments = ["import", file, "--track", track, *options("Date=event"), "--out", tmp_path / "out"]
+    code, _, err = skred(capsys, *arguments)
+    assert code == 2 and "--set track.decimal=.|,\n" in err and '[track] decimal = ".|,"' in err
+    assert f"if it is thousands, add --set track.thousands={sign} instead" in err
+    code, _, err = skred(capsys, *arguments, "--set", f"track.thousands={sign}")
+    assert code == 0, err
+    assert read_campaign(tmp_path / "out").track.z_m.tolist() == [1240, 1212, 1190]
+
+
+def test_mixed_signs_name_the_key_of_their_own_table(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    track.write_text("x_m;z_m\n0;1.240,5\n60;1.212\n130;1190,25\n")
+    file = wide_file(tmp_path, [["Date", "Runout s [m]"], ["a", "120"]], separator=";")
+    arguments = ["import", file, "--track", track, *options("Date=event"), "--out", tmp_path / "out"]
+    code, _, err = skred(capsys, *arguments)
+    assert code == 2 and "declare --set track.thousands=. if it stands" in err, err
+    code, _, err = skred(capsys, *arguments, "--set", "track.thousands=.")
+    assert code == 0, err
+    assert read_campaign(tmp_path / "out").track.z_m.tolist() == [1240.5, 1212, 1190.25]
+
+
 def test_thousands_with_decimals(tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = [["Date", "Runout s [m]"], ["a", "1.234,5"]]
     track.write_text("x_m;z_m\n0;2000\n1000;1000\n4000;0\n")

@@ -52,6 +52,29 @@ def test_standard_deviations_are_as_long_as_the_ground_is_gentle() -> None:
     assert Places(straight, 50.0).sd_along(600, 8, "reference") == 8
 
 
+def test_standard_deviations_do_not_shrink_at_the_ends_of_the_track() -> None:
+    """The last altitude above the end, and the end itself, are known as well as those before."""
+    track = Track([0, 100, 500], [160, 80, 60])
+    places = Places(track, None)
+    per_metre = {"steep": np.hypot(100, 80) / 80, "gentle": np.hypot(400, 20) / 20}
+    for altitude in (64, 63, 61, 60):
+        np.testing.assert_allclose(places.sd_along(altitude, 4, "altitude"), 4 * per_metre["gentle"])
+    for altitude in (150, 157, 160):
+        np.testing.assert_allclose(places.sd_along(altitude, 6, "altitude"), 6 * per_metre["steep"])
+    for x_m in (100 + 390, 500):
+        np.testing.assert_allclose(places.sd_along(x_m, 20, "x"), 20 * np.hypot(400, 20) / 400)
+
+
+def test_standard_deviations_beside_an_end_are_at_least_as_long_as_the_track_there() -> None:
+    """A gentle stretch below a steep one, cut off by the end: what is seen of it counts in full."""
+    track = Track([0, 100, 500], [160, 62, 60])
+    seen, above = np.hypot(400, 2), 6 * np.hypot(100, 98) / 98
+    sd = Places(track, None).sd_along(62, 6, "altitude")
+    np.testing.assert_allclose(sd, (seen + above) / 2)
+    # More than the whole track is within one standard deviation: no side tells of what lies beyond.
+    np.testing.assert_allclose(Places(track, None).sd_along(110, 900, "altitude"), track.s_m[-1] / 2)
+
+
 @pytest.mark.parametrize(
     ("kind", "value"), [("altitude", "105"), ("x", "240"), ("reference", "227.0"), ("s", "327.0")]
 )

@@ -125,8 +125,8 @@ def test_standard_deviations_and_releases_in_columns(
     assert campaign.stated_sd[0, 0] == 2.5 and np.isnan(campaign.stated_sd[1, 0])
     half = (campaign.track.s_m[3] + campaign.track.s_m[4]) / 2
     np.testing.assert_allclose(campaign.values[:, 1], [half, campaign.track.s_m[3]])
-    # On the first segment, 5 m of altitude are 6.25 m of track; nothing lies above its first point.
-    np.testing.assert_allclose(campaign.events[0].release_sd_m, 6.25 / 2)
+    # On the first segment, 5 m of altitude are 6.25 m of track, at its first point too.
+    np.testing.assert_allclose(campaign.events[0].release_sd_m, 6.25)
 
 
 def test_covariates_without_a_unit_are_asked_about_once(
@@ -140,6 +140,33 @@ def test_covariates_without_a_unit_are_asked_about_once(
     assert code == 0, err
     events = read_campaign(tmp_path / "out").events
     assert [event.covariates["volume_m3"] for event in events] == [12000.0, 8000.5, None]
+
+
+@pytest.mark.parametrize("name", ["w" * 196 + " [%]", "İ" * 150])
+def test_a_covariate_whose_name_would_be_too_long_is_asked_about(
+    name: str, tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The header is as long as one may be; with its unit in words, or in small letters, it is longer."""
+    rows = [[*row, "wet"] for row in without_bounds()]
+    rows[0][6] = name
+    code, err = imported(capsys, tmp_path, rows)
+    assert code == 2 and "what is it?" in err and name[:20] in err, err
+    code, err = imported(capsys, tmp_path, rows, "--column", f"{name}=covariate name=wetness")
+    assert code == 0, err
+
+
+def test_covariates_of_one_name_are_told_by_their_columns(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = [[*row, "3"] for row in without_bounds()]
+    rows[0][6] = "volume [m³]"
+    code, err = imported(capsys, tmp_path, rows)
+    told = "table.csv, row 1, column volume [m³]: it would be called 'volume_m3', as is column 'Volume [m3]'"
+    assert code == 2 and told in err, err
+    code, err = imported(capsys, tmp_path, rows, "--column", "volume [m³]=covariate name=fracture_volume_m3")
+    assert code == 0, err
+    code, err = imported(capsys, tmp_path, rows, "--column", "volume [m³]=covariate name=release_sd_m")
+    assert code == 2 and "'release_sd_m', as is the column of that name in events.csv" in err
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,11 @@ from import_cases import (
     without_bounds,
     workbook,
 )
+from openpyxl.worksheet.formula import ArrayFormula, DataTableFormula
 from small_campaign import TEXTS, write_texts
+
+TYPED = '<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'
+"""A part that declares a type and an entity of its own."""
 
 
 def test_workbook_and_text_of_one_table_are_one_campaign(
@@ -86,6 +90,25 @@ def test_a_formula_without_a_result_is_not_a_blank(
     assert code == 2 and "row 2, column number 2: found '=15+15': a formula without a stored result" in err
 
 
+@pytest.mark.parametrize(
+    ("formula", "told"),
+    [
+        (ArrayFormula("B2:B3", "=B9:B10*2"), "found '=B9:B10*2': a formula without a stored result"),
+        (DataTableFormula("B2:B3", r1="A1"), "a formula without a stored result"),
+    ],
+)
+def test_no_kind_of_formula_without_a_result_is_a_blank(
+    formula: object, told: str, tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = workbook(tmp_path / "table.xlsx", {"Sheet1": without_bounds()})
+    book = openpyxl.load_workbook(file)
+    book.active["B2"] = formula
+    book.save(file)
+    code, _, err = skred(capsys, "import", file, "--track", track, *options(), "--out", tmp_path / "out")
+    assert code == 2 and "row 2, column number 2: " in err and told in err, err
+    assert not (tmp_path / "out").exists()
+
+
 def test_an_error_value_is_no_number(tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rows = without_bounds()
     rows[1][1] = "#DIV/0!"
@@ -108,7 +131,10 @@ def repacked(file: Path, change: dict[str, bytes]) -> None:
     [
         ({"xl/bomb.xml": bytes(210_000_000)}, "unpacks to more than is read"),
         ({f"xl/{number}.xml": b"" for number in range(1001)}, "unpacks to more than is read"),
-        ({"xl/workbook.xml": b'<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'}, "declares a document type"),
+        ({"xl/workbook.xml": TYPED.encode()}, "declares a document type"),
+        ({"xl/workbook.xml": f"<!--{'z' * 200_000}-->{TYPED}".encode()}, "declares a document type"),
+        ({"xl/styles.xml": b"<?a" + b" " * 70_000 + b"?>" + TYPED.encode()}, "declares a document type"),
+        ({"xl/workbook.xml": TYPED.encode("utf-16")}, "declares a document type"),
         ({"xl/workbook.xml": b"<workbook"}, "not a workbook that can be read"),
         ({"xl/worksheets/sheet1.xml": b"<worksheet><sheetData><row><c>"}, "not a workbook that can be read"),
         ({"[Content_Types].xml": b""}, "not a workbook that can be read"),
@@ -121,6 +147,17 @@ def test_hostile_workbooks(
     repacked(file, change)
     code, _, err = skred(capsys, "import", file, "--track", track, *options(), "--out", tmp_path / "out")
     assert code == 2 and told in err, err
+
+
+def test_words_of_xml_in_cells_declare_nothing(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = without_bounds()
+    rows[1][5], rows[2][5] = "<!DOCTYPE html>", "<!ENTITY wet>"
+    file = workbook(tmp_path / "table.xlsx", {"Sheet1": rows})
+    repacked(file, {"xl/media/drawing.bin": b"\x89<!DOCTYPE", "xl/note.xml": b"<a><![CDATA[<!DOCTYPE]]></a>"})
+    code, _, err = skred(capsys, "import", file, "--track", track, *options(), "--out", tmp_path / "out")
+    assert code == 0, err
 
 
 def test_a_sheet_of_no_end_is_refused(

@@ -16,6 +16,7 @@ from skred.campaign.tables import MOST_ROWS
 from skred.errors import InputError
 from skred.importing.delimited import ENCODINGS
 from skred.importing.sources import open_source
+from skred.importing.units import OF_KIND
 
 FILE = "import.toml"
 """The mapping file beside an imported campaign."""
@@ -126,7 +127,7 @@ _KEYS: dict[str, frozenset[str]] = {
         {"sensor", "at", "from_", "to", "place", "place_sd_m", "unit", "bound", "relative_sd", "absolute_sd"}
     ),
     "runout": frozenset({"sensor", "place", "unit", "bound", "relative_sd", "absolute_sd"}),
-    "sd": frozenset({"of"}),
+    "sd": frozenset({"of", "unit"}),
     "covariate": frozenset({"name"}),
     "ignore": frozenset(),
 }
@@ -147,6 +148,7 @@ class Column(_Part):
     place_sd_m : float or None
         How well the place is known, along the track, m.
     unit : {"m/s", "km/h", "m", "km"} or None
+        Of a column of standard deviations: their own, which need not be that of the readings.
     bound : {"at_least", "at_most"} or None
         Where plain numbers of the column are bounds. Columns of one sensor make one reading together: two
         bounds an interval.
@@ -184,7 +186,7 @@ class Column(_Part):
             raise ValueError("give either 'at' or 'from' and 'to'")
         if (self.from_ is None) != (self.to is None):
             raise ValueError("a span needs both 'from' and 'to'")
-        units = {"front_velocity": ("m/s", "km/h"), "runout": ("m", "km")}.get(self.is_, ())
+        units = OF_KIND.get(self.is_, ())
         if self.unit is not None and self.unit not in units:
             raise ValueError(f"the unit of '{self.is_}' is one of {', '.join(units)}")
         return self

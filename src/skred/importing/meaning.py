@@ -3,15 +3,10 @@
 import re
 from collections.abc import Iterable
 
-from skred.campaign.cells import has_unit
+from skred.campaign.cells import LONGEST_WORD, has_unit
 from skred.importing.mapping import Column
+from skred.importing.units import METRES, base_and_unit, unit_of
 
-_BRACKETS = re.compile(r"(.*?)[\s_]*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*")
-_TRAILING = re.compile(r"(.+?)[\s_]+(m/s|km/h|kmh|m s-1|km h-1)", re.IGNORECASE)
-_VELOCITY_UNITS = {
-    "m/s": "m/s", "m s-1": "m/s", "m s^-1": "m/s", "ms-1": "m/s", "m s⁻¹": "m/s",
-    "km/h": "km/h", "kmh": "km/h", "kph": "km/h", "km h-1": "km/h", "km/t": "km/h", "km h⁻¹": "km/h",
-}  # fmt: skip
 _COVARIATE_UNITS = {
     "m3": "m3", "m³": "m3", "m^3": "m3", "m2": "m2", "m²": "m2", "m": "m", "km": "km", "cm": "cm", "mm": "mm",
     "°c": "degC", "degc": "degC", "° c": "degC", "c": "degC", "%": "percent", "kg/m3": "kg_m3",
@@ -30,7 +25,12 @@ _EVENT = (
     "datum",
     "dato",
 )
-_RUNOUT = re.compile(r"run-?\s?out|auslauf|stopp?(ed)?( at)?|utløp|arr[eê]t", re.IGNORECASE)
+_WHERE = (
+    r"(?:[ -]?(?:altitude|elevation|height|distance|length|position|point|place|höhe|länge|strecke|weite)"
+    rf"|[ -](?:s|x|z|horizontal|along|track|from|reference|min|max|{METRES}))"
+)
+"""One more word on how a place is given."""
+_RUNOUT = re.compile(rf"(?:run[- ]?out|auslauf|stopp?(?:ed)?(?: at)?|utløp|arr[eê]t){_WHERE}*", re.IGNORECASE)
 _RELEASE = re.compile(r"release|anriss|start(ing)?( point)?|d[eé]part|utløsning", re.IGNORECASE)
 _BOUND_WORDS = {
     "at_least": re.compile(r"[\s_]*(at least|at_least|>=|≥|mindestens|minst)[\s_]*", re.IGNORECASE),
@@ -39,15 +39,6 @@ _BOUND_WORDS = {
 """Only what can be nothing but a bound: "max runout" mostly is the runout itself."""
 _ALTITUDE = re.compile(r"altitude|elevation|height|m ?a\.? ?s\.? ?l\.?|masl|höhe|h\.? ?ü\.? ?m\.?|moh", re.I)
 _SD = re.compile(r"(?:sd|σ|std|sigma)[\s_]+(?P<a>.+)|(?P<b>.+?)[\s_]+(?:sd|σ|std|sigma)", re.IGNORECASE)
-
-
-def base_and_unit(name: str) -> tuple[str, str]:
-    """A column's name without its unit, and the unit as it stands there; empty where there is none."""
-    for pattern in (_BRACKETS, _TRAILING):
-        found = pattern.fullmatch(name)
-        if found is not None and found.group(1):
-            return found.group(1).strip(), found.group(2)
-    return name, ""
 
 
 def recognised(name: str, cells: Iterable[str], sensors: Iterable[str] = ()) -> Column | None:
@@ -71,8 +62,8 @@ def recognised(name: str, cells: Iterable[str], sensors: Iterable[str] = ()) -> 
         known = {sensor.casefold(): sensor for sensor in sensors}
         if of.casefold() in known:
             return Column(is_="sd", of=known[of.casefold()])
-    speed = _VELOCITY_UNITS.get(unit.casefold())
-    if speed is not None:
+    speed = unit_of("front_velocity", name)
+    if speed:
         return Column.model_validate({"is": "front_velocity", "sensor": base, "unit": speed})
     place = place_in(name)
     if name in ("release_s_m", "release_sd_m"):
@@ -87,10 +78,15 @@ def recognised(name: str, cells: Iterable[str], sensors: Iterable[str] = ()) -> 
         if re.fullmatch(rf"({_RELEASE.pattern})([ _](s|x|z|m|altitude|elevation|höhe))*", word, re.I):
             return Column.model_validate({"is": "release"} | place)
     bound = next((key for key, words in _BOUND_WORDS.items() if words.search(base)), None)
-    if _RUNOUT.match(word if bound is None else _BOUND_WORDS[bound].sub(" ", base).strip()):
-        extra = ({"unit": "km"} if unit.casefold() == "km" else {}) | ({"bound": bound} if bound else {})
+    if _RUNOUT.fullmatch(word if bound is None else _BOUND_WORDS[bound].sub(" ", word).strip()):
+        extra = {"bound": bound} if bound else {}
         return Column.model_validate({"is": "runout", "sensor": "runout"} | place | extra)
     return _covariate(name, base, unit, cells)
+
+
+def says_where(words: str) -> bool:
+    """Whether words behind a sensor's id, the blank before them included, only say how its place is given."""
+    return re.fullmatch(f"{_WHERE}+", words, re.IGNORECASE) is not None
 
 
 def place_in(name: str) -> dict[str, str]:
@@ -106,14 +102,17 @@ def place_in(name: str) -> dict[str, str]:
 
 def _covariate(name: str, base: str, unit: str, cells: Iterable[str]) -> Column | None:
     """A property of the avalanche, where its name has a unit or its cells are words."""
-    if has_unit(name):
-        return Column(is_="covariate", name=name)
     known = _COVARIATE_UNITS.get(unit.casefold())
-    if known is not None:
-        return Column(is_="covariate", name=f"{_plain(base)}_{known}")
-    if unit == "" and not any(map(_is_like_a_number, cells)) and not has_unit(_plain(name)):
-        return Column(is_="covariate", name=_plain(name))
-    return None
+    if has_unit(name):
+        new = name
+    elif known is not None:
+        new = f"{_plain(base)}_{known}"
+    elif unit == "" and not any(map(_is_like_a_number, cells)) and not has_unit(_plain(name)):
+        new = _plain(name)
+    else:
+        return None
+    # With its unit in words, a name can become longer than one may be: then a person gives it another.
+    return Column(is_="covariate", name=new) if len(new) <= LONGEST_WORD else None
 
 
 def _is_like_a_number(text: str) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from skred.campaign.cells import CellError, number
 from skred.campaign.problems import CampaignError, Problem
-from skred.importing.questions import Question, Unclear
+from skred.importing.questions import Question, Unclear, set_option
 from skred.importing.sheet import TABLE, NumberText, Section
 
 THOUSANDS = (".", ",", "'", " ")
@@ -111,7 +111,7 @@ def notation_of(
             if not _LIKE_THOUSANDS.fullmatch(digits):
                 sure.add(sign)
     if len(first) == 2:
-        raise CampaignError(_mixed(file, first))
+        raise CampaignError(_mixed(file, first, section))
     if not first:
         return Notation("," if thousands == "." else ".", thousands or "")
     (sign, (line, column, text)) = next(iter(first.items()))
@@ -119,13 +119,16 @@ def notation_of(
         return Notation(sign, thousands or "")
     where = f"{file}, row {line}, column {column}"
     doubt = (
-        f"'{text}' can be a decimal number or thousands, and no other number tells which: the decimal sign is"
+        f"'{text}' can be a decimal number or thousands, and no other number tells which: the decimal sign "
+        f"is '{sign}' if it is a decimal number; if it is thousands, add "
+        f"{set_option((*section, 'thousands'), sign)} instead"
     )
     option = "--decimal" if section == TABLE else ""
-    raise Unclear([Question((*section, "decimal"), where, doubt, (".", ","), f'"{sign}"', option)])
+    # No example: whatever sign it showed would answer the question for who copies the line.
+    raise Unclear([Question((*section, "decimal"), where, doubt, (".", ","), "", option)])
 
 
-def _mixed(file: str, first: dict[str, tuple[int, str, str]]) -> list[Problem]:
+def _mixed(file: str, first: dict[str, tuple[int, str, str]], section: Section) -> list[Problem]:
     """Both decimal signs in one table: where each is."""
     problems = []
     for sign, other in ((",", "."), (".", ",")):
@@ -133,7 +136,8 @@ def _mixed(file: str, first: dict[str, tuple[int, str, str]]) -> list[Problem]:
         word, elsewhere = ("comma", "points") if sign == "," else ("point", "commas")
         message = (
             f"a decimal {word} here, decimal {elsewhere} elsewhere (row {first[other][0]}); write all "
-            f'numbers one way, or declare --set table.thousands="{sign}" if it stands between thousands'
+            f"numbers one way, or declare {set_option((*section, 'thousands'), sign)} if it stands between "
+            "thousands"
         )
         problems.append(Problem(file, line, column, text, message))
     return problems

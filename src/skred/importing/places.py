@@ -59,7 +59,8 @@ class Places:
         """Standard deviation along the track, m, of one that is given as the place is.
 
         It is half the length of the stretch within one standard deviation around the place, so that 5 m of
-        altitude on gentle ground are the many metres of runout that they are.
+        altitude on gentle ground are the many metres of runout that they are. Where the track ends within
+        that stretch, the ground beyond its end is taken to be as the ground on the other side of the place.
 
         Raises
         ------
@@ -113,20 +114,29 @@ def _crossings(s_m: np.ndarray, z_m: np.ndarray, altitude_m: float) -> list[floa
 
 def _half_stretch(s_m: np.ndarray, given: np.ndarray, centre_m: float, value: float, sd: float) -> float:
     """Half the length of the stretch around a place on which a polyline is within sd of its value there."""
-    ends = []
-    for step in (-1, 1):
-        k = (
-            int(np.searchsorted(s_m, centre_m, side="right")) - 1
-            if step < 0
-            else int(np.searchsorted(s_m, centre_m))
-        )
-        at_s, at = centre_m, value
-        while 0 <= k < len(s_m):
-            if abs(given[k] - value) > sd:
-                limit = value + sd * np.sign(given[k] - value)
-                at_s += (s_m[k] - at_s) * (limit - at) / (given[k] - at)
-                break
-            at_s, at = float(s_m[k]), float(given[k])
-            k += step
-        ends.append(at_s)
-    return float(ends[1] - ends[0]) / 2
+    sides = [_side(s_m, given, centre_m, value, sd, step) for step in (-1, 1)]
+    whole = [length for length, is_whole in sides if is_whole]
+    if len(whole) == 1:
+        # The other side is cut off by the polyline's end: it is at least as long as what is seen of it.
+        return (whole[0] + max(length for length, _ in sides)) / 2
+    return sum(length for length, _ in sides) / 2
+
+
+def _side(
+    s_m: np.ndarray, given: np.ndarray, centre_m: float, value: float, sd: float, step: int
+) -> tuple[float, bool]:
+    """Length of one side of that stretch, and whether it ends before the polyline does."""
+    k = (
+        int(np.searchsorted(s_m, centre_m, side="right")) - 1
+        if step < 0
+        else int(np.searchsorted(s_m, centre_m))
+    )
+    at_s, at = centre_m, value
+    while 0 <= k < len(s_m):
+        if abs(given[k] - value) > sd:
+            limit = value + sd * np.sign(given[k] - value)
+            at_s += (s_m[k] - at_s) * (limit - at) / (given[k] - at)
+            return abs(float(at_s) - centre_m), True
+        at_s, at = float(s_m[k]), float(given[k])
+        k += step
+    return abs(at_s - centre_m), False

@@ -47,8 +47,7 @@ class Question:
             return f'--word "{shown(self.key[2], 200)}={answer}"'
         if self.option:
             return f"{self.option} {answer}"
-        key = dotted(self.key)
-        return f"--set {key}={answer}" if '"' not in key else f"--set {shlex.quote(f'{key}={answer}')}"
+        return set_option(self.key, answer)
 
     @property
     def mapping_line(self) -> str:
@@ -77,9 +76,15 @@ def dotted(key: Iterable[str]) -> str:
     )
 
 
+def set_option(key: Iterable[str], answer: str) -> str:
+    """The option that declares a key of the mapping file, as a shell takes it."""
+    text = f"{dotted(key)}={answer}"
+    return f"--set {shlex.quote(text) if '"' in dotted(key) else text}"
+
+
 def inline_table(meaning: str) -> str:
     """A column's meaning in a mapping file: ``release place=x`` as ``{is = "release", place = "x"}``."""
-    kind, *keys = meaning.split()
+    kind, *keys = shlex.split(meaning)
     pairs = [("is", kind), *(tuple(key.split("=", 1)) for key in keys)]
     return "{" + ", ".join(f'{key} = "{value}"' for key, value in pairs) + "}"
 

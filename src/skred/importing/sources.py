@@ -68,7 +68,7 @@ def open_source(path: Path, inside: Path | None = None) -> Source:
     CampaignError
         If it cannot be read, is larger than 20 MB, or is no table.
     """
-    name = path.name
+    name = path.name or str(path)  # "." has no name
     try:
         place = path.resolve(strict=True)
         if inside is not None and not place.is_relative_to(inside.resolve(strict=True)):

@@ -6,17 +6,17 @@ from pathlib import Path
 
 import tomlkit
 
-from skred.campaign import Campaign, CampaignError, Problem
+from skred.campaign import Campaign
 from skred.campaign.writing import write_files
-from skred.importing.draft import Draft, DraftTable, description_text, with_where
-from skred.importing.five_files import COLUMNS, read_five_files, rows_with_points
+from skred.importing.draft import Draft, description_text
+from skred.importing.five_files import COLUMNS, read_five_files
 from skred.importing.joined import joined
 from skred.importing.mapping import FILE, Mapping, split_column
 from skred.importing.mapping_text import mapping_text
 from skred.importing.next_mapping import mapping_of_five, mapping_of_wide
-from skred.importing.numbers import notation_of
 from skred.importing.places import Places
-from skred.importing.sheet import TABLE, Sheet
+from skred.importing.sensors_table import read_sensors
+from skred.importing.sheet import Sheet
 from skred.importing.sheets import section_of, sheets_of
 from skred.importing.sources import CAMPAIGN, Source, Sources, open_source, refuse, sort_out
 from skred.importing.track_table import TrackRead, read_track_table
@@ -198,24 +198,6 @@ def _track_columns(sheet: Sheet, track: TrackRead) -> tuple[ShownColumn, ...]:
     )
 
 
-def _sensor_table(sheet: Sheet) -> DraftTable:
-    """The sensors that go with a wide table, as the format's sensors.csv."""
-    numeric = [name for name in sheet.columns if name not in ("sensor", "quantity")]
-    cells = ((line, name, text) for name in numeric for line, text in sheet.cells(name))
-    notation = notation_of(cells, sheet.file, sheet.separator, (None, None), TABLE)
-    missing = [
-        column.name for column in COLUMNS["sensors"] if column.required and column.name not in sheet.columns
-    ]
-    if missing:
-        raise refuse(sheet.file, f"the columns {', '.join(missing)} are missing; add them", sheet.header_line)
-    names = {name: name for name in sheet.columns}
-    problems = list[Problem]()
-    rows = rows_with_points(sheet, names, numeric, notation, problems)
-    if problems:
-        raise CampaignError(problems)
-    return DraftTable(sheet.columns, with_where(sheet, rows, names))
-
-
 def _wide(
     wide: Sequence[Sheet],
     sheets: dict[str, Sheet],
@@ -225,7 +207,8 @@ def _wide(
     description: str,
 ) -> Imported:
     """Import wide tables."""
-    sensors = _sensor_table(sheets["sensors"]) if "sensors" in sheets else None
+    length_m = places.track.length_m if places.track else None
+    sensors = read_sensors(sheets["sensors"], declared, length_m) if "sensors" in sheets else None
     found = meanings(wide, declared, sensors)
     releases = any(one.column.is_ == "release" for columns in found for one in columns.values())
     open_ = Open()

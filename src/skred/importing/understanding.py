@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 from skred.campaign.cells import has_unit
 from skred.campaign.problems import shown
+from skred.importing.column_meaning import Meaning, sensor_id
 from skred.importing.draft import Draft, DraftTable
 from skred.importing.mapping import Column
 from skred.importing.numbers import Notation
 from skred.importing.readings import AT_LEAST, AT_MOST, BETWEEN, OBSERVED
 from skred.importing.sheet import Sheet
-from skred.importing.wide_columns import Meaning, sensor_id
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -147,7 +147,7 @@ def _in_words(name: str, column: Column) -> tuple[str, str]:
         "event": ("the avalanche's id", ""),
         "release": (f"release as {where}", "m"),
         "release_sd": ("standard deviation of the release", "m"),
-        "sd": (f"standard deviation of each reading of {column.of}", ""),
+        "sd": (f"standard deviation of each reading of {column.of}", column.unit or ""),
         "ignore": ("left out", ""),
     }
     return simple[column.is_]

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 
 from skred.campaign import CampaignError, Problem
 from skred.campaign.cells import CellError
+from skred.importing.column_meaning import Meaning
 from skred.importing.mapping import Column
 from skred.importing.mapping import Mapping as Declared
 from skred.importing.numbers import Notation
 from skred.importing.places import Places
 from skred.importing.questions import Question, Unclear
 from skred.importing.sheet import Sheet
-from skred.importing.wide_columns import Meaning
 
 
 @dataclass

@@ -1,32 +1,23 @@
 """What each column of a wide table is: as declared, as the sensors' table has it, or as its name says."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 from skred.campaign import CampaignError, Problem
 from skred.campaign.problems import shown
+from skred.importing.column_meaning import Meaning, by_sensor
+from skred.importing.column_questions import column_questions, release_question
 from skred.importing.draft import DraftTable
 from skred.importing.mapping import Column, Runout, Velocity
 from skred.importing.mapping import Mapping as Declared
-from skred.importing.meaning import base_and_unit, place_in, recognised
-from skred.importing.questions import Question, Unclear
+from skred.importing.meaning import place_in, recognised, says_where
+from skred.importing.questions import Unclear
 from skred.importing.sheet import Sheet
+from skred.importing.units import OF_KIND, base_and_unit, unit_of
 
-FORMS = (
-    "event, release, release_sd, front_velocity at=S, front_velocity from=S to=S, "
-    "runout place=s|x|altitude|reference (bound=at_least|at_most for bounds), sd of=SENSOR, "
-    "covariate name=NAME_UNIT, ignore"
-)
-"""The meanings that a column can have, as the option takes them."""
-
-
-@dataclass(frozen=True)
-class Meaning:
-    """What a column is, and whether somebody said so."""
-
-    column: Column
-    declared: bool
+RESERVED = ("event", "release_s_m", "release_sd_m")
+"""Columns of events.csv that have meanings of their own here; its release speeds are given by their names."""
 
 
 def meanings(
@@ -55,9 +46,9 @@ def meanings(
     questions = [
         question
         for sheet, columns in zip(sheets, found, strict=True)
-        for question in _questions(sheet, columns, declared)
+        for question in column_questions(sheet, columns, declared)
     ]
-    questions += _release_question(sheets, found, declared)
+    questions += release_question(sheets, found, declared)
     settled = [{name: one for name, one in columns.items() if one is not None} for columns in found]
     problems = [
         problem
@@ -71,16 +62,8 @@ def meanings(
         raise CampaignError(problems)
     if questions:
         raise Unclear(questions)
-    return [{name: _with_defaults(one, declared) for name, one in columns.items()} for columns in settled]
-
-
-def by_sensor(meanings: Mapping[str, Meaning]) -> dict[str, dict[str, Column]]:
-    """The columns of readings by their sensors' ids."""
-    found = dict[str, dict[str, Column]]()
-    for name, one in meanings.items():
-        if one.column.is_ in ("front_velocity", "runout"):
-            found.setdefault(sensor_id(name, one.column), {})[name] = one.column
-    return found
+    complete = [{name: _with_defaults(one, declared) for name, one in columns.items()} for columns in settled]
+    return [_with_units_of_sds(columns) for columns in complete]
 
 
 def _ids(columns: Mapping[str, Meaning]) -> tuple[str, ...]:
@@ -115,13 +98,8 @@ def _described_alike(found: Mapping[str, Meaning | None]) -> dict[str, Meaning |
             }
         for name, column in columns.items():
             update = {key: value for key, value in said.items() if getattr(column, key) is None}
-            filled[name] = Meaning(column.model_copy(update=update), settled[name].declared)
+            filled[name] = replace(settled[name], column=column.model_copy(update=update))
     return filled
-
-
-def sensor_id(name: str, column: Column) -> str:
-    """Id of a column's sensor: as declared, or the column's name without its unit."""
-    return column.sensor or base_and_unit(name)[0]
 
 
 def _of_sensors(sensors: DraftTable | None) -> dict[str, Column]:
@@ -149,35 +127,41 @@ def _meaning(
     ids: tuple[str, ...],
 ) -> Meaning | None:
     """What one column is; None where that is not clear."""
-    cells = [text for _, text in sheet.cells(name)]
-    by_name = recognised(name, cells, ids)
+    by_name = recognised(name, [text for _, text in sheet.cells(name)], ids)
     if name in declared:
-        column = declared[name]
-        if column.unit is None and by_name is not None and by_name.is_ == column.is_:
-            column = column.model_copy(update={"unit": by_name.unit})  # it stands in the name
-        return Meaning(column, True)
+        return _in_its_unit(name, declared[name], is_declared=True)
     sensor, is_exact = _sensor_of(name, known)
-    if sensor is not None and (by_name is None or by_name.is_ in (sensor.is_, "event")):
-        # The unit and the kind of place are not in the sensors' table: they stand in the column's name.
-        extra: dict[str, Any] = place_in(name) if sensor.is_ == "runout" else {}
-        if by_name is not None and by_name.unit is not None:
-            extra["unit"] = by_name.unit
-        return Meaning(sensor.model_copy(update=extra), is_exact)
+    if sensor is not None:
+        # The kind of place is not in the sensors' table: it stands in the column's name.
+        place = place_in(name) if sensor.is_ == "runout" else {}
+        return _in_its_unit(name, sensor.model_copy(update=place), is_declared=is_exact)
     if by_name is None:
         return None
-    return Meaning(by_name, name in ("event", "release_s_m", "release_sd_m") or by_name.name == name)
+    is_of_format = name in ("event", "release_s_m", "release_sd_m") or by_name.name == name
+    return _in_its_unit(name, by_name, is_declared=is_of_format)
+
+
+def _in_its_unit(name: str, column: Column, *, is_declared: bool) -> Meaning:
+    """A column in the unit that its name says, where it was not declared otherwise."""
+    if column.unit is not None:
+        return Meaning(column, is_declared)
+    unit = unit_of(column.is_, name)
+    if unit is None:
+        return Meaning(column, is_declared, base_and_unit(name)[1])
+    return Meaning(column.model_copy(update={"unit": unit or None}), is_declared)
 
 
 def _sensor_of(name: str, known: Mapping[str, Column]) -> tuple[Column | None, bool]:
     """The sensor that a column is named for, and whether it has just that name, but for a unit."""
-    for same in (name, base_and_unit(name)[0]):
+    base = base_and_unit(name)[0]
+    for same in (name, base):
         if same in known:
             return known[same], True
+    words = base.casefold().replace("_", " ")
     for sensor, column in known.items():
         # Such as "stop altitude [m]" for a runout of the sensor "stop".
-        if column.is_ == "runout" and name.casefold().startswith(
-            (f"{sensor} ".casefold(), f"{sensor}_".casefold())
-        ):
+        start = sensor.casefold().replace("_", " ")
+        if column.is_ == "runout" and words.startswith(start) and says_where(words.removeprefix(start)):
             return column, False
     return None, False
 
@@ -203,74 +187,6 @@ def _require_declared(sheets: Sequence[Sheet], declared: Declared) -> None:
         raise CampaignError(problems)
 
 
-def _questions(sheet: Sheet, found: Mapping[str, Meaning | None], declared: Declared) -> list[Question]:
-    """What is open of the columns."""
-    questions = list[Question]()
-
-    def ask(
-        key: tuple[str, ...], column: str, text: str, example: str, choices: tuple[str, ...] = ()
-    ) -> None:
-        where = f"{sheet.file}, column {shown(column)}" if column else sheet.file
-        option = "--runout" if key == ("runout", "place") else ""
-        questions.append(Question(key, where, text, choices, example, option))
-
-    for name, one in found.items():
-        if one is None:
-            sample = next((text for _, text in sheet.cells(name) if text), "nothing")
-            ask(
-                ("columns", name),
-                name,
-                f"what is it? (first cell: '{shown(sample, 30)}'; one of: {FORMS})",
-                "MEANING",
-            )
-            continue
-        column = one.column
-        if column.is_ == "front_velocity":
-            if column.at is None and column.from_ is None:
-                unit = f" unit={column.unit}" if column.unit else ""
-                form = f"front_velocity at=PLACE{unit}"
-                text = (
-                    "a front velocity: where is its sensor? Arc length s [m], for a span from=S to=S "
-                    "(or give --sensors FILE with an id for each column)"
-                )
-                ask(("columns", name), name, text, form)
-            elif column.unit is None and declared.velocity.unit is None:
-                ask(("velocity", "unit"), name, "the unit of velocities", "", ("m/s", "km/h"))
-            if column.relative_sd is None and declared.velocity.relative_sd is None:
-                text = "standard deviation of a velocity: the part that grows with it (0.1: 10 %; 0: none)"
-                ask(("velocity", "relative_sd"), name, text, "0.1")
-            if column.absolute_sd is None and declared.velocity.absolute_sd is None:
-                text = "standard deviation of a velocity: the part that is always the same [m/s]"
-                ask(("velocity", "absolute_sd"), name, text, "1")
-        elif column.is_ == "runout":
-            if column.place is None and declared.runout.place is None:
-                text = (
-                    "how is the runout given: arc length s, horizontal distance x, altitude on the track, or "
-                    "distance along the track from the reference, downhill positive?"
-                )
-                ask(("runout", "place"), name, text, "", ("s", "x", "altitude", "reference"))
-            if column.absolute_sd is None and declared.runout.absolute_sd is None:
-                text = "standard deviation of a runout along the track [m]"
-                ask(("runout", "absolute_sd"), name, text, "15")
-        elif column.is_ == "release" and column.place is None and declared.release.place is None:
-            text = "how is the release given: arc length s, horizontal distance x or altitude on the track?"
-            ask(("release", "place"), name, text, "", ("s", "x", "altitude", "reference"))
-    return questions
-
-
-def _release_question(
-    sheets: Sequence[Sheet], found: Sequence[Mapping[str, Meaning | None]], declared: Declared
-) -> list[Question]:
-    """Where avalanches start, if no column of any table says so."""
-    columns = [one for table in found for one in table.values()]
-    if None in columns or declared.release.s_m is not None:
-        return []
-    if any(one is not None and one.column.is_ == "release" for one in columns):
-        return []
-    text = "no column says where avalanches start: arc length of their release [m], the same for all"
-    return [Question(("release", "s_m"), ", ".join(sheet.file for sheet in sheets), text, (), "0")]
-
-
 def _problems(sheet: Sheet, found: Mapping[str, Meaning]) -> list[Problem]:
     """What cannot be as it is declared or recognised."""
     problems = []
@@ -289,6 +205,8 @@ def _problems(sheet: Sheet, found: Mapping[str, Meaning]) -> list[Problem]:
         if one.column.is_ == "sd" and one.column.of not in ids:
             message = f"of='{one.column.of}' is no sensor; there are: {', '.join(ids) or 'none'}"
             problems.append(Problem(sheet.file, sheet.header_line, name, None, message))
+    problems += _unit_problems(sheet, found)
+    problems += _covariate_problems(sheet, found)
     for sensor, columns in by_sensor(found).items():
         bounds = [column.bound for column in columns.values()]
         if len(set(bounds)) < len(bounds):
@@ -298,6 +216,39 @@ def _problems(sheet: Sheet, found: Mapping[str, Meaning]) -> list[Problem]:
                 "sensor=, or where they hold bounds add bound=at_least and bound=at_most"
             )
             problems.append(Problem(sheet.file, sheet.header_line, None, None, message))
+    return problems
+
+
+def _unit_problems(sheet: Sheet, found: Mapping[str, Meaning]) -> list[Problem]:
+    """Standard deviations in a unit that their readings cannot have."""
+    kinds = {sensor: next(iter(columns.values())).is_ for sensor, columns in by_sensor(found).items()}
+    problems = []
+    for name, one in found.items():
+        kind = kinds.get(one.column.of or "")
+        if one.column.is_ == "sd" and kind and one.column.unit not in (None, *OF_KIND[kind]):
+            message = (
+                f"its unit is {one.column.unit}, and sensor '{one.column.of}' is a {kind}: expected "
+                f"{' or '.join(OF_KIND[kind])}; correct the unit, or of="
+            )
+            problems.append(Problem(sheet.file, sheet.header_line, name, None, message))
+    return problems
+
+
+def _covariate_problems(sheet: Sheet, found: Mapping[str, Meaning]) -> list[Problem]:
+    """Covariates that would become one column of events.csv, or one that has another meaning there."""
+    taken = dict.fromkeys(RESERVED, "the column of that name in events.csv")
+    problems = []
+    for name, one in found.items():
+        if one.column.is_ != "covariate":
+            continue
+        new = one.column.name or name
+        if new in taken:
+            message = (
+                f"it would be called '{shown(new)}', as is {taken[new]}; give it another name with --column "
+                '"NAME=covariate name=OTHER", or leave one out with "NAME=ignore"'
+            )
+            problems.append(Problem(sheet.file, sheet.header_line, name, None, message))
+        taken.setdefault(new, f"column '{shown(name)}'")
     return problems
 
 
@@ -311,7 +262,7 @@ def _with_defaults(one: Meaning, declared: Declared) -> Meaning:
         defaults, last = declared.runout, {"unit": "m", "relative_sd": 0.0}
     elif one.column.is_ == "release":
         place = one.column.place or declared.release.place
-        return Meaning(one.column.model_copy(update={"place": place}), one.declared)
+        return replace(one, column=one.column.model_copy(update={"place": place}))
     else:
         return one
     update = {}
@@ -320,4 +271,15 @@ def _with_defaults(one: Meaning, declared: Declared) -> Meaning:
             if value is not None:
                 update[key] = value
                 break
-    return Meaning(one.column.model_copy(update=update), one.declared)
+    return replace(one, column=one.column.model_copy(update=update))
+
+
+def _with_units_of_sds(found: Mapping[str, Meaning]) -> dict[str, Meaning]:
+    """Standard deviations whose unit nobody said have that of their readings: it is the format's own."""
+    units = {sensor: next(iter(columns.values())).unit for sensor, columns in by_sensor(found).items()}
+    return {
+        name: replace(one, column=one.column.model_copy(update={"unit": units[one.column.of or ""]}))
+        if one.column.is_ == "sd" and one.column.unit is None
+        else one
+        for name, one in found.items()
+    }

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from skred.campaign.cells import CellError, number
 from skred.campaign.problems import shown
+from skred.importing.column_meaning import by_sensor
 from skred.importing.draft import DraftTable, Where
 from skred.importing.five_files import FACTORS
 from skred.importing.mapping import Column
@@ -23,7 +24,6 @@ from skred.importing.readings import (
     silence,
 )
 from skred.importing.wide import Wide
-from skred.importing.wide_columns import by_sensor
 
 RECORDINGS = ("event", "sensor", "value", "value_to", "sd", "status")
 
@@ -81,12 +81,14 @@ def _cell(
             reading = replace(reading, status=column.bound)
         elif column.bound not in (None, reading.status):
             raise CellError(f"the column holds bounds ({column.bound}); write the number alone")
+        reading = _in_format_units(column, reading)
         if sd_name is not None and cells[sd_name] and cells[sd_name] not in DASHES:
             place, found = sd_name, cells[sd_name]
-            reading = replace(reading, sd=wide.notation.with_point(found))
+            sd = wide.notation.with_point(found)
+            reading = replace(reading, sd=_converted(sd, wide.meanings[sd_name].column.unit))
         if column.is_ == "runout" and column.place == "altitude" and reading.status in BOUNDS:
             reading = _of_altitude(wide, line, name, cells[name], reading)
-        return turned(wide, column, reading)
+        return _along_the_track(wide, column, reading)
     except CellError as error:
         wide.fail(line, place, found, error)
         return None
@@ -135,20 +137,29 @@ def _silence(wide: Wide, line: int, name: str, text: str, column: Column) -> str
     return status or MISSING
 
 
-def turned(wide: Wide, column: Column, reading: Reading) -> Reading:
-    """A reading in the format's unit, and a runout as arc length; an interval with its lower end first.
+def _converted(text: str, unit: str | None) -> str:
+    """A number in the format's unit; blanks are left."""
+    factor = FACTORS.get(unit or "")
+    return text if factor is None or not text else repr(number(text) * factor)
+
+
+def _in_format_units(column: Column, reading: Reading) -> Reading:
+    """What a cell says, m/s or m; of places still as they are given."""
+    value, sd, value_to = (
+        _converted(text, column.unit) for text in (reading.value, reading.sd, reading.value_to)
+    )
+    return replace(reading, value=value, sd=sd, value_to=value_to)
+
+
+def _along_the_track(wide: Wide, column: Column, reading: Reading) -> Reading:
+    """A runout and its sd as arc length; an interval with its lower end first.
 
     Raises
     ------
     CellError
         If a place is not on the track.
     """
-    factor = FACTORS.get(column.unit or "")
-    ends = [one for one in (reading.value, reading.value_to) if one]
-    sd = reading.sd
-    if factor is not None:
-        ends = [repr(number(end) * factor) for end in ends]
-        sd = repr(number(sd) * factor) if sd else ""
+    ends, sd = [one for one in (reading.value, reading.value_to) if one], reading.sd
     if column.is_ == "runout" and column.place not in (None, "s"):
         place = str(column.place)
         if sd:

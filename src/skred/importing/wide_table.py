@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from skred.campaign import Problem
 from skred.campaign.cells import CellError, has_unit, number
 from skred.campaign.tables import MOST_ROWS
+from skred.importing.column_meaning import Meaning, by_sensor
 from skred.importing.draft import DraftTable, Where
 from skred.importing.mapping import Column
 from skred.importing.mapping import Mapping as Declared
@@ -14,7 +15,6 @@ from skred.importing.readings import DASHES, OBSERVED, number_of, silence
 from skred.importing.sheet import Section, Sheet
 from skred.importing.sources import refuse
 from skred.importing.wide import Open, Wide
-from skred.importing.wide_columns import Meaning, by_sensor
 from skred.importing.wide_readings import recordings
 
 SENSORS = ("sensor", "quantity", "s_from_m", "s_to_m", "relative_sd", "absolute_sd", "place_sd_m")

@@ -5,8 +5,10 @@ import math
 import warnings
 import zipfile
 from collections.abc import Iterator
+from contextlib import suppress
 from datetime import date, datetime, time
-from typing import Any
+from typing import IO, Any
+from xml.parsers import expat
 
 from skred.campaign.problems import CampaignError, Problem
 from skred.campaign.tables import MOST_COLUMNS, MOST_LINES, MOST_PROBLEMS
@@ -18,6 +20,7 @@ LARGEST_UNPACKED_BYTES = 100_000_000
 """Five times the largest file: tables of text shrink so much when packed, bombs far more."""
 MOST_PARTS = 1000
 MOST_CELLS = 5_000_000
+CHUNK_BYTES = 65_536
 
 
 class EmptySheet(CampaignError):
@@ -117,13 +120,29 @@ def _refuse_bomb(source: Source) -> None:
                 raise refuse(source.name, "the workbook unpacks to more than is read; save one sheet as CSV")
             for part in parts:
                 with archive.open(part) as opened:
-                    head = opened.read(4096)
-                if b"<!DOCTYPE" in head or b"<!ENTITY" in head:
-                    raise refuse(source.name, "the workbook declares a document type; save it anew as .xlsx")
+                    if _declares_a_type(opened):
+                        message = "the workbook declares a document type; save it anew as .xlsx"
+                        raise refuse(source.name, message)
     except CampaignError:
         raise
     except Exception as error:  # damaged, encrypted, or packed in a way that zipfile does not know
         raise _unreadable(source, error) from error
+
+
+def _declares_a_type(part: IO[bytes]) -> bool:
+    """Whether a part is XML with a document type, in whatever encoding and behind whatever comments.
+
+    Read with the parser that reads the tables, as far as the first element: a type can stand only before it.
+    A part that is no XML has none.
+    """
+    found = list[bool]()
+    parser = expat.ParserCreate()
+    parser.StartDoctypeDeclHandler = lambda *_: found.append(True)
+    parser.StartElementHandler = lambda *_: found.append(False)
+    with suppress(expat.ExpatError):
+        while not found and (chunk := part.read(CHUNK_BYTES)):
+            parser.Parse(chunk, False)
+    return found[:1] == [True]
 
 
 def _cells(source: Source, name: str, *, values: bool) -> Iterator[tuple[int, tuple[object, ...]]]:
@@ -153,17 +172,23 @@ def _cells(source: Source, name: str, *, values: bool) -> Iterator[tuple[int, tu
 
 
 def _without_value(source: Source, name: str, lines: list[tuple[int, tuple[str, ...]]]) -> list[Problem]:
-    """Formulas whose result is not stored: they would look like blanks."""
+    """Formulas whose result is not stored: they would look like blanks.
+
+    They are what stands in a cell that has no value. Of what kind they are (text, one of several cells, a
+    table of data) does not matter.
+    """
     known = dict(lines)
     problems = []
     for line, row in _cells(source, name, values=False):
+        values = known.get(line, ())
         for k, cell in enumerate(row):
-            is_formula = isinstance(cell, str) and cell.startswith("=")
-            if is_formula and not (known.get(line, ())[k : k + 1] > ("",)):
-                message = "a formula without a stored result; open and save the workbook, or paste values"
-                problems.append(Problem(source.name, line, f"number {k + 1}", str(cell), message))
-                if len(problems) == MOST_PROBLEMS:
-                    return problems
+            if values[k : k + 1] > ("",) or not _text(cell):
+                continue
+            text = cell if isinstance(cell, str) else getattr(cell, "text", None)
+            message = "a formula without a stored result; open and save the workbook, or paste values"
+            problems.append(Problem(source.name, line, f"number {k + 1}", text, message))
+            if len(problems) == MOST_PROBLEMS:
+                return problems
     return problems
 
 
