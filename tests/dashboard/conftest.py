@@ -50,6 +50,17 @@ def given(results: Path) -> Any:
 
 
 @pytest.fixture
+def tree_file(tmp_path: Path) -> Callable[..., Path]:
+    """Writes the groups that a test makes up as a netCDF file."""
+
+    def write(name: str, **groups: xr.Dataset) -> Path:
+        xr.DataTree.from_dict(groups).to_netcdf(tmp_path / f"{name}.nc", engine="h5netcdf")
+        return tmp_path / f"{name}.nc"
+
+    return write
+
+
+@pytest.fixture
 def older(results: Path, tmp_path: Path) -> Path:
     """A calibration that another version wrote."""
     folder = tmp_path / "older"

@@ -55,16 +55,32 @@ def _panels(runs: Sequence[Run]) -> list[Panel]:
     title = f"arviz.compare, {len(runs)} runs{f', {likelihood}' if likelihood else ''}"
     best = next(run for run in runs if str(run.number) == table.index[0])
     return [
-        Panel(
-            title, html=_table(table, runs), wide=True, note="elpd: expected log density of a left-out event."
-        ),
+        Panel(title, html=_table(table, runs), wide=True, note=_note(table)),
         Panel("Difference of elpd, with its standard error", made),
         Panel(f"By event: difference to run {best.number}", _by_event(runs, best)),
     ]
 
 
+def _note(table: Any) -> str:
+    """What elpd is, and what ArviZ doubts of the differences."""
+    said = "elpd: log density of the left-out events, summed over the events."
+    doubts = sorted({str(one) for one in table.get("diag_diff", ()) if one})
+    if doubts:
+        said += f" ArviZ doubts the errors of these differences: {', '.join(doubts)} (N: events)."
+    return said
+
+
+def _warning(run: Run) -> str:
+    """What to say of a run whose elpd is not to be relied on."""
+    loo = run.loo
+    if not loo.warning:
+        return ""
+    n = int(np.sum(~(np.asarray(loo.pareto_k, dtype=float) <= float(loo.good_k))))
+    return f" (Pareto k above {float(loo.good_k):.2f} for {n} event{'s' if n != 1 else ''})"
+
+
 def _table(table: Any, runs: Sequence[Run]) -> str:
-    titles = {str(run.number): f"{run.number}: {run.title}" for run in runs}
+    of = {str(run.number): run for run in runs}
     columns = [
         ("rank", "rank", 0), ("elpd", "elpd [nats]", 1), ("se", "standard error", 1),
         ("p", "effective parameters", 1), ("elpd_diff", "difference", 1), ("diff_se", "its error", 1),
@@ -78,8 +94,10 @@ def _table(table: Any, runs: Sequence[Run]) -> str:
             Markup('<td class="n">{}</td>').format(f"{float(row[key]):.{digits}f}")
             for key, _, digits in there
         )
-        warned = " (Pareto k above the limit for some events)" if bool(row.get("warning", False)) else ""
-        rows += Markup("<tr><th>{}{}</th>{}</tr>").format(titles[str(name)], warned, cells)
+        one = of[str(name)]
+        rows += Markup('<tr><th>{}: {}<span class="bad">{}</span></th>{}</tr>').format(
+            one.number, one.title, _warning(one), cells
+        )
     return str(
         Markup("<table><thead><tr><th>run</th>{}</tr></thead><tbody>{}</tbody></table>").format(head, rows)
     )
