@@ -52,3 +52,43 @@ def test_the_note_says_what_elpd_sums_and_what_arviz_doubts(tree_file: TreeFile)
     files = [tree_file(f"f{k}", **of_normal(k, readings=readings)) for k in range(2)]
     html = compared(*files)
     assert "summed over the events" in html and "N &lt; 100" in html
+
+
+def test_files_of_other_observations_are_not_compared_and_it_is_told(tree_file: TreeFile) -> None:
+    rng = np.random.default_rng(1)
+    low, high = rng.normal(0.0, 1.0, 20), rng.normal(500.0, 1.0, 20)
+    files = [
+        tree_file("low", **of_normal(2, readings=low)),
+        tree_file("again", **of_normal(3, readings=low)),
+        tree_file("high", **of_normal(4, readings=high)),
+    ]
+    html = compared(*files)
+    assert "arviz.compare, 2 runs" in html and "3: high" not in html
+    assert "run 3, high: no other run has the same observations" in html
+    assert "arviz.compare" not in compared(files[0], files[2])
+
+
+def test_what_does_not_say_what_was_observed_is_not_compared(tree_file: TreeFile) -> None:
+    readings = np.random.default_rng(1).normal(size=20)
+    files = []
+    for number in range(2):
+        groups = of_normal(number, readings=readings)
+        del groups["observed_data"]
+        files.append(tree_file(f"f{number}", **groups))
+    html = compared(*files)
+    assert "No two of the runs" in html and html.count("does not say what was observed") == 2
+
+
+def test_observations_are_those_of_the_likelihood(tree_file: TreeFile) -> None:
+    """Two models of one outcome, one of which was given a covariate as data, can be compared."""
+    readings = np.random.default_rng(1).normal(size=20)
+    more = of_normal(2, readings=readings)
+    more["observed_data"]["x"] = ("place", np.arange(20.0))
+    html = compared(tree_file("one", **of_normal(3, readings=readings)), tree_file("two", **more))
+    assert "arviz.compare, 2 runs" in html and "Not compared" not in html
+
+
+def test_another_likelihood_is_told(given: Any) -> None:
+    (entry,) = [one for one in entries(given) if one.key == "comparison"]
+    html = answer(entry, given)["html"]
+    assert "hierarchical (coulomb, hierarchical): runs of the same observations have another" in html

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
@@ -164,6 +165,23 @@ class Run:
         own = [n for d, n in values.sizes.items() if d not in ("chain", "draw")]
         drawn = {"chain", "draw"} <= set(values.dims)
         return str(name) if drawn and int(np.prod(own)) <= MOST_OBSERVATIONS else None
+
+    @cached_property
+    def observations(self) -> str:
+        """A digest of what was observed, by name and number; empty where the tree does not say."""
+        if not self.has("observed_data"):
+            return ""
+        observed = self.group("observed_data")
+        # Other people's files hold covariates too; the variable of the likelihood is what is predicted.
+        only = [self.likelihood_name] if self.likelihood_name in observed else sorted(map(str, observed))
+        summed = sha256()
+        for name in only:
+            values = observed[name].values
+            if values.dtype.kind in "iufb":
+                values = np.where(np.isnan(values.astype(float)), np.nan, values.astype(float)) + 0.0
+            summed.update(f"{name} {values.shape}".encode())
+            summed.update(values.tobytes() if values.dtype.kind == "f" else repr(values.tolist()).encode())
+        return summed.hexdigest()
 
     @cached_property
     def event_ids(self) -> list[str]:

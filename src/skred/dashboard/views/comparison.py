@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from skred.dashboard.comparable import Comparable, comparable
 from skred.dashboard.figures import legend_above, new_figure, points, quietly, styled
 from skred.dashboard.reading import Given
 from skred.dashboard.run import Run
-from skred.dashboard.view import Asked, NotShownError, Panel
+from skred.dashboard.view import Asked, Panel
 from skred.dashboard.views.pareto_k import name_events
 from skred.report.shared.style import MARKERS, PALETTE
 
@@ -21,23 +22,23 @@ _BOKEH_MARKERS = {"o": "circle", "s": "square", "D": "diamond", "^": "triangle",
 
 def comparison_panels(run: None, given: Given, asked: Asked) -> list[Panel]:
     """A table and a figure of `arviz.compare` for each set of runs that predict the same, and the events."""
-    sets = comparable(given)
-    if not sets:
-        raise NotShownError(
-            "no two of the runs can be compared: it takes runs of the same recordings with the same"
-            " likelihood; give the folders of two laws, or one of skred compare"
-        )
-    return [panel for runs in sets for panel in _panels(runs)]
+    found = comparable(given.runs)
+    panels = [panel for runs in found.sets for panel in _panels(runs)]
+    if found.others:
+        panels.append(_others(found))
+    return panels
 
 
-def comparable(given: Given) -> list[list[Run]]:
-    """Sets of two or more runs of the same observations with the same likelihood."""
-    sets: dict[tuple[Any, ...], list[Run]] = {}
-    for run in given.runs:
-        if run.can_leave_out:
-            what = [str(run.tree.attrs.get(key, "")) for key in ("campaign_fingerprint", "likelihood")]
-            sets.setdefault((*what, tuple(run.event_ids)), []).append(run)
-    return [runs for runs in sets.values() if len(runs) > 1]
+def _others(found: Comparable) -> Panel:
+    """Runs that are compared with none, and why."""
+    rows = Markup("").join(
+        Markup("<li>run {}, {}: {}</li>").format(run.number, run.title, why) for run, why in found.others
+    )
+    note = "Compared are runs of the same observations with the same likelihood."
+    if not found.sets:
+        note += " Give the folders of two laws, or one of skred compare."
+    title = "Not compared" if found.sets else "No two of the runs can be compared"
+    return Panel(title, html=str(Markup("<ul>{}</ul>").format(rows)), note=note, wide=True)
 
 
 def _panels(runs: Sequence[Run]) -> list[Panel]:
