@@ -10,7 +10,7 @@ from skred.dashboard.reading import Given
 from skred.dashboard.run import Run, shown
 from skred.dashboard.view import Asked, Panel
 from skred.report.shared import document as doc
-from skred.report.shared.numbers import is_number, share
+from skred.report.shared.numbers import is_number
 
 _CLASSES = ("n", "text", "text wide-only", "n", "n", "n", "text")
 
@@ -59,18 +59,23 @@ def _row(run: Run) -> tuple[Any, ...]:
     if run.has("posterior"):
         sizes = run.group("posterior").sizes
         draws = f"{sizes.get('chain', 1)} × {sizes.get('draw', 0)}"
-    gate = run.gate
-    state = "not said"
-    if gate:
-        r_hat, ess = gate.get("r_hat_max"), gate.get("ess_bulk_min")
-        numbers = f" (r-hat {r_hat:.3f}, ess {ess:.0f})" if is_number(r_hat) and is_number(ess) else ""
-        state = ("yes" if gate.get("passed") is True else "NO") + numbers
     what = {"calibration": run.tree.attrs.get("title", "calibration"), "arviz": "netCDF with ArviZ's groups"}
     said = what.get(run.kind) or run.tree.attrs.get("title", run.kind)
-    if run.kind == "diagnosis":
-        found = doc.get(run.document, "probability", str(doc.get(run.document, "mechanism")))
-        state = f"probability {share(found)}" if is_number(found) else "see the verdict"
     return (
         run.number, run.title, shown(said, 90), len(run.event_ids) or "-", len(run.names) or "-", draws,
-        state,
+        _converged(run),
     )  # fmt: skip
+
+
+def _converged(run: Run) -> str:
+    """Whether the chains can be trusted, and the numbers that say so; of a diagnosis, all of its chains."""
+    if run.kind == "diagnosis":
+        passed = doc.get(run.document, "converged")
+        r_hat, ess = (doc.get(run.document, "diagnostics", key) for key in ("r_hat_max", "ess_min"))
+    else:
+        passed = run.gate.get("passed")
+        r_hat, ess = run.gate.get("r_hat_max"), run.gate.get("ess_bulk_min")
+    if not isinstance(passed, bool):
+        return "not said"
+    numbers = f" (r-hat {r_hat:.3f}, ess {ess:.0f})" if is_number(r_hat) and is_number(ess) else ""
+    return ("yes" if passed else "NO") + numbers
