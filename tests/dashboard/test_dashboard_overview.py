@@ -38,3 +38,26 @@ def test_converged_of_a_diagnosis_is_whether_its_chains_did(
     numbers = " (r-hat 1.005, ess 716)" if converged is not None else ""
     assert f'<td class="text">{told}{numbers}</td>' in html
     assert "probability 0." not in html.partition("<table>")[2]
+
+
+def test_a_number_beyond_all_floats_is_no_number(
+    results: Path, older: Path, tree_copy: Any, tmp_path: Path
+) -> None:
+    """JSON takes a whole number of any length; no format and no figure does."""
+    huge = 10**400
+    diagnostics = {"r_hat_max": huge, "ess_min": huge}
+    folder = changed(
+        results / "diagnosis",
+        tmp_path / "copy",
+        diagnostics=diagnostics,
+        probability={"nothing": huge, "x": 0.4},
+    )
+    file = tree_copy(
+        results / "pcm" / "posterior.nc",
+        gate=json.dumps({"passed": True, "r_hat_max": huge, "ess_bulk_min": huge}),
+    )
+    found = read_given([folder, file, older])
+    html = made(found)
+    assert "could not be made" not in html and "another version" in html
+    assert html.count('<td class="text">yes</td>') == 2
+    assert "could not be made" not in made(found, "candidates-r1")

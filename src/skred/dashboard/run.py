@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from skred.dashboard.plain_json import plain_json
 from skred.report.shared.labels import shortened, symbol_text, unit_text
 from skred.report.shared.recordings import Recordings, recordings_of
 
@@ -246,7 +246,7 @@ class Run:
     def gate(self) -> Mapping[str, Any]:
         """Whether the chains converged; empty where the tree does not say."""
         try:
-            found = json.loads(self.tree.attrs["gate"])
+            found = plain_json(self.tree.attrs["gate"])
         except (KeyError, TypeError, ValueError):
             return {}
         return found if isinstance(found, dict) else {}
