@@ -39,6 +39,18 @@ def shown_parts(*parts: str) -> list[str]:
     return [shown(part, 16) for part in parts if part.strip()]
 
 
+def apart(texts: Sequence[str]) -> list[str]:
+    """Texts that differ: those that are alike are numbered from the second on."""
+    found: dict[str, None] = {}
+    for text in texts:
+        number, one = 1, text
+        while one in found:
+            number += 1
+            one = f"{text} (no. {number})"
+        found[one] = None
+    return list(found)
+
+
 def unit_of(attributes: Mapping[Any, Any]) -> str:
     """The unit of a variable in brackets; nothing where it says none."""
     return f"[{unit_text(attributes['units'])}]" if "units" in attributes else ""
@@ -115,33 +127,42 @@ class Run:
             found[str(name)] = " ".join((shown(text, 48), *shown_parts(said, unit)))
         return found
 
-    def parameters(self, chosen: Sequence[str] = (), group: str = "posterior") -> xr.Dataset:
-        """Draws of up to twelve parameters: ``p0``, ``p1``, ... (chain, draw), with ``label`` and ``axis``.
+    def parameters(
+        self, chosen: Sequence[str] = (), group: str = "posterior", most: int = MOST_PARAMETERS
+    ) -> xr.Dataset:
+        """Draws of some parameters: ``p0``, ``p1``, ... (chain, draw), with ``label`` and ``axis``.
 
         Parameters
         ----------
         chosen : sequence of str
             Labels; the first ones where none is given.
         group : str
+        most : int
+            How many at most.
         """
-        data = self.group(group)
+        data, wanted = self.group(group), frozenset(chosen)
         columns: dict[str, xr.DataArray] = {}
-        for number, (name, at) in enumerate(self.names):
-            label = self.all_labels[number]
-            if name in data and not (chosen and label not in chosen) and len(columns) < MOST_PARAMETERS:
-                values = data[name]
-                if {d: n for d, n in values.sizes.items() if d not in ("chain", "draw")}.keys() == at.keys():
-                    one = values.isel(at).drop_vars(set(values.coords) - {"chain", "draw"})
-                    columns[f"p{number}"] = one.assign_attrs(label=label, axis=self.short_label(name, label))
+        for number, ((name, at), label) in enumerate(zip(self.names, self.all_labels, strict=True)):
+            if len(columns) < most and (not wanted or label in wanted) and _holds(data, name, at):
+                one = data[name].isel(at)
+                one = one.drop_vars(set(one.coords) - {"chain", "draw"})
+                columns[f"p{number}"] = one.assign_attrs(label=label, axis=self.short_label(name, label))
         return xr.Dataset(columns)
+
+    def labels_in(self, *groups: str) -> list[str]:
+        """Labels of the parameters that each of some groups holds."""
+        data = [self.group(group) for group in groups if self.has(group)]
+        if len(data) < len(groups):
+            return []
+        named = zip(self.names, self.all_labels, strict=True)
+        return [label for (name, at), label in named if all(_holds(one, name, at) for one in data)]
 
     def label(self, name: str, at: Mapping[str, int]) -> str:
         """A parameter by its variable and the place in that."""
         text = self.labels.get(name, shown(name))
         if not at:
             return text
-        data = self.group("posterior")[name]
-        places = [str(data[d].values[k]) if d in data.coords else str(k) for d, k in at.items()]
+        places = _places(self.group("posterior")[name], at)
         return f"{text} ({shown(', '.join(places), 24)})"
 
     def short_label(self, name: str, label: str) -> str:
@@ -153,8 +174,14 @@ class Run:
 
     @cached_property
     def all_labels(self) -> list[str]:
-        """Labels of all parameters that can be chosen."""
-        return [self.label(name, at) for name, at in self.names]
+        """Labels of all parameters that can be chosen, each another."""
+        return apart([self.label(name, at) for name, at in self.names])
+
+    @cached_property
+    def identities(self) -> list[str]:
+        """What a parameter is by its full name and place, uncut: the same in runs of the same law."""
+        data = self.group("posterior") if self.names else xr.Dataset()
+        return apart([f"{name}({', '.join(_places(data[name], at))})" for name, at in self.names])
 
     @cached_property
     def likelihood_name(self) -> str | None:
@@ -264,6 +291,16 @@ def scalars_of(data: xr.Dataset) -> list[tuple[str, dict[str, int]]]:
                 return found
             found.append((str(name), dict(zip(map(str, own), place, strict=True))))
     return found
+
+
+def _holds(data: xr.Dataset, name: str, at: Mapping[str, int]) -> bool:
+    """Whether a group has a parameter, with the same dimensions beside those of the draws."""
+    return name in data and {d for d in data[name].dims if d not in ("chain", "draw")} == at.keys()
+
+
+def _places(values: xr.DataArray, at: Mapping[str, int]) -> list[str]:
+    """The place of a number in its own dimensions, by their coordinates where they have any."""
+    return [str(values[d].values[k]) if d in values.coords else str(k) for d, k in at.items()]
 
 
 def ids_of(values: xr.DataArray) -> list[str]:
