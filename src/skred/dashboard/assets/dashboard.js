@@ -55,7 +55,7 @@
       section.innerHTML = answer.html;
       for (const item of answer.items) await Bokeh.embed.embed_item(item);
     } catch (error) {
-      section.textContent = `This view did not come: ${error.message}. Is the server still there?`;
+      section.textContent = `This view did not come: ${error.message}`;
     }
     mark(section);
     watch();

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from markupsafe import Markup
 
+from skred.dashboard.each import Failures
 from skred.dashboard.reading import Given
 from skred.dashboard.run import Run, shown
 from skred.dashboard.view import Asked, Panel
@@ -19,11 +21,11 @@ def overview_panels(run: None, given: Given, asked: Asked) -> list[Panel]:
     """The runs, their verdicts, and troubles."""
     panels = []
     if given.troubles:
-        rows = Markup("").join(
+        told = Markup("").join(
             Markup("<li><strong>{}</strong><br>{}</li>").format(one.source, one.message)
             for one in given.troubles
         )
-        html = Markup('<div class="box" role="alert"><p>Not shown:</p><ul>{}</ul></div>').format(rows)
+        html = Markup('<div class="box" role="alert"><p>Not shown:</p><ul>{}</ul></div>').format(told)
         panels.append(Panel("What cannot be shown", html=str(html), wide=True))
     for one in given.runs:
         statement = doc.get(one.document, "statement")
@@ -31,14 +33,15 @@ def overview_panels(run: None, given: Given, asked: Asked) -> list[Panel]:
             verdict = shown(str(doc.get(one.document, "verdict")).replace("_", " "), 40)
             html = Markup("<p class='lead'><strong>Verdict: {}.</strong> {}</p>").format(verdict, statement)
             panels.append(Panel(one.title, html=str(html), wide=True))
-    if given.runs:
-        panels.append(Panel("Runs", html=_table(given), wide=True))
-    return panels
+    failures = Failures()
+    rows = [row for _, row in failures.of_each(given.runs, _row)]
+    if rows:
+        panels.append(Panel("Runs", html=_table(rows), wide=True))
+    return panels + failures.panels()
 
 
-def _table(given: Given) -> str:
+def _table(rows: Sequence[tuple[Any, ...]]) -> str:
     heads = ("", "run", "what it is", "events", "parameters", "draws", "converged")
-    rows = [_row(run) for run in given.runs]
     head = Markup("").join(
         Markup('<th class="{}">{}</th>').format(_CLASSES[k], one) for k, one in enumerate(heads)
     )
