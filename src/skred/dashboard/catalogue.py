@@ -75,8 +75,8 @@ VIEWS: tuple[ViewKind, ...] = (
     ),
     ViewKind(
         "force", _FOUND, "Force along the track",
-        "Above zero the law brakes too little there, below zero too much. Where the band holds zero, "
-        "nothing is missing that these recordings could show.",
+        "Above zero the law brakes too little there, below zero too much; fast fronts only, where the "
+        "axis says so. Where the band holds zero, nothing is missing that these recordings could show.",
         lambda run: run.kind == "diagnosis" and run.has("force"), force_panels,
     ),
     ViewKind(
