@@ -50,6 +50,33 @@ def given(results: Path) -> Any:
 
 
 @pytest.fixture
+def tree_file(tmp_path: Path) -> Callable[..., Path]:
+    """Writes the groups that a test makes up as a netCDF file."""
+
+    def write(name: str, **groups: xr.Dataset) -> Path:
+        xr.DataTree.from_dict(groups).to_netcdf(tmp_path / f"{name}.nc", engine="h5netcdf")
+        return tmp_path / f"{name}.nc"
+
+    return write
+
+
+@pytest.fixture
+def tree_copy(tmp_path: Path) -> Callable[..., Path]:
+    """Writes a netCDF file again, with groups changed by a function and with other attributes."""
+
+    def write(file: Path, name: str = "copy", change: Any = dict, **attributes: str) -> Path:
+        with xr.open_datatree(file, engine="h5netcdf") as opened:
+            tree = opened.load()
+        groups = {str(key): node.to_dataset() for key, node in tree.children.items()}
+        copied = xr.DataTree.from_dict(change(groups))
+        copied.attrs = {**tree.attrs, **attributes}
+        copied.to_netcdf(tmp_path / f"{name}.nc", engine="h5netcdf")
+        return tmp_path / f"{name}.nc"
+
+    return write
+
+
+@pytest.fixture
 def older(results: Path, tmp_path: Path) -> Path:
     """A calibration that another version wrote."""
     folder = tmp_path / "older"

@@ -90,6 +90,8 @@ def test_the_file_asks_for_nothing(page_file: Path) -> None:
     assert "url(" not in markup and "@import" not in markup
     assert not re.findall(r"<script[^>]*\ssrc", text)
     assert "default-src 'none'" in markup and "connect-src 'none'" in markup
+    (scripts,) = re.findall(r"script-src ([^;]*);", markup)
+    assert all(one.startswith("'sha256-") for one in scripts.split())
     assert len(text) < 5_000_000
 
 
@@ -142,6 +144,26 @@ def test_a_click_on_a_point_chooses_its_event(page_file: Path) -> None:
 
 
 @needs_chromium
+@pytest.mark.parametrize("clicks", [["trace", "trace"], ["trace", "rank", "trace"], ["trace", "rank"]])
+def test_clicks_while_a_view_is_drawn_show_the_last_once(clicks: list[str], page_file: Path) -> None:
+    click = (
+        """all => { for (const v of all) document.querySelector(`nav button[data-view="${v}"]`).click(); }"""
+    )
+    with opened(page_file.as_uri()) as page:
+        page.page.evaluate(click, clicks)
+        for view in sorted(set(clicks) - {clicks[-1]}) + clicks[-1:]:
+            page.page.wait_for_selector(f".view[data-key^='{view}-'] .panel", state="attached")
+        page.page.wait_for_function(f"document.body.dataset.shown.startsWith('{clicks[-1]}-')")
+        keys = page.page.eval_on_selector_all(".view", "all => all.map(one => one.dataset.key)")
+        assert len(keys) == len(set(keys)) == 1 + len(set(clicks))
+        visible = page.page.eval_on_selector_all(
+            ".view:not([hidden])", "all => all.map(one => one.dataset.key)"
+        )
+        assert [one.partition("-")[0] for one in visible] == clicks[-1:]
+        assert page.page.locator("#wait").is_hidden() and page.complaints == []
+
+
+@needs_chromium
 def test_names_that_attack_do_nothing_where_one_points_at_them(arviz_file: Any, tmp_path: Path) -> None:
     from skred.dashboard.export import export
     from skred.dashboard.reading import read_given
@@ -162,6 +184,19 @@ def test_names_that_attack_do_nothing_where_one_points_at_them(arviz_file: Any, 
         assert page.page.locator("img").count() == 0
         assert page.page.evaluate("document.body.dataset.attacked") is None
         assert page.complaints == []
+
+
+@needs_chromium
+def test_the_file_runs_no_program_but_its_own(page_file: Path) -> None:
+    """Should a name ever get past the escaping: the policy names the programs of the page by digest."""
+    attack = f"""() => {{ document.body.insertAdjacentHTML("beforeend", `{EVIL}`);
+        const script = document.createElement("script");
+        script.textContent = "document.body.dataset.attacked = 2"; document.body.append(script); }}"""
+    with opened(page_file.as_uri()) as page:
+        page.page.evaluate(attack)
+        page.page.wait_for_timeout(300)
+        assert page.page.evaluate("document.body.dataset.attacked") is None
+        assert len(page.complaints) >= 2 and all("Content Security Policy" in one for one in page.complaints)
 
 
 @needs_chromium

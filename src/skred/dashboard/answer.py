@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from bokeh.embed import json_item
 from markupsafe import Markup
 
 from skred.dashboard.catalogue import VIEWS
+from skred.dashboard.parameters import Choice, choice
 from skred.dashboard.reading import Given
-from skred.dashboard.run import MOST_PARAMETERS, Run
+from skred.dashboard.run import Run
 from skred.dashboard.view import Asked, NotShownError, Panel, ViewKind
 
 _NUMBER = itertools.count()
@@ -64,7 +65,11 @@ def answer(entry: Entry, given: Given, asked: Asked = Asked()) -> dict[str, Any]
         ``html``: its markup, every text from a file escaped; ``items``: a figure for each, with the id of the
         element that it goes to.
     """
+    chosen = None
     try:
+        if entry.view.by_parameter:
+            chosen = choice(entry.view, entry.run, given, asked)
+            asked = replace(asked, parameters=chosen.shown)
         panels = entry.view.make(entry.run, given, asked)
         targets = [f"fig-{next(_NUMBER)}" for _ in panels]
         items = [
@@ -78,7 +83,7 @@ def answer(entry: Entry, given: Given, asked: Asked = Asked()) -> dict[str, Any]
         what = " ".join(f"{type(error).__name__}: {error}".split())[:160]
         return {"html": _told(f"This view could not be made of this file: {what}"), "items": []}
     markup = Markup("").join(_panel(panel, target) for panel, target in zip(panels, targets, strict=True))
-    return {"html": str(_choice(entry, given, asked) + markup), "items": items}
+    return {"html": str(_choice(chosen, asked) + markup), "items": items}
 
 
 def _told(message: str) -> str:
@@ -96,23 +101,22 @@ def _panel(panel: Panel, target: str) -> Markup:
     return made.format(" wide" if panel.wide else "", panel.title, Markup(panel.html), figure, note)
 
 
-def _choice(entry: Entry, given: Given, asked: Asked) -> Markup:
+def _choice(chosen: Choice | None, asked: Asked) -> Markup:
     """Which of many parameters are shown; only a server can change that."""
-    run = entry.run
-    if not entry.view.by_parameter or run is None or len(run.all_labels) <= MOST_PARAMETERS:
+    if chosen is None or len(chosen.labels) <= chosen.most:
         return Markup("")
-    shown = list(asked.parameters)[:MOST_PARAMETERS] or run.all_labels[:MOST_PARAMETERS]
-    told = f"{len(shown)} of {len(run.all_labels)} parameters are shown"
+    told = f"{len(chosen.shown)} of {len(chosen.labels)} parameters are shown"
     if not asked.can_choose:
         return Markup('<p class="note wide">{}; the served dashboard can show others.</p>').format(told)
+    shown = frozenset(chosen.shown)
     boxes = Markup("").join(
         Markup('<label><input type="checkbox" data-parameter value="{0}"{1}> {0}</label>').format(
             label, Markup(" checked") if label in shown else ""
         )
-        for label in run.all_labels
+        for label in chosen.labels
     )
     return Markup(
         '<details class="wide parameters"><summary>{}</summary>'
         '<div class="boxes">{}</div>'
         '<button type="button" data-again>Show these (at most {})</button></details>'
-    ).format(told, boxes, MOST_PARAMETERS)
+    ).format(told, boxes, chosen.most)

@@ -8,11 +8,11 @@ from skred.dashboard.views.candidates import candidate_panels
 from skred.dashboard.views.comparison import comparison_panels
 from skred.dashboard.views.events import event_panels
 from skred.dashboard.views.force import force_panels
-from skred.dashboard.views.forest import forest_panels
+from skred.dashboard.views.forest import MOST_SHOWN, forest_panels
 from skred.dashboard.views.held_out import held_out_panels
 from skred.dashboard.views.loo_pit import loo_pit_panels
 from skred.dashboard.views.overview import overview_panels
-from skred.dashboard.views.pair import pair_panels
+from skred.dashboard.views.pair import MOST_PAIRED, pair_panels
 from skred.dashboard.views.pareto_k import pareto_panels
 from skred.dashboard.views.predictive import predictive_panels
 from skred.dashboard.views.prior_posterior import prior_panels
@@ -75,8 +75,8 @@ VIEWS: tuple[ViewKind, ...] = (
     ),
     ViewKind(
         "force", _FOUND, "Force along the track",
-        "Above zero the law brakes too little there, below zero too much. Where the band holds zero, "
-        "nothing is missing that these recordings could show.",
+        "Above zero the law brakes too little there, below zero too much; fast fronts only, where the "
+        "axis says so. Where the band holds zero, nothing is missing that these recordings could show.",
         lambda run: run.kind == "diagnosis" and run.has("force"), force_panels,
     ),
     ViewKind(
@@ -108,19 +108,20 @@ VIEWS: tuple[ViewKind, ...] = (
         "forest", _DRAWS, "Forest",
         "Median (dot), 50 % (thick) and 90 % (thin) of each parameter, a line for each run; numbers "
         "of runs as in the overview.",
-        _posterior, forest_panels, over_all=True, by_parameter=True,
+        _posterior, forest_panels, over_all=True, by_parameter=True, most_parameters=MOST_SHOWN,
     ),
     ViewKind(
         "prior", _DRAWS, "Prior and posterior",
         "Grey: before the recordings. Blue: after them. Where both agree, the recordings taught "
         "nothing.",
         lambda run: _posterior(run) and run.has("prior"), prior_panels, by_parameter=True,
+        drawn_from=("posterior", "prior"),
     ),
     ViewKind(
         "pair", _DRAWS, "Pairs",
         "Each dot is a draw. A narrow band says that the recordings fix a combination of both, not "
         "each by itself.",
-        _posterior, pair_panels, by_parameter=True,
+        _posterior, pair_panels, by_parameter=True, most_parameters=MOST_PAIRED,
     ),
     ViewKind(
         "trace", _DRAWS, "Trace",

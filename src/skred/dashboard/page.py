@@ -30,7 +30,8 @@ def body(given: Given, entries: list[Entry]) -> str:
     groups: dict[str, list[Any]] = {}
     for view in views:
         groups.setdefault(view.group, []).append(view)
-    events = all_events(given)[:MOST_EVENTS]
+    every_event = all_events(given)
+    events = every_event[:MOST_EVENTS]
     catalogue = {
         "entries": [entry.key for entry in entries],
         "views": [{"id": v.id, "title": v.title, "how": v.how, "over_all": v.over_all} for v in views],
@@ -42,6 +43,7 @@ def body(given: Given, entries: list[Entry]) -> str:
         title=TITLE,
         groups=list(groups.items()),
         events=events,
+        n_more=len(every_event) - len(events),
         n_troubles=len(given.troubles),
         catalogue=Markup(in_script(catalogue)),
     )

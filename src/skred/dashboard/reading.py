@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from skred.dashboard.plain_json import plain_json
 from skred.dashboard.run import Run, shown
 from skred.documents import FORMAT, TREE_FORMAT
 from skred.errors import InputError
@@ -138,7 +138,7 @@ def _document(file: Path, key: str) -> dict[str, Any]:
     if file.stat().st_size > _LARGEST_JSON:
         raise InputError(f"{file}: larger than {_LARGEST_JSON // 1_000_000} MB, which no result is")
     try:
-        document = json.loads(file.read_text(encoding="utf-8"))
+        document = plain_json(file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, ValueError, RecursionError) as error:
         raise InputError(f"{file}: not a JSON document ({str(error):.80})") from error
     found = document.get(key) if isinstance(document, dict) else None

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from skred.dashboard.plain_json import plain_json
 from skred.report.shared.labels import shortened, symbol_text, unit_text
 from skred.report.shared.recordings import Recordings, recordings_of
 
@@ -36,6 +37,18 @@ def shown(text: Any, length: int = 40) -> str:
 def shown_parts(*parts: str) -> list[str]:
     """Those of some short texts that say something."""
     return [shown(part, 16) for part in parts if part.strip()]
+
+
+def apart(texts: Sequence[str]) -> list[str]:
+    """Texts that differ: those that are alike are numbered from the second on."""
+    found: dict[str, None] = {}
+    for text in texts:
+        number, one = 1, text
+        while one in found:
+            number += 1
+            one = f"{text} (no. {number})"
+        found[one] = None
+    return list(found)
 
 
 def unit_of(attributes: Mapping[Any, Any]) -> str:
@@ -114,33 +127,42 @@ class Run:
             found[str(name)] = " ".join((shown(text, 48), *shown_parts(said, unit)))
         return found
 
-    def parameters(self, chosen: Sequence[str] = (), group: str = "posterior") -> xr.Dataset:
-        """Draws of up to twelve parameters: ``p0``, ``p1``, ... (chain, draw), with ``label`` and ``axis``.
+    def parameters(
+        self, chosen: Sequence[str] = (), group: str = "posterior", most: int = MOST_PARAMETERS
+    ) -> xr.Dataset:
+        """Draws of some parameters: ``p0``, ``p1``, ... (chain, draw), with ``label`` and ``axis``.
 
         Parameters
         ----------
         chosen : sequence of str
             Labels; the first ones where none is given.
         group : str
+        most : int
+            How many at most.
         """
-        data = self.group(group)
+        data, wanted = self.group(group), frozenset(chosen)
         columns: dict[str, xr.DataArray] = {}
-        for number, (name, at) in enumerate(self.names):
-            label = self.all_labels[number]
-            if name in data and not (chosen and label not in chosen) and len(columns) < MOST_PARAMETERS:
-                values = data[name]
-                if {d: n for d, n in values.sizes.items() if d not in ("chain", "draw")}.keys() == at.keys():
-                    one = values.isel(at).drop_vars(set(values.coords) - {"chain", "draw"})
-                    columns[f"p{number}"] = one.assign_attrs(label=label, axis=self.short_label(name, label))
+        for number, ((name, at), label) in enumerate(zip(self.names, self.all_labels, strict=True)):
+            if len(columns) < most and (not wanted or label in wanted) and _holds(data, name, at):
+                one = data[name].isel(at)
+                one = one.drop_vars(set(one.coords) - {"chain", "draw"})
+                columns[f"p{number}"] = one.assign_attrs(label=label, axis=self.short_label(name, label))
         return xr.Dataset(columns)
+
+    def labels_in(self, *groups: str) -> list[str]:
+        """Labels of the parameters that each of some groups holds."""
+        data = [self.group(group) for group in groups if self.has(group)]
+        if len(data) < len(groups):
+            return []
+        named = zip(self.names, self.all_labels, strict=True)
+        return [label for (name, at), label in named if all(_holds(one, name, at) for one in data)]
 
     def label(self, name: str, at: Mapping[str, int]) -> str:
         """A parameter by its variable and the place in that."""
         text = self.labels.get(name, shown(name))
         if not at:
             return text
-        data = self.group("posterior")[name]
-        places = [str(data[d].values[k]) if d in data.coords else str(k) for d, k in at.items()]
+        places = _places(self.group("posterior")[name], at)
         return f"{text} ({shown(', '.join(places), 24)})"
 
     def short_label(self, name: str, label: str) -> str:
@@ -152,8 +174,14 @@ class Run:
 
     @cached_property
     def all_labels(self) -> list[str]:
-        """Labels of all parameters that can be chosen."""
-        return [self.label(name, at) for name, at in self.names]
+        """Labels of all parameters that can be chosen, each another."""
+        return apart([self.label(name, at) for name, at in self.names])
+
+    @cached_property
+    def identities(self) -> list[str]:
+        """What a parameter is by its full name and place, uncut: the same in runs of the same law."""
+        data = self.group("posterior") if self.names else xr.Dataset()
+        return apart([f"{name}({', '.join(_places(data[name], at))})" for name, at in self.names])
 
     @cached_property
     def likelihood_name(self) -> str | None:
@@ -164,6 +192,23 @@ class Run:
         own = [n for d, n in values.sizes.items() if d not in ("chain", "draw")]
         drawn = {"chain", "draw"} <= set(values.dims)
         return str(name) if drawn and int(np.prod(own)) <= MOST_OBSERVATIONS else None
+
+    @cached_property
+    def observations(self) -> str:
+        """A digest of what was observed, by name and number; empty where the tree does not say."""
+        if not self.has("observed_data"):
+            return ""
+        observed = self.group("observed_data")
+        # Other people's files hold covariates too; the variable of the likelihood is what is predicted.
+        only = [self.likelihood_name] if self.likelihood_name in observed else sorted(map(str, observed))
+        summed = sha256()
+        for name in only:
+            values = observed[name].values
+            if values.dtype.kind in "iufb":
+                values = np.where(np.isnan(values.astype(float)), np.nan, values.astype(float)) + 0.0
+            summed.update(f"{name} {values.shape}".encode())
+            summed.update(values.tobytes() if values.dtype.kind == "f" else repr(values.tolist()).encode())
+        return summed.hexdigest()
 
     @cached_property
     def event_ids(self) -> list[str]:
@@ -228,7 +273,7 @@ class Run:
     def gate(self) -> Mapping[str, Any]:
         """Whether the chains converged; empty where the tree does not say."""
         try:
-            found = json.loads(self.tree.attrs["gate"])
+            found = plain_json(self.tree.attrs["gate"])
         except (KeyError, TypeError, ValueError):
             return {}
         return found if isinstance(found, dict) else {}
@@ -246,6 +291,16 @@ def scalars_of(data: xr.Dataset) -> list[tuple[str, dict[str, int]]]:
                 return found
             found.append((str(name), dict(zip(map(str, own), place, strict=True))))
     return found
+
+
+def _holds(data: xr.Dataset, name: str, at: Mapping[str, int]) -> bool:
+    """Whether a group has a parameter, with the same dimensions beside those of the draws."""
+    return name in data and {d for d in data[name].dims if d not in ("chain", "draw")} == at.keys()
+
+
+def _places(values: xr.DataArray, at: Mapping[str, int]) -> list[str]:
+    """The place of a number in its own dimensions, by their coordinates where they have any."""
+    return [str(values[d].values[k]) if d in values.coords else str(k) for d, k in at.items()]
 
 
 def ids_of(values: xr.DataArray) -> list[str]:

@@ -11,7 +11,9 @@ from typing import Any
 
 import panel
 from bokeh.models import TextInput
+from bokeh.server.auth_provider import AuthProvider
 from panel.io.server import get_server
+from tornado.web import HTTPError, RequestHandler
 
 from skred.dashboard.answer import Entry, answer, entries
 from skred.dashboard.page import TITLE, asset, body
@@ -20,18 +22,44 @@ from skred.dashboard.view import Asked
 from skred.errors import InputError
 
 ADDRESS = "127.0.0.1"
+_OUR_NAMES = ("localhost", ADDRESS)
 _LONGEST_QUESTION = 100_000
 _MOST_ASKED = 100
 _TEMPLATE = """{% extends base %}
 {% block postamble %}<meta name="viewport" content="width=device-width, initial-scale=1">
 <meta http-equiv="Content-Security-Policy" content="\
-default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; connect-src 'self' ws://localhost:*">
+default-src 'self' 'unsafe-inline' 'unsafe-eval' data: blob:; connect-src 'self' ws://localhost:*; \
+object-src 'none'; base-uri 'none'; form-action 'none'">
 <link rel="icon" href="data:,"><style>{{ dashboard_css }}</style>{% endblock %}
 {% block contents %}{{ dashboard_body }}
 <div hidden>{{ embed(roots.question) }}{{ embed(roots.reply) }}</div>
 <script>{{ dashboard_ask }}</script><script>{{ dashboard_js }}</script>{% endblock %}
 """
 # What comes from files is in variables, never in the template itself, where it could be a program.
+
+
+class LocalOnly(AuthProvider):
+    """Answers requests that name this machine, and no others.
+
+    A page elsewhere may have its own name resolved to this machine (DNS rebinding). Its requests still name
+    it, and bokeh asks for the user of each request but those of its own scripts.
+    """
+
+    @property
+    def get_user(self) -> Callable[[RequestHandler], str]:
+        """Everybody who asks this machine by its name is one user."""
+        return _local_user
+
+    @property
+    def login_url(self) -> str:
+        """Nobody is sent here: who is not let in gets 403."""
+        return "/"
+
+
+def _local_user(handler: RequestHandler) -> str:
+    if handler.request.host_name.lower() not in _OUR_NAMES:
+        raise HTTPError(403, "served to this machine only")
+    return "local"
 
 
 class Answers:
@@ -112,7 +140,7 @@ def start(given: Given, port: int = 0) -> tuple[Any, str]:
     try:
         server = get_server(
             lambda: session(answers), port=port, address=ADDRESS, show=False, start=False, title=TITLE,
-            websocket_max_message_size=_LONGEST_QUESTION * 10,
+            websocket_max_message_size=_LONGEST_QUESTION * 10, auth_provider=LocalOnly(),
         )  # fmt: skip
     except OSError as error:
         raise InputError(

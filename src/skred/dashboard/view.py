@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from skred.dashboard.run import MOST_PARAMETERS
 from skred.errors import InputError
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ class Asked:
     Attributes
     ----------
     parameters : sequence of str
-        Labels of the parameters to show; the first twelve where there is none.
+        Labels of the parameters to show; the first ones where there is none.
     can_choose : bool
         Whether somebody can ask for others: a server can be asked, a file cannot.
     """
@@ -73,6 +74,10 @@ class ViewKind:
         Whether it is made of all runs together.
     by_parameter : bool
         Whether it shows the parameters that are asked for.
+    most_parameters : int
+        How many of them at a time.
+    drawn_from : tuple of str
+        Groups that must hold a parameter that it shows.
     """
 
     id: str
@@ -83,3 +88,5 @@ class ViewKind:
     make: Callable[[Any, Given, Asked], list[Panel]]
     over_all: bool = False
     by_parameter: bool = False
+    most_parameters: int = MOST_PARAMETERS
+    drawn_from: tuple[str, ...] = ("posterior",)

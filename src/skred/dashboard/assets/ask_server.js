@@ -16,7 +16,7 @@
             if (resolved) resolved(answer);
           });
           resolve(question);
-        } else if (Date.now() - begun > 30000) reject(new Error("no session"));
+        } else if (Date.now() - begun > 30000) reject(new Error("no session; is the server still there?"));
         else setTimeout(look, 30);
       };
       look();
@@ -28,7 +28,7 @@
     const question = await session(), id = String(++count);
     return new Promise((resolve, reject) => {
       waiting.set(id, resolve);
-      setTimeout(() => { if (waiting.delete(id)) reject(new Error("no reply within five minutes")); }, 300000);
+      setTimeout(() => { if (waiting.delete(id)) reject(new Error("no reply within five minutes; is the server still there?")); }, 300000);
       question.value = JSON.stringify({ id, key, parameters });
     });
   };

@@ -27,15 +27,14 @@
       if (button.dataset.view === view) button.setAttribute("aria-current", "page");
       else button.removeAttribute("aria-current");
     }
-    for (const other of stage.children) other.hidden = true;
     const key = keyOf();
-    if (!made.has(key)) {
-      element("wait").hidden = false;
-      made.set(key, await draw(key, []));
-      element("wait").hidden = true;
-    }
-    if (mine === turn) made.get(key).hidden = false;
-    else made.get(key).hidden = key !== keyOf();
+    for (const other of stage.children) other.hidden = other.dataset.key !== key;
+    if (!made.has(key)) made.set(key, draw(key, []));  // the promise: a second click waits for the first
+    element("wait").hidden = false;
+    const section = await made.get(key);
+    if (mine !== turn) return;  // a later click shows what it asked for, and hides the word
+    element("wait").hidden = true;
+    section.hidden = false;
     document.body.dataset.shown = key;
     document.body.dataset.chosen = chosen === null ? "" : chosen;
   }
@@ -49,13 +48,19 @@
     return section;
   }
 
+  // What is asked last is what a section shows, however the answers come.
   async function fill(section, key, parameters) {
+    const mine = section.dataset.turn = String(Number(section.dataset.turn ?? 0) + 1);
     try {
       const answer = await window.skredAsk(key, parameters);
+      if (section.dataset.turn !== mine) return;
       section.innerHTML = answer.html;
-      for (const item of answer.items) await Bokeh.embed.embed_item(item);
+      for (const item of answer.items) {
+        if (section.dataset.turn !== mine) return;
+        await Bokeh.embed.embed_item(item);
+      }
     } catch (error) {
-      section.textContent = `This view did not come: ${error.message}. Is the server still there?`;
+      section.textContent = `This view did not come: ${error.message}`;
     }
     mark(section);
     watch();

@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from skred.dashboard.figures import BLUE, legend_above, new_figure, points
 from skred.dashboard.reading import Given
-from skred.dashboard.run import Run, shown
+from skred.dashboard.run import Run, apart, shown
 from skred.dashboard.view import Asked, NotShownError, Panel
 from skred.dashboard.views.pareto_k import name_events
 from skred.report.diagnosis.words import title_of
@@ -42,7 +42,7 @@ def candidate_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
 
 def _probabilities(run: Run, ranked: list[tuple[float, str]]) -> Any:
     names = [shown(title_of(run.document, name).partition(":")[0], 32) for _, name in ranked]
-    names = [f"{name} ({k + 1})" if names.count(name) > 1 else name for k, name in enumerate(names)]
+    names = apart(names)
     values = [value for value, _ in ranked]
     source = ColumnDataSource({"name": names, "value": values, "told": [share(v) for v in values]})
     made = new_figure("probability [-]", "", height=90 + 24 * len(names), x_range=(0, 1.25),

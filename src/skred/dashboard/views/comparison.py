@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from skred.dashboard.comparable import Comparable, comparable
 from skred.dashboard.figures import legend_above, new_figure, points, quietly, styled
 from skred.dashboard.reading import Given
 from skred.dashboard.run import Run
-from skred.dashboard.view import Asked, NotShownError, Panel
+from skred.dashboard.view import Asked, Panel
 from skred.dashboard.views.pareto_k import name_events
 from skred.report.shared.style import MARKERS, PALETTE
 
@@ -21,23 +22,23 @@ _BOKEH_MARKERS = {"o": "circle", "s": "square", "D": "diamond", "^": "triangle",
 
 def comparison_panels(run: None, given: Given, asked: Asked) -> list[Panel]:
     """A table and a figure of `arviz.compare` for each set of runs that predict the same, and the events."""
-    sets = comparable(given)
-    if not sets:
-        raise NotShownError(
-            "no two of the runs can be compared: it takes runs of the same recordings with the same"
-            " likelihood; give the folders of two laws, or one of skred compare"
-        )
-    return [panel for runs in sets for panel in _panels(runs)]
+    found = comparable(given.runs)
+    panels = [panel for runs in found.sets for panel in _panels(runs)]
+    if found.others:
+        panels.append(_others(found))
+    return panels
 
 
-def comparable(given: Given) -> list[list[Run]]:
-    """Sets of two or more runs of the same observations with the same likelihood."""
-    sets: dict[tuple[Any, ...], list[Run]] = {}
-    for run in given.runs:
-        if run.can_leave_out:
-            what = [str(run.tree.attrs.get(key, "")) for key in ("campaign_fingerprint", "likelihood")]
-            sets.setdefault((*what, tuple(run.event_ids)), []).append(run)
-    return [runs for runs in sets.values() if len(runs) > 1]
+def _others(found: Comparable) -> Panel:
+    """Runs that are compared with none, and why."""
+    rows = Markup("").join(
+        Markup("<li>run {}, {}: {}</li>").format(run.number, run.title, why) for run, why in found.others
+    )
+    note = "Compared are runs of the same observations with the same likelihood."
+    if not found.sets:
+        note += " Give the folders of two laws, or one of skred compare."
+    title = "Not compared" if found.sets else "No two of the runs can be compared"
+    return Panel(title, html=str(Markup("<ul>{}</ul>").format(rows)), note=note, wide=True)
 
 
 def _panels(runs: Sequence[Run]) -> list[Panel]:
@@ -55,16 +56,32 @@ def _panels(runs: Sequence[Run]) -> list[Panel]:
     title = f"arviz.compare, {len(runs)} runs{f', {likelihood}' if likelihood else ''}"
     best = next(run for run in runs if str(run.number) == table.index[0])
     return [
-        Panel(
-            title, html=_table(table, runs), wide=True, note="elpd: expected log density of a left-out event."
-        ),
+        Panel(title, html=_table(table, runs), wide=True, note=_note(table)),
         Panel("Difference of elpd, with its standard error", made),
         Panel(f"By event: difference to run {best.number}", _by_event(runs, best)),
     ]
 
 
+def _note(table: Any) -> str:
+    """What elpd is, and what ArviZ doubts of the differences."""
+    said = "elpd: log density of the left-out events, summed over the events."
+    doubts = sorted({str(one) for one in table.get("diag_diff", ()) if one})
+    if doubts:
+        said += f" ArviZ doubts the errors of these differences: {', '.join(doubts)} (N: events)."
+    return said
+
+
+def _warning(run: Run) -> str:
+    """What to say of a run whose elpd is not to be relied on."""
+    loo = run.loo
+    if not loo.warning:
+        return ""
+    n = int(np.sum(~(np.asarray(loo.pareto_k, dtype=float) <= float(loo.good_k))))
+    return f" (Pareto k above {float(loo.good_k):.2f} for {n} event{'s' if n != 1 else ''})"
+
+
 def _table(table: Any, runs: Sequence[Run]) -> str:
-    titles = {str(run.number): f"{run.number}: {run.title}" for run in runs}
+    of = {str(run.number): run for run in runs}
     columns = [
         ("rank", "rank", 0), ("elpd", "elpd [nats]", 1), ("se", "standard error", 1),
         ("p", "effective parameters", 1), ("elpd_diff", "difference", 1), ("diff_se", "its error", 1),
@@ -78,8 +95,10 @@ def _table(table: Any, runs: Sequence[Run]) -> str:
             Markup('<td class="n">{}</td>').format(f"{float(row[key]):.{digits}f}")
             for key, _, digits in there
         )
-        warned = " (Pareto k above the limit for some events)" if bool(row.get("warning", False)) else ""
-        rows += Markup("<tr><th>{}{}</th>{}</tr>").format(titles[str(name)], warned, cells)
+        one = of[str(name)]
+        rows += Markup('<tr><th>{}: {}<span class="bad">{}</span></th>{}</tr>').format(
+            one.number, one.title, _warning(one), cells
+        )
     return str(
         Markup("<table><thead><tr><th>run</th>{}</tr></thead><tbody>{}</tbody></table>").format(head, rows)
     )

@@ -10,7 +10,7 @@ from bokeh.models import BoxAnnotation, Span
 
 from skred.dashboard.figures import BLUE, CHOSEN, legend_above, new_figure
 from skred.dashboard.reading import Given
-from skred.dashboard.run import Run
+from skred.dashboard.run import Run, shown
 from skred.dashboard.view import Asked, Panel
 from skred.report.diagnosis.words import stretch_in, title_of
 from skred.report.shared import document as doc
@@ -22,24 +22,47 @@ def force_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
     """The model discrepancy with its band, where avalanches come, and what was added."""
     force = run.group("force")
     s, mean, low, high = (force[name].values.astype(float) for name in ("s", "mean", "low", "high"))
-    made = new_figure("place along the track s [m]", "missing retardation [m/s²]", height=380)
+    of_fast = doc.get(run.document, "report", "force", "nil_at_typical_speed") is True
+    what = "missing retardation of a fast front [m/s²]" if of_fast else "missing retardation [m/s²]"
+    made = new_figure("place along the track s [m]", what, height=380)
     made.varea(s, low, high, color=BLUE, fill_alpha=0.18, legend_label="90 %, the whole profile")
     made.line(s, mean, color=BLUE, line_width=2, legend_label="a force in no list")
     made.add_layout(Span(location=0, dimension="width", line_color=GREY))
     for mechanism in doc.listed(run.document, "mechanisms"):
         _stretch(made, mechanism)
-    added = [
-        title_of(run.document, str(doc.get(one, "id"))) for one in doc.listed(run.document, "mechanisms")
-    ]
-    note = f"Orange: where {', '.join(added)} was added." if added else "Nothing was added."
+    said = _added(run)
+    if of_fast:
+        said.append(
+            "The force is that on a front that is faster than most by the spread of fronts there;"
+            " at the typical speed it is nil."
+        )
+    said.append("Below: how many avalanches come that far, and the places of the sensors (blue).")
     legend_above(made)
     come = new_figure("place along the track s [m]", "share that comes [-]", height=200,
                       x_range=made.x_range)  # fmt: skip
     come.varea(s, np.zeros(len(s)), force["covered"].values, color=GREY, fill_alpha=0.3)
     _sensors(come, run)
-    note += " Below: how many avalanches come that far, and the places of the sensors (blue)."
     both = column(made, come, sizing_mode="stretch_width")
-    return [Panel("What a retardation in no list would have to be", both, note=note, wide=True)]
+    return [Panel("What a retardation in no list would have to be", both, note=" ".join(said), wide=True)]
+
+
+def _added(run: Run) -> list[str]:
+    """What was added, in sentences: orange is only what acts on a stretch."""
+    placed, said = list[str](), list[str]()
+    for one in doc.listed(run.document, "mechanisms"):
+        title = shown(title_of(run.document, str(doc.get(one, "id"))), 80)
+        sensor = doc.get(one, "sensor")
+        if stretch_in(doc.get(one, "location")) is not None:
+            placed.append(title)
+        elif sensor:
+            said.append(f"Not drawn: {title}, added to the readings of {shown(sensor, 30)}.")
+        else:
+            said.append(f"Not drawn: {title}, added along the whole track.")
+    if placed:
+        said.insert(0, f"Orange: where {' and '.join(placed)} was added.")
+    if doc.get(run.document, "profile"):
+        said.append("No mechanism of the list was added, but this force itself (blue).")
+    return said or ["Nothing was added."]
 
 
 def _stretch(made: Any, mechanism: Any) -> None:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import xarray as xr
 from bokeh.models import ColumnDataSource, FactorRange, HoverTool
 
+from skred.dashboard.each import Failures
 from skred.dashboard.figures import new_figure
+from skred.dashboard.parameters import common_parameters
 from skred.dashboard.reading import Given
-from skred.dashboard.run import MOST_PARAMETERS, Run
+from skred.dashboard.run import Run
 from skred.dashboard.view import Asked, NotShownError, Panel
 from skred.report.shared.style import PALETTE
 
+MOST_SHOWN = 24
+"""Parameters, each a small panel."""
 TRUNK, TWIG = 0.5, 0.9
 """Probabilities of the thick and of the thin line, equal-tailed."""
 
@@ -21,15 +27,27 @@ def forest_panels(run: None, given: Given, asked: Asked) -> list[Panel]:
 
     A forest of arviz-plots puts all parameters on one scale: ours have different units.
     """
-    by_label: dict[str, list[tuple[Run, xr.DataArray]]] = {}
-    for one in (one for one in given.runs if one.names):
-        for draws in one.parameters(asked.parameters).values():
-            by_label.setdefault(str(draws.attrs["label"]), []).append((one, draws))
-    if not by_label:
+    failures = Failures()
+    rows_of = common_parameters(given.runs, failures)
+    chosen = [label for label in asked.parameters if label in rows_of] or list(rows_of)[:MOST_SHOWN]
+    if not chosen:
         raise NotShownError("none of the runs has the parameters that were asked for")
-    # What several runs share comes first.
-    chosen = sorted(by_label, key=lambda label: -len(by_label[label]))[: 2 * MOST_PARAMETERS]
-    return [Panel(label, _figure(by_label[label])) for label in chosen]
+    wanted: dict[Run, list[str]] = {}
+    for label in chosen:
+        for one, own in rows_of[label]:
+            wanted.setdefault(one, []).append(own)
+    drawn = dict(failures.of_each(wanted, lambda one: _draws(one, wanted[one])))
+    panels = []
+    for label in chosen:
+        rows = [(one, drawn[one][own]) for one, own in rows_of[label] if one in drawn]
+        if rows:
+            panels.append(Panel(label, _figure(rows)))
+    return panels + failures.panels()
+
+
+def _draws(run: Run, labels: Sequence[str]) -> dict[str, xr.DataArray]:
+    """Draws of some parameters by their labels."""
+    return {str(one.attrs["label"]): one for one in run.parameters(labels, most=len(labels)).values()}
 
 
 def _figure(rows: list[tuple[Run, xr.DataArray]]) -> object:

@@ -11,7 +11,7 @@ from skred.dashboard.reading import Given
 from skred.dashboard.run import Run
 from skred.dashboard.view import Asked, Panel
 
-MOST_PARAMETERS, MOST_DRAWS = 6, 250
+MOST_PAIRED, MOST_DRAWS = 6, 250
 """Parameters, each of which gets a row and a column; draws of a chain."""
 
 
@@ -19,8 +19,8 @@ def pair_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
     """The draws of each pair of parameters, by arviz-plots, each a panel of its own."""
     import arviz_plots as azp
 
-    draws = run.parameters(asked.parameters)
-    names = [str(name) for name in draws.data_vars][:MOST_PARAMETERS]
+    draws = run.parameters(asked.parameters, most=MOST_PAIRED)
+    names = [str(name) for name in draws.data_vars]
     kept = spread_out(draws["draw"], MOST_DRAWS)
     tree = xr.DataTree.from_dict({"posterior": draws[names].isel(draw=kept)})
     if len(names) < 2:
