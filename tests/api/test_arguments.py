@@ -5,10 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import skred
+from skred.api import arguments
+from skred.api.problems import chosen_laws
+from skred.api.sampling import settings_of
 from skred.errors import InputError
+
+HUGE = 10**5000  # has not even a text
 
 
 @pytest.mark.parametrize(
@@ -33,6 +39,12 @@ from skred.errors import InputError
         ({"priors": [("dry_friction", 1)]}, "priors: expected a mapping"),
         ({"seed": -1}, "seed: expected a whole number from 0"),
         ({"seed": "a"}, "seed: expected a whole number"),
+        ({"draws": np.array([500, 600])}, "draws: expected a whole number"),
+        ({"draws": HUGE}, "draws: expected a whole number"),
+        ({"smoothing_m": HUGE}, "smoothing_m: expected a number from 0 to 1000"),
+        ({"priors": {"dry_friction": HUGE}}, "priors.'dry_friction'.: expected a number"),
+        ({"priors": {"dry_friction": "much"}}, "priors.'dry_friction'.: expected a number, found 'much'"),
+        ({"priors": {"dry_friction": -1.0}}, "'dry_friction': expected a scale, a number above 0"),
     ],
 )
 def test_calibrate(options: dict[str, Any], told: str) -> None:
@@ -75,6 +87,11 @@ def test_diagnose(options: dict[str, Any]) -> None:
         ({"speeds_m_s": ["a"]}, "speeds_m_s: expected a number"),
         ({"return_periods_years": 30, "per_year": 1}, "return_periods_years: expected numbers"),
         ({"draws": 1}, "draws: expected a whole number"),
+        ({"per_year": np.array(-0.1)}, "expected above 0"),
+        ({"per_year": np.array([[0.1, 0.0]])}, "per_year: expected a number"),
+        ({"release_s_m": np.array(np.nan)}, "release_s_m: expected a number"),
+        ({"speeds_m_s": np.array(30.0)}, "speeds_m_s: expected numbers"),
+        ({"speeds_m_s": [HUGE]}, "speeds_m_s: expected a number"),
     ],
 )
 def test_predict(options: dict[str, Any], told: str, tmp_path: Path) -> None:
@@ -86,3 +103,18 @@ def test_predict(options: dict[str, Any], told: str, tmp_path: Path) -> None:
 def test_read_campaign(name: Any) -> None:
     with pytest.raises(InputError, match="campaign: expected a folder"):
         skred.read_campaign(name)
+
+
+@pytest.mark.parametrize("value", [np.float32(0.25), np.float64(0.25), np.array(0.25), 0.25])
+def test_numbers_may_be_of_numpy(value: Any) -> None:
+    assert arguments.number("x", value) == 0.25 and type(arguments.number("x", value)) is float
+    [law] = chosen_laws(["pcm"], {"dry_friction": value})
+    assert dict(law.changed_priors) == {"dry_friction": 0.25}
+    settings = settings_of("pooled", np.int64(500), np.int32(600), np.int8(4), np.uint8(1))
+    assert {type(one) for one in (settings.draws, settings.tune, settings.chains, settings.seed)} == {int}
+
+
+@pytest.mark.parametrize("smoothing_m", [-5, "a", np.inf, pytest.param(HUGE, id="huge")])
+def test_front_readings(smoothing_m: Any) -> None:
+    with pytest.raises(InputError, match="smoothing_m: expected a number from 0 to 1000"):
+        skred.front_readings("pcm", smoothing_m=smoothing_m, dry_friction=0.2, turbulent_drag=0.003)

@@ -107,10 +107,10 @@ def diagnose(
     from skred.diagnosis.run import diagnose_to
 
     if max_mechanisms is not None:
-        arguments.whole("max_mechanisms", max_mechanisms, 1, 2)
-    arguments.whole("lock", lock, 0, 10_000)
-    arguments.whole("outer_folds", outer_folds, 0, 10_000)
-    arguments.whole("seed", seed, 0, arguments.SEEDS - 1)
+        max_mechanisms = arguments.whole("max_mechanisms", max_mechanisms, 1, 2)
+    lock = arguments.whole("lock", lock, 0, 10_000)
+    outer_folds = arguments.whole("outer_folds", outer_folds, 0, 10_000)
+    seed = arguments.whole("seed", seed, 0, arguments.SEEDS - 1)
     [chosen] = chosen_laws([law], priors)
     problem = hierarchical_of(campaign_of(campaign), errors, smoothing_m)
     effort = replace(effort_of(quick), exact_loo=exact_loo)

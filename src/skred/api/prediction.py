@@ -145,7 +145,7 @@ def _wanted(
 
     rate = None
     if per_year is not None:
-        pair = per_year if hasattr(per_year, "__iter__") else (per_year, 0.0)
+        pair = per_year if arguments.is_several(per_year) else (per_year, 0.0)
         rate = Rate(*arguments.numbers("per_year", pair, 2))
     places = tuple((name, arguments.number(f"at[{name!r:.40}]", place)) for name, place in at.items())
     return Wanted(places, speeds, pressures, (density[0], density[1]), (drag[0], drag[1]), rate, years)
@@ -155,7 +155,7 @@ def _scenarios(release_s_m: Any) -> list[tuple[float, float]] | None:
     """Releases with their weights."""
     if release_s_m is None:
         return None
-    if not hasattr(release_s_m, "__iter__"):
+    if not arguments.is_several(release_s_m):
         return [(arguments.number("release_s_m", release_s_m), 1.0)]
     if isinstance(release_s_m, (str, bytes)):
         raise InputError(

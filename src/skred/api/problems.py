@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from skred.api.arguments import LIKELIHOODS, mapping, one_of
+from skred.api.arguments import LIKELIHOODS, one_of, scales
 from skred.api.arguments import smoothing as smoothing_length
 from skred.errors import InputError
 
@@ -85,8 +85,7 @@ def chosen_laws(given: list[str | Law], priors: Mapping[str, float] | None) -> l
             laws.append(law)
     if not laws:
         raise InputError("laws: expected at least one")
-    scales = mapping("priors", priors, "parameters to scales")
-    return laws_with_priors([load_law(law) if isinstance(law, str) else law for law in laws], scales)
+    return laws_with_priors([load_law(law) if isinstance(law, str) else law for law in laws], scales(priors))
 
 
 def campaign_of(given: str | Path | Campaign) -> Campaign:
@@ -106,7 +105,7 @@ def problem_of(
     """The problem of a campaign, or what is wrong with it."""
     one_of("likelihood", likelihood, LIKELIHOODS)
     checked = campaign_of(campaign)
-    smoothing_length(smoothing)
+    smoothing = smoothing_length(smoothing)
     if likelihood == "hierarchical":
         return hierarchical_of(checked, errors, smoothing)
     if errors is not None:
@@ -128,7 +127,7 @@ def hierarchical_of(
 
     if errors is not None:
         one_of("errors", errors, tuple(ERROR_MODELS))
-    smoothing_length(smoothing)
+    smoothing = smoothing_length(smoothing)
     try:
         return hierarchical_problem(campaign, error_model=errors or DEFAULT_ERRORS, smoothing_m=smoothing)
     except ValueError as error:
