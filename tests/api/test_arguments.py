@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -87,6 +88,11 @@ def test_diagnose(options: dict[str, Any]) -> None:
         ({"speeds_m_s": ["a"]}, "speeds_m_s: expected a number"),
         ({"return_periods_years": 30, "per_year": 1}, "return_periods_years: expected numbers"),
         ({"draws": 1}, "draws: expected a whole number"),
+        ({"release_s_m": []}, "release_s_m: expected a place, or pairs"),
+        ({"law": ""}, "law: expected an id or a law"),
+        ({"campaign": ""}, "campaign: expected a folder, a name or a campaign"),
+        ({"from_folder": ""}, "from_folder: expected a path"),
+        ({"track": ""}, "track: expected a path"),
         ({"per_year": np.array(-0.1)}, "expected above 0"),
         ({"per_year": np.array([[0.1, 0.0]])}, "per_year: expected a number"),
         ({"release_s_m": np.array(np.nan)}, "release_s_m: expected a number"),
@@ -118,3 +124,15 @@ def test_numbers_may_be_of_numpy(value: Any) -> None:
 def test_front_readings(smoothing_m: Any) -> None:
     with pytest.raises(InputError, match="smoothing_m: expected a number from 0 to 1000"):
         skred.front_readings("pcm", smoothing_m=smoothing_m, dry_friction=0.2, turbulent_drag=0.003)
+
+
+def test_the_same_law_is_taken_once() -> None:
+    pcm = skred.laws()["pcm"]
+    for given in (["pcm", pcm], [pcm, "pcm"], ["pcm", "pcm"], [pcm, pcm]):
+        assert [law.id for law in chosen_laws(given, None)] == ["pcm"]
+
+
+def test_two_laws_of_one_name_are_refused() -> None:
+    other = replace(skred.laws()["pcm"], title="something else")
+    with pytest.raises(InputError, match="laws: two different ones are named 'pcm'"):
+        chosen_laws(["pcm", other], None)

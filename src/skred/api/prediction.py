@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any
 
 from skred.api import arguments
@@ -100,12 +101,13 @@ def predict(
     )
     scenarios = _scenarios(release_s_m)
     for name, path in (("from_folder", from_folder), ("track", track)):
-        if path is not None and not isinstance(path, (str, Path)):
+        if path == "" or not isinstance(path, (str, Path, NoneType)):
             raise InputError(f"{name}: expected a path, found {path!r:.60}")
     if from_folder is None:
         source = None
-        [chosen] = chosen_laws([law or "pcm"], priors)
-        problem = hierarchical_of(campaign_of(campaign or "ryggfonn"), errors, smoothing_m)
+        [chosen] = chosen_laws(["pcm" if law is None else law], priors)
+        recorded = campaign_of("ryggfonn" if campaign is None else campaign)
+        problem = hierarchical_of(recorded, errors, smoothing_m)
     else:
         given = {
             "law": law,
@@ -157,11 +159,12 @@ def _scenarios(release_s_m: Any) -> list[tuple[float, float]] | None:
         return None
     if not arguments.is_several(release_s_m):
         return [(arguments.number("release_s_m", release_s_m), 1.0)]
-    if isinstance(release_s_m, (str, bytes)):
+    pairs = [] if isinstance(release_s_m, (str, bytes)) else list(release_s_m)
+    if not pairs:
         raise InputError(
             f"release_s_m: expected a place, or pairs of place and weight, found {release_s_m!r:.60}"
         )
-    pairs = [arguments.numbers("release_s_m", pair, 2) for pair in release_s_m]
+    pairs = [arguments.numbers("release_s_m", pair, 2) for pair in pairs]
     return [(place, weight) for place, weight in pairs]
 
 
