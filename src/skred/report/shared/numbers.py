@@ -17,7 +17,12 @@ _MOST_ODDS = 50.0
 
 def is_number(value: Any) -> bool:
     """Whether a value of a plain document is a finite number."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    if not isinstance(value, (int, float)) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number beyond all floats
+        return False
 
 
 def floats(values: Sequence[Any] | None) -> NDArray[np.float64]:

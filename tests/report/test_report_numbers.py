@@ -1,0 +1,13 @@
+"""Numbers for people, and what is none."""
+
+import math
+
+import pytest
+
+from skred.report.shared.numbers import ABSENT, fixed, is_number, rounded, share, three_digits
+
+
+@pytest.mark.parametrize("value", [10**400, -(10**400), math.nan, math.inf, None, True, "1", []])
+def test_what_is_no_finite_number_is_not_available(value):
+    assert not is_number(value)
+    assert {fixed(value), three_digits(value), share(value), rounded(value, 2)} == {ABSENT}
