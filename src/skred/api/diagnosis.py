@@ -53,9 +53,10 @@ def identify(
 
     [chosen] = chosen_laws([law], priors)
     problem = hierarchical_of(campaign_of(campaign), errors, smoothing_m)
-    folder = fresh_folder()
-    document = identify_to(problem, chosen, folder, tell)
-    return Result("identify", f"{chosen.title}, on {problem.campaign.name}", document, None, folder)
+    subject = f"{chosen.title}, on {problem.campaign.name}"
+    with fresh_folder() as folder:
+        document = identify_to(problem, chosen, folder, tell)
+        return Result("identify", subject, document, None, folder)
 
 
 def diagnose(
@@ -116,9 +117,10 @@ def diagnose(
     effort = replace(effort_of(quick), exact_loo=exact_loo)
     if max_mechanisms is not None:
         effort = replace(effort, max_mechanisms=max_mechanisms)
-    folder, settings = fresh_folder(), replace(SAMPLING, seed=seed)
-    document = diagnose_to(problem, chosen, settings, effort, folder, tell, lock=lock, folds=outer_folds)
-    result = Result("diagnose", f"{chosen.title}, on {problem.campaign.name}", document, None, folder)
-    base = result.tree("base.nc") if (folder / "base.nc").is_file() else None
-    object.__setattr__(result, "posterior", base)  # before anyone has seen it
-    return result
+    settings, subject = replace(SAMPLING, seed=seed), f"{chosen.title}, on {problem.campaign.name}"
+    with fresh_folder() as folder:
+        document = diagnose_to(problem, chosen, settings, effort, folder, tell, lock=lock, folds=outer_folds)
+        result = Result("diagnose", subject, document, None, folder)
+        base = result.tree("base.nc") if (folder / "base.nc").is_file() else None
+        object.__setattr__(result, "posterior", base)  # before anyone has seen it
+        return result

@@ -125,12 +125,12 @@ def predict(
         chosen, problem = source.stored.calibration.law, source.stored.problem
     where = prediction_track(problem, None if track is None else Path(track), scenarios)
     wanted.check_on(where.length_m)
-    folder = fresh_folder()
     settings = settings_of("hierarchical", draws, tune, chains, seed)
-    document, calibration = predict_to(
-        problem, chosen, settings, folder, tell, where=where, wanted=wanted, source=source
-    )
-    return Result("predict", f"{chosen.title}, on {where.name}", document, calibration.tree, folder)
+    with fresh_folder() as folder:
+        document, calibration = predict_to(
+            problem, chosen, settings, folder, tell, where=where, wanted=wanted, source=source
+        )
+        return Result("predict", f"{chosen.title}, on {where.name}", document, calibration.tree, folder)
 
 
 def _wanted(
