@@ -136,3 +136,28 @@ def test_two_laws_of_one_name_are_refused() -> None:
     other = replace(skred.laws()["pcm"], title="something else")
     with pytest.raises(InputError, match="laws: two different ones are named 'pcm'"):
         chosen_laws(["pcm", other], None)
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda: skred.calibrate("pcm", errors="robust"), "errors: only with likelihood='hierarchical'"),
+        (lambda: skred.predict(at={"a": 1e9}), r"at a=1e\+09: expected a place on the track"),
+        (lambda: skred.predict(speeds_m_s=[-1]), "speeds_m_s -1: expected a number"),
+        (lambda: skred.predict(density_kg_m3=(300, 100)), "density_kg_m3 300,100: expected"),
+        (lambda: skred.predict(return_periods_years=[9]), "return_periods_years: needs per_year"),
+        (lambda: skred.predict(release_s_m=1e9), "release_s_m 1e.09: expected a place on the track"),
+        (lambda: skred.predict(from_folder="nowhere"), "from_folder nowhere: no such folder"),
+        (lambda: skred.diagnose(outer_folds=1), "outer_folds 1: "),
+        (lambda: skred.diagnose(lock=9999), "lock 9999: "),
+    ],
+)
+def test_what_is_refused_further_down_is_told_by_name_too(call: Any, told: str) -> None:
+    with pytest.raises(InputError, match=f"^{told}") as caught:
+        call()
+    assert "--" not in str(caught.value)
+
+
+def test_a_file_that_is_named_like_an_option_keeps_its_name() -> None:
+    with pytest.raises(InputError, match=r"^from_folder /tmp/--out/--at: no such folder"):
+        skred.predict(from_folder="/tmp/--out/--at")

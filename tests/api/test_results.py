@@ -14,6 +14,7 @@ import xarray as xr
 import skred
 from skred.api.results import Result, fresh_folder
 from skred.errors import InputError
+from skred.output import OutputError
 
 ROW = {"name": "<b>", "unit": "&", "mean": 1.0, "sd": 1.0, "low": 1.0, "high": 1.0}
 
@@ -68,3 +69,9 @@ def test_what_is_refused_leaves_no_folder(tmp_path: Path, monkeypatch: pytest.Mo
     with pytest.raises(InputError, match="9999"):
         skred.diagnose(lock=9999)
     assert not list(tmp_path.glob("skred-*"))
+
+
+def test_a_folder_that_holds_files_is_told_by_the_argument(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").touch()
+    with pytest.raises(OutputError, match="choose another path, or force=True"):
+        made([]).report(tmp_path)

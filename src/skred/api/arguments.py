@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
 from operator import index
 from typing import Any
 
@@ -11,6 +13,45 @@ from skred.errors import InputError
 
 MOST_DRAWS, MOST_CHAINS, SEEDS, LONGEST_SMOOTHING_M = 1_000_000, 100, 2**31, 1000.0
 LIKELIHOODS, SAMPLERS = ("pooled", "hierarchical"), ("metropolis", "nuts", "smc")
+
+_NAMES = {
+    "--likelihood hierarchical": "likelihood='hierarchical'",
+    "--sampler metropolis": "sampler='metropolis'",
+    "--force": "force=True",
+    "--speed": "speeds_m_s",
+    "--pressure": "pressures_kpa",
+    "--density": "density_kg_m3",
+    "--return-period": "return_periods_years",
+    "--release": "release_s_m",
+    "--smoothing": "smoothing_m",
+    "--from": "from_folder",
+    "--base-model": "law",
+    "--models": "laws",
+    "--out": "path",
+} | {
+    f"--{name.replace('_', '-')}": name
+    for name in (
+        *("likelihood", "errors", "priors", "sampler", "draws", "tune", "chains", "seed", "exact_loo"),
+        *("at", "drag_coefficient", "per_year", "track", "lock", "outer_folds", "max_mechanisms", "quick"),
+    )
+}
+"""What the options of the commands are called here."""
+_OPTION = re.compile(rf"(?<![\w/-])(?:{'|'.join(sorted(_NAMES, key=len, reverse=True))})(?![\w/-])")
+
+
+def told_by_name[**P, R](function: Callable[P, R]) -> Callable[P, R]:
+    """Let what is refused further down, in the words of the command line, be told by the arguments' names."""
+
+    @wraps(function)
+    def told(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return function(*args, **kwargs)
+        except InputError as error:
+            if len(error.args) == 1:
+                error.args = (_OPTION.sub(lambda option: _NAMES[option[0]], str(error)),)
+            raise
+
+    return told
 
 
 def _refuse(name: str, expected: str, found: Any) -> InputError:

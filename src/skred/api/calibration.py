@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from skred.physics.law import Law
 
 
+@arguments.told_by_name
 def calibrate(
     law: str | Law,
     campaign: str | Path | Campaign = "ryggfonn",
@@ -88,7 +89,7 @@ def calibrate(
     [chosen] = chosen_laws([law], priors)
     problem = problem_of(campaign, likelihood, errors, smoothing_m)
     if sampler == "nuts":
-        warnings.warn(KINKED, UserWarning, stacklevel=2)
+        warnings.warn(KINKED, UserWarning, stacklevel=3)
     settings = settings_of(likelihood, draws, tune, chains, seed, sampler)
     subject = f"{chosen.title}, {likelihood}, on {problem.campaign.name}"
     with fresh_folder() as folder:
@@ -110,6 +111,7 @@ def calibrate_to(
     return calibration
 
 
+@arguments.told_by_name
 def compare(
     laws: Sequence[str | Law] = ("coulomb", "pcm", "constant", "voellmy"),
     campaign: str | Path | Campaign = "ryggfonn",

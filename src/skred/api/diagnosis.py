@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from skred.physics.law import Law
 
 
+@arguments.told_by_name
 def identify(
     law: str | Law = "pcm",
     campaign: str | Path | Campaign = "ryggfonn",
@@ -59,6 +60,7 @@ def identify(
         return Result("identify", subject, document, None, folder)
 
 
+@arguments.told_by_name
 def diagnose(
     law: str | Law = "pcm",
     campaign: str | Path | Campaign = "ryggfonn",

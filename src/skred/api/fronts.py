@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from skred.physics.law import Law
 
 
+@arguments.told_by_name
 def front_readings(
     law: str | Law,
     campaign: str | Path | Campaign = "ryggfonn",

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from skred.prediction.wanted import Wanted
 
 
+@arguments.told_by_name
 def predict(
     law: str | Law | None = None,
     campaign: str | Path | Campaign | None = None,

@@ -12,6 +12,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from skred.api.arguments import told_by_name
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -87,6 +89,7 @@ class Result:
         with xr.open_datatree(self.folder / file, engine="h5netcdf") as opened:
             return opened.load()
 
+    @told_by_name
     def report(self, path: str | Path | None = None, *, force: bool = False) -> Path:
         """Write the documents, the figures and the report, as the command does.
 
