@@ -161,3 +161,12 @@ def test_what_is_refused_further_down_is_told_by_name_too(call: Any, told: str) 
 def test_a_file_that_is_named_like_an_option_keeps_its_name() -> None:
     with pytest.raises(InputError, match=r"^from_folder /tmp/--out/--at: no such folder"):
         skred.predict(from_folder="/tmp/--out/--at")
+
+
+@pytest.mark.parametrize(
+    "given",
+    [{"law": "pcm"}, {"draws": 50}, {"draws": 1000}, {"tune": 50}, {"chains": 2}, {"seed": 0}, {"seed": 1}],
+)
+def test_beside_a_calibration_nothing_is_ignored(given: dict[str, Any], tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=f"made already; leave out {next(iter(given))}"):
+        skred.predict(from_folder=tmp_path, **given)

@@ -46,10 +46,10 @@ def predict(
     errors: str | None = None,
     smoothing_m: float | None = None,
     priors: Mapping[str, float] | None = None,
-    draws: int = 1000,
+    draws: int | None = None,
     tune: int | None = None,
-    chains: int = 4,
-    seed: int = 0,
+    chains: int | None = None,
+    seed: int | None = None,
     tell: Tell = silent,
 ) -> Result:
     """Say how fast and how far the next avalanche goes along a track, and how sure that is.
@@ -60,8 +60,9 @@ def predict(
     Parameters
     ----------
     from_folder : str or Path, optional
-        Folder of a calibration, a prediction or a diagnosis: nothing is sampled then, and neither law,
-        campaign, errors, smoothing nor priors may be given.
+        Folder of a calibration, a prediction or a diagnosis: nothing is sampled then, and nothing that a
+        calibration is made from may be given: law, campaign, errors, smoothing_m, priors, draws, tune,
+        chains or seed.
     track : str or Path, optional
         A table like a campaign's ``track.csv``, by default that of the campaign.
     release_s_m : float or sequence of (float, float), m, optional
@@ -76,6 +77,8 @@ def predict(
         How often avalanches like those recorded start, and the standard deviation of that.
     return_periods_years : sequence of float
         Of the runouts that are passed once in that time; they need `per_year`.
+    draws, tune, chains, seed : int, optional
+        By default 1000, 1000, 4 and 0.
 
     Returns
     -------
@@ -90,7 +93,7 @@ def predict(
     from skred.prediction.source import source_of
     from skred.prediction.track import prediction_track
 
-    arguments.sampling(draws, tune, chains, seed)
+    settings = _settings(draws, tune, chains, seed)
     wanted = _wanted(
         arguments.mapping("at", at, "names to places"),
         arguments.numbers("speeds_m_s", speeds_m_s),
@@ -110,28 +113,36 @@ def predict(
         recorded = campaign_of("ryggfonn" if campaign is None else campaign)
         problem = hierarchical_of(recorded, errors, smoothing_m)
     else:
-        given = {
-            "law": law,
-            "campaign": campaign,
-            "errors": errors,
-            "smoothing_m": smoothing_m,
-            "priors": priors,
-        }
-        for name, value in given.items():
-            if value is not None:
-                raise InputError(
-                    f"predict: the calibration in {from_folder} is made already; leave out {name}"
-                )
+        _refuse_beside(
+            from_folder,
+            {"law": law, "campaign": campaign, "errors": errors, "smoothing_m": smoothing_m}
+            | {"priors": priors, "draws": draws, "tune": tune, "chains": chains, "seed": seed},
+        )
         source = source_of(Path(from_folder))
         chosen, problem = source.stored.calibration.law, source.stored.problem
     where = prediction_track(problem, None if track is None else Path(track), scenarios)
     wanted.check_on(where.length_m)
-    settings = settings_of("hierarchical", draws, tune, chains, seed)
     with fresh_folder() as folder:
         document, calibration = predict_to(
             problem, chosen, settings, folder, tell, where=where, wanted=wanted, source=source
         )
         return Result("predict", f"{chosen.title}, on {where.name}", document, calibration.tree, folder)
+
+
+def _settings(draws: Any, tune: Any, chains: Any, seed: Any) -> SamplerSettings:
+    """Settings of the sampler, those of the command where none are given."""
+    draws, chains, seed = (
+        default if given is None else given for given, default in ((draws, 1000), (chains, 4), (seed, 0))
+    )
+    arguments.sampling(draws, tune, chains, seed)
+    return settings_of("hierarchical", draws, tune, chains, seed)
+
+
+def _refuse_beside(from_folder: str | Path, given: Mapping[str, Any]) -> None:
+    """Refuse what would calibrate otherwise than the folder was, even where it says the same."""
+    for name, value in given.items():
+        if value is not None:
+            raise InputError(f"predict: the calibration in {from_folder} is made already; leave out {name}")
 
 
 def _wanted(
