@@ -1,4 +1,4 @@
-"""Damaged folders of results are told by file; a fault of skred on good ones stays one."""
+"""Damaged folders of results are told by file; a fault of skred on good ones stays one; nothing leads out."""
 
 import json
 import shutil
@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from diagnosis_report_cases import write_documents
-from report_cases import as_saved, calibration, ryggfonn
+from report_cases import as_saved, calibration, comparison, ryggfonn
 
 from skred.cli.main import run
 from skred.inference.results import save
 from skred.output import UNFINISHED, write_json
 from skred.physics.laws import load_law
-from skred.report.folders import write_reports
+from skred.report.folders import ReportError, write_reports
 
 HUGE = 10**400
 pytestmark = pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of what is no number
@@ -137,6 +137,30 @@ def test_a_full_disk_is_no_damage(tmp_path, monkeypatch):
     monkeypatch.setattr("skred.report.diagnosis.report.render_diagnosis", full)
     with pytest.raises(OSError, match="No space"):
         write_reports(tmp_path)
+
+
+@pytest.mark.parametrize("link", ["pcm", "pooled"])
+def test_a_link_leads_nowhere_else(link, good, tmp_path):
+    folder, target = tmp_path / "results", tmp_path / "target"
+    shutil.copytree(good, target / "pcm")
+    shutil.copy(good / "posterior.nc", target)
+    for name in ("events.png", "pcm/events.png"):
+        (target / name).write_bytes(b"of another")
+    document = {"format": 1, "models": [], "pooled": {"models": [{"id": "pcm"}]}}
+    folder.mkdir()
+    write_json(folder / "compare.json", comparison() if link == "pcm" else document)
+    (folder / link).symlink_to("../target", target_is_directory=True)
+    before = contents(target)
+    with pytest.raises(ReportError, match=rf"results/{link}(/pcm)?: a link, not a folder of results"):
+        write_reports(folder)
+    assert contents(target) == before and not list(folder.glob("*.png"))
+
+
+def test_the_folder_itself_may_be_a_link(tmp_path):
+    (tmp_path / "real").mkdir()
+    write_documents("cannot", tmp_path / "real")
+    (tmp_path / "link").symlink_to("real", target_is_directory=True)
+    assert tmp_path / "link" / "report.html" in write_reports(tmp_path / "link")
 
 
 def test_a_folder_in_the_way_is_told_before_anything_is_replaced(tmp_path, capsys):

@@ -1,4 +1,4 @@
-"""The documents that a report is made from, known again if they are unchanged.
+"""The documents that a report is made from: all inside one folder, and known again if they are unchanged.
 
 Result folders come from strangers. What is wrong with one shows wherever its numbers are used, as an error of
 any kind; a fault of skred shows in the same way. They are told apart by what a page says of its documents:
@@ -72,8 +72,12 @@ class Documents:
             self._in_use.remove(name)  # not where its use failed
 
     def _inside(self, name: str) -> Path:
-        """A file of the folder."""
+        """A file of the folder; refused where a link in between leads somewhere else."""
         file = self.folder / name
+        if file.parent.resolve() != self.folder.resolve() / Path(name).parent:
+            raise ReportError(
+                f"{file.parent}: a link, not a folder of results; put the folder itself there, or {AGAIN}"
+            )
         self._read.append(file)
         return file
 
