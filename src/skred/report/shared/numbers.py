@@ -44,6 +44,11 @@ def whole(value: Any) -> str:
     return fixed(value, 0)
 
 
+def counted(value: Any, thing: str) -> str:
+    """How many there are of a thing: 1 avalanche, 2 avalanches."""
+    return f"{whole(value)} {thing}{'' if value == 1 else 's'}"
+
+
 def three_digits(value: Any) -> str:
     """A number to act on, with three significant digits and no exponent; ``n/a`` where there is none."""
     if not is_number(value) or value == 0:
