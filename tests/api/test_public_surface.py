@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
 
 import skred
-from skred.api.results import Result, fresh_folder
+from skred.api.results import Result
 from skred.cli.main import run
 from skred.errors import InputError
 
@@ -72,18 +72,6 @@ def test_arviz_takes_the_posterior(calibrated: Result) -> None:
     assert calibrated.tree("posterior.nc")["along_track"]
     with pytest.raises(FileNotFoundError, match=r"there are: posterior\.nc"):
         calibrated.tree("other.nc")
-
-
-def test_names_are_escaped_and_the_folder_goes_with_the_result() -> None:
-    folder = fresh_folder()
-    row = {"name": "<b>", "unit": "&", "mean": 1.0, "sd": 1.0, "low": 1.0, "high": 1.0}
-    document = {"statement": "<script>", "parameters": [row]}
-    result = Result("calibrate", "<img>", document, None, folder)
-    page = result.html()
-    assert "<script>" not in page and "<img>" not in page and "<b>" not in page and "&lt;b&gt;" in page
-    assert repr(result) == "<skred calibrate: <img>>" and folder.is_dir()
-    del result
-    assert not folder.exists()
 
 
 def test_what_recordings_can_tell(tmp_path: Path) -> None:

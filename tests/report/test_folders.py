@@ -142,7 +142,7 @@ def test_a_figure_that_fails_leaves_everything_as_it_was(tmp_path):
     without = tree.copy()
     without["held_out"] = xr.DataTree(tree["held_out"].to_dataset().drop_vars("low"))
     save(without, tmp_path / "diagnosis.nc")
-    with pytest.raises(KeyError):
+    with pytest.raises(ReportError, match=r"diagnosis\.nc: not as skred writes it \(KeyError.*low"):
         write_reports(tmp_path)
     after = contents(tmp_path)
     assert {name for name in before if before[name] != after[name]} == {

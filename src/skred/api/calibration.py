@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from skred.physics.law import Law
 
 
+@arguments.told_by_name
 def calibrate(
     law: str | Law,
     campaign: str | Path | Campaign = "ryggfonn",
@@ -88,13 +89,14 @@ def calibrate(
     [chosen] = chosen_laws([law], priors)
     problem = problem_of(campaign, likelihood, errors, smoothing_m)
     if sampler == "nuts":
-        warnings.warn(KINKED, UserWarning, stacklevel=2)
-    folder, settings = fresh_folder(), settings_of(likelihood, draws, tune, chains, seed, sampler)
-    calibration = calibrate_to(problem, chosen, settings, folder)
-    document = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    document["statement"] = calibration_statement(calibration.entry())
+        warnings.warn(KINKED, UserWarning, stacklevel=3)
+    settings = settings_of(likelihood, draws, tune, chains, seed, sampler)
     subject = f"{chosen.title}, {likelihood}, on {problem.campaign.name}"
-    return Result("calibrate", subject, document, calibration.tree, folder)
+    with fresh_folder() as folder:
+        calibration = calibrate_to(problem, chosen, settings, folder)
+        document = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        document["statement"] = calibration_statement(calibration.entry())
+        return Result("calibrate", subject, document, calibration.tree, folder)
 
 
 def calibrate_to(
@@ -109,6 +111,7 @@ def calibrate_to(
     return calibration
 
 
+@arguments.told_by_name
 def compare(
     laws: Sequence[str | Law] = ("coulomb", "pcm", "constant", "voellmy"),
     campaign: str | Path | Campaign = "ryggfonn",
@@ -154,15 +157,15 @@ def compare(
         raise InputError(f"laws: expected several, as ['pcm', 'coulomb'], found {laws!r:.60}")
     chosen = chosen_laws(list(laws), priors)
     problem = problem_of(campaign, likelihood, errors, smoothing_m)
-    folder = fresh_folder()
     settings = settings_of(likelihood, draws, tune, chains, seed)
-    document = compare_to(problem, chosen, settings, folder, tell, exact=exact_loo)
     subject = f"{', '.join(law.id for law in chosen)}, {likelihood}, on {problem.campaign.name}"
-    result = Result("compare", subject, document, xr.DataTree(), folder)
-    children = {law.id: result.tree(f"{law.id}/posterior.nc") for law in chosen}
-    assert result.posterior is not None
-    result.posterior.children = children
-    return result
+    with fresh_folder() as folder:
+        document = compare_to(problem, chosen, settings, folder, tell, exact=exact_loo)
+        result = Result("compare", subject, document, xr.DataTree(), folder)
+        children = {law.id: result.tree(f"{law.id}/posterior.nc") for law in chosen}
+        assert result.posterior is not None
+        result.posterior.children = children
+        return result
 
 
 def compare_to(

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from skred.physics.law import Law
 
 
+@arguments.told_by_name
 def identify(
     law: str | Law = "pcm",
     campaign: str | Path | Campaign = "ryggfonn",
@@ -53,11 +54,13 @@ def identify(
 
     [chosen] = chosen_laws([law], priors)
     problem = hierarchical_of(campaign_of(campaign), errors, smoothing_m)
-    folder = fresh_folder()
-    document = identify_to(problem, chosen, folder, tell)
-    return Result("identify", f"{chosen.title}, on {problem.campaign.name}", document, None, folder)
+    subject = f"{chosen.title}, on {problem.campaign.name}"
+    with fresh_folder() as folder:
+        document = identify_to(problem, chosen, folder, tell)
+        return Result("identify", subject, document, None, folder)
 
 
+@arguments.told_by_name
 def diagnose(
     law: str | Law = "pcm",
     campaign: str | Path | Campaign = "ryggfonn",
@@ -107,18 +110,19 @@ def diagnose(
     from skred.diagnosis.run import diagnose_to
 
     if max_mechanisms is not None:
-        arguments.whole("max_mechanisms", max_mechanisms, 1, 2)
-    arguments.whole("lock", lock, 0, 10_000)
-    arguments.whole("outer_folds", outer_folds, 0, 10_000)
-    arguments.whole("seed", seed, 0, arguments.SEEDS - 1)
+        max_mechanisms = arguments.whole("max_mechanisms", max_mechanisms, 1, 2)
+    lock = arguments.whole("lock", lock, 0, 10_000)
+    outer_folds = arguments.whole("outer_folds", outer_folds, 0, 10_000)
+    seed = arguments.whole("seed", seed, 0, arguments.SEEDS - 1)
     [chosen] = chosen_laws([law], priors)
     problem = hierarchical_of(campaign_of(campaign), errors, smoothing_m)
     effort = replace(effort_of(quick), exact_loo=exact_loo)
     if max_mechanisms is not None:
         effort = replace(effort, max_mechanisms=max_mechanisms)
-    folder, settings = fresh_folder(), replace(SAMPLING, seed=seed)
-    document = diagnose_to(problem, chosen, settings, effort, folder, tell, lock=lock, folds=outer_folds)
-    result = Result("diagnose", f"{chosen.title}, on {problem.campaign.name}", document, None, folder)
-    base = result.tree("base.nc") if (folder / "base.nc").is_file() else None
-    object.__setattr__(result, "posterior", base)  # before anyone has seen it
-    return result
+    settings, subject = replace(SAMPLING, seed=seed), f"{chosen.title}, on {problem.campaign.name}"
+    with fresh_folder() as folder:
+        document = diagnose_to(problem, chosen, settings, effort, folder, tell, lock=lock, folds=outer_folds)
+        result = Result("diagnose", subject, document, None, folder)
+        base = result.tree("base.nc") if (folder / "base.nc").is_file() else None
+        object.__setattr__(result, "posterior", base)  # before anyone has seen it
+        return result

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from skred.api import arguments
 from skred.api.problems import campaign_of, chosen_laws
 
 if TYPE_CHECKING:
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from skred.physics.law import Law
 
 
+@arguments.told_by_name
 def front_readings(
     law: str | Law,
     campaign: str | Path | Campaign = "ryggfonn",
@@ -44,6 +46,8 @@ def front_readings(
 
     Raises
     ------
+    skred.errors.InputError
+        If the campaign, the law or the smoothing length cannot be used.
     TypeError
         If parameters are missing or unknown; the message names those of the law.
     """
@@ -53,6 +57,7 @@ def front_readings(
     from skred.physics.geometry import contributions_of, path_of, sensor_table
     from skred.physics.terrain import build_terrain
 
+    smoothing_m = arguments.smoothing(smoothing_m)
     [chosen], recorded = chosen_laws([law], None), campaign_of(campaign)
     if set(parameters) != set(chosen.parameter_names):
         raise TypeError(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any
 
 from skred.api import arguments
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from skred.prediction.wanted import Wanted
 
 
+@arguments.told_by_name
 def predict(
     law: str | Law | None = None,
     campaign: str | Path | Campaign | None = None,
@@ -44,10 +46,10 @@ def predict(
     errors: str | None = None,
     smoothing_m: float | None = None,
     priors: Mapping[str, float] | None = None,
-    draws: int = 1000,
+    draws: int | None = None,
     tune: int | None = None,
-    chains: int = 4,
-    seed: int = 0,
+    chains: int | None = None,
+    seed: int | None = None,
     tell: Tell = silent,
 ) -> Result:
     """Say how fast and how far the next avalanche goes along a track, and how sure that is.
@@ -58,8 +60,9 @@ def predict(
     Parameters
     ----------
     from_folder : str or Path, optional
-        Folder of a calibration, a prediction or a diagnosis: nothing is sampled then, and neither law,
-        campaign, errors, smoothing nor priors may be given.
+        Folder of a calibration, a prediction or a diagnosis: nothing is sampled then, and nothing that a
+        calibration is made from may be given: law, campaign, errors, smoothing_m, priors, draws, tune,
+        chains or seed.
     track : str or Path, optional
         A table like a campaign's ``track.csv``, by default that of the campaign.
     release_s_m : float or sequence of (float, float), m, optional
@@ -74,6 +77,8 @@ def predict(
         How often avalanches like those recorded start, and the standard deviation of that.
     return_periods_years : sequence of float
         Of the runouts that are passed once in that time; they need `per_year`.
+    draws, tune, chains, seed : int, optional
+        By default 1000, 1000, 4 and 0.
 
     Returns
     -------
@@ -88,7 +93,7 @@ def predict(
     from skred.prediction.source import source_of
     from skred.prediction.track import prediction_track
 
-    arguments.sampling(draws, tune, chains, seed)
+    settings = _settings(draws, tune, chains, seed)
     wanted = _wanted(
         arguments.mapping("at", at, "names to places"),
         arguments.numbers("speeds_m_s", speeds_m_s),
@@ -100,35 +105,44 @@ def predict(
     )
     scenarios = _scenarios(release_s_m)
     for name, path in (("from_folder", from_folder), ("track", track)):
-        if path is not None and not isinstance(path, (str, Path)):
+        if path == "" or not isinstance(path, (str, Path, NoneType)):
             raise InputError(f"{name}: expected a path, found {path!r:.60}")
     if from_folder is None:
         source = None
-        [chosen] = chosen_laws([law or "pcm"], priors)
-        problem = hierarchical_of(campaign_of(campaign or "ryggfonn"), errors, smoothing_m)
+        [chosen] = chosen_laws(["pcm" if law is None else law], priors)
+        recorded = campaign_of("ryggfonn" if campaign is None else campaign)
+        problem = hierarchical_of(recorded, errors, smoothing_m)
     else:
-        given = {
-            "law": law,
-            "campaign": campaign,
-            "errors": errors,
-            "smoothing_m": smoothing_m,
-            "priors": priors,
-        }
-        for name, value in given.items():
-            if value is not None:
-                raise InputError(
-                    f"predict: the calibration in {from_folder} is made already; leave out {name}"
-                )
+        _refuse_beside(
+            from_folder,
+            {"law": law, "campaign": campaign, "errors": errors, "smoothing_m": smoothing_m}
+            | {"priors": priors, "draws": draws, "tune": tune, "chains": chains, "seed": seed},
+        )
         source = source_of(Path(from_folder))
         chosen, problem = source.stored.calibration.law, source.stored.problem
     where = prediction_track(problem, None if track is None else Path(track), scenarios)
     wanted.check_on(where.length_m)
-    folder = fresh_folder()
-    settings = settings_of("hierarchical", draws, tune, chains, seed)
-    document, calibration = predict_to(
-        problem, chosen, settings, folder, tell, where=where, wanted=wanted, source=source
+    with fresh_folder() as folder:
+        document, calibration = predict_to(
+            problem, chosen, settings, folder, tell, where=where, wanted=wanted, source=source
+        )
+        return Result("predict", f"{chosen.title}, on {where.name}", document, calibration.tree, folder)
+
+
+def _settings(draws: Any, tune: Any, chains: Any, seed: Any) -> SamplerSettings:
+    """Settings of the sampler, those of the command where none are given."""
+    draws, chains, seed = (
+        default if given is None else given for given, default in ((draws, 1000), (chains, 4), (seed, 0))
     )
-    return Result("predict", f"{chosen.title}, on {where.name}", document, calibration.tree, folder)
+    arguments.sampling(draws, tune, chains, seed)
+    return settings_of("hierarchical", draws, tune, chains, seed)
+
+
+def _refuse_beside(from_folder: str | Path, given: Mapping[str, Any]) -> None:
+    """Refuse what would calibrate otherwise than the folder was, even where it says the same."""
+    for name, value in given.items():
+        if value is not None:
+            raise InputError(f"predict: the calibration in {from_folder} is made already; leave out {name}")
 
 
 def _wanted(
@@ -145,7 +159,7 @@ def _wanted(
 
     rate = None
     if per_year is not None:
-        pair = per_year if hasattr(per_year, "__iter__") else (per_year, 0.0)
+        pair = per_year if arguments.is_several(per_year) else (per_year, 0.0)
         rate = Rate(*arguments.numbers("per_year", pair, 2))
     places = tuple((name, arguments.number(f"at[{name!r:.40}]", place)) for name, place in at.items())
     return Wanted(places, speeds, pressures, (density[0], density[1]), (drag[0], drag[1]), rate, years)
@@ -155,13 +169,14 @@ def _scenarios(release_s_m: Any) -> list[tuple[float, float]] | None:
     """Releases with their weights."""
     if release_s_m is None:
         return None
-    if not hasattr(release_s_m, "__iter__"):
+    if not arguments.is_several(release_s_m):
         return [(arguments.number("release_s_m", release_s_m), 1.0)]
-    if isinstance(release_s_m, (str, bytes)):
+    pairs = [] if isinstance(release_s_m, (str, bytes)) else list(release_s_m)
+    if not pairs:
         raise InputError(
             f"release_s_m: expected a place, or pairs of place and weight, found {release_s_m!r:.60}"
         )
-    pairs = [arguments.numbers("release_s_m", pair, 2) for pair in release_s_m]
+    pairs = [arguments.numbers("release_s_m", pair, 2) for pair in pairs]
     return [(place, weight) for place, weight in pairs]
 
 

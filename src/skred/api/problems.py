@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from skred.api.arguments import LIKELIHOODS, mapping, one_of
+from skred.api.arguments import LIKELIHOODS, one_of, scales
 from skred.api.arguments import smoothing as smoothing_length
 from skred.errors import InputError
 
@@ -72,21 +72,21 @@ def mechanisms() -> dict[str, Mechanism]:
 
 
 def chosen_laws(given: list[str | Law], priors: Mapping[str, float] | None) -> list[Law]:
-    """Laws by id or as they are, with the scales of priors that are given."""
+    """Laws by id or as they are, each once, with the scales of priors that are given."""
     from skred.inference.priors import laws_with_priors
     from skred.physics.law import Law
     from skred.physics.laws import load_law
 
-    laws = list[str | Law]()
-    for law in given:
-        if not isinstance(law, (str, Law)):
-            raise InputError(f"law: expected an id or a law of skred.laws(), found {law!r:.60}")
-        if law not in laws:
-            laws.append(law)
-    if not laws:
+    loaded = dict[str, Law]()
+    for one in given:
+        if not isinstance(one, (str, Law)) or one == "":
+            raise InputError(f"law: expected an id or a law of skred.laws(), found {one!r:.60}")
+        law = load_law(one) if isinstance(one, str) else one
+        if loaded.setdefault(law.id, law) != law:
+            raise InputError(f"laws: two different ones are named {law.id!r:.60}; results go by that name")
+    if not loaded:
         raise InputError("laws: expected at least one")
-    scales = mapping("priors", priors, "parameters to scales")
-    return laws_with_priors([load_law(law) if isinstance(law, str) else law for law in laws], scales)
+    return laws_with_priors(list(loaded.values()), scales(priors))
 
 
 def campaign_of(given: str | Path | Campaign) -> Campaign:
@@ -95,7 +95,7 @@ def campaign_of(given: str | Path | Campaign) -> Campaign:
 
     if isinstance(given, Campaign):
         return given
-    if not isinstance(given, (str, Path)):
+    if not isinstance(given, (str, Path)) or given == "":
         raise InputError(f"campaign: expected a folder, a name or a campaign, found {given!r:.60}")
     return read_campaign(find_campaign(str(given)))
 
@@ -106,7 +106,7 @@ def problem_of(
     """The problem of a campaign, or what is wrong with it."""
     one_of("likelihood", likelihood, LIKELIHOODS)
     checked = campaign_of(campaign)
-    smoothing_length(smoothing)
+    smoothing = smoothing_length(smoothing)
     if likelihood == "hierarchical":
         return hierarchical_of(checked, errors, smoothing)
     if errors is not None:
@@ -128,7 +128,7 @@ def hierarchical_of(
 
     if errors is not None:
         one_of("errors", errors, tuple(ERROR_MODELS))
-    smoothing_length(smoothing)
+    smoothing = smoothing_length(smoothing)
     try:
         return hierarchical_problem(campaign, error_model=errors or DEFAULT_ERRORS, smoothing_m=smoothing)
     except ValueError as error:

@@ -5,14 +5,36 @@ from __future__ import annotations
 import shutil
 import tempfile
 import weakref
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from skred.api.arguments import told_by_name
+
 if TYPE_CHECKING:
     import xarray as xr
+
+
+class _Hold:
+    """Keeps a temporary folder: copies of a result share it, and with the last of them the folder goes."""
+
+    def __init__(self, folder: Path) -> None:
+        weakref.finalize(self, shutil.rmtree, folder, True)
+
+    def __copy__(self) -> _Hold:
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> _Hold:
+        return self
+
+    def __reduce__(self) -> str:
+        raise TypeError(
+            "a result cannot be pickled: its documents are in a temporary folder of this process;"
+            " write them with result.report(folder)"
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,7 +53,7 @@ class Result:
         Draws in ArviZ's groups. Of a comparison one child for each law, of a diagnosis those of the base law;
         None where nothing was sampled.
     folder : Path
-        Holds the documents as long as the result lives; `report` puts them where they stay.
+        Holds the documents as long as the result or a copy of it lives; `report` puts them where they stay.
     """
 
     command: str
@@ -39,10 +61,11 @@ class Result:
     document: dict[str, Any]
     posterior: xr.DataTree | None
     folder: Path
+    _hold: _Hold = field(init=False)
 
     def __post_init__(self) -> None:
-        """Let the folder go with the result."""
-        weakref.finalize(self, shutil.rmtree, self.folder, True)
+        """Let the folder go with the last copy of the result."""
+        object.__setattr__(self, "_hold", _Hold(self.folder))
 
     @property
     def statement(self) -> list[str]:
@@ -50,7 +73,7 @@ class Result:
         said = self.document.get("statement", [])
         return [said] if isinstance(said, str) else list(said)
 
-    def tree(self, file: str) -> xr.DataTree:
+    def tree(self, file: str | Path) -> xr.DataTree:
         """One of the netCDF files, such as ``augmented.nc`` of a diagnosis that added something.
 
         Raises
@@ -60,12 +83,13 @@ class Result:
         """
         import xarray as xr
 
-        there = sorted(str(one.relative_to(self.folder)) for one in self.folder.rglob("*.nc"))
-        if file not in there:
+        there = sorted(one.relative_to(self.folder).as_posix() for one in self.folder.rglob("*.nc"))
+        if Path(file).as_posix() not in there:
             raise FileNotFoundError(f"no {file}; there are: {', '.join(there)}")
         with xr.open_datatree(self.folder / file, engine="h5netcdf") as opened:
             return opened.load()
 
+    @told_by_name
     def report(self, path: str | Path | None = None, *, force: bool = False) -> Path:
         """Write the documents, the figures and the report, as the command does.
 
@@ -116,9 +140,15 @@ def parameter_table(rows: Sequence[dict[str, Any]]) -> str:
     """Parameters of a calibration as an HTML table; nothing where there are none."""
     if not rows:
         return ""
+    from skred.report.shared.numbers import ABSENT, is_number
+
     heads = ("parameter", "unit", "mean", "sd", "5 %", "95 %")
     cells = [
-        [row["name"], row["unit"], *(f"{row[key]:.4g}" for key in ("mean", "sd", "low", "high"))]
+        [
+            row["name"],
+            row["unit"],
+            *(f"{row[key]:.4g}" if is_number(row[key]) else ABSENT for key in ("mean", "sd", "low", "high")),
+        ]
         for row in rows
     ]
     head = "".join(f"<th>{escape(name)}</th>" for name in heads)
@@ -126,6 +156,12 @@ def parameter_table(rows: Sequence[dict[str, Any]]) -> str:
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
-def fresh_folder() -> Path:
-    """A folder of its own for a result's documents."""
-    return Path(tempfile.mkdtemp(prefix="skred-"))
+@contextmanager
+def fresh_folder() -> Iterator[Path]:
+    """A folder of its own for a result's documents; gone again where there is no result."""
+    folder = Path(tempfile.mkdtemp(prefix="skred-"))
+    try:
+        yield folder
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise

@@ -20,7 +20,8 @@ def silent(line: str) -> None:
 def settings_of(
     likelihood: str, draws: int, tune: int | None, chains: int, seed: int, sampler: Sampler = "metropolis"
 ) -> SamplerSettings:
-    """Settings of the sampler from the arguments of a function."""
+    """Settings of the sampler from the arguments of a function, as plain numbers."""
     from skred.inference.sampling import TUNE, SamplerSettings
 
-    return SamplerSettings(sampler, draws, TUNE[likelihood] if tune is None else tune, chains, seed)
+    tuned = TUNE[likelihood] if tune is None else tune
+    return SamplerSettings(sampler, int(draws), int(tuned), int(chains), int(seed))

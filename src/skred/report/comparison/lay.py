@@ -6,15 +6,15 @@ from collections.abc import Sequence
 
 from skred.report.shared.document import Document, failed, get, listed, ranked
 from skred.report.shared.labels import printable
-from skred.report.shared.numbers import is_number, whole
+from skred.report.shared.numbers import counted, is_number
 
 
 def lay_words(comparison: Document) -> list[str]:
     """Sentences that say what was asked, what came out, and what to make of it; no nats, no Pareto k."""
     laws, campaign = ranked(comparison), get(comparison, "campaign")
-    n = whole(get(campaign, "n_events"))
+    n = counted(get(campaign, "n_events"), "avalanche")
     asked = (
-        f"{_number(laws, failed(comparison))} of how avalanches slow down were fitted to the {n} avalanches"
+        f"{_fitted(laws, failed(comparison))} to the {n}"
         f" recorded at {printable(get(campaign, 'name') or 'this path')}. Question: which predicts best an"
         " avalanche that it has not seen?"
     )
@@ -26,10 +26,12 @@ def lay_words(comparison: Document) -> list[str]:
     return [asked, *_answer(laws), *_firm(comparison, n), *_miss(laws), _meaning(laws)]
 
 
-def _number(laws: Sequence[Document], others: Sequence[Document]) -> str:
-    n = len(laws) + len(others)
-    words = {1: "One simple model", 2: "Two simple models", 3: "Three simple models", 4: "Four simple models"}
-    return words.get(n, f"{n} simple models")
+def _fitted(laws: Sequence[Document], others: Sequence[Document]) -> str:
+    n, what = len(laws) + len(others), "of how avalanches slow down"
+    words = {2: "Two", 3: "Three", 4: "Four"}
+    if n == 1:
+        return f"One simple model {what} was fitted"
+    return f"{words.get(n, n)} simple models {what} were fitted"
 
 
 def _answer(laws: Sequence[Document]) -> list[str]:
@@ -60,10 +62,10 @@ def _firm(comparison: Document, n: str) -> list[str]:
     first = printable(get(comparison, "ranking", "best"))
     which = ", ".join(map(printable, listed(closest, "reversed_without")))
     if count <= 2:
-        one = "avalanche" if count == 1 else "avalanches"
-        return [f"Take that with care: without {count} {one} ({which}) {name} would be ahead of {first}."]
+        one = counted(count, "avalanche")
+        return [f"Take that with care: without {one} ({which}) {name} would be ahead of {first}."]
     return [
-        f"That {first} is first does not hang on a few: {count} of the {n} avalanches would have to go before"
+        f"That {first} is first does not hang on a few: {count} of the {n} would have to go before"
         " another were ahead of it."
     ]
 

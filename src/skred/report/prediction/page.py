@@ -12,7 +12,7 @@ from skred.report.prediction.places import has_places, places_figure
 from skred.report.shared import document as doc
 from skred.report.shared.drawing import Picture, draw
 from skred.report.shared.html import page
-from skred.report.shared.numbers import fixed, is_number, three_digits
+from skred.report.shared.numbers import decimals_for, is_number, rounded, three_digits
 from skred.report.shared.style import write_svg
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ def render_prediction(document: doc.Document, figures: Mapping[str, Picture]) ->
         lead=_lead(document) if valid else list(doc.listed(document, "statement")),
         caveats=[line for line in doc.listed(document, "statement") if is_caveat(line)],
         left_out=_left_out(document),
+        added=_added_terms(document),
         once_in=_once_in(document),
         percent=percent,
         period=period,
@@ -105,7 +106,11 @@ def _lead(document: doc.Document) -> list[str]:
         )
     if not told:
         rows = doc.listed(document, "runout", "exceeded_by")
-        said = "; ".join(f"{100 * row['share']:g} % run beyond s = {row['value']:.0f} m" for row in rows)
+        said = "; ".join(
+            f"{100 * row['share']:g} % run {'at least to' if row['at_least'] else 'beyond'}"
+            f" s = {row['value']:.0f} m"
+            for row in rows
+        )
         told.append(f"Of avalanches like those recorded, {said}.")
     return told
 
@@ -134,6 +139,17 @@ def _once_in(document: doc.Document) -> list[doc.Document]:
     return doc.listed(document, "runout", "once_in") if doc.get(document, "valid") is True else []
 
 
+def _added_terms(document: doc.Document) -> list[str]:
+    """What moved the fronts besides the law's own terms, each once, and where."""
+    told = []
+    for row in doc.listed(document, "added"):
+        if row["used"] is True:
+            place = row["place_m"]
+            where = f" from s = {place[0]:.0f} to {place[1]:.0f} m" if place else ""
+            told.append(f"{row['title']}{where}")
+    return list(dict.fromkeys(told))
+
+
 def _left_out(document: doc.Document) -> list[doc.Document]:
     """What does not act here, each once: a force in no list has a row for each of its knots."""
     rows = [row for row in doc.listed(document, "added") if row["used"] is False]
@@ -151,7 +167,7 @@ def period(band: Any) -> str:
 
 def _years(value: float) -> str:
     """Two significant digits: a return period is never known better."""
-    return fixed(float(f"{value:.1e}"), 0 if value >= 10 else 1)
+    return rounded(value, decimals_for(value))
 
 
 def percent(value: Any) -> str:

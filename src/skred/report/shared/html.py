@@ -15,6 +15,7 @@ from skred.report.shared.colours import dark
 from skred.report.shared.inline import colours_in
 from skred.report.shared.labels import name_text, population_role, printable, symbol_text, unit_text
 from skred.report.shared.numbers import (
+    counted,
     decimals_for,
     fixed,
     is_number,
@@ -154,6 +155,7 @@ def environment() -> Environment:
     environment.filters.update(
         fixed=fixed,
         whole=whole,
+        counted=counted,
         share=share,
         odds=odds,
         rounded=rounded,

@@ -17,7 +17,12 @@ _MOST_ODDS = 50.0
 
 def is_number(value: Any) -> bool:
     """Whether a value of a plain document is a finite number."""
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    if not isinstance(value, (int, float)) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number beyond all floats
+        return False
 
 
 def floats(values: Sequence[Any] | None) -> NDArray[np.float64]:
@@ -37,6 +42,11 @@ def fixed(value: Any, decimals: int = 2, *, signed: bool = False) -> str:
 def whole(value: Any) -> str:
     """Format as a whole number."""
     return fixed(value, 0)
+
+
+def counted(value: Any, thing: str) -> str:
+    """How many there are of a thing: 1 avalanche, 2 avalanches."""
+    return f"{whole(value)} {thing}{'' if value == 1 else 's'}"
 
 
 def three_digits(value: Any) -> str:
