@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -66,7 +67,7 @@ def check_format(
     error : type of InputError
     """
     found = content.get("format") if isinstance(content, Mapping) else None
-    if found != expected:
+    if not (isinstance(found, Integral) and found == expected):
         told = f"without {key!r}" if found is None else f"with {key} {found!r:.20} instead of {expected}"
         raise error(f"{file}: written by another version of skred, {told}; {AGAIN}")
 
@@ -93,7 +94,8 @@ def opened_tree(file: Path, error: type[InputError] = InputError) -> Iterator[xr
     if not file.is_file():
         raise error(f"{file}: not there; {AGAIN}")
     try:
-        opened = xr.open_datatree(file, engine="h5netcdf")
+        # HDF5 that is no netCDF may have dimensions without names: they are given some, without a warning
+        opened = xr.open_datatree(file, engine="h5netcdf", phony_dims="access")
     except (OSError, ValueError) as cause:
         raise error(f"{file}: not a netCDF file that can be read ({cause})") from cause
     with opened as tree:

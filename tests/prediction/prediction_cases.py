@@ -115,3 +115,19 @@ def plane(folder: Path, degrees: float = 32.0, length_m: float = 1200.0) -> Path
     rows = [f"{a:.6f},{b:.6f}" for a, b in zip(x, z, strict=True)]
     file.write_text("\n".join(["x_m,z_m", *rows]) + "\n")
     return file
+
+
+def many_gates(folder: Path, n: int) -> Path:
+    """A campaign of three avalanches on a plane with gates every 40 m, the lowest one first in its file."""
+    folder.mkdir()
+    names = [f"gate{k}" for k in range(n)]
+    head = 'format = 1\nname = "gates"\ndescription = ""\nsource = ""\norigin = "simulated"\n'
+    (folder / "campaign.toml").write_text(f"{head}reference_s_m = 50.0\n")
+    plane(folder, length_m=40.0 * n + 300.0).rename(folder / "track.csv")
+    rows = [f"{name},front_velocity,{40 * k + 40},{40 * k + 40},0.1,1\n" for k, name in enumerate(names)]
+    title = "sensor,quantity,s_from_m,s_to_m,relative_sd,absolute_sd\n"
+    (folder / "sensors.csv").write_text(title + "".join(reversed(rows)))
+    (folder / "events.csv").write_text("event,release_s_m\na,0\nb,0\nc,0\n")
+    passed = [f"{event},{name},{10 + k % 5},observed\n" for event in "abc" for k, name in enumerate(names)]
+    (folder / "recordings.csv").write_text("event,sensor,value,status\n" + "".join(passed))
+    return folder

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchic
 from skred.physics.kernel.columns import GRAVITY
 from skred.physics.laws import load_law
 from skred.prediction.at_places import annual_exceedance
-from skred.prediction.places_table import BYTE_ORDER_MARK, COLUMNS
+from skred.prediction.places_table import BYTE_ORDER_MARK, COLUMNS, places_table
 from skred.prediction.predict import Simulation, prediction_of
 from skred.prediction.track import prediction_track
 from skred.prediction.wanted import Rate, Wanted, impact_pressure_kpa
@@ -164,6 +165,29 @@ def test_the_table_and_the_page(problem: HierarchicalProblem, tmp_path: Path) ->
     assert "your frequency of 0.2" in said and "selection" in said and "not per year" not in said
     with xr.open_datatree(out / "prediction.nc", engine="h5netcdf") as tree:
         assert tree["speed_exceedance"].dims == ("at", "speed_threshold")
+
+
+@pytest.mark.parametrize(
+    ("name", "written"),
+    [
+        ("=1+cmd|A1", "'=1+cmd|A1"),
+        ('=HYPERLINK("http://x","y")', '\'=HYPERLINK("http://x","y")'),
+        ("+1", "'+1"),
+        ("-1", "'-1"),
+        ("@SUM(A1)", "'@SUM(A1)"),
+        ("\t=1", "'\t'=1"),
+        (" =1", "' =1"),
+        ("mast;=1+1", "mast;'=1+1"),
+        ("v-1 (a=b)", "v-1 (a=b)"),
+        ("Brücke", "Brücke"),
+    ],
+)
+def test_names_of_others_are_no_formulas(name: str, written: str) -> None:
+    band = {"value": 0.5, "low": 0.4, "high": 0.6}
+    quantity = {"unit": "m/s", "given_reached": [], "exceeded_by": [], "above": []}
+    place = {"name": name, "s_m": 10.0, "reached": band, "speed": quantity, "pressure": quantity}
+    rows = list(csv.reader(io.StringIO(places_table({"at": [place]}), newline="")))
+    assert rows[1][:3] == [written, "10.0", "avalanche comes: probability for an avalanche"]
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -60,6 +61,16 @@ def test_times_in_which_no_avalanche_starts() -> None:
     assert rows[0]["value"] is None and rows[0]["low"] is None and rows[0]["high"] is None
     assert rows[1]["low"] is None and rows[1]["value"] is not None and rows[1]["high"] is not None
     assert rows[2]["at_least"] is True
+
+
+def test_a_population_where_none_starts() -> None:
+    """A gamma distribution with a wide SD has rates that are 0 as far as a computer can tell."""
+    rate = Rate(0.01, 0.1).drawn(np.array([1e-5, 0.5, 0.999]))
+    assert rate[0] == 0.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        [row] = runouts_once_in((30.0,), exponential(3, np.full(3, 100.0)), rate, 5000.0)
+    assert row["low"] is None and row["high"] > 1000.0
 
 
 @pytest.mark.parametrize(

@@ -170,8 +170,46 @@ def test_projected_coordinates_in_a_geojson_are_seen(dem: Path, tmp_path: Path) 
     """A GeoJSON without a reference system is said to be in longitude and latitude."""
     file = tmp_path / "l.geojson"
     file.write_text(shapely.to_geojson(shapely.LineString(on_map(DOWN))))
-    with pytest.raises(InputError, match=r"\(400100, 5.2001e\+06\) are no longitude and latitude"):
+    with pytest.raises(InputError, match=r"\(400100, 5200100\) are no longitude and latitude"):
         make_track(Wanted(dem, file))
+
+
+def turned(points: list[tuple[float, float]]) -> shapely.LineString:
+    return shapely.LineString([(y, x) for x, y in points])
+
+
+@pytest.mark.parametrize("grid", ["utm", "far east", "degrees", "without"])
+def test_coordinates_the_other_way_round_are_the_lines_fault(tmp_path: Path, grid: str) -> None:
+    """Not the terrain's, which measures metres where it lies; in Japan they are not even on the globe."""
+    what, crs, options = "longitude and latitude", GEOGRAPHIC, {}
+    if grid == "utm":
+        dem, points = write_dem(tmp_path / "dem.tif", plane), on_globe(DOWN)
+    elif grid == "far east":
+        dem, points = write_dem(tmp_path / "dem.tif", plane, crs="EPSG:32654"), on_map(DOWN)
+        to = pyproj.Transformer.from_crs("EPSG:32654", GEOGRAPHIC, always_xy=True)
+        points = [to.transform(*point) for point in points]
+    elif grid == "degrees":
+        options = {"crs": GEOGRAPHIC, "corner": (7.7, 46.9), "cell": 1e-4}
+        dem, points = write_dem(tmp_path / "dem.tif", plane, **options), [(7.701, 46.901), (7.706, 46.906)]
+    else:
+        dem, points = write_dem(tmp_path / "dem.asc", plane), on_map(DOWN)
+        what, crs = "easting and northing", UTM
+    line = write_shapes(tmp_path / "line.gpkg", [turned(points)], crs=crs)
+    with pytest.raises(InputError) as error:
+        make_track(Wanted(dem, line))
+    assert f"line.gpkg: {what} of the line are exchanged" in str(error.value)
+    assert "rio warp" not in str(error.value) and "export the line again" in str(error.value)
+
+
+def test_a_line_somewhere_else_is_told_with_both_places(dem: Path, tmp_path: Path) -> None:
+    far = [(x + 9.0, y) for x, y in on_globe(DOWN)]
+    line = write_shapes(tmp_path / "line.geojson", [shapely.LineString(far)], crs=GEOGRAPHIC)
+    with pytest.raises(InputError) as error:
+        make_track(Wanted(dem, line))
+    told = str(error.value)
+    assert "line.geojson: the line lies off the raster: its first point is (16.6" in told
+    assert "in the terrain's reference system (" in told and "dem.tif covers x 400005 to 400995" in told
+    assert "rio warp" not in told
 
 
 def lines_of(n: int) -> list[shapely.LineString]:

@@ -12,7 +12,9 @@ from map_cases import bowl, on_map, plane, write_dem, write_line
 
 from skred.errors import InputError
 from skred.physics.terrain import build_terrain
+from skred.prediction.track import read_track
 from skred.tracks.build import Wanted, make_track
+from skred.tracks.files import track_table
 from skred.tracks.profile import rise_notice, shape, smoothed, smoothed_twice_as_m
 from skred.tracks.statement import track_statement
 
@@ -194,3 +196,41 @@ def test_the_document_says_where_it_comes_from(tmp_path: Path) -> None:
     assert made["terrain"]["reference_system"] == "EPSG:32632 (WGS 84 / UTM zone 32N)"
     assert str(tmp_path) not in json.dumps(made)
     assert on_map(DOWN)[0] == (made["profile"]["east_m"][0], made["profile"]["north_m"][0])
+
+
+@pytest.mark.parametrize("smoothing_m", [0.0, 5.0, 200.0])
+@pytest.mark.parametrize("no_data", [0.0, 500.0])
+def test_a_hole_that_the_file_does_not_declare_is_refused(
+    tmp_path: Path, smoothing_m: float, no_data: float
+) -> None:
+    """However much it is smoothed: that makes a dale of it."""
+
+    def holed(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.where((np.abs(x - 500.0) < 60.0) & (np.abs(y - 500.0) < 60.0), no_data, plane(x, y))
+
+    dem = write_dem(tmp_path / "dem.tif", holed, no_data=None)
+    across = write_line(tmp_path / "line.gpkg", [(100.0, 505.0), (900.0, 505.0)])
+    with pytest.raises(InputError) as error:
+        make_track(Wanted(dem, across, smoothing_m=smoothing_m))
+    told = str(error.value)
+    assert "dem.tif: the ground goes from" in told and "expected at most 80. Are there cells without" in told
+    assert f"{no_data:.1f} m between (400" in told and ", 5200505.0)" in told
+    assert "Declare them (rio edit-info dem.tif --nodata 0)" in told
+    beside = write_line(tmp_path / "beside.gpkg", [(100.0, 205.0), (900.0, 205.0)])
+    assert make_track(Wanted(dem, beside, smoothing_m=smoothing_m))["notices"] == []
+
+
+def test_a_rock_step_is_ground(tmp_path: Path) -> None:
+    """On fine cells it is steeper than 80 degrees before smoothing; other commands read what is written."""
+
+    def step(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return plane(x, y) - np.where(x > 50.0, 12.0, 0.0)
+
+    dem = write_dem(tmp_path / "dem.tif", step, cell=1.0)
+    line = write_line(tmp_path / "line.gpkg", [(10.0, 50.5), (90.0, 50.5)])
+    document = make_track(Wanted(dem, line))
+    assert document["smoothing"]["sampled"]["steepest_deg"] > 80.0
+    (tmp_path / "track.csv").write_text(track_table(document))
+    assert len(read_track(tmp_path / "track.csv").x_m) == len(document["profile"]["x_m"])
+    with pytest.raises(InputError, match="At a cliff, lay the line beside it, or smooth more"):
+        make_track(Wanted(dem, line, smoothing_m=0.0))

@@ -106,8 +106,38 @@ def test_nothing_is_replaced_without_force(
     assert run([*maps, "--out", str(out)]) == 2
     assert f"{there}: is there already" in capsys.readouterr().err and names(out.parent) == [there]
     assert (out.parent / there).read_text() == "mine"
-    assert run([*maps, "--out", str(out), "--force", "--quiet"]) == 0
-    assert names(out.parent) == WRITTEN and (out.parent / there).read_bytes() != b"mine"
+
+
+def test_force_replaces_an_earlier_track(maps: list[str], tmp_path: Path) -> None:
+    out = tmp_path / "out" / "track.csv"
+    words = [*maps, "--out", str(out), "--quiet"]
+    assert run([*words, "--step", "50"]) == 0
+    before = [(out.parent / name).read_bytes() for name in WRITTEN]
+    assert run([*words, "--force"]) == 0
+    assert names(out.parent) == WRITTEN
+    after = [(out.parent / name).read_bytes() for name in WRITTEN]
+    assert all(one != other for one, other in zip(before, after, strict=True))
+
+
+@pytest.mark.parametrize("linked", [False, True])
+def test_force_never_replaces_the_line(
+    maps: list[str], tmp_path: Path, linked: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`--out mine.csv` also writes mine.json: here the line itself, or a link to it."""
+    shape = shapely.LineString(on_map([(100.0, 100.0), (500.0, 400.0)]))
+    line = write_shapes(tmp_path / "line.geojson", [shape], RFC7946="NO")
+    mine = tmp_path / "mine.json"
+    if linked:
+        mine.symlink_to(line)
+    else:
+        line = line.rename(mine)
+    before = line.read_bytes()
+    words = [*maps[:3], "--line", str(line), "--out", str(tmp_path / "mine.csv")]
+    assert run([*words, "--force"]) == 2
+    told = capsys.readouterr().err
+    assert "mine.json: is not the document of a track" in told and "choose another --out" in told
+    assert line.read_bytes() == before and not (tmp_path / "mine.csv").exists()
+    mine.unlink()
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), OSError("full"), ZeroDivisionError()])

@@ -11,34 +11,13 @@ import xarray as xr
 from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY
+from skred.prediction.own_places import own_places, places_left_out
 from skred.prediction.probabilities import PARTS
 from skred.prediction.source import Source
 from skred.prediction.statement import prediction_statement
 from skred.prediction.terms import added_rows
 from skred.prediction.track import PredictionTrack
-from skred.prediction.wanted import MOST_PLACES, Wanted
-
-_MOST_SENSORS = 30
-
-
-def named_places(problem: HierarchicalProblem, track: PredictionTrack) -> list[tuple[str, float]]:
-    """Sensors of speed (spans by their middle) and the reference, on the campaign's own track only."""
-    if not track.is_own:
-        return []
-    sensors = [s for s in problem.campaign.sensors if not s.is_runout][:_MOST_SENSORS]
-    named = [(sensor.id, 0.5 * (sensor.s_from_m + sensor.s_to_m)) for sensor in sensors]
-    if track.reference_s_m is not None:
-        named.append(("reference", track.reference_s_m))
-    return sorted(((name, min(s, track.length_m)) for name, s in named), key=lambda place: place[1])
-
-
-def shown_places(
-    problem: HierarchicalProblem, track: PredictionTrack, wanted: Wanted
-) -> list[tuple[str, float]]:
-    """Places of the table: those asked for, else the sensors and the reference of the campaign's track."""
-    if wanted.places:
-        return sorted(wanted.places, key=lambda place: place[1])
-    return named_places(problem, track)[:MOST_PLACES]
+from skred.prediction.wanted import Wanted
 
 
 def prediction_document(
@@ -81,12 +60,15 @@ def prediction_document(
         "gate": calibration.gate.as_dict(),
         "interval": {"kind": INTERVAL_KIND, "probability": INTERVAL_PROBABILITY},
     }
-    document |= {"from": None if source is None else source.as_dict(), **(wanted or Wanted()).as_dict()}
+    wanted = wanted or Wanted()
+    document |= {"from": None if source is None else source.as_dict(), **wanted.as_dict()}
     added = () if source is None else source.stored.added
     document["added"] = added_rows(added, track)
     used = dict.fromkeys(row["title"].partition(":")[0] for row in document["added"] if row["used"])
     if used:
         document["law"]["title"] += f", with {' and '.join(used)}"
+    left_out = places_left_out(problem, track, wanted)
+    document["places_left_out"] = [{"name": name, "s_m": s} for name, s in left_out]
     empty = ("simulation", "reading_errors", "runout", "places", "at")
     document |= dict.fromkeys(empty) if data is None else _numbers(problem, track, data)
     document["statement"] = prediction_statement(document)
@@ -128,7 +110,7 @@ def _numbers(problem: HierarchicalProblem, track: PredictionTrack, data: xr.Data
             "beyond_shortest_recorded": _runout_parts(data, "long_runout"),
         },
         "at": json.loads(data.attrs["at"]),
-        "places": [_place(data, name, s) for name, s in named_places(problem, track)],
+        "places": [_place(data, name, s) for name, s in own_places(problem, track).shown],
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,6 +12,8 @@ BYTE_ORDER_MARK = "\N{ZERO WIDTH NO-BREAK SPACE}"
 """At the start of the file: by it Excel knows the text as UTF-8."""
 COLUMNS = ("place", "s [m]", "what", "threshold", "unit", "value", "low (90 %)", "high (90 %)")
 _ENDS = ("value", "low", "high")
+_FORMULA = re.compile(r"(^|[;\t\r\n])(?=\s*[=+\-@\N{FULLWIDTH EQUALS SIGN}\N{FULLWIDTH PLUS SIGN}])")
+"""Where a spreadsheet would see a formula: at the start, and after what ends a cell in some countries."""
 Row = tuple[str, str, str, dict[str, Any]]
 """What, threshold, unit, and a value with its band."""
 
@@ -29,7 +32,7 @@ def places_table(document: dict[str, Any]) -> str:
     for place in document["at"]:
         for what, threshold, unit, band in _rows(place):
             numbers = (_number(band[key]) for key in _ENDS)
-            writer.writerow([place["name"], f"{place['s_m']:.1f}", what, threshold, unit, *numbers])
+            writer.writerow([_text(place["name"]), f"{place['s_m']:.1f}", what, threshold, unit, *numbers])
     return text.getvalue()
 
 
@@ -54,6 +57,14 @@ def _chances(what: str, threshold: str, row: dict[str, Any]) -> Iterator[Row]:
     if "annual" in row:
         yield f"{what}: probability in a year", threshold, "1", row["annual"]
         yield f"{what}: return period", threshold, "years", row["return_period_years"]
+
+
+def _text(name: str) -> str:
+    """A name that a spreadsheet takes as text: an apostrophe where it would see a formula.
+
+    Names of sensors come with campaigns of others, and what is computed may read files or call other hosts.
+    """
+    return _FORMULA.sub(r"\1'", name)
 
 
 def _number(value: float | None) -> str:

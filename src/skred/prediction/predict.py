@@ -25,9 +25,10 @@ from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY
 from skred.inference.results import FORMAT, save
 from skred.physics.law import Law
 from skred.prediction.at_places import at_places, unrecorded
-from skred.prediction.document import named_places, prediction_document, recorded_runouts, shown_places
+from skred.prediction.document import prediction_document, recorded_runouts
 from skred.prediction.files import write_prediction
 from skred.prediction.fronts import new_fronts
+from skred.prediction.own_places import own_places, shown_places
 from skred.prediction.probabilities import prediction_dataset, simulation_errors
 from skred.prediction.reading_errors import reading_error
 from skred.prediction.return_periods import runouts_once_in
@@ -229,7 +230,7 @@ def _places(
     fitting = (step for step in _STEPS_M if length <= _MOST_STEPS * step)
     step = next(fitting, length / _MOST_STEPS)
     regular = np.arange(0.0, length, step)
-    own = [place for _, place in (*named_places(problem, track), *named)]
+    own = [place for _, place in (*own_places(problem, track).shown, *named)]
     within = [s for s in (*regular, *own, *recorded_runouts(problem, track)) if 0.0 <= s < length]
     return np.array([*sorted(set(within)), length])
 

@@ -42,7 +42,7 @@ def runouts_once_in(
     ordered, per_year = runouts.ravel()[farthest_first], np.cumsum(weights[farthest_first])
     rows = []
     for time in years:
-        each = np.array([_once(row, share) for row, share in zip(runouts, 1.0 / (rate * time), strict=True)])
+        each = np.array([_once(row, n) for row, n in zip(runouts, rate * time, strict=True)])
         low, high = (_end(value) for value in np.quantile(each, [tail, 1.0 - tail], method="nearest"))
         # Of all populations together: the runout that is passed with the mean frequency 1 / T.
         value = float(ordered[np.searchsorted(per_year, 1.0 / time)]) if per_year[-1] > 1.0 / time else None
@@ -59,9 +59,9 @@ def runouts_once_in(
     return rows
 
 
-def _once(runouts: FloatArray, share: float) -> float:
-    """The runout that a share of a population's avalanches passes; minus infinity where there are fewer."""
-    return float(np.quantile(runouts, 1.0 - share)) if share < 1.0 else -np.inf
+def _once(runouts: FloatArray, expected: float) -> float:
+    """The runout that one of `expected` avalanches passes; minus infinity where fewer than one start."""
+    return float(np.quantile(runouts, 1.0 - 1.0 / expected)) if expected > 1.0 else -np.inf
 
 
 def _end(value: float) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from skred.inference.between_events import BetweenEvents
@@ -91,7 +92,18 @@ def _once_in(document: dict[str, Any]) -> list[str]:
 
 
 def _at_places(document: dict[str, Any]) -> list[str]:
-    return [_at(place) for place in document["at"]]
+    return [*(_at(place) for place in document["at"]), *_left_out(document.get("places_left_out", ()))]
+
+
+def _left_out(places: Sequence[dict[str, Any]]) -> list[str]:
+    """Sensors of speed that no table shows; nothing where all are shown."""
+    if not places:
+        return []
+    first, last = (f"{place['name']}, s = {place['s_m']:.0f} m" for place in (places[0], places[-1]))
+    if len(places) == 1:
+        return [f"Probabilities at the sensor farthest up ({first}) are not shown; --at asks for it."]
+    which = f"{len(places)} sensors farther up ({first}, to {last})"
+    return [f"Probabilities at {which} are not shown; --at asks for them."]
 
 
 def _at(place: dict[str, Any]) -> str:

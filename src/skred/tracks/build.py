@@ -16,6 +16,7 @@ from skred.tracks.plan import Plan
 from skred.tracks.profile import (
     Shape,
     goes_uphill,
+    require_ground,
     rise_notice,
     sampled,
     shape,
@@ -113,6 +114,7 @@ def make_track(wanted: Wanted) -> dict[str, Any]:
             plan = plan.then(extension.plan)
         along, points = plan.resampled(step)
         z = sampled(elevations, points)
+        require_ground(elevations, along, points, z, wanted.smoothing_m)
         profile = _profile(along, points, z, wanted.smoothing_m)
         s_m = np.array(profile["s_m"])
         notices += rise_notice(s_m, z)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -10,6 +11,9 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from skred.errors import InputError
+
+_DOCUMENT = {"format", "skred", "profile"}
+"""What every document of a track has; none of the files that a track is made from does."""
 
 
 @contextmanager
@@ -21,7 +25,7 @@ def track_files(out: Path, *, force: bool = False) -> Iterator[Path]:
     out : Path
         The table, whose name ends in .csv; the others have its name with another end. Folders are made.
     force : bool
-        Replace files that are there.
+        Replace files of an earlier track that are there.
 
     Yields
     ------
@@ -56,7 +60,8 @@ def require_free(out: Path, *, force: bool = False) -> list[Path]:
     out : Path
         The table.
     force : bool
-        They may be there.
+        They may be there, as files of an earlier track: a ``.json`` that is something else, such as the line
+        that is read, stays.
 
     Returns
     -------
@@ -76,7 +81,21 @@ def require_free(out: Path, *, force: bool = False) -> list[Path]:
             raise InputError(f"{target}: a folder is where this file is to go; choose another --out")
         if target.exists() and not force:
             raise InputError(f"{target}: is there already; choose another --out, or --force to replace it")
+    if targets[1].exists() and not _is_of_a_track(targets[1]):
+        raise InputError(
+            f"{targets[1]}: is not the document of a track, which would be written here; --force replaces "
+            "nothing else: choose another --out, or move the file away"
+        )
     return targets
+
+
+def _is_of_a_track(file: Path) -> bool:
+    """Whether a file is the document of a track, of any version."""
+    try:
+        content = json.loads(file.read_bytes())
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(content, dict) and _DOCUMENT <= content.keys()
 
 
 def track_table(document: Mapping[str, Any]) -> str:

@@ -2,56 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from skred.campaign.problems import shown
 from skred.errors import InputError
+from skred.tracks.features import Feature, read_features
 from skred.tracks.plan import Plan, plan_of
 
-if TYPE_CHECKING:
-    from pyproj import CRS
-
-SUFFIXES = (".shp", ".geojson", ".json", ".gpkg", ".gpx")
-"""What is read, by the end of the file's name."""
-MOST_FEATURES = 1000
 MOST_VERTICES = 1_000_000
 _LISTED = 20
-
-
-@dataclass(frozen=True, eq=False)
-class Feature:
-    """One thing on a map.
-
-    Attributes
-    ----------
-    file : Path
-    layer : str
-        The file's layer that it is in.
-    number : int
-        Its number there, from 0; in a GeoPackage its key, mostly from 1.
-    name : str
-        What the file calls it; empty where it has no name.
-    geometry : shapely geometry
-    crs : pyproj.CRS or None
-        None where the file does not say.
-    """
-
-    file: Path
-    layer: str
-    number: int
-    name: str
-    geometry: Any
-    crs: CRS | None
-
-    @property
-    def label(self) -> str:
-        """How messages speak of it."""
-        return f"feature {self.number}" + (f" ({shown(self.name, 40)})" if self.name else "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,70 +56,6 @@ def read_line(file: Path, layer: str | None = None, feature: str | None = None) 
     if not lines:
         raise InputError(f"{file}: holds no line; draw one along the track, from top to bottom")
     return _as_line(_chosen(file, lines, layer, feature))
-
-
-def read_features(file: Path, layer: str | None = None) -> list[Feature]:
-    """Everything with a geometry in a file.
-
-    Parameters
-    ----------
-    file : Path
-    layer : str, optional
-        By default all layers; of a GPX file its tracks and routes.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, has no such layer or holds too much.
-    """
-    import pyogrio
-    from pyogrio.errors import DataLayerError, DataSourceError
-
-    if file.suffix.lower() not in SUFFIXES:
-        raise InputError(f"{file}: expected a line as {', '.join(SUFFIXES)}; export it as one of these")
-    if not file.is_file():
-        raise InputError(f"{file}: there is no such file; give a line as {', '.join(SUFFIXES)}")
-    try:
-        layers = [str(name) for name, kind in pyogrio.list_layers(file) if kind is not None]
-        if layer is not None and layer not in layers:
-            raise InputError(
-                f"--layer {layer}: {file} holds {', '.join(map(shown, layers))}; choose one of these"
-            )
-        if file.suffix.lower() == ".gpx" and layer is None:
-            layers = [name for name in layers if name in ("tracks", "routes")]
-        return [one for name in layers if layer in (None, name) for one in _layer(file, name)]
-    except (DataSourceError, DataLayerError) as error:
-        raise InputError(f"{file}: cannot be read ({shown(str(error), 200)}); export it again") from error
-
-
-def _layer(file: Path, layer: str) -> list[Feature]:
-    """Everything with a geometry in a layer."""
-    import pyogrio
-    import shapely
-    from pyproj import CRS
-
-    meta, numbers, shapes, columns = pyogrio.raw.read(
-        file, layer=layer, max_features=MOST_FEATURES + 1, return_fids=True
-    )
-    if len(numbers) > MOST_FEATURES:
-        raise InputError(
-            f"{file}, layer {shown(layer)}: more than {MOST_FEATURES} features; export the one line"
-        )
-    crs = CRS.from_user_input(meta["crs"]) if meta["crs"] else None
-    names = _names(meta["fields"], columns, len(numbers))
-    found = []
-    for number, shape, name in zip(numbers.tolist(), shapes, names, strict=True):
-        if shape is not None:
-            found.append(Feature(file, layer, int(number), name, shapely.from_wkb(shape), crs))
-    return found
-
-
-def _names(fields: Sequence[str], columns: Sequence[Any], n: int) -> list[str]:
-    """What features are called: the column `name` in any case."""
-    for field, column in zip(fields, columns, strict=True):
-        if str(field).lower() == "name":
-            return ["" if value is None or value != value else str(value) for value in column]
-    return [""] * n
 
 
 def _chosen(file: Path, lines: list[Feature], layer: str | None, feature: str | None) -> Feature:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.campaign.track_rules import STEEPEST_DEG
 from skred.errors import InputError
 from skred.physics.terrain import smoothed_slopes
 from skred.tracks.elevations import Elevations
@@ -19,6 +20,8 @@ _SHOWN_STRETCHES = 3
 _STEP = 0.1
 """Length of the stretches by which slopes are averaged, in smoothing lengths."""
 _MOST_STEPS = 1_000_000
+MOST_SMOOTHED_M = 5.0
+"""Smoothing behind which a hole of the terrain model still has edges."""
 _RISES_M = 0.5
 """A rise that is told of is higher."""
 
@@ -64,6 +67,46 @@ def _stretches(bad: NDArray[np.bool_], off: NDArray[np.bool_], plan: Plan) -> It
         else:
             ends = f"{along[start]:.0f} to {along[last]:.0f} m along the line"
             yield f"{what} from {places[0]} to {places[1]}, {ends}"
+
+
+def require_ground(
+    elevations: Elevations, along: FloatArray, points: Plan, z: FloatArray, smoothing_m: float
+) -> None:
+    """Refuse steps that no command reads as a track: mostly edges of holes that the file does not declare.
+
+    Parameters
+    ----------
+    elevations : Elevations
+    along : (n,) array, m
+        Horizontal distance.
+    points : Plan
+        The track's points.
+    z : (n,) array, m
+        Elevations there, as sampled.
+    smoothing_m : float
+        Of what is written. Steps are looked for after at most `MOST_SMOOTHED_M`, because more makes a gentle
+        dale of a hole.
+
+    Raises
+    ------
+    InputError
+        If a stretch is steeper than a track may be; with its coordinates.
+    """
+    ground = smoothed(along, z, min(smoothing_m, MOST_SMOOTHED_M))
+    degrees = np.degrees(np.abs(np.arctan2(np.diff(ground), np.diff(along))))
+    k = int(degrees.argmax())
+    if degrees[k] <= STEEPEST_DEG:
+        return
+    start, end = max(0, k - 1), min(len(z) - 1, k + 2)  # an edge may lie between two points
+    places = " and ".join(f"({points.x[i]:.1f}, {points.y[i]:.1f})" for i in (start, end))
+    cliff = "lay the line beside it" + (", or smooth more" if smoothing_m < MOST_SMOOTHED_M else "")
+    raise InputError(
+        f"{elevations.file}: the ground goes from {z[start]:.1f} to {z[end]:.1f} m between {places}, "
+        f"{along[k]:.0f} m along the track, at up to {degrees[k]:.1f} degrees; expected at most "
+        f"{STEEPEST_DEG:g}. Are there cells without data that the file does not declare, such as 0? Declare "
+        f"them (rio edit-info {elevations.file.name} --nodata 0), and fill them or move the line. At a "
+        f"cliff, {cliff}"
+    )
 
 
 def goes_uphill(z: FloatArray) -> bool:

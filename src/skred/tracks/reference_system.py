@@ -82,19 +82,18 @@ def in_the_terrains(
             )
     if terrain is None:
         _require_no_degrees(elevations)
+        _require_on_the_raster(line, elevations, None)
         notices.append("neither file has a reference system: taken to be in the same one, in metres")
         return line.plan, None, notices
-    plan = line.plan
+    plan = _require_on_the_raster(line, elevations, terrain)
     if of_line is None:
         notices.append(
             f"{line.feature.file.name} has no reference system: taken to be in that of the terrain, "
             f"{named(terrain)}"
         )
     elif not _same(of_line, terrain):
-        moved = _transformed(line, terrain)
-        known = _known_to(plan, of_line, terrain)
+        known = _known_to(line.plan, of_line, terrain)
         notices.append(f"line brought from {named(of_line)} into the terrain's {named(terrain)}{known}")
-        plan = moved
     _require_metres(terrain, plan, elevations)
     return plan, terrain, notices
 
@@ -170,26 +169,58 @@ def _assumed(line: MapLine, elevations: Elevations) -> CRS | None:
     return crs
 
 
-def _transformed(line: MapLine, terrain: CRS) -> Plan:
-    """The vertices of the line in another reference system."""
-    plan, source = line.plan, line.feature.crs
-    assert source is not None
-    if _horizontal(source).is_geographic and (np.abs(plan.x).max() > 360 or np.abs(plan.y).max() > 90):
-        at = _first_point(plan)
+def _require_on_the_raster(line: MapLine, elevations: Elevations, terrain: CRS | None) -> Plan:
+    """The line in the terrain's reference system, with a point on the raster at least.
+
+    Before anything is said of the terrain: a line in the wrong place says nothing about it.
+    """
+    file, source, given = line.feature.file, line.feature.crs, line.plan
+    plan = _placed(given, source, terrain)
+    if plan is not None and elevations.contains(plan.x, plan.y).any():
+        return plan
+    at, moved = _first_point(given), source is not None and terrain is not None and not _same(source, terrain)
+    turned = _placed(Plan(given.y, given.x), source, terrain)
+    geographic = source is not None and _horizontal(source).is_geographic
+    if turned is not None and elevations.contains(turned.x, turned.y).any():
+        what = "longitude and latitude" if geographic else "easting and northing"
         raise InputError(
-            f"{line.feature.file}: coordinates such as {at} are no longitude and latitude, which the file "
+            f"{file}: {what} of the line are exchanged: {at} lies off the raster {elevations.file.name}, and "
+            "the other way round on it; export the line again, with the easting or the longitude first"
+        )
+    if geographic and moved and not _on_the_globe(given):
+        raise InputError(
+            f"{file}: coordinates such as {at} are no longitude and latitude, which the file "
             "says they are; export the line with its reference system, for example as .gpkg"
         )
+    if plan is None:
+        assert source is not None and terrain is not None
+        raise InputError(f"{file}: {at} in {named(source)} has no place in {named(terrain)}")
+    there = f", in the terrain's reference system {_first_point(plan, '.1f')}" if moved else ""
+    left, low, right, high = elevations.bounds
+    raise InputError(
+        f"{file}: the line lies off the raster: its first point is {at}{there}; "
+        f"{elevations.file.name} covers x {left:.10g} to {right:.10g}, y {low:.10g} to {high:.10g}. Give the "
+        "line that belongs to this terrain, or correct its coordinates or its reference system"
+    )
+
+
+def _placed(plan: Plan, source: CRS | None, terrain: CRS | None) -> Plan | None:
+    """Vertices in another reference system; None where they have no place there."""
+    if source is None or terrain is None or _same(source, terrain):
+        return plan
+    if _horizontal(source).is_geographic and not _on_the_globe(plan):
+        return None
     x, y = transformed(plan.x, plan.y, source, terrain)
-    if not (np.all(np.isfinite(x)) and np.all(np.isfinite(y))):
-        raise InputError(
-            f"{line.feature.file}: {_first_point(plan)} in {named(source)} has no place in {named(terrain)}"
-        )
-    return plan_of(x, y)
+    return plan_of(x, y) if np.all(np.isfinite(x)) and np.all(np.isfinite(y)) else None
 
 
-def _first_point(plan: Plan) -> str:
-    return f"({plan.x[0]:.6g}, {plan.y[0]:.6g})"
+def _on_the_globe(plan: Plan) -> bool:
+    """Whether coordinates can be longitude and latitude."""
+    return bool(np.abs(plan.x).max() <= 360 and np.abs(plan.y).max() <= 90)
+
+
+def _first_point(plan: Plan, form: str = ".10g") -> str:
+    return f"({plan.x[0]:{form}}, {plan.y[0]:{form}})"
 
 
 def _require_metres(terrain: CRS, plan: Plan, elevations: Elevations) -> None:

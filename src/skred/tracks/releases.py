@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign.problems import shown
-from skred.tracks.lines import Feature, read_features
+from skred.tracks.features import Feature, read_features
 from skred.tracks.plan import Plan
 from skred.tracks.reference_system import moved_into
 
