@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -206,8 +206,7 @@ def _calibrations(found: Outcome) -> list[dict[str, Any]]:
     alone, same_errors = found.calibration, found.reference
     entries = [_calibration([], alone, found.before if same_errors is alone else None)]
     if same_errors is not alone:
-        assert isinstance(same_errors.problem, HierarchicalProblem)
-        errors = same_errors.problem.error_model.title
+        errors = cast(HierarchicalProblem, same_errors.problem).error_model.title
         entries.append(_calibration([], same_errors, found.before) | {"errors": errors})
     names = [step.candidate.mechanism.id for step in found.steps]
     for number, step in enumerate(found.steps, start=1):
