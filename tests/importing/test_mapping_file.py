@@ -51,6 +51,19 @@ def test_the_mapping_of_the_formats_files(tmp_path: Path, capsys: pytest.Capture
     assert prints[0] == prints[1] == read_campaign(write_texts(tmp_path / "plain", TEXTS)).fingerprint()
 
 
+def test_two_covariates_of_the_formats_files_do_not_become_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    events = TEXTS["events.csv"].replace("snow_temperature_degC", "temperature")
+    folder = write_texts(tmp_path / "in", {**TEXTS, "events.csv": events})
+    column = "temperature=covariate name=release_s_m"
+    code, _, err = skred(capsys, "import", folder, "--column", column, "--out", tmp_path / "out")
+    told = (
+        "events.csv, row 1, column temperature: it would be called 'release_s_m', as is column 'release_s_m'"
+    )
+    assert code == 2 and told in err, err
+
+
 def test_a_declared_column_that_is_not_there(
     tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from import_cases import TRACK, in_dialect, written
 
@@ -70,11 +71,19 @@ def test_any_campaign_in_any_dialect(
         folder = Path(name)
         write_campaign(campaign, folder / "plain")
         texts = {file.name: file.read_text(encoding="utf-8") for file in (folder / "plain").iterdir()}
+        assume(encoding != "latin-1" or not any(map(is_utf_8_too, texts.values())))
         how = {"separator": separator, "decimal": decimal, "encoding": encoding, "newline": newline}
         other = in_dialect(texts, folder / "other", **how)
         imported = answered(Files([other]), {"encoding": encoding, "decimal": decimal})
         write_imported(imported, folder / "out")
         assert read_campaign(folder / "out").fingerprint() == campaign.fingerprint()
+
+
+def is_utf_8_too(text: str) -> bool:
+    """Whether a text's bytes in Latin-1 are another text in UTF-8: nothing in such a file tells which."""
+    with suppress(UnicodeError):
+        return text.encode("latin-1").decode("utf-8") != text
+    return False
 
 
 def answered(files: Files, answers: dict[str, str]) -> Any:

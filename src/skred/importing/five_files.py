@@ -53,9 +53,7 @@ def read_five_files(
     tables, notations = dict[str, DraftTable](), dict[str, Notation]()
     names = _covariates(sheets["events"], declared, questions)
     for table, sheet in sheets.items():
-        renames = names if table == "events" else {}
-        kept = [name for name in sheet.columns if renames.get(name, name) != ""]
-        written = {renames.get(name, name): name for name in kept}
+        written = _written(sheet, names if table == "events" else {}, problems)
         numeric = [new for new in written if _is_numeric(table, new)]
         cells = ((line, written[new], text) for new in numeric for line, text in sheet.cells(written[new]))
         try:
@@ -77,6 +75,20 @@ def read_five_files(
     if problems:
         raise CampaignError(problems)
     return tables, notations
+
+
+def _written(sheet: Sheet, renames: Mapping[str, str], problems: list[Problem]) -> dict[str, str]:
+    """The columns that are kept, by their new names; two that would have one are a problem."""
+    written = dict[str, str]()
+    for name in sheet.columns:
+        new = renames.get(name, name)
+        if new != "" and written.setdefault(new, name) != name:
+            message = (
+                f"it would be called '{new}', as is column '{written[new]}'; give it another name with "
+                '--column "NAME=covariate name=OTHER"'
+            )
+            problems.append(Problem(sheet.file, sheet.header_line, name, None, message))
+    return written
 
 
 def rows_with_points(
