@@ -52,7 +52,7 @@ def test_a_result_is_not_pickled() -> None:
 
 
 def test_a_number_that_is_not_there_is_shown_as_such() -> None:
-    assert "<td>n/a</td>" in made([ROW | {"mean": None, "sd": 10**400}])._repr_html_()
+    assert "<td>n/a</td>" in made([ROW | {"mean": None, "sd": 10**400}]).html()
 
 
 def test_a_tree_is_named_by_a_text_or_a_path() -> None:
