@@ -34,6 +34,17 @@ def test_the_format_that_is_written_is_read(tmp_path: Path) -> None:
         assert tree.attrs["format"] == TREE_FORMAT
 
 
+def test_a_small_file_that_holds_more_than_fits_into_memory_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "posterior.nc"
+    with h5py.File(file, "w") as opened:
+        opened.attrs["format"] = TREE_FORMAT
+        opened.create_dataset("big", (2_000_000_000,), "f8", chunks=(1024,))
+    assert file.stat().st_size < 100_000
+    with pytest.raises(InputError, match=r"posterior\.nc: holds more than 4 GB"):
+        with opened_tree(file):
+            pass
+
+
 @pytest.mark.parametrize("found", [[FORMAT], {"format": FORMAT}, "1", [[FORMAT, FORMAT]]])
 def test_a_format_of_a_json_document_that_is_no_number_is_refused(found: Any, tmp_path: Path) -> None:
     file = tmp_path / "summary.json"

@@ -22,6 +22,8 @@ FORMAT = 1
 TREE_FORMAT = 3
 """Of netCDF files."""
 MOST_BYTES = 100_000_000
+MOST_VARIABLES, LARGEST_TREE = 20_000, 4_000_000_000
+"""Of netCDF files, the latter in bytes."""
 AGAIN = "run the command that wrote it again"
 
 
@@ -100,4 +102,14 @@ def opened_tree(file: Path, error: type[InputError] = InputError) -> Iterator[xr
         raise error(f"{file}: not a netCDF file that can be read ({cause})") from cause
     with opened as tree:
         check_format(file, tree.attrs, "format", TREE_FORMAT, error)
+        check_size(file, tree, error)
         yield tree
+
+
+def check_size(file: Path, tree: xr.DataTree, error: type[InputError] = InputError) -> None:
+    """Refuse what would not fit into memory, before it is read: a small file may unpack to any size."""
+    nodes = list(tree.subtree)
+    if sum(len(node.variables) for node in nodes) > MOST_VARIABLES:
+        raise error(f"{file}: more than {MOST_VARIABLES} variables; write fewer of them")
+    if sum(int(v.nbytes) for node in nodes for v in node.variables.values()) > LARGEST_TREE:
+        raise error(f"{file}: holds more than {LARGEST_TREE // 10**9} GB; thin its draws")

@@ -53,7 +53,7 @@ def test_unknown_names_are_refused_with_the_known_ones(name: str) -> None:
         laws_with_priors([load_law("pcm")], {name: 1.0})
 
 
-@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf"), True, "1", None])
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf"), 10**400, True, "1", None])
 def test_what_is_no_scale_is_refused(value: Any) -> None:
     with pytest.raises(PriorsError, match="a number above 0"):
         laws_with_priors([load_law("pcm")], {"dry_friction": value})

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from skred.dashboard.plain_json import plain_json
 from skred.dashboard.run import Run, shown
-from skred.documents import FORMAT, TREE_FORMAT
+from skred.documents import FORMAT, TREE_FORMAT, check_size
 from skred.errors import InputError
 
 if TYPE_CHECKING:
@@ -17,9 +17,8 @@ if TYPE_CHECKING:
 
 _AGAIN = "run the command that wrote it again"
 _LARGEST_JSON = 50_000_000
-_LARGEST_FILE, _LARGEST_TREE = 2_000_000_000, 4_000_000_000
-"""Bytes of a file, and of what is in it: a small file may hold a large compressed tree."""
-_MOST_VARIABLES = 20_000
+_LARGEST_FILE = 2_000_000_000
+"""Bytes of a file."""
 _MOST_RUNS = 24
 _OF_A_DIAGNOSIS = {
     "base.nc": "base law",
@@ -162,7 +161,7 @@ def _tree(file: Path, *, of_ours: bool) -> xr.DataTree:
             if of_ours and opened.attrs.get("format") != TREE_FORMAT:
                 told = f"format {opened.attrs.get('format')!r:.20} instead of {TREE_FORMAT}"
                 raise InputError(f"{file}: written by another version of skred, {told}; {_AGAIN}")
-            _check_size(file, opened)
+            _check_tree(file, opened)
             return opened.load() if of_ours else _cleaned(opened.load())
     except InputError:
         raise
@@ -187,13 +186,9 @@ def _cleaned(tree: xr.DataTree) -> xr.DataTree:
     return cleaned
 
 
-def _check_size(file: Path, tree: xr.DataTree) -> None:
-    """Refuse what would not fit into memory, before it is read."""
-    nodes = list(tree.subtree)
-    if sum(len(node.variables) for node in nodes) > _MOST_VARIABLES:
-        raise InputError(f"{file}: more than {_MOST_VARIABLES} variables; write fewer of them")
-    if sum(int(v.nbytes) for node in nodes for v in node.variables.values()) > _LARGEST_TREE:
-        raise InputError(f"{file}: holds more than {_LARGEST_TREE // 10**9} GB; thin its draws")
+def _check_tree(file: Path, tree: xr.DataTree) -> None:
+    """Refuse what would not fit into memory, and what holds nothing to show."""
+    check_size(file, tree)
     if not {"posterior", "observed_data", "constant_data", "prior"} & set(tree.children):
         raise InputError(
             f"{file}: has none of ArviZ's groups, such as posterior; expected a file that ArviZ wrote"

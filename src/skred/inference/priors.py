@@ -72,10 +72,13 @@ def laws_with_priors(laws: Sequence[Law], priors: Mapping[str, float] | None) ->
 
 
 def _scale(name: str, value: Any, where: str = "priors: ") -> float:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not number or not (math.isfinite(value) and value > 0.0):
+    try:
+        number = math.nan if isinstance(value, (bool, str, bytes)) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not (math.isfinite(number) and number > 0.0):
         raise PriorsError(f"{where}{name!r:.60}: expected a scale, a number above 0, found {value!r:.60}")
-    return float(value)
+    return number
 
 
 def _with_scales(law: Law, priors: Mapping[str, float]) -> Law:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from skred.report.shared.document import Document
 
 MOST_SHOWN = 7
-"""Places drawn at most: more lines are not told apart."""
+"""Places drawn at most, the lowest: more lines are not told apart, and fewer avalanches come there."""
 _FLOOR, _LEAST = 0.0005, 0.005
 _DASHES = ("-", (0, (6, 2)), (0, (1.5, 1.5)), (0, (6, 2, 1.5, 2)))
 
@@ -44,7 +44,8 @@ def places_figure(document: Document, tree: xr.DataTree) -> Figure:
         The content of ``prediction.nc``.
     """
     data = tree.to_dataset()
-    title = f"At the named places of {figure_text(data.attrs['track'], 40)}"
+    n, name = len(data["at"]), figure_text(data.attrs["track"], 40)
+    title = f"At the {f'{MOST_SHOWN} lowest of {n}' if n > MOST_SHOWN else 'named'} places of {name}"
     figure = new_figure(3.9, f"{title}\nlines: of all avalanches; bands: 90 % credible")
     speed, pressure = side_by_side(figure, 2, sharey=True)
     for axes, name, words in ((speed, "speed", "front speed"), (pressure, "pressure", "impact pressure")):
@@ -69,7 +70,8 @@ def _thresholds(document: Document, name: str) -> list[float]:
 def _curves(axes: Axes, data: xr.Dataset, name: str) -> None:
     """One line and band for each place."""
     at = data[f"{name}_threshold"].values
-    for k, place in enumerate(data["at"].values[:MOST_SHOWN]):
+    data = data.isel(at=slice(-MOST_SHOWN, None))
+    for k, place in enumerate(data["at"].values):
         value, low, high = (
             np.maximum(data[f"{name}_exceedance{end}"].values[k], _FLOOR) for end in ("", "_low", "_high")
         )
