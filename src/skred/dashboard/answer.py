@@ -92,7 +92,7 @@ def _told(message: str) -> str:
 
 def _panel(panel: Panel, target: str) -> Markup:
     figure = (
-        Markup('<div class="fig" id="{}" role="img" aria-label="{}"></div>').format(target, panel.title)
+        Markup('<div class="fig" id="{}" role="group" aria-label="{}"></div>').format(target, panel.title)
         if panel.figure is not None
         else ""
     )
