@@ -24,7 +24,7 @@ from typing import Annotated, Any
 import cyclopts
 
 from benchmarks.commit import commit
-from benchmarks.files import RESULTS, ROOT, write
+from benchmarks.files import RESULTS, ROOT, as_columns, rounded, write
 from benchmarks.reference.pairs import (
     campaigns_in,
     draw_candidate,
@@ -36,6 +36,8 @@ from benchmarks.reference.table import summary, table
 from skred.output import write_json
 
 RESULT = RESULTS / "evidence_reference.json"
+DIGITS = 4
+"""Significant digits of a pair that are kept: of a hundred nats a tenth."""
 NESTED_EVERY = 5
 """No multiple of the number of base laws: each of them has its turn."""
 app = cyclopts.App(help=__doc__)
@@ -127,8 +129,15 @@ def main(
         return 0
     found = summary(records)
     print(table(found))
-    write(result, {"commit": commit(), **found, "pairs": records})
+    write(result, {"commit": commit(), **found, "pairs": as_columns([_kept(one) for one in records])})
     return 0
+
+
+def _kept(record: dict[str, Any]) -> dict[str, Any]:
+    """What the result has of a pair: in digits that matter, of shapes what they have."""
+    shapes = [{key: value for key, value in one.items() if value} for one in record["shapes"]]
+    kept: dict[str, Any] = rounded(record | {"shapes": shapes}, DIGITS)
+    return kept
 
 
 def _line(record: dict[str, Any]) -> str:
