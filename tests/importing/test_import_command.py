@@ -34,8 +34,10 @@ class Terminal:
         environment = {**os.environ, "COLUMNS": "200", "TERM": "dumb", "NO_COLOR": "1"}
         command = [sys.executable, "-m", "skred.cli", *map(str, arguments)]
         self.process = subprocess.Popen(
-            command, stdin=inner, stdout=inner, stderr=inner, env=environment, start_new_session=True
-        )
+            command, stdin=inner, stdout=inner, stderr=inner, env=environment, start_new_session=True,
+            # As in a terminal, however the tests were started: what runs in the background has it ignored.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        )  # fmt: skip
         os.close(inner)
         self.said = ""
 
