@@ -12,7 +12,7 @@ from markupsafe import Markup
 from skred.dashboard.catalogue import VIEWS
 from skred.dashboard.parameters import Choice, choice
 from skred.dashboard.reading import Given
-from skred.dashboard.run import Run
+from skred.dashboard.run import OF_A_FILE, Run
 from skred.dashboard.view import Asked, NotShownError, Panel, ViewKind
 
 _NUMBER = itertools.count()
@@ -52,7 +52,7 @@ def _applies(view: ViewKind, run: Run) -> bool:
     """Whether a view can be made; a stranger's file that it stumbles over has no such view."""
     try:
         return view.applies(run)
-    except Exception:
+    except OF_A_FILE:
         return False
 
 

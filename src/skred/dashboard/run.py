@@ -26,6 +26,8 @@ MOST_EVENTS = 1000
 """Events that can be chosen."""
 MOST_OBSERVATIONS = 20_000
 """Of a variable: with more of them, leaving out one by one says little and takes long."""
+OF_A_FILE = (ArithmeticError, AttributeError, LookupError, OSError, RuntimeError, TypeError, ValueError)
+"""What a library may raise of a stranger's file that is not what it seems."""
 _MOST_LISTED = 500
 
 
@@ -229,12 +231,12 @@ class Run:
 
     @cached_property
     def can_leave_out(self) -> bool:
-        """Whether `loo` can be computed; of a stranger's file it may fail in any way."""
+        """Whether `loo` can be computed."""
         if self.likelihood_name is None:
             return False
         try:
             return len(np.ravel(self.loo.pareto_k)) == len(self.event_ids)
-        except Exception:
+        except OF_A_FILE:
             return False
 
     @cached_property

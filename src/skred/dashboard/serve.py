@@ -52,7 +52,7 @@ class LocalOnly(AuthProvider):
 
     @property
     def login_url(self) -> str:
-        """Nobody is sent here: who is not let in gets 403."""
+        """Nobody is sent here: others get 403."""
         return "/"
 
 
