@@ -9,7 +9,7 @@ from skred.diagnosis.augment.problem import as_diagnosed
 from skred.diagnosis.compare.comparison import with_errors
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import Place, candidates_of, leading
-from skred.diagnosis.compare.screening import curve, screening_budget
+from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import Base, curve_near, fit_base
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.linear_mixed_model import mean_prior
@@ -34,15 +34,14 @@ def fitted_base(problem: HierarchicalProblem, law: Law) -> Base:
 def engine_log_bayes_factor(base: Base, mechanism: Mechanism, shapes: Sequence[Shape]) -> float:
     """Log Bayes factor of a mechanism against nothing, averaged over some shapes alone.
 
-    Screened, the leading shapes computed with fronts, and then anew with more quadrature points, as a
-    comparison does; no shape is split into others.
+    Screened, the leading shapes computed anew, and then with more quadrature points, as a comparison does; no
+    shape is split into others.
     """
-    budget = screening_budget(base)
-    screened = [curve(base, mechanism, one, budget) for one in shapes]
+    screened = [curve(base, mechanism, one) for one in shapes]
     places: dict[int, Place] = {}
     while todo := [k for k in leading(screened, places) if k not in places]:
         for k in todo:
-            places[k] = Place((curve_near(base, mechanism, shapes[k], screened[k], budget),))
+            places[k] = Place((curve_near(base, screened[k], shapes[k]),))
     candidates = candidates_of(screened, places)
     with ThreadPoolExecutor(1) as pool:
         again, _ = recomputed(base, candidates, [], pool)

@@ -56,7 +56,7 @@ def _at(base: Base, name: str, place: tuple[float, float], factor: float) -> flo
     speeds = factor * np.interp(place, base.setting.terrain.edge_s_m, base.setting.front_speed)
     shape = Shape(*place, constants=((U_1, float(speeds[0])), (U_2, float(speeds[1]))))
     rough = curve_at(base, mechanism, shape, mechanism.added.scale * np.array(STRENGTHS), USUAL)
-    return curve_near(base, mechanism, shape, rough, USUAL).log_bayes_factor
+    return curve_near(base, rough, shape).log_bayes_factor
 
 
 def opposed_trials() -> dict[str, tuple[dict[str, Any], float | None]]:

@@ -28,7 +28,7 @@ from skred.diagnosis.evidence.conditional_map import (
 from skred.diagnosis.evidence.event_quadrature import (
     FINE,
     FIRST,
-    FRONTS,
+    SCREENING,
     USUAL,
     Budget,
     importance_nodes,
@@ -43,7 +43,7 @@ from studies.thresholds.compared_again import base_on
 app = cyclopts.App(help=__doc__)
 RESULT = RESULTS / "line_nodes.json"
 LAWS = ("coulomb", "constant")
-BUDGETS = {"first round": FIRST, "first look": FRONTS, "usual": USUAL, "fine": FINE}
+BUDGETS = {"first round": FIRST, "first look": SCREENING, "usual": USUAL, "fine": FINE}
 EXACT, MANY = USUAL.times(256), USUAL.times(32)
 KEPT = 0.125
 """Share of the comparison's curves that are computed again."""
@@ -62,12 +62,12 @@ class Integration(NamedTuple):
 
 
 def integrations(comparison: Comparison) -> list[Integration]:
-    """Those of one in eight curves of fronts, screened or computed again, by all error models."""
+    """Those of one in eight curves, screened or computed again, by all error models."""
     rng, kept = np.random.default_rng(0), list[Integration]()
     for under_errors in comparison.under_each:
         finer = [one for candidate in under_errors.candidates.values() for one in candidate.curves]
         for curve in {id(one): one for one in (*under_errors.screened, *finer)}.values():
-            if not curve.rough and rng.random() < KEPT:
+            if rng.random() < KEPT:
                 kept.append(integration_of(under_errors.base, curve))
     return kept
 

@@ -27,7 +27,6 @@ from skred.diagnosis.evidence.conditional_map import (
     event_modes,
     log_joint,
 )
-from skred.diagnosis.evidence.event_quadrature import ROUGH
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
 from skred.diagnosis.tabulated.coefficient_grid import finer, locate
@@ -84,7 +83,7 @@ def curve_of(base: Base, mechanism_id: str) -> Curve:
     mechanism = mechanisms()[mechanism_id]
     assert mechanism.added is not None
     shape = mechanism.added.shapes(base.setting)[0]
-    return curve_near(base, mechanism, shape, curve(base, mechanism, shape, ROUGH), ROUGH)
+    return curve_near(base, curve(base, mechanism, shape), shape)
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,6 @@ from skred.diagnosis.compare.between import gains_of, may_differ, ways_of
 from skred.diagnosis.compare.candidate import BESIDE, log_gain
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
-from skred.diagnosis.evidence.event_quadrature import ROUGH
 from skred.diagnosis.evidence.extension import extended, setting_of
 from skred.inference.between_events import (
     PRIOR,
@@ -52,7 +51,7 @@ def stretch_curve(base: Base, mechanism_id: str = "segment_friction") -> Curve:
     assert mechanism.added is not None
     first = next(one for one in mechanism.added.shapes(base.setting) if one.s_from_m is not None)
     shape = replace(first, s_from_m=STRETCH[0], s_to_m=STRETCH[1])
-    return curve_near(base, mechanism, shape, curve(base, mechanism, shape, ROUGH), ROUGH)
+    return curve_near(base, curve(base, mechanism, shape), shape)
 
 
 def made_campaign(law_id: str, mean: list[float], sd: list[float], own: np.ndarray, seed: int) -> Campaign:
@@ -157,7 +156,7 @@ def test_a_base_law_with_the_term_has_the_same_evidence() -> None:
     drag = mechanisms()["turbulent_drag"]
     assert drag.added is not None
     shape = drag.added.shapes(coulomb.setting)[0]
-    found = curve_near(coulomb, drag, shape, curve(coulomb, drag, shape, ROUGH), ROUGH)
+    found = curve_near(coulomb, curve(coulomb, drag, shape), shape)
     ways = ways_of(coulomb, found)
     differ = ways[SPREAD].log_evidence - coulomb.fit.found.log_evidence
     assert differ - found.log_bayes_factor > 20.0

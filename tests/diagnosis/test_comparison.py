@@ -13,10 +13,10 @@ from skred.diagnosis.compare.candidate import FORM, Candidate
 from skred.diagnosis.compare.comparison import with_errors, worth_comparing
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import Place, candidates_of, leading, refine
-from skred.diagnosis.compare.screening import curve, screened, screening_budget
+from skred.diagnosis.compare.screening import curve, screened
 from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at, curve_near
-from skred.diagnosis.evidence.event_quadrature import FINE, FIRST, FRONTS, ROUGH, USUAL
+from skred.diagnosis.evidence.event_quadrature import FINE, FIRST, SCREENING, USUAL
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.refit import Rounds, refit
 from skred.physics.mechanisms import mechanisms
@@ -33,7 +33,7 @@ def base() -> Base:
 @pytest.mark.parametrize("name", ["turbulent_drag", "viscous_drag", "sensor_bias"])
 def test_second_look_against_many_nodes_on_a_dense_grid(base: Base, name: str) -> None:
     job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == name)
-    found = curve_near(base, job.mechanism, job.shape, curve(base, job.mechanism, job.shape, ROUGH), ROUGH)
+    found = curve_near(base, curve(base, job.mechanism, job.shape), job.shape)
     assert job.mechanism.added is not None
     reach = job.mechanism.added.scale * np.linspace(0.0, 3.5, 24)
     grid = np.concatenate([-reach[:0:-1], reach]) if job.mechanism.added.either_sign else reach
@@ -43,28 +43,21 @@ def test_second_look_against_many_nodes_on_a_dense_grid(base: Base, name: str) -
     assert abs(found.moments[0] - mean) < 0.25 * sd
 
 
-def test_rough_look_finds_what_is_missing(base: Base) -> None:
-    assert screening_budget(base) is ROUGH
+def test_a_first_look_finds_what_is_missing(base: Base) -> None:
     for job in placed_mechanisms(base.setting):
         if job.mechanism.id in ("turbulent_drag", "viscous_drag"):
-            assert curve(base, job.mechanism, job.shape, ROUGH).log_bayes_factor > 5.0
+            assert curve(base, job.mechanism, job.shape).log_bayes_factor > 5.0
 
 
 @pytest.mark.slow
-def test_what_tangents_promise_counts_by_what_fronts_say() -> None:
-    """In a clean campaign friction on many a stretch reads five nats along tangents; none has two."""
+def test_a_first_look_promises_nothing_in_a_clean_campaign() -> None:
+    """Along tangents friction on many a stretch reads five nats where fronts stop; by fronts none has two."""
     base = base_of(trial(990001, "sparse", "nothing", "pcm").campaign, "pcm")
     friction = [one for one in placed_mechanisms(base.setting) if one.mechanism.id == "segment_friction"]
-    assert screening_budget(base) is ROUGH and len(friction) > 15
-    found = [curve(base, one.mechanism, one.shape, ROUGH) for one in friction]
-    tangents = [
-        curve_at(base, one.mechanism, one.shape, k.strengths[k.strengths != 0.0], ROUGH)
-        for one, k in zip(friction, found, strict=True)
-    ]
-    promised = np.array([one.log_evidence.max() for one in tangents])
-    assert np.count_nonzero(promised > 5.0) > 3
+    found = [curve(base, one.mechanism, one.shape) for one in friction]
+    assert len(found) > 15
     assert max(one.log_evidence.max() for one in found) < 2.0
-    assert all(one.rough and one.log_evidence[one.strengths == 0.0][0] == 0.0 for one in found)
+    assert all(one.log_evidence[one.strengths == 0.0][0] == 0.0 for one in found)
 
 
 def test_a_curve_goes_on_where_its_posterior_would_be_cut(base: Base) -> None:
@@ -75,42 +68,33 @@ def test_a_curve_goes_on_where_its_posterior_would_be_cut(base: Base) -> None:
     whole = curve_at(base, job.mechanism, job.shape, scale * np.linspace(0.05, 4.5, 60), USUAL)
     start = curve_at(base, job.mechanism, job.shape, scale * np.array([0.01, 0.02, 0.03]), USUAL)
     assert start.is_cut and not whole.is_cut
-    near = curve_near(base, job.mechanism, job.shape, start, USUAL)
+    near = curve_near(base, start, job.shape)
     assert not near.is_cut
     assert near.log_bayes_factor == pytest.approx(whole.log_bayes_factor, abs=0.2)
     assert near.moments == pytest.approx(whole.moments, rel=0.15)
 
 
-def test_only_what_fronts_computed_is_corrected(base: Base) -> None:
-    """What is wrong with a rough curve is its own, and not its mechanism's."""
+def test_only_what_leads_is_computed_again(base: Base) -> None:
     job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == "turbulent_drag")
-    rough = curve(base, job.mechanism, job.shape, ROUGH)
-    fronts = curve_near(base, job.mechanism, job.shape, rough, ROUGH)
-    assert rough.rough and not fronts.rough
+    one = curve_near(base, curve(base, job.mechanism, job.shape), job.shape)
+    drag = {"turbulent_drag": Candidate(job.mechanism, (one,), np.zeros(1))}
     with ThreadPoolExecutor(1) as pool:
-        found = [
-            recomputed(
-                base, {"turbulent_drag": Candidate(job.mechanism, (one,), np.zeros(1))}, [], pool, best
-            )
-            for one, best in ((rough, 0.0), (fronts, 0.0), (fronts, fronts.log_bayes_factor + 7.0))
-        ]
-    looked = [candidates["turbulent_drag"] for candidates, _ in found]
-    assert [one.disagreement is None for one in looked] == [True, False, True]
-    assert looked[0].correction == looked[2].correction == 0.0
-    assert looked[1].disagreement is not None
-    assert 0.0 < abs(looked[1].correction) < 0.5 and abs(looked[1].disagreement) < 0.5
+        looked, behind = (
+            recomputed(base, drag, [], pool, best)[0]["turbulent_drag"]
+            for best in (0.0, one.log_bayes_factor + 7.0)
+        )
+    assert behind.correction == 0.0 and behind.disagreement is None
+    assert looked.disagreement is not None
+    assert 0.0 < abs(looked.correction) < 0.5 and abs(looked.disagreement) < 0.5
 
 
-def test_fronts_are_looked_at_where_readings_are_far_off() -> None:
+def test_a_first_look_is_by_fronts() -> None:
     """At Ryggfonn without drag a third of the readings are outliers: tangents miss what ends that."""
     base = ryggfonn_base("coulomb")
-    assert screening_budget(base) is FRONTS
     drag = mechanisms()["velocity_weakening"]
     assert drag.added is not None
-    found = [curve(base, drag, shape, FRONTS) for shape in drag.added.shapes(base.setting)]
-    rough = [curve(base, drag, shape, ROUGH) for shape in drag.added.shapes(base.setting)]
-    heights = [max(one.log_bayes_factor for one in curves) for curves in (found, rough)]
-    assert heights[0] > 30.0 > heights[1] + 10.0
+    found = [curve(base, drag, shape) for shape in drag.added.shapes(base.setting)]
+    assert max(one.log_bayes_factor for one in found) > 30.0
 
 
 def made(name: str, place: float, height: float) -> Curve:
@@ -195,13 +179,12 @@ def test_under_another_error_model_each_mechanism_is_looked_at_until_the_rest_is
         ]
 
     with ThreadPoolExecutor(1) as pool:
-        now = screened(base, ROUGH, pool, before=before(0.0, 0.0, 0.0, 0.0))
+        now = screened(base, pool, before=before(0.0, 0.0, 0.0, 0.0))
         heights = [one.log_bayes_factor for one in now]
         most = max(heights[:2])
         known = before(most + 90.0, most + 45.0, most - 12.0, -50.0)
         told: list[tuple[int, int]] = []
-        found = screened(base, ROUGH, pool, lambda *of: told.append(of), known)
-    assert all(one.rough for one in now)
+        found = screened(base, pool, lambda *of: told.append(of), known)
     assert [one.log_bayes_factor for one in found[:2]] == heights[:2]
     assert found[2] is known[2]
     assert found[3].log_bayes_factor == heights[3]  # the best of its own mechanism
@@ -330,7 +313,7 @@ def test_errors_in_common_are_integrated_as_closely_as_others() -> None:
     """
     clean = trial(2300015, "dense", "nasty", "constant").campaign
     base = with_errors(base_of(clean, "constant"), "correlated")
-    found = [base.with_nothing(budget).found.log_evidence for budget in (ROUGH, FRONTS, USUAL, FINE)]
+    found = [base.with_nothing(budget).found.log_evidence for budget in (SCREENING, USUAL, FINE)]
     assert max(found) - min(found) < 1.0
 
 
@@ -346,8 +329,8 @@ def test_a_first_look_leaves_out_only_strengths_that_are_hopeless() -> None:
         assert added is not None
         grid = added.scale_of(job.shape) * np.array([0.2, 0.6, 1.2, 2.2, 3.5])
         grid = np.append(-grid[::-1], grid) if added.either_sign else grid
-        whole = curve_at(base, job.mechanism, job.shape, grid, FRONTS)
-        found = curve(base, job.mechanism, job.shape, FRONTS)
+        whole = curve_at(base, job.mechanism, job.shape, grid, SCREENING)
+        found = curve(base, job.mechanism, job.shape)
         assert found.log_bayes_factor == pytest.approx(whole.log_bayes_factor, abs=0.05)
         spared += len(set(whole.strengths) - set(found.strengths))
     assert spared > 0
@@ -359,21 +342,20 @@ def test_nothing_is_the_same_whatever_is_not_added() -> None:
     for job in (placed_mechanisms(base.setting)[k] for k in (0, 20, -1)):
         extension = extended(base.problem, base.law, (*base.directions, job.direction))
         start = (base.population, base.fit.points)
-        for budget, first in ((ROUGH, None), (FRONTS, FIRST)):
-            (zero,) = refit(extension, base.rows, np.zeros((1, 1)), start, Rounds(budget, first))
-            found = base.with_nothing(budget)
-            assert found.found.log_evidence == pytest.approx(zero.found.log_evidence, abs=1e-6)
-            assert base.with_nothing(budget) is found
+        (zero,) = refit(extension, base.rows, np.zeros((1, 1)), start, Rounds(SCREENING, FIRST))
+        found = base.with_nothing(SCREENING)
+        assert found.found.log_evidence == pytest.approx(zero.found.log_evidence, abs=1e-6)
+        assert base.with_nothing(SCREENING) is found
     # Another base, under another error model say, has its own.
-    assert replace(base).with_nothing(ROUGH) is not base.with_nothing(ROUGH)
+    assert replace(base).with_nothing(SCREENING) is not base.with_nothing(SCREENING)
 
 
 def test_screening_sees_strengths_far_below_the_grid() -> None:
     """Many recordings tell a drag of a tenth of its prior's scale; the grid begins at a fifth."""
     base = base_of(trial(1031, "dense", "turbulent_drag", "constant", 9.5).campaign, "constant")
     job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == "turbulent_drag")
-    rough = curve(base, job.mechanism, job.shape, ROUGH)
-    settled = curve_near(base, job.mechanism, job.shape, rough, ROUGH)
+    rough = curve(base, job.mechanism, job.shape)
+    settled = curve_near(base, rough, job.shape)
     assert job.mechanism.added is not None
     assert 0.0 < settled.moments[0] < 0.2 * job.mechanism.added.scale
     assert settled.log_bayes_factor > 20.0

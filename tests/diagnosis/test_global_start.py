@@ -9,7 +9,7 @@ import pytest
 from diagnosis_cases import base_of
 from rolling_cases import rolling
 
-from skred.diagnosis.compare.screening import curve, screening_budget
+from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, look_around
 from skred.diagnosis.evidence.extension import extended
@@ -34,7 +34,7 @@ def base() -> Base:
 
 def test_a_drag_that_friction_has_absorbed_is_found(base: Base) -> None:
     """Friction has to fall to a third for it: no derivative at nil, no refit at a fixed drag gets there."""
-    found = curve(base, mechanisms()["turbulent_drag"], Shape(), screening_budget(base))
+    found = curve(base, mechanisms()["turbulent_drag"], Shape())
     mean, sd = found.moments
     assert found.log_bayes_factor > 30.0
     assert abs(mean - DRAG) < 4.0 * sd and sd < 0.2 * DRAG
@@ -50,7 +50,7 @@ def test_all_starts_lead_to_one_maximum(base: Base) -> None:
 
 def test_nothing_is_found_where_nothing_is() -> None:
     base = base_of(rolling(1e-8, friction=0.02, n_events=12), "coulomb")
-    found = curve(base, mechanisms()["turbulent_drag"], Shape(), screening_budget(base))
+    found = curve(base, mechanisms()["turbulent_drag"], Shape())
     assert found.log_bayes_factor < 1.0
 
 

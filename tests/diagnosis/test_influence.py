@@ -14,7 +14,7 @@ from skred.campaign.parts import of_events
 from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
-from skred.diagnosis.compare.screening import curve, screening_budget
+from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import Curve, curve_near
 from skred.diagnosis.evidence.prior_odds import prior_odds
 from skred.diagnosis.influence.influence import MOST, FloatArray, influence
@@ -30,8 +30,7 @@ DRAG = mechanisms()["turbulent_drag"]
 def drag_in(campaign: Campaign) -> tuple[Comparison, Curve]:
     """A comparison that has drag along the track alone."""
     base = base_of(campaign, "coulomb")
-    budget = screening_budget(base)
-    found = curve_near(base, DRAG, Shape(), curve(base, DRAG, Shape(), budget), budget)
+    found = curve_near(base, curve(base, DRAG, Shape()), Shape())
     candidates = {DRAG.id: Candidate(DRAG, (found,), np.zeros(1))}
     under_errors = ComparisonUnderErrors("robust", base, candidates, [], [found])
     return Comparison((under_errors,), prior_odds([DRAG]), {"robust": 0.0}), found

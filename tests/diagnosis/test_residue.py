@@ -15,7 +15,7 @@ from skred.campaign import Campaign
 from skred.diagnosis.compare.candidate import BESIDE, Candidate, log_gain
 from skred.diagnosis.compare.comparison import free_force
 from skred.diagnosis.compare.residue import with_residues
-from skred.diagnosis.compare.screening import curve, screening_budget
+from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, curve_near
 from skred.physics.mechanisms import mechanisms
@@ -27,8 +27,7 @@ DRAG = mechanisms()["turbulent_drag"]
 def fitted(campaign: Campaign) -> tuple[Base, Candidate, list[Profile]]:
     """The base law, drag along the track, and the force that is not in the list."""
     base = base_of(campaign, "coulomb")
-    budget = screening_budget(base)
-    found = curve_near(base, DRAG, Shape(), curve(base, DRAG, Shape(), budget), budget)
+    found = curve_near(base, curve(base, DRAG, Shape()), Shape())
     candidate = Candidate(DRAG, (found,), np.zeros(1))
     return base, candidate, [*map(partial(free_force, base, candidates={DRAG.id: candidate}), KINDS)]
 

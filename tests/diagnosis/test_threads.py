@@ -11,7 +11,6 @@ from diagnosis_cases import sparse_base
 from skred.diagnosis.check.bootstrap_test import bootstrap_test
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import curve_near
-from skred.diagnosis.evidence.event_quadrature import ROUGH
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.tabulated.coefficient_grid import locate
 from skred.diagnosis.tabulated.tables import BUDGETS, build_tables
@@ -79,7 +78,7 @@ def test_tables_are_the_same_in_threads(monkeypatch: pytest.MonkeyPatch) -> None
     mechanism = mechanisms()["viscous_drag"]
     assert mechanism.added is not None
     shape = mechanism.added.shapes(base.setting)[0]
-    near = curve_near(base, mechanism, shape, curve(base, mechanism, shape, ROUGH), ROUGH)
+    near = curve_near(base, curve(base, mechanism, shape), shape)
     extension = extended(base.problem, base.law, (near.direction,))
     found = []
     for said in ("1", "3"):

@@ -121,7 +121,7 @@ def test_rules_on_the_page_are_the_codes() -> None:
 
 
 WORDS = """
-    model comparison; comparison under one error model; candidate; added; linearised screening; local
+    model comparison; comparison under one error model; candidate; added; screening; local
     refinement; re-computed evidence; model discrepancy; mode; Laplace approximation; prior penalty;
     Occam factor; tempered; tempering exponent; held-out; worker pool; sandbox; score and information;
     linear mixed model; conditional MAP; quadrature points; B-spline basis; score test; bootstrap test

@@ -66,6 +66,8 @@ def test_what_is_no_scale_is_refused(value: Any) -> None:
         ("[scales]\na = 1", "a number above 0"),
         ("=", "TOML"),
         ("#" * 100_001, "longer than 100000 bytes"),
+        ("dry_friction = " + "9" * 6000, "TOML"),
+        ("a = " + "[" * 50_000, "TOML"),
     ],
 )
 def test_a_file_says_what_is_wrong_with_it(text: str, told: str, tmp_path: Path) -> None:

@@ -32,14 +32,16 @@ def read_priors(file: Path) -> dict[str, float]:
     try:
         with file.open("rb") as stream:
             text = stream.read(MOST_BYTES + 1)
-        if len(text) > MOST_BYTES:
-            raise PriorsError(f"{file}: longer than {MOST_BYTES} bytes; no file of priors")
-        content = tomllib.loads(text.decode("utf-8"))
     except OSError as error:
         raise PriorsError(f"{file}: cannot be read ({error.strerror or error})") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    if len(text) > MOST_BYTES:
+        raise PriorsError(f"{file}: longer than {MOST_BYTES} bytes; no file of priors")
+    try:
+        content = tomllib.loads(text.decode("utf-8"))
+    except (ValueError, RecursionError) as error:  # also of numbers of thousands of digits, of deep nesting
+        told = f"{error!s:.100}"
         raise PriorsError(
-            f"{file}: not a TOML file ({error}); write lines such as dry_friction = 0.3"
+            f"{file}: not a TOML file ({told}); write lines such as dry_friction = 0.3"
         ) from error
     return {name: _scale(name, value, f"{file}: ") for name, value in content.items()}
 

@@ -19,7 +19,7 @@ from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import Population, Rows
-from skred.diagnosis.evidence.event_quadrature import FRONTS, USUAL
+from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import Scores
 from skred.diagnosis.evidence.prior_odds import UNLISTED
@@ -82,4 +82,4 @@ def _beyond_linear(base: Base, score_test: ScoreTest, scores: Scores, name: str)
     own = [k for k, one in enumerate(score_test.placed_mechanisms) if one.mechanism.id == name]
     best = max(own, key=lambda k: factors[k])
     placed = score_test.placed_mechanisms[best]
-    return curve(base, placed.mechanism, placed.shape, FRONTS).log_bayes_factor - float(factors[best])
+    return curve(base, placed.mechanism, placed.shape).log_bayes_factor - float(factors[best])

@@ -24,19 +24,18 @@ from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import refine
 from skred.diagnosis.compare.residue import with_residues
 from skred.diagnosis.compare.restarts import better_modes
-from skred.diagnosis.compare.screening import Tell, screened, screening_budget
+from skred.diagnosis.compare.screening import Tell, screened
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, alike, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
-from skred.diagnosis.evidence.event_quadrature import FINE, USUAL
+from skred.diagnosis.evidence.event_quadrature import FINE, SCREENING, USUAL
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds, stated
 from skred.diagnosis.evidence.refit import Rounds, refit
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
 from skred.parallel.processes import worker_pool
 from skred.parallel.threads import side_by_side
-from skred.physics.mechanisms.spec import Shape
 
 FloatArray = NDArray[np.float64]
 ERROR_SHARES = {"robust": 0.55, "student": 0.15, "correlated": 0.15, "scaled": 0.15}
@@ -60,8 +59,8 @@ class ComparisonUnderErrors:
     candidates : mapping of str to Candidate
     profiles : list of Profile
     screened : list of Curve
-        A rough one for each candidate of the mechanisms compared; that under another error model where it
-        cannot count.
+        One for each candidate of the mechanisms compared; that under another error model where it cannot
+        count.
     """
 
     error_model: str
@@ -207,15 +206,10 @@ def _under_errors(
     best : float, optional
         The most that a candidate has under that, in nats above nothing under this one.
     """
-    budget = screening_budget(base)
-    base.with_nothing(budget)  # before anyone else does it once more
-
-    def near(known: Curve, shape: Shape) -> Curve:
-        return curve_near(base, known.mechanism, shape, known, budget)
-
+    base.with_nothing(SCREENING)  # before anyone else does it once more
     with worker_pool() as pool:
-        curves = screened(base, budget, pool, tell, before)
-        candidates = refine(base.setting, curves, near, pool)
+        curves = screened(base, pool, tell, before)
+        candidates = refine(base.setting, curves, partial(curve_near, base), pool)
         profiles = list(pool.map(partial(free_force, base, candidates=candidates), KINDS))
         candidates, profiles = recomputed(base, candidates, profiles, pool, best)
         candidates = with_ways(base, candidates, pool)

@@ -38,8 +38,7 @@ def recomputed(
 ) -> tuple[dict[str, Candidate], list[Profile]]:
     """All candidates under one error model, those that lead with re-computed evidence.
 
-    A mechanism's is re-computed along its best curve, if that was computed with fronts: a rough one is wrong
-    in its own way. A profile's is computed by sampling its values.
+    A mechanism's is re-computed along its best curve, a profile's by sampling its values.
 
     Parameters
     ----------
@@ -52,7 +51,6 @@ def recomputed(
     leading = sorted(
         (name for name in height if height[name] > most - _BEHIND), key=lambda name: -height[name]
     )
-    leading = [name for name in leading[:_CHECKED] if not candidates[name].best.rough]
     # A force that is less probable than none would raise no alarm with some nats more.
     worth = [k for k, factor in enumerate(force) if factor > max(most - _COUNTS - _TOO_LOW, 0.0)]
     # Each waits for jobs of the pool, and takes none of its threads for that.
@@ -61,7 +59,7 @@ def recomputed(
             k: waiting.submit(sampled_log_factor, base, profiles[k], pool, max(most - _COUNTS, 0.0))
             for k in worth
         }
-        found = _looked_at(base, candidates, leading, pool)
+        found = _looked_at(base, candidates, leading[:_CHECKED], pool)
         factors = {k: one.result() for k, one in sampled.items()}
     again = [replace(one, log_bayes_factor=factors.get(k, force[k])) for k, one in enumerate(profiles)]
     return found, again

@@ -1,9 +1,9 @@
-"""Local refinement: leading places computed with fronts, then split as finely as the recordings resolve.
+"""Local refinement: leading places computed anew, then split as finely as the recordings resolve.
 
-Screening takes one place for all that is near it. Where a mechanism leads, its place is computed with
-fronts, and moved, shortened and lengthened. A part that holds most of the evidence is parted in its turn, in
-smaller steps. A strong effect on a stretch whose ends are wrong by a tenth of its length loses several nats,
-and a force of any shape would not.
+Screening takes one place for all that is near it. Where a mechanism leads, its place is computed with more
+quadrature points, and moved, shortened and lengthened. A part that holds most of the evidence is parted in
+its turn, in smaller steps. A strong effect on a stretch whose ends are wrong by a tenth of its length loses
+several nats, and a force of any shape would not.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from skred.physics.mechanisms.stretches import shares
 
 Near = Callable[[Curve, Shape], Curve]
 _WITHIN = 3.0
-"""Nats behind its mechanism's best within which a place is refined: screening is off by nats where fronts
-stop."""
+"""Nats behind its mechanism's best within which a place is refined: what its parts have more may differ so
+much."""
 _AT_MOST = 2
 """Places of a mechanism that are refined at most at a time, which bounds the time."""
 _TURNS = 3
@@ -86,7 +86,7 @@ class Place:
 def refine(
     setting: Setting, curves: Sequence[Curve], near: Near, pool: ThreadPoolExecutor
 ) -> dict[str, Candidate]:
-    """Candidates whose leading places are computed with fronts and then split; rough curves for the others.
+    """Candidates whose leading places are computed anew and then split; the others as they were screened.
 
     The leading mechanism comes first: others have to keep up with what its parts have. Once a place is looked
     at it may fall behind others that then lead, and are looked at in their turn.
@@ -98,7 +98,7 @@ def refine(
     curves : sequence of Curve
         Of all places, screened.
     near : callable
-        Computes with fronts the curve at a shape near that of another curve.
+        Computes the curve at a shape near that of another curve.
     pool : ThreadPoolExecutor
     """
     places: dict[int, Place] = {}

@@ -1,17 +1,16 @@
-"""Linearised screening: the evidence at every place along tangents, and by fronts where tangents mislead."""
+"""Screening: the evidence of every candidate at every place, well enough to say where to look closer."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import numpy as np
 
 from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
-from skred.diagnosis.evidence.event_quadrature import FRONTS, ROUGH, Budget
+from skred.diagnosis.evidence.event_quadrature import SCREENING
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.global_start import Start, global_starts
 from skred.physics.mechanisms.placed import direction_of
@@ -26,38 +25,16 @@ _HOPELESS = 12.0
 """Nats behind the best at which stronger is not tried: it would count for one in a hundred thousand."""
 _ABOUT = (-2.0, 0.0, 2.0)
 """Strengths about a global start, in its standard deviations."""
-_PROMISED = 0.3
-"""Nats that a rough curve must have for fronts to be asked at its maximum."""
-_FAR_OFF = 4.0
-"""Standard deviations beyond which a reading is far off: one in sixteen thousand is by chance."""
-_FAR_SHARE = 0.02
-"""Share of such readings that is many: that of the robust error model's larger outlier share."""
 _FAR_BEHIND = 10.0
 """Nats behind its mechanism's best at which a place is not screened under another error model: it counts for
 nothing."""
 
 
-def screening_budget(base: Base) -> Budget:
-    """Nodes for a look at every place: readings along tangents, unless many readings are far off.
-
-    Robust errors take what is far from a front for outliers and see no direction to go; only fronts
-    themselves tell then that a strong effect brings them back.
-    """
-    extension = extended(base.problem, base.law, base.directions)
-    predictions = extension.predict(base.rows.event, base.fit.points, base.strengths)[:, :-1]
-    readings = base.rows.readings
-    stated = np.hypot(readings.relative_sd * predictions, readings.absolute_sd)
-    sd = np.where(readings.stated_sd > 0.0, readings.stated_sd, stated)
-    far = np.abs(readings.values - predictions) > _FAR_OFF * sd
-    return FRONTS if far[readings.observed].mean() > _FAR_SHARE else ROUGH
-
-
-def curve(base: Base, mechanism: Mechanism, shape: Shape, budget: Budget) -> Curve:
+def curve(base: Base, mechanism: Mechanism, shape: Shape) -> Curve:
     """Evidence along the strength of a mechanism, on a grid over its prior and about each global start.
 
     Many recordings tell strengths far below the prior's scale, or far beyond what a refit from the base law
-    reaches; the grid alone would miss where the evidence is. With the budget ``ROUGH`` quick enough for every
-    place, and wrong by nats where fronts stop near sensors.
+    reaches; the grid alone would miss where the evidence is.
     """
     added = mechanism.added
     assert added is not None
@@ -68,12 +45,12 @@ def curve(base: Base, mechanism: Mechanism, shape: Shape, budget: Budget) -> Cur
     strengths = np.multiply.outer(signs, scale * np.array(_GRID)).ravel()
     about = np.array([one.strength + one.sd * by for one in starts for by in _ABOUT])
     strengths = np.append(strengths, about if added.either_sign else about[about > 0.0])
-    found = curve_at(base, mechanism, shape, np.unique(strengths), budget, begin=begin)
+    found = curve_at(base, mechanism, shape, np.unique(strengths), SCREENING, begin=begin)
     signs = signs[[_may_be_stronger(found, sign, scale * _GRID[-1]) for sign in signs]]
     if len(signs):
         stronger = np.multiply.outer(signs, scale * np.array(_STRONGER)).ravel()
-        found = found.joined(curve_at(base, mechanism, shape, stronger, budget, begin=begin))
-    return _by_fronts(base, found) if found.rough else found
+        found = found.joined(curve_at(base, mechanism, shape, stronger, SCREENING, begin=begin))
+    return found
 
 
 def _starts(base: Base, mechanism: Mechanism, shape: Shape) -> list[Start]:
@@ -95,39 +72,19 @@ def _may_be_stronger(found: Curve, sign: float, least: float) -> bool:
     return bool(found.log_evidence[strong].max() > found.log_evidence.max() - _HOPELESS)
 
 
-def _by_fronts(base: Base, rough: Curve) -> Curve:
-    """A rough curve whose evidence for anything is what fronts say at its top, in proportion elsewhere.
-
-    Where fronts stop, tangents can promise ten nats that are not there, at more places than are looked at
-    again.
-    """
-    top = int(np.argmax(rough.log_evidence))
-    promised = float(rough.log_evidence[top])
-    if promised < _PROMISED:
-        return rough
-    strengths = rough.strengths[[top]]
-    near = curve_at(base, rough.mechanism, rough.shape, strengths, FRONTS, rough.known)
-    there = max(float(near.log_evidence[near.strengths == strengths[0]][0]), 0.0)
-    heights = np.where(rough.log_evidence > 0.0, rough.log_evidence * (there / promised), rough.log_evidence)
-    return replace(rough, log_evidence=heights)
-
-
 def screened(
     base: Base,
-    budget: Budget,
     pool: ThreadPoolExecutor,
     tell: Tell = lambda done, of: None,
     before: Sequence[Curve] = (),
 ) -> list[Curve]:
-    """A rough curve for each candidate.
+    """A curve for each candidate.
 
     Under another error model only places are looked at that may count: each mechanism's best ones, and
     others once these have fallen behind.
 
     Parameters
     ----------
-    budget : Budget
-        Quadrature points, of `screening_budget`.
     tell : callable
         Is told how many candidates are screened, and of how many.
     before : sequence of Curve, optional
@@ -138,7 +95,7 @@ def screened(
 
     def look(number: int) -> Curve:
         mechanism, shape = todo[number]
-        return curve(base, mechanism, shape, budget)
+        return curve(base, mechanism, shape)
 
     while jobs := sorted(set(_that_count(curves) if curves else range(len(todo))) - looked):
         looked |= set(jobs)

@@ -111,8 +111,6 @@ class Curve:
         Relative to strength 0.
     fits : tuple of Fit
         One for each strength.
-    rough : bool
-        Whether readings at nodes were taken along tangents.
     """
 
     mechanism: Mechanism
@@ -121,7 +119,6 @@ class Curve:
     strengths: FloatArray
     log_evidence: FloatArray
     fits: tuple[Fit, ...]
-    rough: bool = False
 
     def nearest(self, strength: float) -> Fit:
         """The fit at the strength closest to one."""
@@ -188,26 +185,23 @@ class Curve:
         return mean, math.sqrt(max(float(weights @ (strengths - mean) ** 2), 0.0))
 
 
-def curve_near(base: Base, mechanism: Mechanism, shape: Shape, near: Curve, first: Budget) -> Curve:
-    """Evidence along the strength of a mechanism, around where another curve, perhaps a rough one, has it.
+def curve_near(base: Base, near: Curve, shape: Shape) -> Curve:
+    """Evidence along the strength of a mechanism, around where another curve has it.
 
     Parameters
     ----------
     near : Curve
         Of the same mechanism and nearly the same shape.
-    first : Budget
-        For finding where to look; what counts is computed there with fronts.
     """
-    assert mechanism.added is not None
-    least = _SMALLEST * mechanism.added.scale_of(shape)
-    for number in range(_PASSES):
-        budget = first if number == 0 and first.linear else USUAL
+    assert near.mechanism.added is not None
+    least = _SMALLEST * near.mechanism.added.scale_of(shape)
+    for _ in range(_PASSES):
         before = near.moments
-        near = curve_at(base, mechanism, shape, _strengths_near(near), budget, near.known)
+        near = curve_at(base, near.mechanism, shape, _strengths_near(near), USUAL, near.known)
         after = near.moments
         sd = max(before[1], least), max(after[1], least)
         settled = abs(after[0] - before[0]) < sd[0] and 0.5 < sd[1] / sd[0] < 2.0
-        if budget is USUAL and settled and not near.is_cut:
+        if settled and not near.is_cut:
             break
     return near
 
@@ -265,7 +259,7 @@ def curve_at(
         found = _refit_from(base, extension, strengths, budget, fits, Rounds(budget, least=1, draws=draws))
     heights = np.array([fit.found.log_evidence for fit in found])
     heights = np.nan_to_num(heights - heights[strengths == 0.0], nan=-1e3, neginf=-1e3)
-    return Curve(mechanism, shape, direction, strengths, heights, tuple(found), budget.linear)
+    return Curve(mechanism, shape, direction, strengths, heights, tuple(found))
 
 
 def _closest(fits: Mapping[float, Fit], strength: float) -> Fit:
@@ -286,7 +280,7 @@ def _refit_from(
     if len(strengths):
         given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
     start = (base.population, base.fit.points)
-    rounds = rounds or Rounds(budget, None if budget.linear else FIRST)
+    rounds = rounds or Rounds(budget, FIRST)
     return refit(extension, base.rows, given, start, rounds, fits)
 
 

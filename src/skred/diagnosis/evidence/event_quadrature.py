@@ -41,9 +41,6 @@ class Budget(NamedTuple):
     adapted : int
         Put where the others have found the weight to be: around modes that nobody looked for, along the
         edges that stops make.
-    linear : bool
-        Take readings at the points from the tangents at the mode instead of from fronts: quick, and wrong
-        where a front stops near a sensor.
     """
 
     around_mode: int = 16
@@ -51,7 +48,6 @@ class Budget(NamedTuple):
     adapted: int = 64
     wider: float = 1.35
     population_wider: float = 1.6
-    linear: bool = False
 
     @property
     def total(self) -> int:
@@ -73,10 +69,8 @@ FIRST = Budget(32, 16, 0)
 """Of rounds that only move the population."""
 FINE = Budget(256, 128, 512, 1.5, 1.8)
 """Of re-computed evidence, and of the base law under each error model."""
-ROUGH = Budget(32, 16, 0, linear=True)
-"""Of linearised screening."""
-FRONTS = Budget(16, 32, 32)
-"""Of screening with fronts, where tangents mislead."""
+SCREENING = Budget(16, 32, 32)
+"""Of the look at every place, which only says where to look closer."""
 _CENTRES = 16
 """Places that adapted points are put around, of each event."""
 _SHRUNK = 3.0
@@ -240,7 +234,7 @@ def importance_nodes(
         n_events = likelihood.extension.problem.campaign.n_events
         numbers = _normal_numbers(n_events, part.size, axes, seed)[rows.event]
         points = part.points(_rotated(numbers, shifts))
-        return points, _log_likelihoods(likelihood, modes, points, budget.linear)
+        return points, _log_likelihoods(likelihood, points)
 
     found = [spread(part, seed) for seed, part in enumerate(parts)]
     points, log_l = (np.concatenate([one[k] for one in found], axis=1) for k in range(2))
@@ -274,7 +268,7 @@ def on_a_line(
     widths += [budget.population_wider * factor[:, 0, 0] for _, factor in over]
 
     def log_likelihoods_at(points: FloatArray) -> FloatArray:
-        return _log_likelihoods(likelihood, modes, points[:, :, None], budget.linear)
+        return _log_likelihoods(likelihood, points[:, :, None])
 
     populations = centres[:, 1:], np.column_stack([factor[:, 0, 0] for _, factor in over])
     points, log_weights = line_nodes(
@@ -303,19 +297,14 @@ def _cover(rows: Rows, population: Population, modes: Modes, axes: int) -> Float
     return result
 
 
-def _log_likelihoods(
-    likelihood: EventLikelihood, modes: Modes, points: FloatArray, linear: bool
-) -> FloatArray:
+def _log_likelihoods(likelihood: EventLikelihood, points: FloatArray) -> FloatArray:
     """At points, (n_rows, k, n_axes) to (n_rows, k); with the prior of a release that is an axis."""
     n_rows, size, axes = points.shape
     extension, rows, n = likelihood.extension, likelihood.rows, likelihood.extension.n_base
     flat = np.zeros((n_rows * size, n + 1))
     flat[:, :axes] = points.reshape(-1, axes)
     which = np.repeat(np.arange(n_rows), size)
-    if linear:
-        predictions = _linear_predictions(modes, flat.reshape(n_rows, size, n + 1))
-    else:
-        predictions = extension.predict(rows.event[which], flat, likelihood.given[which])
+    predictions = extension.predict(rows.event[which], flat, likelihood.given[which])
     log_l: FloatArray = log_likelihoods(which, predictions, rows.readings, rows.errors)
     if axes > n:
         log_l = log_l - 0.5 * flat[:, n] ** 2 - _LOG_SQRT_2PI
@@ -355,13 +344,6 @@ def _rotated(numbers: FloatArray, shifts: FloatArray | None) -> FloatArray:
     quantiles = (ndtr(numbers) + shifts[:, None, : numbers.shape[2]]) % 1.0
     rotated: FloatArray = ndtri(np.clip(quantiles, 1e-12, 1.0 - 1e-12))
     return rotated
-
-
-def _linear_predictions(modes: Modes, points: FloatArray) -> FloatArray:
-    """Readings at points along the tangents at each row's mode; a speed below zero is none."""
-    change = (points - modes.tangents_at[:, None, :]) @ modes.by_points.transpose(0, 2, 1)
-    result: FloatArray = np.maximum(modes.predictions[:, None, :] + change, 0.0)
-    return result.reshape(-1, result.shape[2])
 
 
 def _over(population: Population, rows: Rows, axes: int, wider: float) -> tuple[FloatArray, FloatArray]:

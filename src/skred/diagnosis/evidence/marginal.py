@@ -20,13 +20,11 @@ from skred.diagnosis.evidence.population_target import (
     log_targets,
     slopes,
 )
-from skred.diagnosis.evidence.student import Weighted, weighted_draws
+from skred.diagnosis.evidence.student import ENOUGH, Proposal, Weighted, weighted_draws
 from skred.inference.hierarchical.surface import Nodes
 
 FloatArray = NDArray[np.float64]
 _LOG_2PI = math.log(2.0 * math.pi)
-_WIDER = 1.15
-"""How much wider than the Laplace approximation the proposal is."""
 _RESAMPLED_FROM = 8
 """Draws for each population that is kept: so many that resampling repeats few."""
 
@@ -129,8 +127,15 @@ def evidence(nodes: Nodes, log_scale: FloatArray, start: FloatArray, n_steps: in
 def importance_evidence(
     nodes: Nodes, log_scale: FloatArray, found: Evidence, n_draws: int, seed: int
 ) -> tuple[float, float]:
-    """Evidence by importance sampling around the Laplace approximation, and its standard error in nats."""
-    weighted = _weighted(nodes, log_scale, found, n_draws, np.random.default_rng([seed, 11]))
+    """Evidence by importance sampling from the Laplace approximation on, and its standard error in nats.
+
+    Parameters
+    ----------
+    n_draws : int
+        Of a turn; there are more turns until it is known well enough.
+    """
+    rng = np.random.default_rng([seed, 11])
+    weighted = _weighted(nodes, log_scale, found, n_draws, rng, ENOUGH)
     return weighted.log_integral + log_correlation_constant(len(log_scale)), weighted.error
 
 
@@ -138,18 +143,23 @@ def importance_draws(
     nodes: Nodes, log_scale: FloatArray, found: Evidence, n: int, rng: np.random.Generator
 ) -> FloatArray:
     """Draws of the population, (n, n_psi): the Laplace approximation's, many more, weighted and resampled."""
-    return _weighted(nodes, log_scale, found, _RESAMPLED_FROM * n, rng).resampled(n, rng)
+    return _weighted(nodes, log_scale, found, _RESAMPLED_FROM * n, rng, np.inf).resampled(n, rng)
 
 
 def _weighted(
-    nodes: Nodes, log_scale: FloatArray, found: Evidence, n_draws: int, rng: np.random.Generator
+    nodes: Nodes,
+    log_scale: FloatArray,
+    found: Evidence,
+    n_draws: int,
+    rng: np.random.Generator,
+    enough: float,
 ) -> Weighted:
-    """Draws around the Laplace approximation, from a somewhat wider density."""
+    """Draws of the population, weighted."""
 
     def log_density(psi: FloatArray) -> FloatArray:
         return log_targets(psi, len(log_scale), log_scale, *nodes)
 
-    return weighted_draws(log_density, found.psi, _WIDER * np.linalg.cholesky(found.covariance), n_draws, rng)
+    return weighted_draws(log_density, Proposal(found.psi, found.covariance), n_draws, rng, enough)
 
 
 def prior_log_scale(prior: MeanPrior) -> FloatArray:

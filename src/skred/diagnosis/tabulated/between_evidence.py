@@ -2,7 +2,7 @@
 
 An integral over the population, the strength, and what says how it differs, all at once; the events' own
 strengths are integrated by tables. Importance sampling around the highest mode, which is climbed to from
-several starts, adapted once (Cappé and others, 2008, doi 10.1007/s11222-008-9059-x).
+several starts.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from scipy.optimize import minimize
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.marginal import Evidence, population_at
 from skred.diagnosis.evidence.population_target import NARROWEST, log_correlation_constant, log_priors
-from skred.diagnosis.evidence.student import Weighted, weighted_draws
+from skred.diagnosis.evidence.student import Proposal, Weighted, weighted_draws
 from skred.diagnosis.tabulated.tables import Tables
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.between_events import BetweenEvents, components, from_unbounded
 
 FloatArray = NDArray[np.float64]
-_WIDER = 1.2
-"""How much wider than the mode's curvature, or the first draws, proposals are."""
-_DRAWS = 400, 1600
-"""Before and after the proposal is adapted: the error of a log evidence is then a few hundredths."""
+_DRAWS = 400
+"""Of a turn."""
+_KEPT = 1600
+"""Draws of the posterior that are kept."""
 _STARTS: dict[BetweenEvents, tuple[tuple[float, float], ...]] = {
     BetweenEvents.COMMON: ((1.0, 0.0),),
     BetweenEvents.SPREAD: ((1.0, -1.6), (1.0, -0.3)),
@@ -116,8 +116,8 @@ class BetweenTarget:
         return result
 
 
-def between_evidence(target: BetweenTarget, near: Evidence, strength: float, seed: int) -> Way:
-    """The evidence of one way, and draws of it.
+def search(target: BetweenTarget, near: Evidence, strength: float, seed: int) -> Weighted:
+    """Look for the highest mode, and by first draws how far the posterior around it reaches.
 
     Parameters
     ----------
@@ -134,28 +134,16 @@ def between_evidence(target: BetweenTarget, near: Evidence, strength: float, see
         start = [*near.psi, min(log_size + math.log(multiple), most), *([] if alone else [coordinate])]
         tops.append(_climbed(target, np.array(start)))
     top = max(tops, key=lambda x: float(target(x[None])[0]))
-    covariance = _curvature(target, top)
-    rng = np.random.default_rng([seed, 71])
-    first = _weighted(target, top, covariance, _DRAWS[0], rng)
-    weights = first.shares
-    mean = weights @ first.draws
-    deviation = first.draws - mean
-    adapted = deviation.T @ (weights[:, None] * deviation)
-    effective = 1.0 / float(np.sum(weights**2))
-    share = effective / (effective + 3.0 * len(top))
-    centre, width = share * mean + (1.0 - share) * top, share * adapted + (1.0 - share) * covariance
-    second = _weighted(target, centre, width, _DRAWS[1], rng)
-    drawn = second.resampled(len(second.draws), rng)
-    psi, strengths, parameter, _ = target.split(drawn)
-    return Way(second.log_integral, second.error, np.column_stack([psi, strengths, parameter]))
+    proposal = Proposal(top, _curvature(target, top))
+    return weighted_draws(target, proposal, _DRAWS, np.random.default_rng([seed, 71]))
 
 
-def _weighted(
-    target: BetweenTarget, centre: FloatArray, covariance: FloatArray, n: int, rng: np.random.Generator
-) -> Weighted:
-    """Draws from a somewhat wider density than the normal one of a covariance."""
-    factor = _WIDER * np.linalg.cholesky(covariance + 1e-9 * np.eye(len(centre)))
-    return weighted_draws(target, centre, factor, n, rng)
+def between_evidence(target: BetweenTarget, proposal: Proposal, seed: int) -> Way:
+    """The evidence of one way, and draws of it, from a proposal; that may be by other tables."""
+    rng = np.random.default_rng([seed, 72])
+    found = weighted_draws(target, proposal, _DRAWS, rng)
+    psi, strengths, parameter, _ = target.split(found.resampled(_KEPT, rng))
+    return Way(found.log_integral, found.error, np.column_stack([psi, strengths, parameter]))
 
 
 def _climbed(target: BetweenTarget, start: FloatArray) -> FloatArray:

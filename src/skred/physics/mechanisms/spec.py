@@ -200,7 +200,7 @@ class Added:
         Ids of the base law's mechanisms to whether it can be missing there.
     split : callable
         Setting, shape and steps to finer shapes around it, which share its weight. Steps are 1 around a shape
-        of the linearised screening, and less around its parts.
+        of the screening, and less around its parts.
     """
 
     scale: float
