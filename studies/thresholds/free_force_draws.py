@@ -8,7 +8,6 @@ formula fails.
 
 from __future__ import annotations
 
-import math
 import sys
 import time
 from collections.abc import Iterator
@@ -28,7 +27,7 @@ from studies.thresholds.compared_again import base_on
 app = cyclopts.App(help=__doc__)
 RESULT = RESULTS / "free_force_draws.json"
 LAWS = ("voellmy", "pcm")
-SEEDS, MANY_SEEDS, MANY_TURNS = range(1, 5), range(101, 103), 16
+SEEDS, MANY_SEEDS, MANY_DRAWS = range(1, 5), range(101, 103), 176
 
 
 def both_ways(law: str, under_errors: ComparisonUnderErrors, pool: Executor) -> Iterator[dict[str, Any]]:
@@ -42,7 +41,7 @@ def both_ways(law: str, under_errors: ComparisonUnderErrors, pool: Executor) -> 
         usual = [sampled_log_factor(under_errors.base, profile, pool, seed=seed) for seed in SEEDS]
         seconds = (time.process_time() - started) / len(SEEDS)
         many = [
-            sampled_log_factor(under_errors.base, profile, pool, seed=seed, turns=MANY_TURNS, enough=math.inf)
+            sampled_log_factor(under_errors.base, profile, pool, seed=seed, n=MANY_DRAWS, enough=0.0)
             for seed in MANY_SEEDS
         ]
         yield {

@@ -15,10 +15,10 @@ from functools import partial
 import numpy as np
 
 from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.evidence.adaptive_sampling import Mixture
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import FINE, Budget
 from skred.diagnosis.evidence.marginal import Evidence
-from skred.diagnosis.evidence.student import Proposal
 from skred.diagnosis.tabulated.between_evidence import BetweenTarget, Way, between_evidence, search
 from skred.diagnosis.tabulated.wide_tables import wide_tables
 from skred.inference.between_events import PRIOR, BetweenEvents
@@ -84,9 +84,10 @@ def ways_of(base: Base, curve: Curve, budgets: Sequence[Budget] = TABLES) -> dic
     }
 
 
-def covered_by(proposal: Proposal, n_psi: int) -> Evidence:
+def covered_by(proposal: Mixture, n_psi: int) -> Evidence:
     """The populations of a way, as one that tables cover; its evidence is not known."""
-    return Evidence(-math.inf, proposal.centre[:n_psi], proposal.covariance[:n_psi, :n_psi])
+    first = int(np.argmax(proposal.log_weights))
+    return Evidence(-math.inf, proposal.means[first, :n_psi], proposal.covariances[first, :n_psi, :n_psi])
 
 
 def populations_of(way: Way) -> Evidence:

@@ -17,8 +17,6 @@ from skred.diagnosis.evidence.event_quadrature import FINE
 
 _CHECKED = 5
 """Mechanisms re-computed at most, which bounds the time."""
-_DRAWS = 500
-"""Populations drawn for each."""
 _BEHIND = 6.0
 """Nats behind the best of all at which nothing is re-computed: it counts for a ninetieth, as stated
 (`prior_odds.POWER`), and what a mechanism has changes by a nat or so."""
@@ -83,7 +81,7 @@ def _again(base: Base, curve: Curve) -> tuple[float, float]:
     And what sampling changes of Laplace's formula at its maximum, nothing's subtracted.
     """
     strengths = curve.strengths[curve.strengths != 0.0]
-    fine = curve_at(base, curve.mechanism, curve.shape, strengths, FINE, curve.known, draws=_DRAWS)
+    fine = curve_at(base, curve.mechanism, curve.shape, strengths, FINE, curve.known, sampled=True)
     changed = np.array([one.found.sampling_changed for one in fine.fits])
     disagreement = changed[int(np.argmax(fine.log_evidence))] - changed[fine.strengths == 0.0][0]
     return fine.log_bayes_factor, float(disagreement)

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.discrepancy.profile import Mode, Prior
+from skred.diagnosis.discrepancy.profile import Prior
+from skred.diagnosis.evidence.adaptive_sampling import Mode
 from skred.diagnosis.evidence.refit import Fit
 
 FloatArray = NDArray[np.float64]

@@ -23,13 +23,13 @@ from skred.diagnosis.discrepancy.explored import (
 from skred.diagnosis.discrepancy.profile import (
     NEAR_M,
     Kind,
-    Mode,
     Prior,
     Profile,
     knots,
     priors_of,
     spline_basis,
 )
+from skred.diagnosis.evidence.adaptive_sampling import Mode
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import Population
 

@@ -15,12 +15,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 
+from skred.diagnosis.evidence.adaptive_sampling import Mode
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.extension import Extension, extended
 from skred.diagnosis.evidence.refit import Fit
@@ -108,22 +108,6 @@ MOST_KNOTS = 32
 """Coefficients at most: what the cost of a fit grows with."""
 _LEAST_STEP_M = 30.0
 """Distance of the knots at least: below it recordings do not tell one from the next."""
-
-
-class Mode(NamedTuple):
-    """Roughly what is known of a profile's values under one prior.
-
-    Attributes
-    ----------
-    mean : (n,) array
-    covariance : (n, n) array
-    log_factor : float
-        Log Bayes factor and log prior probability of the prior.
-    """
-
-    mean: FloatArray
-    covariance: FloatArray
-    log_factor: float
 
 
 @dataclass(frozen=True, eq=False)

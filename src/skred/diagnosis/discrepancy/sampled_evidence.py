@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.discrepancy.fit import mode_at
-from skred.diagnosis.discrepancy.importance_sampling import ENOUGH, MOST_TURNS, log_integral
-from skred.diagnosis.discrepancy.profile import KINDS, Mode, Profile, knot_by_knot, log_prior_density
+from skred.diagnosis.discrepancy.profile import KINDS, Profile, knot_by_knot, log_prior_density
+from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, weighted_draws
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.refit import Rounds, refit
@@ -24,6 +24,10 @@ from skred.diagnosis.evidence.refit import Rounds, refit
 FloatArray = NDArray[np.float64]
 _AT_ONCE = 32
 """Draws fitted together."""
+_DRAWS = 2 * _AT_ONCE
+"""Of a turn: two lots, one for each of two cores."""
+_ENOUGH = 0.2
+"""Standard error in nats at which there are enough draws: each is a fit of everything else."""
 
 
 def sampled_log_factor(
@@ -32,8 +36,8 @@ def sampled_log_factor(
     pool: Executor,
     least: float = -math.inf,
     seed: int = 0,
-    turns: int = MOST_TURNS,
-    enough: float = ENOUGH,
+    n: int = _DRAWS,
+    enough: float = _ENOUGH,
 ) -> float:
     """Log Bayes factor of a kind of profile over all its priors, by importance sampling of its values.
 
@@ -43,8 +47,8 @@ def sampled_log_factor(
     ----------
     pool : Executor
         For the fits, some draws at once. This itself must not be a job of the pool: it waits for those.
-    least, turns, enough
-        When to end, as in `log_integral`.
+    least, n, enough
+        When to end, as in `weighted_draws`.
     """
 
     def log_density(values: FloatArray) -> FloatArray:
@@ -54,7 +58,8 @@ def sampled_log_factor(
         return pool.submit(mode_at, base, profile, values).result()
 
     rng = np.random.default_rng([seed, 61, KINDS.index(profile.kind)])
-    found = log_integral(log_density, profile.modes, mode_near, rng, least, turns, enough)
+    proposal = Mixture.on(profile.modes)
+    found = weighted_draws(log_density, proposal, rng, n, enough, least, mode_near).log_integral
     return profile.log_bayes_factor if found == -math.inf else found
 
 

@@ -226,7 +226,7 @@ def curve_at(
     budget: Budget = USUAL,
     known: Mapping[float, Fit] | None = None,
     begin: Mapping[float, Fit] | None = None,
-    draws: int = 0,
+    sampled: bool = False,
 ) -> Curve:
     """Evidence along the strength of a mechanism, at some strengths and at 0.
 
@@ -238,8 +238,8 @@ def curve_at(
     begin : mapping of float to Fit, optional
         The same, of other places or of a linear model: where refits begin that go all their rounds; else they
         begin with the base's.
-    draws : int
-        Populations drawn for the evidence, of fits that begin at known ones; 0 for Laplace's formula.
+    sampled : bool
+        Whether the evidence, of fits that begin at known ones, is computed by importance sampling.
     """
     added = mechanism.added
     assert added is not None
@@ -256,7 +256,9 @@ def curve_at(
     else:
         strengths = np.insert(strengths, place, 0.0)
         fits = [_closest(known, strength) for strength in strengths]
-        found = _refit_from(base, extension, strengths, budget, fits, Rounds(budget, least=1, draws=draws))
+        found = _refit_from(
+            base, extension, strengths, budget, fits, Rounds(budget, least=1, sampled=sampled)
+        )
     heights = np.array([fit.found.log_evidence for fit in found])
     heights = np.nan_to_num(heights - heights[strengths == 0.0], nan=-1e3, neginf=-1e3)
     return Curve(mechanism, shape, direction, strengths, heights, tuple(found))

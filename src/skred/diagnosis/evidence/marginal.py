@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.diagnosis.evidence.adaptive_sampling import DRAWS, ENOUGH, Mixture, Mode, Weighted, weighted_draws
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.linear_mixed_model import MeanPrior
 from skred.diagnosis.evidence.population_target import (
@@ -20,13 +21,12 @@ from skred.diagnosis.evidence.population_target import (
     log_targets,
     slopes,
 )
-from skred.diagnosis.evidence.student import ENOUGH, Proposal, Weighted, weighted_draws
 from skred.inference.hierarchical.surface import Nodes
 
 FloatArray = NDArray[np.float64]
 _LOG_2PI = math.log(2.0 * math.pi)
-_RESAMPLED_FROM = 8
-"""Draws for each population that is kept: so many that resampling repeats few."""
+_RESAMPLED_FROM = 4
+"""Draws of a turn for each population that is kept: so many that resampling repeats few."""
 
 
 def _allowed(psi: FloatArray, n: int) -> FloatArray:
@@ -125,17 +125,10 @@ def evidence(nodes: Nodes, log_scale: FloatArray, start: FloatArray, n_steps: in
 
 
 def importance_evidence(
-    nodes: Nodes, log_scale: FloatArray, found: Evidence, n_draws: int, seed: int
+    nodes: Nodes, log_scale: FloatArray, found: Evidence, seed: int
 ) -> tuple[float, float]:
-    """Evidence by importance sampling from the Laplace approximation on, and its standard error in nats.
-
-    Parameters
-    ----------
-    n_draws : int
-        Of a turn; there are more turns until it is known well enough.
-    """
-    rng = np.random.default_rng([seed, 11])
-    weighted = _weighted(nodes, log_scale, found, n_draws, rng, ENOUGH)
+    """Evidence by importance sampling from the Laplace approximation on, and its standard error in nats."""
+    weighted = _weighted(nodes, log_scale, found, np.random.default_rng([seed, 11]), DRAWS, ENOUGH)
     return weighted.log_integral + log_correlation_constant(len(log_scale)), weighted.error
 
 
@@ -143,15 +136,15 @@ def importance_draws(
     nodes: Nodes, log_scale: FloatArray, found: Evidence, n: int, rng: np.random.Generator
 ) -> FloatArray:
     """Draws of the population, (n, n_psi): the Laplace approximation's, many more, weighted and resampled."""
-    return _weighted(nodes, log_scale, found, _RESAMPLED_FROM * n, rng, np.inf).resampled(n, rng)
+    return _weighted(nodes, log_scale, found, rng, _RESAMPLED_FROM * n, np.inf).resampled(n, rng)
 
 
 def _weighted(
     nodes: Nodes,
     log_scale: FloatArray,
     found: Evidence,
-    n_draws: int,
     rng: np.random.Generator,
+    n_draws: int,
     enough: float,
 ) -> Weighted:
     """Draws of the population, weighted."""
@@ -159,7 +152,8 @@ def _weighted(
     def log_density(psi: FloatArray) -> FloatArray:
         return log_targets(psi, len(log_scale), log_scale, *nodes)
 
-    return weighted_draws(log_density, Proposal(found.psi, found.covariance), n_draws, rng, enough)
+    proposal = Mixture.on([Mode(found.psi, found.covariance)])
+    return weighted_draws(log_density, proposal, rng, n_draws, enough)
 
 
 def prior_log_scale(prior: MeanPrior) -> FloatArray:

@@ -54,14 +54,14 @@ class Rounds(NamedTuple):
         Of the rounds before, which only move the population there; None for the same.
     least : int
         Rounds that there are in any case; more where the population has moved far.
-    draws : int
-        Populations drawn for the evidence by importance sampling; 0 for Laplace's formula.
+    sampled : bool
+        Whether the evidence is computed by importance sampling; else by Laplace's formula.
     """
 
     budget: Budget = USUAL
     first: Budget | None = None
     least: int = 2
-    draws: int = 0
+    sampled: bool = False
 
 
 USUAL_ROUNDS = Rounds()
@@ -110,8 +110,8 @@ def refit(
             found = evidence(part, log_scale, before)
             if number + 1 < rounds.least or _moved(before, found.psi, n):
                 moved.append(k)
-            if rounds.draws:
-                sampled, _ = importance_evidence(part, log_scale, found, rounds.draws, seed=0)
+            if rounds.sampled:
+                sampled, _ = importance_evidence(part, log_scale, found, seed=0)
                 found = found._replace(log_evidence=sampled, sampling_changed=sampled - found.log_evidence)
             state[k] = Fit(found, own)
         active = moved

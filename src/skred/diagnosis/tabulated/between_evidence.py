@@ -16,17 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, Weighted, weighted_draws
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.marginal import Evidence, population_at
 from skred.diagnosis.evidence.population_target import NARROWEST, log_correlation_constant, log_priors
-from skred.diagnosis.evidence.student import Proposal, Weighted, weighted_draws
 from skred.diagnosis.tabulated.tables import Tables
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.between_events import BetweenEvents, components, from_unbounded
 
 FloatArray = NDArray[np.float64]
-_DRAWS = 400
-"""Of a turn."""
 _KEPT = 1600
 """Draws of the posterior that are kept."""
 _STARTS: dict[BetweenEvents, tuple[tuple[float, float], ...]] = {
@@ -39,6 +37,8 @@ _DIFFERENCE = 1e-3
 """Step of central differences, in coordinates whose scale is one or so."""
 _LEAST_CURVATURE = 0.05
 """Of minus the log density along an axis, as for any population here: proposals stay bounded."""
+_SETTLED = 1e-5
+"""Share of the log density by which a step must gain: some thousandths of a nat."""
 _BAD = -1e10
 """Height where there is none: a climb turns back, and differences stay finite."""
 
@@ -117,12 +117,12 @@ class BetweenTarget:
 
 
 def search(target: BetweenTarget, near: Evidence, strength: float, seed: int) -> Weighted:
-    """Look for the highest mode, and by first draws how far the posterior around it reaches.
+    """Look for modes, and by first draws how far the posterior around them reaches.
 
     Parameters
     ----------
     near : Evidence
-        Populations around the mode.
+        Populations around a mode.
     strength : float
         What avalanches have in common, roughly.
     """
@@ -134,14 +134,14 @@ def search(target: BetweenTarget, near: Evidence, strength: float, seed: int) ->
         start = [*near.psi, min(log_size + math.log(multiple), most), *([] if alone else [coordinate])]
         tops.append(_climbed(target, np.array(start)))
     top = max(tops, key=lambda x: float(target(x[None])[0]))
-    proposal = Proposal(top, _curvature(target, top))
-    return weighted_draws(target, proposal, _DRAWS, np.random.default_rng([seed, 71]))
+    proposal = Mixture.on([Mode(top, _curvature(target, top))])
+    return weighted_draws(target, proposal, np.random.default_rng([seed, 71]))
 
 
-def between_evidence(target: BetweenTarget, proposal: Proposal, seed: int) -> Way:
+def between_evidence(target: BetweenTarget, proposal: Mixture, seed: int) -> Way:
     """The evidence of one way, and draws of it, from a proposal; that may be by other tables."""
     rng = np.random.default_rng([seed, 72])
-    found = weighted_draws(target, proposal, _DRAWS, rng)
+    found = weighted_draws(target, proposal, rng)
     psi, strengths, parameter, _ = target.split(found.resampled(_KEPT, rng))
     return Way(found.log_integral, found.error, np.column_stack([psi, strengths, parameter]))
 
@@ -155,7 +155,7 @@ def _climbed(target: BetweenTarget, start: FloatArray) -> FloatArray:
         n = len(x)
         return -float(heights[0]), -(heights[1 : n + 1] - heights[n + 1 :]) / (2.0 * _DIFFERENCE)
 
-    found = minimize(value_and_slope, start, jac=True, method="L-BFGS-B", options={"maxiter": 100})
+    found = minimize(value_and_slope, start, jac=True, method="L-BFGS-B", tol=_SETTLED)
     return np.asarray(found.x)
 
 

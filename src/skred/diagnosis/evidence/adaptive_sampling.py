@@ -1,0 +1,232 @@
+"""Integrals by adaptive importance sampling from a mixture of Student t densities around modes.
+
+All draws are weighted by the mixture of all that was proposed (adaptive multiple importance sampling: Cornuet
+and others, 2012, doi 10.1111/j.1467-9469.2011.00756.x). Proposals move to where the weight is, and a mode is
+looked for wherever a single draw has much of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln
+
+FloatArray = NDArray[np.float64]
+DRAWS = 200
+"""Draws of a turn, where a density takes no time."""
+ENOUGH = 0.1
+"""Standard error of a log integral, in nats, at which there are enough draws."""
+_FEWEST, _MOST = 2, 6
+"""Turns of sampling in any case, because the first does not know what it missed; and at most, for time."""
+_ODD = 0.1
+"""Share of all weight on one draw from which on a mode is looked for there: the proposals have missed one."""
+_NEW_SHARE = 0.3
+"""Share of the draws on a mode that was found so: its weight is not known yet."""
+_WIDER = 1.1
+"""Width of the proposals in that of the modes, which is rather too narrow."""
+_DEGREES = 7.0
+"""Degrees of freedom of the proposals: tails heavy enough to bound the weights."""
+_TEMPERED = 0.5
+"""Tempering exponent of the modes' factors in how many draws each one has: they are rough."""
+
+
+class Mode(NamedTuple):
+    """Where a density is.
+
+    Attributes
+    ----------
+    mean : (size,) array
+    covariance : (size, size) array
+    log_factor : float
+        Log of the integral around it, but for what all modes have in common.
+    """
+
+    mean: FloatArray
+    covariance: FloatArray
+    log_factor: float = 0.0
+
+
+class Mixture(NamedTuple):
+    """Student densities, one on each mode.
+
+    Attributes
+    ----------
+    log_weights : (n_modes,) array
+    means : (n_modes, size) array
+    covariances : (n_modes, size, size) array
+        Of the modes; the densities are somewhat wider.
+    """
+
+    log_weights: FloatArray
+    means: FloatArray
+    covariances: FloatArray
+
+    @classmethod
+    def on(cls, modes: Sequence[Mode]) -> Mixture:
+        """Around each mode."""
+        evened = _TEMPERED * np.array([mode.log_factor for mode in modes])
+        means = np.array([mode.mean for mode in modes])
+        covariances = np.array([mode.covariance for mode in modes])
+        return cls(evened - np.logaddexp.reduce(evened), means, covariances)
+
+    @property
+    def _factors(self) -> FloatArray:
+        variance = np.einsum("kii->k", self.covariances) / self.means.shape[1]
+        regular = self.covariances + 1e-10 * variance[:, None, None] * np.eye(self.means.shape[1])
+        result: FloatArray = _WIDER * np.linalg.cholesky(regular)
+        return result
+
+    def drawn(self, n: int, rng: np.random.Generator) -> FloatArray:
+        """Draws, (n, size); of each mode as many as its weight says."""
+        steps = (np.arange(n) + rng.random()) / n
+        of = np.searchsorted(np.cumsum(np.exp(self.log_weights)), steps).clip(max=len(self.means) - 1)
+        white = rng.standard_normal((n, self.means.shape[1]))
+        white /= np.sqrt(rng.chisquare(_DEGREES, n) / _DEGREES)[:, None]
+        return self.means[of] + np.einsum("nij,nj->ni", self._factors[of], white)
+
+    def log_densities(self, draws: FloatArray) -> FloatArray:
+        """Of each mode with its weight, (n_modes, n)."""
+        size, factors = self.means.shape[1], self._factors
+        away = (draws - self.means[:, None]).transpose(0, 2, 1)
+        squares = np.sum(np.linalg.solve(factors, away) ** 2, axis=1)
+        constant = float(gammaln(0.5 * (_DEGREES + size)) - gammaln(0.5 * _DEGREES))
+        constant -= 0.5 * size * math.log(_DEGREES * math.pi)
+        scale = self.log_weights - np.log(np.einsum("kii->ki", factors)).sum(axis=1)
+        found: FloatArray = constant - 0.5 * (_DEGREES + size) * np.log1p(squares / _DEGREES)
+        return found + scale[:, None]
+
+    def adapted(self, draws: FloatArray, shares: FloatArray) -> Mixture:
+        """With weights, means and covariances that weighted draws call for, as far as so few can tell.
+
+        Population Monte Carlo: Cappé and others, 2008, doi 10.1007/s11222-008-9059-x. A covariance of fewer
+        effective draws than it has numbers would follow these very draws, and take weight from them.
+        """
+        log_densities, size = self.log_densities(draws), self.means.shape[1]
+        own = shares * np.exp(log_densities - np.logaddexp.reduce(log_densities, axis=0))
+        total = np.maximum(own.sum(axis=1), 1e-300)
+        effective = total**2 / np.maximum(np.sum(own**2, axis=1), 1e-300)
+        means, covariances = self.means.copy(), self.covariances.copy()
+        for k, weights in enumerate(own / total[:, None]):
+            mean = weights @ draws
+            away = draws - mean
+            means[k] += effective[k] / (size + effective[k]) * (mean - self.means[k])
+            trust = max(1.0 - 0.5 * size * (size + 1) / effective[k], 0.0)
+            covariances[k] += trust * (away.T @ (weights[:, None] * away) - self.covariances[k])
+        return Mixture(np.log(0.5 * np.exp(self.log_weights) + 0.5 * total), means, covariances)
+
+    def joined_by(self, mode: Mode) -> Mixture:
+        """With one mode more, and a share of the draws on it."""
+        return Mixture(
+            np.append(self.log_weights + math.log1p(-_NEW_SHARE), math.log(_NEW_SHARE)),
+            np.vstack([self.means, mode.mean]),
+            np.concatenate([self.covariances, mode.covariance[None]]),
+        )
+
+
+class Weighted(NamedTuple):
+    """Draws of proposals.
+
+    Attributes
+    ----------
+    draws : (n, size) array
+    log_weights : (n,) array
+        Log of the density over that of all proposals.
+    proposal : Mixture
+        The last one.
+    """
+
+    draws: FloatArray
+    log_weights: FloatArray
+    proposal: Mixture
+
+    @property
+    def shares(self) -> FloatArray:
+        """The weights, which sum to 1.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            If no draw has any density.
+        """
+        if self.log_weights.max() == -np.inf:
+            raise np.linalg.LinAlgError("nothing is found where a density was thought to be")
+        weights = np.exp(self.log_weights - self.log_weights.max())
+        result: FloatArray = weights / weights.sum()
+        return result
+
+    @property
+    def log_integral(self) -> float:
+        """Logarithm of the density's integral; minus infinity where no draw has any.
+
+        No weight is larger than their mean times the root of their number: a single draw on a spike does not
+        decide then (Ionides, 2008, doi 10.1198/106186008X320456).
+        """
+        n = len(self.log_weights)
+        most = float(np.logaddexp.reduce(self.log_weights)) - 0.5 * math.log(n)
+        return float(np.logaddexp.reduce(np.minimum(self.log_weights, most))) - math.log(n)
+
+    @property
+    def error(self) -> float:
+        """Standard error of the log integral, in nats."""
+        return float(self.shares.std() * math.sqrt(len(self.log_weights)))
+
+    @property
+    def adapted(self) -> Mixture:
+        """The last proposal, moved to where the weight is."""
+        return self.proposal.adapted(self.draws, self.shares)
+
+    def resampled(self, n: int, rng: np.random.Generator) -> FloatArray:
+        """So many of the draws, by their weights."""
+        return self.draws[rng.choice(len(self.draws), size=n, p=self.shares)]
+
+
+def weighted_draws(
+    log_density: Callable[[FloatArray], FloatArray],
+    proposal: Mixture,
+    rng: np.random.Generator,
+    n: int = DRAWS,
+    enough: float = ENOUGH,
+    least: float = -math.inf,
+    mode_near: Callable[[FloatArray], Mode] | None = None,
+) -> Weighted:
+    """Draws of a density, in turns until its integral is known well enough.
+
+    Parameters
+    ----------
+    log_density : callable
+        What is integrated: (n, size) to (n,); need not be normalised.
+    proposal : Mixture
+        Where the density is, roughly.
+    n : int
+        Draws of a turn.
+    enough : float
+        Standard error of the log integral, in nats, from which on there are no further turns.
+    least : float
+        Where the log integral is less than this after the first turns, further ones are not worth it.
+    mode_near : callable, optional
+        Takes a draw, (size,), and climbs from there to a mode.
+    """
+    proposals, draws, heights = [proposal], np.empty((0, proposal.means.shape[1])), np.empty(0)
+    while True:
+        drawn = proposals[-1].drawn(n, rng)
+        draws = np.concatenate([draws, drawn])
+        height = log_density(drawn)
+        heights = np.append(heights, np.where(np.isnan(height), -np.inf, height))
+        of_each = [np.logaddexp.reduce(one.log_densities(draws), axis=0) for one in proposals]
+        log_mixture = np.logaddexp.reduce(of_each, axis=0) - math.log(len(proposals))
+        found = Weighted(draws, heights - log_mixture, proposals[-1])
+        if found.log_integral == -math.inf:
+            return found
+        ended = found.log_integral < least or found.error < enough
+        if (ended and len(proposals) >= _FEWEST) or len(proposals) == _MOST:
+            return found
+        following, shares = found.adapted, found.shares
+        if mode_near is not None and shares.max() > _ODD:
+            # Where fronts stop there are more modes than climbs find: so do Raftery and Bao, 2010,
+            # doi 10.1111/j.1541-0420.2010.01399.x.
+            following = following.joined_by(mode_near(draws[np.argmax(shares)]))
+        proposals.append(following)
