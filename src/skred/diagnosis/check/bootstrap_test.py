@@ -27,8 +27,8 @@ from skred.parallel.threads import side_by_side, threads
 FloatArray = NDArray[np.float64]
 LIMIT = 0.01
 """Share of clean campaigns that may be called wrong: the one limit of an alarm."""
-_ENOUGH_ABOVE = 8
-"""Clean campaigns at least as odd after which sampling stops: the p-value is then known to a third of it."""
+_ENOUGH_ABOVE = 5
+"""Clean campaigns at least as odd after which sampling stops: with so many of 500 there is no alarm."""
 _BATCH = 25
 """Campaigns refitted together: large enough for arrays, small enough to stop early."""
 

@@ -57,9 +57,11 @@ def log_odds_by_fronts(
     simulated, todo = None, set(terms)
     while True:
         log_odds = float(np.logaddexp.reduce(list(terms.values())))
-        first = max(todo, key=lambda name: terms[name], default=None)
-        if log_odds < reach or first is None or terms[first] < log_odds + math.log(_COUNTS):
+        counting = {name for name in todo if terms[name] >= log_odds + math.log(_COUNTS)}
+        if log_odds < reach or not counting:
             return log_odds
+        # The force not in the list last: its fit takes as long as those of all others.
+        first = max(counting - {UNLISTED} or counting, key=lambda name: terms[name])
         simulated = _fitted(base, rows, start) if simulated is None else simulated
         terms[first] += _beyond_linear(simulated, score_test, scores, first)
         todo.remove(first)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import batched
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,8 @@ from skred.inference.hierarchical.surface import Nodes
 FloatArray = NDArray[np.float64]
 _MOST_ROUNDS = 6
 """Rounds of a refit at most: a population could go to and fro."""
+_MOST_NODES = 200_000
+"""Quadrature points in memory together, but for those of one group at least: some hundred megabytes."""
 _FAR_MEAN, _FAR_SPREAD = 0.7, 0.35
 """Change of a population after which quadrature points are made anew: of its mean in spreads, of a log
 spread."""
@@ -92,32 +95,34 @@ def refit(
     state = list(fits) if fits is not None else [Fit(unfitted(start[0]), start[1])] * n_groups
     active = list(range(n_groups))
     for number in range(_MOST_ROUNDS):
-        likelihood = EventLikelihood(extension, rows, np.empty(0)).in_groups(strengths[active])
-        parts = [state[k].found.population(n) for k in active]
-        population = Population(*(np.concatenate([part[a] for part in parts]) for a in range(2)))
-        points = np.concatenate([state[k].points for k in active])
-        modes = event_modes(likelihood, points, population, n_steps=6)
         spent = rounds.budget if number > 0 or rounds.first is None else rounds.first
-        nodes = event_nodes(likelihood, population, modes, spent, start[0]).nodes
-        moved = []
-        for k, part, own in zip(
-            active,
-            _split(nodes, len(active), n_events),
-            modes.points.reshape(len(active), n_events, -1),
-            strict=True,
-        ):
-            before = state[k].found.psi
-            found = evidence(part, log_scale, before)
-            if number + 1 < rounds.least or _moved(before, found.psi, n):
-                moved.append(k)
-            if rounds.sampled:
-                sampled, _ = importance_evidence(part, log_scale, found, seed=0)
-                found = found._replace(log_evidence=sampled, sampling_changed=sampled - found.log_evidence)
-            state[k] = Fit(found, own)
+        at_once, moved = max(_MOST_NODES // (n_events * spent.total), 1), list[int]()
+        for some in map(list, batched(active, at_once)):
+            likelihood = EventLikelihood(extension, rows, np.empty(0)).in_groups(strengths[some])
+            parts = [state[k].found.population(n) for k in some]
+            population = Population(*(np.concatenate([part[a] for part in parts]) for a in range(2)))
+            points = np.concatenate([state[k].points for k in some])
+            modes = event_modes(likelihood, points, population, n_steps=6)
+            nodes = event_nodes(likelihood, population, modes, spent, start[0]).nodes
+            own_points = modes.points.reshape(len(some), n_events, -1)
+            for k, part, own in zip(some, _split(nodes, len(some), n_events), own_points, strict=True):
+                before = state[k].found.psi
+                found = evidence(part, log_scale, before)
+                if number + 1 < rounds.least or _moved(before, found.psi, n):
+                    moved.append(k)
+                if rounds.sampled:
+                    found = _by_sampling(part, log_scale, found)
+                state[k] = Fit(found, own)
         active = moved
         if not active:
             break
     return state
+
+
+def _by_sampling(nodes: Nodes, log_scale: FloatArray, found: Evidence) -> Evidence:
+    """With evidence by importance sampling."""
+    sampled, _ = importance_evidence(nodes, log_scale, found, seed=0)
+    return found._replace(log_evidence=sampled, sampling_changed=sampled - found.log_evidence)
 
 
 def unfitted(population: Population) -> Evidence:
