@@ -25,6 +25,7 @@ from skred.prove.ledger import ledger_sha256
 from skred.prove.scorecard import DIAGNOSIS, scorecard
 from skred.prove.scoring.answers import UNLISTED
 from studies.files import FIGURES, ROOT, shrink
+from studies.proof.beside import EARLIER, beside
 from studies.proof.record import (
     Batch,
     add,
@@ -83,6 +84,12 @@ The *newest batch* is {newest}, the last that was sealed. Intervals in brackets 
 what the linearised model expects of a perfect method in the blind run. Criteria leave compensated effects
 out; these have a table of their own.
 """
+_EARLIER = f"""The same campaigns, by the code of commit 7d03b1a as well, side by side on one machine. That version
+had no global starts, took avalanches to have every added strength in common, named a term that two mechanisms
+share by one of them, and compared no mechanism with a force beside it. *p* is that of a sign test of trials
+that one version has right and the other has not. Rows on effects take those with a signal-to-noise of
+{STRONG:g} and more, and open ones but for the row on compensated effects.
+"""
 _ORDER = """In the order in which they were sealed, each diagnosed by the code of its day. *Found* counts
 effects with a signal-to-noise of {strong:g} and more. The first two batches did not look for forces that are
 nil on average. CPU times are of different machines.
@@ -124,6 +131,9 @@ def page(figures: Sequence[str], run: Found) -> str:
     parts += [f"![{name.replace('_', ' ')}](figures/proof-{name}.png)\n" for name in figures]
     parts += ["Open and compensated effects of the blind run:\n", _open_and_compensated(run)]
     parts += ["What was hidden in the blind run:\n", _by_hidden(run["trials"])]
+    if EARLIER in answers_of(newest):
+        trials, answers = gathered([newest])
+        parts += ["## The newest batch by an earlier version\n", _EARLIER, beside(trials, answers)]
     parts += ["## Every batch\n", _ORDER.format(strong=STRONG), _by_batch(every, lines)]
     parts += ["## The full record\n", _FULL.format(command=COMMAND, kept=KEPT)]
     return "\n".join(parts)
