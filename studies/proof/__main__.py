@@ -85,10 +85,11 @@ what the linearised model expects of a perfect method in the blind run. Criteria
 out; these have a table of their own.
 """
 _EARLIER = f"""The same campaigns, by the code of commit 7d03b1a as well, side by side on one machine. That
-version had no global starts, took avalanches to have every added strength in common, named a term that two
-mechanisms share by one of them, and compared no mechanism with a force beside it. *p* is that of a sign test of trials
-that one version has right and the other has not. Rows on effects take those with a signal-to-noise of
-{STRONG:g} and more, and open ones but for the row on compensated effects.
+version had no global starts, took avalanches to have every added strength in common, named a
+term that two mechanisms share by one of them, and compared no mechanism with a force beside
+it. *p* is that of a sign test of trials that one version has right and the other has not. Rows
+on effects take those with a signal-to-noise of {STRONG:g} and more, and open ones but for the
+row on compensated effects.
 """
 _ORDER = """In the order in which they were sealed, each diagnosed by the code of its day. *Found* counts
 effects with a signal-to-noise of {strong:g} and more. The first two batches did not look for forces that are
