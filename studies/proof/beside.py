@@ -37,7 +37,11 @@ ROWS: tuple[tuple[str, Chosen, Chosen], ...] = (
         lambda p: p.right_set and len(p.names) <= _MOST_TIED,
     ),
     ("right set of names", _strong_listed, lambda p: p.right_set),
-    ("right first name, compensated effect", lambda p: p.hidden == "masked", lambda p: p.right_name),
+    (
+        "right first name, compensated effect",
+        lambda p: p.hidden == "masked" and p.snr >= STRONG,
+        lambda p: p.right_name,
+    ),
     ("a verdict", lambda p: True, lambda p: not p.failed),
 )
 """What is counted, of which trials, and what is good."""
@@ -90,16 +94,16 @@ def _sets(now: Sequence[Pair], then: Sequence[Pair]) -> list[str]:
 
 def _sums(now: Sequence[Pair], then: Sequence[Pair]) -> list[str]:
     """Log scores and times."""
-    differences = [
-        log_score(one) - log_score(other)
-        for one, other in zip(now, then, strict=True)
-        if not one.failed and not other.failed
-    ]
+    differences = [log_score(one) - log_score(other) for one, other in zip(now, then, strict=True)]
     said = [f"- Log score of the truth's id: {sum(differences) / len(differences):+.2f} nats a trial."]
     for kind in ("sparse", "dense"):
-        medians = [
-            median([float(pair.answer["cpu_seconds"]) for pair in pairs if pair.kind == kind])
-            for pairs in (now, then)
-        ]
-        said.append(f"- Median CPU time, {kind}: today {medians[0]:.0f} s, earlier {medians[1]:.0f} s.")
+        times = [[_seconds(pair) for pair in pairs if pair.kind == kind] for pairs in (now, then)]
+        if all(times):
+            today, earlier = (median(own) for own in times)
+            said.append(f"- Median CPU time, {kind}: today {today:.0f} s, earlier {earlier:.0f} s.")
     return said
+
+
+def _seconds(pair: Pair) -> float:
+    """What an answer took; one that is not there took no time."""
+    return float(pair.answer.get("cpu_seconds", 0.0))

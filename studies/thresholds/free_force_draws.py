@@ -69,7 +69,7 @@ def main() -> None:
                 for row in both_ways(law, under_errors, pool):
                     print(row, flush=True)
                     rows.append(row)
-    write(RESULT, {"commit": commit(), "rows": rows})
+    write(RESULT, {"commit": commit(), "many_draws": 6 * MANY_DRAWS, "rows": rows})
 
 
 if __name__ == "__main__":

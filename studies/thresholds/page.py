@@ -73,18 +73,18 @@ def free_force_draws() -> str:
     due = [fmean(row["many"]) for row in found["rows"]]
     few = [one - own for row, own in zip(found["rows"], due, strict=True) for one in row["usual"]]
     laplace = [row["laplace"] - own for row, own in zip(found["rows"], due, strict=True)]
-    near = sum(abs(one) <= _NEAR for one in few)
+    near, many = sum(abs(one) <= _NEAR for one in few), found.get("many_draws", 1024)
     return f"""
 ## The evidence of a force in no list
 
 `python -m studies.thresholds.free_force_draws` (code
 {found["commit"]}): log Bayes factors of what is missing at Ryggfonn against nothing, by the way the force
 goes with speed. By Laplace's formula over its 32 values, and by importance sampling of them, with as many
-draws as a comparison takes and with 1024; one number a seed. Of the {len(few)} numbers with few draws {near}
-are within {_NEAR} nats of the mean of those with 1024, from {min(few):+.1f} to {max(few):+.1f} and
+draws as a comparison takes and with {many}; one number a seed. Of the {len(few)} with few draws {near}
+are within {_NEAR} nats of the mean of those with many, from {min(few):+.1f} to {max(few):+.1f} and
 {fmean(few):+.1f} in the mean; by Laplace's formula from {min(laplace):+.1f} to {max(laplace):+.1f}.
 
-| base law | errors | force | Laplace | as in a comparison | 1024 draws | best listed | CPU seconds |
+| base law | errors | force | Laplace | as in a comparison | many draws | best listed | CPU seconds |
 | --- | --- | --- | --- | --- | --- | --- | --- |
 {rows}"""
 

@@ -15,7 +15,7 @@ FloatArray = np.ndarray[Any, np.dtype[np.float64]]
 
 @pytest.mark.parametrize("size", [2, 5, 8])
 def test_a_skewed_density_from_a_proposal_that_is_off_and_too_narrow(size: int) -> None:
-    """The stated errors are those that are made, and nothing is left of what adaptation takes."""
+    """The stated errors are those that are made, and adaptation takes no weight from what is counted."""
     rng = np.random.default_rng(9)
     factor = rng.standard_normal((size, size)) / np.sqrt(size) + 0.5 * np.eye(size)
     log_volume = float(np.linalg.slogdet(factor)[1])
@@ -29,8 +29,23 @@ def test_a_skewed_density_from_a_proposal_that_is_off_and_too_narrow(size: int) 
     values = np.array([one.log_integral for one in found])
     stated = float(np.mean([one.error for one in found]))
     assert all(one.error < 0.1 for one in found)
-    assert values.mean() == pytest.approx(2.0, abs=0.05)
+    assert values.mean() == pytest.approx(2.0, abs=3.5 * values.std() / np.sqrt(len(values)))
     assert 0.6 * stated < values.std() < 1.6 * stated
+
+
+def test_a_force_of_many_values_loses_little_to_adaptation() -> None:
+    """By few draws in 32 dimensions, a fifth of a width off along each: by the mixture's weights 0.2."""
+    size = 32
+
+    def log_density(draws: FloatArray) -> FloatArray:
+        return np.asarray(-0.5 * np.sum(draws**2, axis=1) - 0.5 * size * np.log(2.0 * np.pi))
+
+    near = Mixture.on([Mode(0.2 * np.ones(size), 0.9 * np.eye(size))])
+    found = [
+        weighted_draws(log_density, near, np.random.default_rng(seed), 64, 0.2).log_integral
+        for seed in range(60)
+    ]
+    assert np.mean(found) == pytest.approx(0.0, abs=0.12)
 
 
 def test_proposals_of_any_size_of_numbers() -> None:
@@ -45,7 +60,8 @@ def test_proposals_of_any_size_of_numbers() -> None:
         found = weighted_draws(
             density, Mixture.on([Mode(np.zeros(len(own)), np.diag(own**2))]), np.random.default_rng(0)
         )
-        assert found.log_integral == pytest.approx(0.0, abs=4.0 * found.error + 0.01)
+        assert found.error < 0.05
+        assert found.log_integral == pytest.approx(0.0, abs=4.0 * found.error)
 
 
 def _of_one(scale: float) -> Any:

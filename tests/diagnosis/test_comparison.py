@@ -1,4 +1,4 @@
-"""The comparison's two looks: rough ones at every place, and fronts where a place leads."""
+"""The comparison: screening of every place, refinement where one leads, and what is computed again."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
 
+import skred.diagnosis.evidence.refit as refits
 from skred.diagnosis.compare.candidate import FORM, Candidate
 from skred.diagnosis.compare.comparison import with_errors, worth_comparing
 from skred.diagnosis.compare.recomputed import recomputed
@@ -43,15 +44,15 @@ def test_second_look_against_many_nodes_on_a_dense_grid(base: Base, name: str) -
     assert abs(found.moments[0] - mean) < 0.25 * sd
 
 
-def test_a_first_look_finds_what_is_missing(base: Base) -> None:
+def test_screening_finds_what_is_missing(base: Base) -> None:
     for job in placed_mechanisms(base.setting):
         if job.mechanism.id in ("turbulent_drag", "viscous_drag"):
             assert curve(base, job.mechanism, job.shape).log_bayes_factor > 5.0
 
 
 @pytest.mark.slow
-def test_a_first_look_promises_nothing_in_a_clean_campaign() -> None:
-    """Along tangents friction on many a stretch reads five nats where fronts stop; by fronts none has two."""
+def test_screening_promises_nothing_in_a_clean_campaign() -> None:
+    """Along tangents friction on many a stretch would have five nats here, where fronts stop."""
     base = base_of(trial(990001, "sparse", "nothing", "pcm").campaign, "pcm")
     friction = [one for one in placed_mechanisms(base.setting) if one.mechanism.id == "segment_friction"]
     found = [curve(base, one.mechanism, one.shape) for one in friction]
@@ -88,8 +89,8 @@ def test_only_what_leads_is_computed_again(base: Base) -> None:
     assert 0.0 < abs(looked.correction) < 0.5 and abs(looked.disagreement) < 0.5
 
 
-def test_a_first_look_is_by_fronts() -> None:
-    """At Ryggfonn without drag a third of the readings are outliers: tangents miss what ends that."""
+def test_screening_finds_what_ends_outliers() -> None:
+    """At Ryggfonn without drag a third of the readings are outliers; no tangent leads to what ends that."""
     base = ryggfonn_base("coulomb")
     drag = mechanisms()["velocity_weakening"]
     assert drag.added is not None
@@ -318,7 +319,7 @@ def test_errors_in_common_are_integrated_as_closely_as_others() -> None:
 
 
 @pytest.mark.slow
-def test_a_first_look_leaves_out_only_strengths_that_are_hopeless() -> None:
+def test_screening_leaves_out_only_strengths_that_are_hopeless() -> None:
     """The same evidence as on the whole grid, without those that have none and have the more the weaker."""
     base, spared = sparse_base(), 0
     local = [
@@ -348,6 +349,17 @@ def test_nothing_is_the_same_whatever_is_not_added() -> None:
         assert base.with_nothing(SCREENING) is found
     # Another base, under another error model say, has its own.
     assert replace(base).with_nothing(SCREENING) is not base.with_nothing(SCREENING)
+
+
+def test_refits_of_few_points_at_a_time_are_the_same(base: Base, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Groups one by one, as of campaigns of a thousand avalanches."""
+    job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == "turbulent_drag")
+    assert job.mechanism.added is not None
+    strengths = job.mechanism.added.scale * np.array([0.3, 0.6, 1.2])
+    whole = curve_at(base, job.mechanism, job.shape, strengths, USUAL)
+    monkeypatch.setattr(refits, "MOST_NODES", 1)
+    parts = curve_at(base, job.mechanism, job.shape, strengths, USUAL)
+    assert parts.log_evidence == pytest.approx(whole.log_evidence, abs=1e-8)
 
 
 def test_screening_sees_strengths_far_below_the_grid() -> None:

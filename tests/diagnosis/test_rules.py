@@ -60,12 +60,12 @@ def test_probabilities_by_hand() -> None:
 
 
 def test_p_value_of_besag_and_clifford() -> None:
-    """Few above after all: (above + 1) / (n + 1); eight above, stopped: above / n."""
+    """Few above after all: (above + 1) / (n + 1); six above, stopped: above / n."""
     clean = np.arange(300.0)
     assert BootstrapTest(1000.0, clean).p_value == pytest.approx(1.0 / 301.0)
     assert BootstrapTest(298.0, clean).p_value == pytest.approx(3.0 / 301.0)
-    assert BootstrapTest(296.0, clean).p_value == pytest.approx(5.0 / 301.0)  # four above
-    assert BootstrapTest(295.0, clean).p_value == pytest.approx(5.0 / 300.0)
+    assert BootstrapTest(295.0, clean).p_value == pytest.approx(6.0 / 301.0)  # five above
+    assert BootstrapTest(294.0, clean).p_value == pytest.approx(6.0 / 300.0)
     assert BootstrapTest(15.0, np.arange(25.0)).p_value == pytest.approx(10.0 / 25.0)
     assert BootstrapTest(0.0, np.zeros(25)).p_value == 1.0  # ties count as above
 
@@ -75,6 +75,9 @@ def test_limit_of_the_check() -> None:
     assert BootstrapTest(9.0, np.zeros(99)).fired and not BootstrapTest(9.0, np.zeros(98)).fired
     assert BootstrapTest(9.0, np.append(np.zeros(298), [10.0, 10.0])).fired
     assert not BootstrapTest(9.0, np.append(np.zeros(297), [10.0] * 3)).fired
+    assert BootstrapTest(9.0, np.append(np.zeros(496), [10.0] * 4)).fired
+    assert not BootstrapTest(9.0, np.append(np.zeros(495), [10.0] * 5)).fired
+    assert not BootstrapTest(9.0, np.append(np.zeros(494), [10.0] * 6)).fired
 
 
 def shares(nothing: float, unlisted: float, **named: float) -> dict[str, float]:

@@ -15,7 +15,7 @@ from skred.diagnosis.augment.problem import (
     AugmentedProblem,
     extension_with,
 )
-from skred.diagnosis.compare.between import populations_of, ways_of
+from skred.diagnosis.compare.between import ways_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.marginal import population_at
 from skred.diagnosis.tabulated.coefficient_grid import finer, locate
@@ -84,9 +84,7 @@ def augmented_problem(
 def _differing(base: Base, curve: Curve, way: BetweenEvents) -> AugmentedProblem:
     """With one mechanism in which avalanches differ: tables around where that way has populations."""
     found, added = ways_of(base, curve)[way], added_strengths([curve], [way])
-    strength, near = found.draws[:, -2], populations_of(found)
-    mean, sd = float(strength.mean()), float(strength.std())
-    return _with_tables(base, added, wide_tables(base, curve, near, BUDGETS[0], mean, sd))
+    return _with_tables(base, added, wide_tables(base, curve, found.populations, BUDGETS[0], *found.strength))
 
 
 def _with_tables(base: Base, added: tuple[AddedStrength, ...], tables: Tables) -> AugmentedProblem:

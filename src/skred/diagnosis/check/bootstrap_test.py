@@ -27,7 +27,7 @@ from skred.parallel.threads import side_by_side, threads
 FloatArray = NDArray[np.float64]
 LIMIT = 0.01
 """Share of clean campaigns that may be called wrong: the one limit of an alarm."""
-_ENOUGH_ABOVE = 5
+_ENOUGH_ABOVE = 6
 """Clean campaigns at least as odd after which sampling stops: with so many of 500 there is no alarm."""
 _BATCH = 25
 """Campaigns refitted together: large enough for arrays, small enough to stop early."""
@@ -45,16 +45,19 @@ class BootstrapTest:
         The same of clean campaigns, in the linear model; by fronts where that reaches the statistic.
     linear : float or None
         Of the recordings in the linear model, where the statistic is not that.
+    simulated_linear : (n,) array, optional
+        Of clean campaigns in the linear model, where `simulated` is not that.
     """
 
     statistic: float
     simulated: FloatArray
     linear: float | None = None
+    simulated_linear: FloatArray | None = None
 
     @property
     def p_value(self) -> float:
         """Share of clean campaigns at least as odd, by Besag and Clifford's rule where it stopped early."""
-        return self._share(self.statistic)
+        return _share(self.simulated, self.statistic)
 
     @property
     def fired(self) -> bool:
@@ -64,13 +67,17 @@ class BootstrapTest:
     @property
     def p_value_in_linear_model(self) -> float:
         """The same of the recordings in the linear model."""
-        return self._share(self.statistic if self.linear is None else self.linear)
+        if self.linear is None:
+            return self.p_value
+        return _share(self.simulated if self.simulated_linear is None else self.simulated_linear, self.linear)
 
-    def _share(self, statistic: float) -> float:
-        above = int(np.sum(self.simulated >= statistic))
-        if above >= _ENOUGH_ABOVE:
-            return above / len(self.simulated)
-        return (above + 1) / (len(self.simulated) + 1)
+
+def _share(simulated: FloatArray, statistic: float) -> float:
+    """Of clean campaigns at least as odd."""
+    above = int(np.sum(simulated >= statistic))
+    if above >= _ENOUGH_ABOVE:
+        return above / len(simulated)
+    return (above + 1) / (len(simulated) + 1)
 
 
 def bootstrap_test(
@@ -98,20 +105,22 @@ def bootstrap_test(
     # At less than even odds there is no alarm, whatever clean campaigns have.
     by_fronts = log_odds is not None and log_odds > 0.0
     rng = np.random.default_rng([seed, 21])
-    simulated: list[FloatArray] = []
+    in_linear, simulated = list[FloatArray](), list[FloatArray]()
     for some in batched(range(0, most, _BATCH), threads()):
         # Simulated one after the other and counted in order: how many threads there are changes nothing.
         made = [_simulated(test, draws, slice(first, min(first + _BATCH, most)), rng) for first in some]
         for refitted in side_by_side(lambda clean: _refitted(test, *clean), made):
-            found = refitted.log_odds
+            in_linear.append(refitted.log_odds)
+            found = refitted.log_odds.copy()
             if by_fronts:
                 high = np.flatnonzero(found >= statistic)
                 parts = [refitted.one(int(group)) for group in high]
                 found[high] = side_by_side(lambda one: log_odds_by_fronts(base, test, *one, statistic), parts)
             simulated.append(found)
-            if np.sum(np.concatenate(simulated) >= statistic) >= _ENOUGH_ABOVE:
-                return BootstrapTest(statistic, np.concatenate(simulated), linear)
-    return BootstrapTest(statistic, np.concatenate(simulated), linear)
+            done = BootstrapTest(statistic, np.concatenate(simulated), linear, np.concatenate(in_linear))
+            if np.sum(done.simulated >= statistic) >= _ENOUGH_ABOVE:
+                return done
+    return done
 
 
 class _Refitted(NamedTuple):

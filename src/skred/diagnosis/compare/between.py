@@ -12,14 +12,10 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
-
 from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.evidence.adaptive_sampling import Mixture
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import FINE, Budget
-from skred.diagnosis.evidence.marginal import Evidence
-from skred.diagnosis.tabulated.between_evidence import BetweenTarget, Way, between_evidence, search
+from skred.diagnosis.tabulated.between_evidence import BetweenTarget, Way, between_evidence, search, way_of
 from skred.diagnosis.tabulated.wide_tables import wide_tables
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism
@@ -28,7 +24,7 @@ _LOOKED_AT = 4
 """Mechanisms that are looked at, the most probable ones with the strength in common: one that is far behind
 would have to gain more by what avalanches differ in than these do."""
 TABLES = Budget(64, 64, 128, 1.5, 1.8), FINE
-"""Nodes of an event in each table: to find where modes are, and then there."""
+"""Quadrature points of an event in each table: to find where modes are, and then there."""
 
 
 def may_differ(mechanism: Mechanism) -> bool:
@@ -65,32 +61,20 @@ def ways_of(base: Base, curve: Curve, budgets: Sequence[Budget] = TABLES) -> dic
     Parameters
     ----------
     budgets : sequence of Budget
-        Nodes of an event in the tables by which modes are looked for, and in those by which evidence is
-        computed around the populations that were found; one where they are the same.
+        Quadrature points of an event in the tables by which modes are looked for, and in those by which
+        evidence is computed around the populations that were found; one where they are the same.
     """
     mean, sd = curve.moments
     near = curve.nearest(mean).found
     tables = wide_tables(base, curve, near, budgets[0], mean, sd)
-    found = {
-        kind: search(BetweenTarget(base, curve, tables, kind), near, mean, seed=0) for kind in BetweenEvents
-    }
-    if len(budgets) > 1:
-        best = max(found, key=lambda kind: math.log(PRIOR[kind]) + found[kind].log_integral)
-        around = covered_by(found[best].adapted, near.psi.size)
-        tables = wide_tables(base, curve, around, budgets[1], mean, sd)
+    targets = {kind: BetweenTarget(base, curve, tables, kind) for kind in BetweenEvents}
+    found = {kind: search(target, near, mean, seed=0) for kind, target in targets.items()}
+    if len(budgets) == 1:
+        return {kind: way_of(target, found[kind]) for kind, target in targets.items()}
+    best = max(found, key=lambda kind: math.log(PRIOR[kind]) + found[kind].log_integral)
+    around = way_of(targets[best], found[best]).populations
+    tables = wide_tables(base, curve, around, budgets[1], mean, sd)
     return {
-        kind: between_evidence(BetweenTarget(base, curve, tables, kind), one.adapted, seed=0)
+        kind: between_evidence(BetweenTarget(base, curve, tables, kind), one.proposal, seed=0)
         for kind, one in found.items()
     }
-
-
-def covered_by(proposal: Mixture, n_psi: int) -> Evidence:
-    """The populations of a way, as one that tables cover; its evidence is not known."""
-    first = int(np.argmax(proposal.log_weights))
-    return Evidence(-math.inf, proposal.means[first, :n_psi], proposal.covariances[first, :n_psi, :n_psi])
-
-
-def populations_of(way: Way) -> Evidence:
-    """The populations of a way, as one that tables cover."""
-    psi = way.draws[:, :-2]
-    return Evidence(way.log_evidence, psi.mean(axis=0), np.cov(psi.T))

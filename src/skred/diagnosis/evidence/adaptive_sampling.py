@@ -1,8 +1,10 @@
 """Integrals by adaptive importance sampling from a mixture of Student t densities around modes.
 
-All draws are weighted by the mixture of all that was proposed (adaptive multiple importance sampling: Cornuet
-and others, 2012, doi 10.1111/j.1467-9469.2011.00756.x). Proposals move to where the weight is, and a mode is
-looked for wherever a single draw has much of it.
+Proposals move to where the weight of all draws is, these weighted by all that was proposed (adaptive multiple
+importance sampling: Cornuet and others, 2012, doi 10.1111/j.1467-9469.2011.00756.x), and a mode is looked for
+wherever a single draw has much of it. An integral is of draws that no proposal has followed: those of later
+turns, each weighted by its own turn's. With the mixture's weights adaptation would take weight from the very
+draws that it follows, 0.2 to 0.5 nats in 32 dimensions.
 """
 
 from __future__ import annotations
@@ -20,8 +22,8 @@ DRAWS = 200
 """Draws of a turn, where a density takes no time."""
 ENOUGH = 0.1
 """Standard error of a log integral, in nats, at which there are enough draws."""
-_FEWEST, _MOST = 2, 6
-"""Turns of sampling in any case, because the first does not know what it missed; and at most, for time."""
+_MOST = 6
+"""Turns of sampling at most, which bounds the time. The first one is a search."""
 _ODD = 0.1
 """Share of all weight on one draw from which on a mode is looked for there: the proposals have missed one."""
 _NEW_SHARE = 0.3
@@ -31,7 +33,7 @@ _WIDER = 1.1
 _DEGREES = 7.0
 """Degrees of freedom of the proposals: tails heavy enough to bound the weights."""
 _TEMPERED = 0.5
-"""Tempering exponent of the modes' factors in how many draws each one has: they are rough."""
+"""Tempering exponent of the modes' factors, which are rough, where they say how many draws each one gets."""
 
 
 class Mode(NamedTuple):
@@ -68,15 +70,15 @@ class Mixture(NamedTuple):
     @classmethod
     def on(cls, modes: Sequence[Mode]) -> Mixture:
         """Around each mode."""
-        evened = _TEMPERED * np.array([mode.log_factor for mode in modes])
+        tempered = _TEMPERED * np.array([mode.log_factor for mode in modes])
         means = np.array([mode.mean for mode in modes])
         covariances = np.array([mode.covariance for mode in modes])
-        return cls(evened - np.logaddexp.reduce(evened), means, covariances)
+        return cls(tempered - np.logaddexp.reduce(tempered), means, covariances)
 
     @property
     def _factors(self) -> FloatArray:
-        variance = np.einsum("kii->k", self.covariances) / self.means.shape[1]
-        regular = self.covariances + 1e-10 * variance[:, None, None] * np.eye(self.means.shape[1])
+        variances = np.einsum("kii->ki", self.covariances)
+        regular = self.covariances + 1e-10 * variances[:, :, None] * np.eye(self.means.shape[1])
         result: FloatArray = _WIDER * np.linalg.cholesky(regular)
         return result
 
@@ -128,15 +130,15 @@ class Mixture(NamedTuple):
 
 
 class Weighted(NamedTuple):
-    """Draws of proposals.
+    """Draws that no proposal has followed.
 
     Attributes
     ----------
     draws : (n, size) array
     log_weights : (n,) array
-        Log of the density over that of all proposals.
+        Log of the density over that of each draw's own proposal.
     proposal : Mixture
-        The last one.
+        Adapted to all draws, these and those of the search.
     """
 
     draws: FloatArray
@@ -152,11 +154,7 @@ class Weighted(NamedTuple):
         numpy.linalg.LinAlgError
             If no draw has any density.
         """
-        if self.log_weights.max() == -np.inf:
-            raise np.linalg.LinAlgError("nothing is found where a density was thought to be")
-        weights = np.exp(self.log_weights - self.log_weights.max())
-        result: FloatArray = weights / weights.sum()
-        return result
+        return _shares(self.log_weights)
 
     @property
     def log_integral(self) -> float:
@@ -173,11 +171,6 @@ class Weighted(NamedTuple):
     def error(self) -> float:
         """Standard error of the log integral, in nats."""
         return float(self.shares.std() * math.sqrt(len(self.log_weights)))
-
-    @property
-    def adapted(self) -> Mixture:
-        """The last proposal, moved to where the weight is."""
-        return self.proposal.adapted(self.draws, self.shares)
 
     def resampled(self, n: int, rng: np.random.Generator) -> FloatArray:
         """So many of the draws, by their weights."""
@@ -210,23 +203,34 @@ def weighted_draws(
     mode_near : callable, optional
         Takes a draw, (size,), and climbs from there to a mode.
     """
-    proposals, draws, heights = [proposal], np.empty((0, proposal.means.shape[1])), np.empty(0)
+    proposals, turns, first = [proposal], list[tuple[FloatArray, FloatArray]](), 1
     while True:
         drawn = proposals[-1].drawn(n, rng)
-        draws = np.concatenate([draws, drawn])
         height = log_density(drawn)
-        heights = np.append(heights, np.where(np.isnan(height), -np.inf, height))
+        turns.append((drawn, np.where(np.isnan(height), -np.inf, height)))
+        draws, heights = (np.concatenate(parts) for parts in zip(*turns, strict=True))
         of_each = [np.logaddexp.reduce(one.log_densities(draws), axis=0) for one in proposals]
-        log_mixture = np.logaddexp.reduce(of_each, axis=0) - math.log(len(proposals))
-        found = Weighted(draws, heights - log_mixture, proposals[-1])
-        if found.log_integral == -math.inf:
+        if heights.max() == -np.inf:
+            return Weighted(draws, heights, proposal)
+        shares = _shares(heights - np.logaddexp.reduce(of_each, axis=0))
+        following = proposals[-1].adapted(draws, shares)
+        last = len(turns) == _MOST
+        fresh = slice(n * min(first, len(turns) - 1), None)
+        own = np.concatenate([log_q[n * k : n * (k + 1)] for k, log_q in enumerate(of_each)])
+        found = Weighted(draws[fresh], heights[fresh] - own[fresh], following)
+        if last or (len(turns) > first and (found.log_integral < least or found.error < enough)):
             return found
-        ended = found.log_integral < least or found.error < enough
-        if (ended and len(proposals) >= _FEWEST) or len(proposals) == _MOST:
-            return found
-        following, shares = found.adapted, found.shares
         if mode_near is not None and shares.max() > _ODD:
             # Where fronts stop there are more modes than climbs find: so do Raftery and Bao, 2010,
             # doi 10.1111/j.1541-0420.2010.01399.x.
-            following = following.joined_by(mode_near(draws[np.argmax(shares)]))
+            following, first = following.joined_by(mode_near(draws[np.argmax(shares)])), len(turns)
         proposals.append(following)
+
+
+def _shares(log_weights: FloatArray) -> FloatArray:
+    """Weights that sum to 1."""
+    if log_weights.max() == -np.inf:
+        raise np.linalg.LinAlgError("nothing is found where a density was thought to be")
+    weights = np.exp(log_weights - log_weights.max())
+    result: FloatArray = weights / weights.sum()
+    return result

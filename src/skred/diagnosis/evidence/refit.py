@@ -25,7 +25,7 @@ from skred.inference.hierarchical.surface import Nodes
 FloatArray = NDArray[np.float64]
 _MOST_ROUNDS = 6
 """Rounds of a refit at most: a population could go to and fro."""
-_MOST_NODES = 200_000
+MOST_NODES = 200_000
 """Quadrature points in memory together, but for those of one group at least: some hundred megabytes."""
 _FAR_MEAN, _FAR_SPREAD = 0.7, 0.35
 """Change of a population after which quadrature points are made anew: of its mean in spreads, of a log
@@ -96,7 +96,7 @@ def refit(
     active = list(range(n_groups))
     for number in range(_MOST_ROUNDS):
         spent = rounds.budget if number > 0 or rounds.first is None else rounds.first
-        at_once, moved = max(_MOST_NODES // (n_events * spent.total), 1), list[int]()
+        at_once, moved = max(MOST_NODES // (n_events * spent.total), 1), list[int]()
         for some in map(list, batched(active, at_once)):
             likelihood = EventLikelihood(extension, rows, np.empty(0)).in_groups(strengths[some])
             parts = [state[k].found.population(n) for k in some]
@@ -110,7 +110,7 @@ def refit(
                 found = evidence(part, log_scale, before)
                 if number + 1 < rounds.least or _moved(before, found.psi, n):
                     moved.append(k)
-                if rounds.sampled:
+                if rounds.sampled and (k not in moved or number + 1 == _MOST_ROUNDS):
                     found = _by_sampling(part, log_scale, found)
                 state[k] = Fit(found, own)
         active = moved

@@ -25,8 +25,6 @@ from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.between_events import BetweenEvents, components, from_unbounded
 
 FloatArray = NDArray[np.float64]
-_KEPT = 1600
-"""Draws of the posterior that are kept."""
 _STARTS: dict[BetweenEvents, tuple[tuple[float, float], ...]] = {
     BetweenEvents.COMMON: ((1.0, 0.0),),
     BetweenEvents.SPREAD: ((1.0, -1.6), (1.0, -0.3)),
@@ -38,7 +36,7 @@ _DIFFERENCE = 1e-3
 _LEAST_CURVATURE = 0.05
 """Of minus the log density along an axis, as for any population here: proposals stay bounded."""
 _SETTLED = 1e-5
-"""Share of the log density by which a step must gain: some thousandths of a nat."""
+"""Share of the log density by which a step must gain: some thousandths or hundredths of a nat."""
 _BAD = -1e10
 """Height where there is none: a climb turns back, and differences stay finite."""
 
@@ -50,13 +48,16 @@ class Way(NamedTuple):
     ----------
     log_evidence, error : float
         In nats; its standard error by importance sampling.
-    draws : (n, n_psi + 2) array
-        Of its posterior: populations, the strength, and what says how it differs.
+    populations : Evidence
+        Mean and covariance over its posterior.
+    strength : (float, float)
+        Mean and standard deviation over it.
     """
 
     log_evidence: float
     error: float
-    draws: FloatArray
+    populations: Evidence
+    strength: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +118,7 @@ class BetweenTarget:
 
 
 def search(target: BetweenTarget, near: Evidence, strength: float, seed: int) -> Weighted:
-    """Look for modes, and by first draws how far the posterior around them reaches.
+    """Look for the highest mode, and by draws around it how far the posterior reaches.
 
     Parameters
     ----------
@@ -138,12 +139,20 @@ def search(target: BetweenTarget, near: Evidence, strength: float, seed: int) ->
     return weighted_draws(target, proposal, np.random.default_rng([seed, 71]))
 
 
+def way_of(target: BetweenTarget, found: Weighted) -> Way:
+    """One way, from draws of its posterior."""
+    shares = found.shares
+    psi, strengths, _, _ = target.split(found.draws)
+    mean, middle = shares @ psi, float(shares @ strengths)
+    away = psi - mean
+    populations = Evidence(found.log_integral, mean, away.T @ (shares[:, None] * away))
+    sd = math.sqrt(float(shares @ (strengths - middle) ** 2))
+    return Way(found.log_integral, found.error, populations, (middle, sd))
+
+
 def between_evidence(target: BetweenTarget, proposal: Mixture, seed: int) -> Way:
-    """The evidence of one way, and draws of it, from a proposal; that may be by other tables."""
-    rng = np.random.default_rng([seed, 72])
-    found = weighted_draws(target, proposal, rng)
-    psi, strengths, parameter, _ = target.split(found.resampled(_KEPT, rng))
-    return Way(found.log_integral, found.error, np.column_stack([psi, strengths, parameter]))
+    """One way, from a proposal that may be by other tables."""
+    return way_of(target, weighted_draws(target, proposal, np.random.default_rng([seed, 72])))
 
 
 def _climbed(target: BetweenTarget, start: FloatArray) -> FloatArray:
