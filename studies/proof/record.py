@@ -3,8 +3,8 @@
 A batch is one ledger. All batches are in one archive, ``studies/results/proof.tar.xz``; of each it has
 ``<seed>/ledger.json`` as it was published, ``<seed>/sealed.json``, what the ledger's hashes are of, and
 ``<seed>/answers/<method>.json``. What was sealed is kept to the last digit, in columns: one list for each
-key, with one entry a trial (a tenth smaller: salts stand by salts). Answers have one trial a line and six
-digits. ``notes/<seed>.md`` is what was written about a batch after it was opened, or why it was given up.
+key, with one entry a trial (a tenth smaller: salts stand by salts). Answers have one trial a line and four
+digits; those of baselines are kept of the largest batch. ``notes/<seed>.md`` is what was written about a batch after it was opened, or why it was given up.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from studies.proof.archive import read_archive, write_archive
 
 ARCHIVE = Path(__file__).resolve().parents[1] / "results" / "proof.tar.xz"
 NOTES = Path(__file__).resolve().parent / "notes"
-DIGITS = 6
+DIGITS = 4
 """Significant digits of what is kept of an answer."""
 LEFT_OUT = (
     "predictors",
@@ -38,6 +38,11 @@ LEFT_OUT = (
     "next_sensor",
     "diagnostics",
     "equation",
+    "statement",
+    "conditional",
+    "influence",
+    "detection_sensor",
+    "calibration",
 )
 """Most of the volume of an answer, and neither scored nor read by a study. The first three are of the
 campaign, which its seed draws again."""
