@@ -103,7 +103,7 @@ all batches, and what was written about each batch. The files are in `{kept}`:
 | `ledger.json` | what was published before the first diagnosis |
 | `sealed.json` | truth, settings and salt of every trial, which the ledger's hashes are of |
 | `answers/skred.json` | every answer, less what is neither scored nor studied |
-| `answers/<baseline>.json` | the same of a baseline, of the blind run; of others the seed draws the campaigns again |
+| `answers/<baseline>.json` | the same of a baseline, of the blind run alone |
 | `studies/proof/notes/` | what was written about the batch when it was opened, or why it was given up |
 
 `tests/studies/test_record.py` recomputes every hash.

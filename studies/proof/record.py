@@ -4,7 +4,8 @@ A batch is one ledger. All batches are in one archive, ``studies/results/proof.t
 ``<seed>/ledger.json`` as it was published, ``<seed>/sealed.json``, what the ledger's hashes are of, and
 ``<seed>/answers/<method>.json``. What was sealed is kept to the last digit, in columns: one list for each
 key, with one entry a trial (a tenth smaller: salts stand by salts). Answers have one trial a line and four
-digits; those of baselines are kept of the largest batch. ``notes/<seed>.md`` is what was written about a batch after it was opened, or why it was given up.
+digits; those of baselines are kept of the largest batch, of others the seed draws the campaigns again.
+``notes/<seed>.md`` is what was written about a batch after it was opened, or why it was given up.
 """
 
 from __future__ import annotations

@@ -105,7 +105,7 @@ def test_a_batch_is_kept_and_the_same_batch_makes_the_same_archive(tmp_path: Pat
     found = {name: json.loads(content) for name, content in read_archive(tmp_path / "one.tar.xz").items()}
     assert found["7/ledger.json"]["seed"] == 7
     assert as_rows(found["7/sealed.json"])[0]["truth"] == {"snr": 0.1 + 0.2}
-    kept = {"verdict": "unexplained", "power": 0.123457, "gain": {"realised": 0.5}}
+    kept = {"verdict": "unexplained", "power": 0.1235, "gain": {"realised": 0.5}}
     assert found["7/answers/skred.json"]["trial-0001"] == kept
 
 
