@@ -72,7 +72,7 @@ class Base:
     fit: Fit
     directions: tuple[Direction, ...] = ()
     strengths: FloatArray = field(default_factory=lambda: np.empty(0))
-    _nothing: dict[Budget, Fit] = field(default_factory=dict, init=False, repr=False)
+    _nothing: dict[tuple[Budget, bool], Fit] = field(default_factory=dict, init=False, repr=False)
 
     @property
     def log_scale(self) -> FloatArray:
@@ -88,12 +88,17 @@ class Base:
         """The base law without what was added before."""
         return replace(self, directions=(), strengths=np.empty(0))
 
-    def with_nothing(self, budget: Budget) -> Fit:
-        """Refitted with nothing added, as `curve_at` does with something: the same for all mechanisms."""
-        if budget not in self._nothing:
+    def with_nothing(self, budget: Budget, *, sampled: bool = False) -> Fit:
+        """Refitted with nothing added, as `curve_at` does with something: the same for all mechanisms.
+
+        Always from the base's own fit. From that of another curve it can come to a lower mode, and then
+        everything has nats that are not there.
+        """
+        if (budget, sampled) not in self._nothing:
             extension = extended(self.problem, self.law, self.directions)
-            self._nothing[budget] = _refit_from(self, extension, np.empty(0), budget)[0]
-        return self._nothing[budget]
+            rounds = Rounds(budget, FIRST, sampled=sampled)
+            self._nothing[budget, sampled] = _refit_from(self, extension, np.empty(0), rounds)[0]
+        return self._nothing[budget, sampled]
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,34 +238,28 @@ def curve_at(
     Parameters
     ----------
     known : mapping of float to Fit, optional
-        Fits by strength, of the same mechanism and nearly the same shape, 0 among them: the closest is where
-        each refit begins, and one round goes on from it.
+        Fits by strength, of the same mechanism and nearly the same shape: the closest is where each refit
+        begins, and one round goes on from it.
     begin : mapping of float to Fit, optional
         The same, of other places or of a linear model: where refits begin that go all their rounds; else they
         begin with the base's.
     sampled : bool
-        Whether the evidence, of fits that begin at known ones, is computed by importance sampling.
+        Whether the evidence is computed by importance sampling; else by Laplace's formula.
     """
     added = mechanism.added
     assert added is not None
     direction = direction_of(mechanism, base.setting, shape)
     extension = extended(base.problem, base.law, (*base.directions, direction))
     strengths = np.sort(strengths[np.abs(strengths) > _SMALLEST * added.scale_of(shape)])
+    fits = known or begin
+    near = None if fits is None else [_closest(fits, strength) for strength in strengths]
+    rounds = Rounds(budget, FIRST, sampled=sampled) if known is None else Rounds(budget, None, 1, sampled)
+    found = _refit_from(base, extension, strengths, rounds, near) if len(strengths) else []
     place = int(np.searchsorted(strengths, 0.0))
-    # Strength 0 like all others, so that what is left of integration errors is the same there.
-    if known is None:
-        fits = None if begin is None else [_closest(begin, strength) for strength in strengths]
-        found = _refit_from(base, extension, strengths, budget, fits) if len(strengths) else []
-        found.insert(place, base.with_nothing(budget))
-        strengths = np.insert(strengths, place, 0.0)
-    else:
-        strengths = np.insert(strengths, place, 0.0)
-        fits = [_closest(known, strength) for strength in strengths]
-        found = _refit_from(
-            base, extension, strengths, budget, fits, Rounds(budget, least=1, sampled=sampled)
-        )
+    found.insert(place, base.with_nothing(budget, sampled=sampled))
+    strengths = np.insert(strengths, place, 0.0)
     heights = np.array([fit.found.log_evidence for fit in found])
-    heights = np.nan_to_num(heights - heights[strengths == 0.0], nan=-1e3, neginf=-1e3)
+    heights = np.nan_to_num(heights - heights[place], nan=-1e3, neginf=-1e3)
     return Curve(mechanism, shape, direction, strengths, heights, tuple(found))
 
 
@@ -273,16 +272,14 @@ def _refit_from(
     base: Base,
     extension: Extension,
     strengths: FloatArray,
-    budget: Budget,
+    rounds: Rounds,
     fits: list[Fit] | None = None,
-    rounds: Rounds | None = None,
 ) -> list[Fit]:
     """Fits at strengths of the extension's last direction, or without it; begun at fits or at the base's."""
     given = base.strengths[None, :]
     if len(strengths):
         given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
     start = (base.population, base.fit.points)
-    rounds = rounds or Rounds(budget, FIRST)
     return refit(extension, base.rows, given, start, rounds, fits)
 
 
