@@ -43,7 +43,7 @@ from studies.thresholds.compared_again import base_on
 app = cyclopts.App(help=__doc__)
 RESULT = RESULTS / "line_nodes.json"
 LAWS = ("coulomb", "constant")
-BUDGETS = {"first round": FIRST, "first look": SCREENING, "usual": USUAL, "fine": FINE}
+BUDGETS = {"first round": FIRST, "screening": SCREENING, "usual": USUAL, "fine": FINE}
 EXACT, MANY = USUAL.times(256), USUAL.times(32)
 KEPT = 0.125
 """Share of the comparison's curves that are computed again."""

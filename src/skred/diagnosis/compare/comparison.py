@@ -206,7 +206,8 @@ def _under_errors(
     best : float, optional
         The most that a candidate has under that, in nats above nothing under this one.
     """
-    base.with_nothing(SCREENING)  # before anyone else does it once more
+    for budget in (SCREENING, USUAL):  # before every worker does it once more
+        base.with_nothing(budget)
     with worker_pool() as pool:
         curves = screened(base, pool, tell, before)
         candidates = refine(base.setting, curves, partial(curve_near, base), pool)

@@ -68,6 +68,8 @@ def _looked_at(
 ) -> dict[str, Candidate]:
     """All mechanisms, those that lead with their best curve computed again."""
     found = dict(candidates)
+    if leading:
+        base.with_nothing(FINE, sampled=True)  # before every worker does it once more
     again = pool.map(partial(_again, base), [candidates[name].best for name in leading])
     for name, (log_factor, disagreement) in zip(leading, again, strict=True):
         correction = log_factor - candidates[name].best.log_bayes_factor
