@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.commit import commit
-from skred.diagnosis.check.bootstrap_test import LIMIT
+from skred.diagnosis.check.limits import LIMIT
 from skred.diagnosis.detect.score_test import PlacedMechanism, ScoreTest
 from skred.diagnosis.evidence.linear_mixed_model import Scores
 from skred.physics.mechanisms.spec import Group

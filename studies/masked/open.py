@@ -29,10 +29,9 @@ import numpy as np
 
 from benchmarks.commit import commit
 from skred.campaign import Campaign, read_campaign, write_campaign
-from skred.diagnosis.check.bootstrap_test import bootstrap_test
+from skred.diagnosis.check.bootstrap_test import odds_test
 from skred.diagnosis.check.decision import alarmed
 from skred.diagnosis.compare.comparison import compare
-from skred.diagnosis.effort import REPLICAS
 from skred.diagnosis.evidence.prior_odds import NOTHING
 from skred.simulator.detectability import over_noise
 from skred.simulator.draw import Trial, draw_trial
@@ -128,13 +127,12 @@ def alarm_of(campaign: Campaign, law_id: str) -> dict[str, Any]:
         base, draws = found
         comparison = compare(base)
         log_odds, probability = comparison.log_odds, comparison.probability
-        check = bootstrap_test(base, draws, 0, REPLICAS, log_odds)
+        check = odds_test(base, draws, 0, log_odds)
     except np.linalg.LinAlgError as error:
         return {"alarm": False, "failed": repr(error)}
     return {
         "alarm": alarmed(probability, check.p_value),
         "p_value": check.p_value,
-        "linear_p_value": check.p_value_in_linear_model,
         "nothing": probability[NOTHING],
     }
 

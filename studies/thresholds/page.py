@@ -107,10 +107,10 @@ def alarm() -> str:
 
 `python -m studies.thresholds.alarm --n {len(found["trials"])}`, seeds from {found["seed"]}, code
 {", ".join(found["commits"])}: the statistic of the recordings is the log odds by the whole comparison, that
-of simulated campaigns the linear model's. Beside it what the linear model alone would have said.
+of simulated campaigns comes from one shape of each mechanism (`skred.diagnosis.check.by_fronts`).
 
-| clean campaigns | n | alarms | p at most 0.01 | by the linear model | p at most 0.1 | by the linear model |
-| --- | --- | --- | --- | --- | --- | --- |
+| clean campaigns | n | alarms | p at most 0.01 | p at most 0.1 |
+| --- | --- | --- | --- | --- |
 {rows}"""
 
 

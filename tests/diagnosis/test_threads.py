@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from diagnosis_cases import sparse_base
 
-from skred.diagnosis.check.bootstrap_test import bootstrap_test
+from skred.diagnosis.check.bootstrap_test import linear_test, odds_test
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import curve_near
 from skred.diagnosis.evidence.extension import extended
@@ -39,7 +39,8 @@ def test_there_are_no_threads_within_threads(monkeypatch: pytest.MonkeyPatch) ->
     assert threads() == 3
 
 
-def test_the_check_is_the_same_in_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("by", ["linear model", "fronts"])
+def test_the_check_is_the_same_in_threads(by: str, monkeypatch: pytest.MonkeyPatch) -> None:
     base = sparse_base()
     n = len(base.law.mechanisms)
     rng = np.random.default_rng(3)
@@ -48,28 +49,13 @@ def test_the_check_is_the_same_in_threads(monkeypatch: pytest.MonkeyPatch) -> No
     found = []
     for said in ("1", "2"):
         monkeypatch.setenv("OMP_NUM_THREADS", said)
-        found.append(bootstrap_test(base, draws, 5, 120))
+        fronts = by == "fronts"
+        found.append(odds_test(base, draws, 5, -1.2) if fronts else linear_test(base, draws, 5, 120))
     one, two = found
     assert one.statistic == two.statistic
-    assert 25 <= len(one.simulated) < 120  # it stopped early, with batches begun that do not count
+    assert 4 <= len(one.simulated) < 120  # it stopped at the fourth that is as odd
+    assert (one.simulated >= one.statistic).sum() == 4 and one.simulated[-1] >= one.statistic
     np.testing.assert_array_equal(one.simulated, two.simulated)
-
-
-def test_high_odds_of_simulated_campaigns_are_those_of_their_fronts() -> None:
-    """Where the linear model reaches the recordings' odds; below, its own stay, for they cannot count."""
-    base = sparse_base()
-    n = len(base.law.mechanisms)
-    draws = np.tile(base.population.mean, (25, 1)), np.tile(0.1 * np.eye(n), (25, 1, 1))
-    linear = bootstrap_test(base, draws, 5, 25)
-    reach = max(float(np.sort(linear.simulated)[-3]), 0.01)
-    found = bootstrap_test(base, draws, 5, 25, log_odds=reach)
-    assert found.linear == linear.statistic and found.statistic == reach
-    high = linear.simulated >= reach
-    assert 1 <= high.sum() <= 3
-    np.testing.assert_array_equal(found.simulated[~high], linear.simulated[~high])
-    assert (found.simulated[high] != linear.simulated[high]).all()
-    # By fronts a clean campaign has little evidence for anything: as Markov's inequality wants it.
-    assert (found.simulated[high] < 3.0).all()
 
 
 @pytest.mark.slow

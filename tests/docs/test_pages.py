@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from skred.diagnosis.check.bootstrap_test import LIMIT
-from skred.diagnosis.check.decision import HELD, NOTHING_AT_MOST, TIED_NATS
+from skred.diagnosis.check.decision import TIED_NATS
+from skred.diagnosis.check.limits import HELD, LIMIT, NOTHING_AT_MOST
 from skred.diagnosis.compare.candidate import FORM
 from skred.diagnosis.evidence.prior_odds import POWER, SHARES
 from skred.diagnosis.verdict.document import verdict

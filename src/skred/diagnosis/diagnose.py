@@ -9,7 +9,7 @@ from skred.diagnosis.augment.add import Adding, add_mechanisms
 from skred.diagnosis.augment.problem import as_diagnosed
 from skred.diagnosis.augment.reference import Reference
 from skred.diagnosis.augment.step import Augmented, NotAugmented
-from skred.diagnosis.check.bootstrap_test import bootstrap_test
+from skred.diagnosis.check.bootstrap_test import odds_test
 from skred.diagnosis.check.decision import Decision, decide
 from skred.diagnosis.clock import Clock, Tell
 from skred.diagnosis.compare.comparison import Comparison, compare
@@ -87,7 +87,7 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
     comparison = compare(base, clock.progress)
 
     clock.stage("check", "is anything wrong: clean campaigns simulated and refitted")
-    check = bootstrap_test(base, draws, run.seed, effort.replicas, comparison.log_odds)
+    check = odds_test(base, draws, run.seed, comparison.log_odds)
     decision = decide(comparison.probability, check.p_value, table.can_tell)
     location = location_of(comparison, next(iter(decision.names), None))
 

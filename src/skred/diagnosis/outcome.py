@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from skred.diagnosis.augment.step import Left, Step
-from skred.diagnosis.check.bootstrap_test import LIMIT, BootstrapTest
+from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import Decision, alarmed
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.compare.location import Location
@@ -167,11 +167,11 @@ class Diagnosis:
     def alarm_by(self) -> str | None:
         """What raised the alarm; None where there is none.
 
-        ``both`` where the linear model would have raised it too, ``evidence`` where it took the comparison.
+        ``evidence`` where the odds alone suffice, ``check`` where clean campaigns were simulated.
         """
         if not alarmed(self.comparison.probability, self.check.p_value):
             return None
-        return "both" if self.check.p_value_in_linear_model <= LIMIT else "evidence"
+        return "check" if len(self.check.simulated) else "evidence"
 
     @property
     def reason(self) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from skred.diagnosis.augment.coefficient import added_draws, multiples_of_events
-from skred.diagnosis.check.bootstrap_test import BootstrapTest, bootstrap_test
+from skred.diagnosis.check.bootstrap_test import BootstrapTest, linear_test, odds_test
 from skred.diagnosis.effort import Run
 from skred.diagnosis.evidence.coefficient import Base, Curve, fit_base
 from skred.diagnosis.evidence.population_draws import population_draws, typical
@@ -56,8 +56,8 @@ def check_again(base: Base, calibration: Calibration, chosen: Sequence[Curve], r
     again = fit_base(base.problem, base.law, typical(draws), base.fit.points, directions, strengths)
     setting = replace(again.setting, base=(*base.setting.base, *_global_ids(chosen)))
     again = replace(again, setting=setting)
-    test = partial(bootstrap_test, again, draws, run.seed + 1, run.effort.replicas)
-    return Again(test(), again, test)
+    check = linear_test(again, draws, run.seed + 1, run.effort.replicas)
+    return Again(check, again, partial(odds_test, again, draws, run.seed + 1))
 
 
 def _global_ids(chosen: Sequence[Curve]) -> list[str]:

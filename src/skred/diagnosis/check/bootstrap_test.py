@@ -2,13 +2,16 @@
 
 The statistic is the log odds of anything against nothing. Whole campaigns are simulated from the base law's
 posterior and everything is refitted to each, so that looking at many mechanisms and places is accounted for.
-Of simulated campaigns the odds are those of the linear model; where these reach the recordings', they are
-computed by fronts (`by_fronts`). Sampling stops as soon as the answer is clear (Besag and Clifford, 1991, doi
-10.1093/biomet/78.2.301).
+Of a comparison's odds those of simulated campaigns are computed by fronts (`by_fronts`), of a law with
+something added both are the linear model's. Sampling stops as soon as the answer is clear (Besag and
+Clifford, 1991, doi 10.1093/biomet/78.2.301). Bayes factors of clean campaigns average to one, so that odds of
+100 to 1 are rarer than one in a hundred by Markov's inequality: there nothing has to be simulated.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import batched
 from typing import NamedTuple
@@ -18,6 +21,7 @@ from numpy.typing import NDArray
 
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
 from skred.diagnosis.check.by_fronts import log_odds_by_fronts
+from skred.diagnosis.check.limits import LIMIT, NOTHING_AT_MOST
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
@@ -25,12 +29,14 @@ from skred.diagnosis.evidence.linear_mixed_model import Scores, fit_population
 from skred.parallel.threads import side_by_side, threads
 
 FloatArray = NDArray[np.float64]
-LIMIT = 0.01
-"""Share of clean campaigns that may be called wrong: the one limit of an alarm."""
-_ENOUGH_ABOVE = 6
-"""Clean campaigns at least as odd after which sampling stops: with so many of 500 there is no alarm."""
+_ENOUGH_ABOVE = 4
+"""Clean campaigns at least as odd after which sampling stops: p is known to half of itself then."""
 _BATCH = 25
 """Campaigns refitted together: large enough for arrays, small enough to stop early."""
+_FEWEST = round(1.0 / LIMIT) - 1
+"""Clean campaigns by fronts at most: the fewest that place the limit, which none of them may reach then."""
+_FEW = 24
+"""The same where nothing is too probable for a claim: they only say whether such odds are usual."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,87 +46,97 @@ class BootstrapTest:
     Attributes
     ----------
     statistic : float
-        Log odds of anything against nothing: by the whole comparison, or in the linear model.
+        Log odds of anything against nothing.
     simulated : (n,) array
-        The same of clean campaigns, in the linear model; by fronts where that reaches the statistic.
-    linear : float or None
-        Of the recordings in the linear model, where the statistic is not that.
-    simulated_linear : (n,) array, optional
-        Of clean campaigns in the linear model, where `simulated` is not that.
+        The same of clean campaigns; none where the odds are so high that no clean campaign has to be seen.
     """
 
     statistic: float
     simulated: FloatArray
-    linear: float | None = None
-    simulated_linear: FloatArray | None = None
 
     @property
     def p_value(self) -> float:
-        """Share of clean campaigns at least as odd, by Besag and Clifford's rule where it stopped early."""
-        return _share(self.simulated, self.statistic)
+        """Share of clean campaigns at least as odd, or a limit that it is not above.
+
+        By Besag and Clifford's rule where it stopped early.
+        """
+        if not len(self.simulated):
+            return LIMIT
+        above = int(np.sum(self.simulated >= self.statistic))
+        if above >= _ENOUGH_ABOVE:
+            return above / len(self.simulated)
+        return (above + 1) / (len(self.simulated) + 1)
 
     @property
     def fired(self) -> bool:
         """Whether the calibrated limit is passed."""
         return self.p_value <= LIMIT
 
-    @property
-    def p_value_in_linear_model(self) -> float:
-        """The same of the recordings in the linear model."""
-        if self.linear is None:
-            return self.p_value
-        return _share(self.simulated if self.simulated_linear is None else self.simulated_linear, self.linear)
 
-
-def _share(simulated: FloatArray, statistic: float) -> float:
-    """Of clean campaigns at least as odd."""
-    above = int(np.sum(simulated >= statistic))
-    if above >= _ENOUGH_ABOVE:
-        return above / len(simulated)
-    return (above + 1) / (len(simulated) + 1)
-
-
-def bootstrap_test(
-    base: Base,
-    draws: tuple[FloatArray, FloatArray],
-    seed: int,
-    most: int = 300,
-    log_odds: float | None = None,
-) -> BootstrapTest:
-    """Check a law, perhaps with mechanisms added.
+def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_odds: float) -> BootstrapTest:
+    """Check a law, perhaps with mechanisms added, by the odds that a comparison gives.
 
     Parameters
     ----------
     base : Base
         Fitted to the recordings.
     draws : (n, n_base) and (n, n_base, n_base) arrays
-        Means and factors of populations from the law's posterior, at least `most` of them.
-    log_odds : float, optional
-        Of anything against nothing, as a comparison has them; in the linear model unless given, and then of
-        simulated campaigns as well.
+        Means and factors of populations from the law's posterior.
+    log_odds : float
+        Of anything against nothing.
+    """
+    if log_odds >= -math.log(LIMIT):
+        return BootstrapTest(log_odds, np.empty(0))
+    test = ScoreTest(base.problem, base.law, base.setting, base.directions, base.strengths)
+
+    def by_fronts(refitted: _Refitted, first: int) -> Iterator[float]:
+        def one(group: int) -> float:
+            rng = np.random.default_rng([seed, 22, first + group])
+            return log_odds_by_fronts(base, test, *refitted.one(group), log_odds, rng)
+
+        for some in batched(range(len(refitted.log_odds)), threads()):
+            yield from side_by_side(one, some)
+
+    may_claim = log_odds > math.log((1.0 - NOTHING_AT_MOST) / NOTHING_AT_MOST)
+    most = _FEWEST if may_claim else _FEW
+    return BootstrapTest(log_odds, _until_clear(test, draws, seed, log_odds, most, by_fronts))
+
+
+def linear_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, most: int) -> BootstrapTest:
+    """Check a law, perhaps with mechanisms added, by the linear model's odds of what may be missing still.
+
+    Parameters
+    ----------
+    base, draws
+        As of `odds_test`.
+    most : int
+        Campaigns simulated at most; as many draws at least.
     """
     test = ScoreTest(base.problem, base.law, base.setting, base.directions, base.strengths)
-    linear = float(_refitted(test, base.rows, (base.population, base.fit.points)).log_odds[0])
-    statistic = linear if log_odds is None else log_odds
-    # At less than even odds there is no alarm, whatever clean campaigns have.
-    by_fronts = log_odds is not None and log_odds > 0.0
+    statistic = float(_refitted(test, base.rows, (base.population, base.fit.points)).log_odds[0])
+    simulated = _until_clear(test, draws, seed, statistic, most, lambda refitted, first: refitted.log_odds)
+    return BootstrapTest(statistic, simulated)
+
+
+def _until_clear(
+    test: ScoreTest,
+    draws: tuple[FloatArray, FloatArray],
+    seed: int,
+    statistic: float,
+    most: int,
+    log_odds: Callable[[_Refitted, int], Iterable[float]],
+) -> FloatArray:
+    """Log odds of clean campaigns, until enough are as odd as the recordings."""
     rng = np.random.default_rng([seed, 21])
-    in_linear, simulated = list[FloatArray](), list[FloatArray]()
-    for some in batched(range(0, most, _BATCH), threads()):
-        # Simulated one after the other and counted in order: how many threads there are changes nothing.
-        made = [_simulated(test, draws, slice(first, min(first + _BATCH, most)), rng) for first in some]
-        for refitted in side_by_side(lambda clean: _refitted(test, *clean), made):
-            in_linear.append(refitted.log_odds)
-            found = refitted.log_odds.copy()
-            if by_fronts:
-                high = np.flatnonzero(found >= statistic)
-                parts = [refitted.one(int(group)) for group in high]
-                found[high] = side_by_side(lambda one: log_odds_by_fronts(base, test, *one, statistic), parts)
-            simulated.append(found)
-            done = BootstrapTest(statistic, np.concatenate(simulated), linear, np.concatenate(in_linear))
-            if np.sum(done.simulated >= statistic) >= _ENOUGH_ABOVE:
-                return done
-    return done
+    simulated, above = list[float](), 0
+    for first in range(0, most, _BATCH):
+        clean = _simulated(test, draws, slice(first, min(first + _BATCH, most)), rng)
+        for one in log_odds(_refitted(test, *clean), first):
+            simulated.append(one)
+            above += one >= statistic
+            if above >= _ENOUGH_ABOVE:
+                return np.array(simulated)
+    return np.array(simulated)
 
 
 class _Refitted(NamedTuple):

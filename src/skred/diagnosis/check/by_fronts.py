@@ -1,8 +1,11 @@
-"""The odds of a simulated campaign by its fronts, where the linear model says that they are high.
+"""The odds of a simulated campaign by its fronts.
 
-Where fronts stop near sensors, tangents promise evidence that is not there. What the odds of a simulated
-campaign mostly come from is then computed as a comparison does it: one candidate after the other, until the
-odds have fallen below those that they are to be compared with, or have held.
+A comparison refits every mechanism in every shape, which is too slow for a hundred campaigns. Here each is
+refitted in one of its shapes, drawn by what the linear model thinks of them and by their prior, half each.
+With the weight of importance sampling this estimates the evidence over all shapes without bias, wherever the
+linear model errs: tangents promise evidence where fronts stop near sensors, and miss it where strengths have
+to be large. What leads where the odds reach those of the recordings is computed again by more points, as a
+comparison does.
 """
 
 from __future__ import annotations
@@ -13,21 +16,19 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.diagnosis.compare.recomputed import computed_again
 from skred.diagnosis.compare.screening import curve
-from skred.diagnosis.detect.score_test import ScoreTest
+from skred.diagnosis.detect.score_test import LinearFactors, ScoreTest
 from skred.diagnosis.discrepancy.fit import fit_profile
-from skred.diagnosis.discrepancy.profile import KINDS
-from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.discrepancy.profile import Kind, Profile
+from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import Population, Rows
 from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import Scores
-from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.evidence.refit import Rounds, refit
 
 FloatArray = NDArray[np.float64]
-_COUNTS = 0.1
-"""Share of the odds from which a candidate is computed by fronts: with less it hardly changes them."""
 
 
 def log_odds_by_fronts(
@@ -37,6 +38,7 @@ def log_odds_by_fronts(
     start: tuple[Population, FloatArray],
     scores: Scores,
     reach: float,
+    rng: np.random.Generator,
 ) -> float:
     """Log odds of anything against nothing of one simulated campaign.
 
@@ -51,37 +53,33 @@ def log_odds_by_fronts(
     scores : Scores
         Of one group.
     reach : float
-        The odds to compare with: nothing more is computed once these are lower.
+        The odds to compare with.
     """
-    terms = {name: float(values[0]) for name, values in score_test.log_terms(scores).items()}
-    simulated, todo = None, set(terms)
-    while True:
-        log_odds = float(np.logaddexp.reduce(list(terms.values())))
-        counting = {name for name in todo if terms[name] >= log_odds + math.log(_COUNTS)}
-        if log_odds < reach or not counting:
-            return log_odds
-        # The force not in the list last: its fit takes as long as those of all others.
-        first = max(counting - {UNLISTED} or counting, key=lambda name: terms[name])
-        simulated = _fitted(base, rows, start) if simulated is None else simulated
-        terms[first] += _beyond_linear(simulated, score_test, scores, first)
-        todo.remove(first)
-
-
-def _fitted(base: Base, rows: Rows, start: tuple[Population, FloatArray]) -> Base:
-    """The law fitted to a simulated campaign."""
     extension = extended(base.problem, base.law, base.directions)
     fit = refit(extension, rows, base.strengths[None, :], start, Rounds(USUAL))[0]
-    return replace(base, rows=rows, fit=fit)
+    simulated = replace(base, rows=rows, fit=fit)
+    of_id = {name: _drawn(simulated, one, rng) for name, one in score_test.by_id(scores).items()}
+    terms = {name: beside + one.log_bayes_factor for name, (one, beside) in of_id.items()}
+    while True:
+        log_odds = float(np.logaddexp.reduce(list(terms.values())))
+        first = max(terms, key=lambda name: terms[name])
+        one, beside = of_id.pop(first, (None, 0.0))
+        if log_odds < reach or not isinstance(one, Curve):
+            return log_odds
+        terms[first] = beside + computed_again(simulated, one)[0]
 
 
-def _beyond_linear(base: Base, score_test: ScoreTest, scores: Scores, name: str) -> float:
-    """What fronts change of a candidate's log Bayes factor in the linear model, at its best shape."""
-    if name == UNLISTED:
-        factors = score_test.log_factors_of_kinds(scores)[:, 0]
-        kind = int(np.argmax(factors + np.log([one.share for one in KINDS])))
-        return fit_profile(base, KINDS[kind]).log_bayes_factor - float(factors[kind])
-    factors = score_test.log_factors(scores)[0]
-    own = [k for k, one in enumerate(score_test.placed_mechanisms) if one.mechanism.id == name]
-    best = max(own, key=lambda k: factors[k])
-    placed = score_test.placed_mechanisms[best]
-    return curve(base, placed.mechanism, placed.shape).log_bayes_factor - float(factors[best])
+def _drawn(base: Base, linear: LinearFactors, rng: np.random.Generator) -> tuple[Curve | Profile, float]:
+    """One of the candidates that an id stands for, fitted; and what to add to its log Bayes factor."""
+    log_prior = linear.log_shares - np.logaddexp.reduce(linear.log_shares)
+    log_posterior = log_prior + linear.log_factors[0]
+    log_posterior -= np.logaddexp.reduce(log_posterior)
+    log_chance = np.logaddexp(log_prior, log_posterior) - math.log(2.0)
+    k = int(rng.choice(len(log_chance), p=np.exp(log_chance)))
+    candidate = linear.candidates[k]
+    fitted = (
+        fit_profile(base, candidate)
+        if isinstance(candidate, Kind)
+        else curve(base, candidate.mechanism, candidate.shape)
+    )
+    return fitted, linear.log_odds + float(log_prior[k] - log_chance[k])

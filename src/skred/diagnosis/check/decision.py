@@ -6,19 +6,15 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from skred.diagnosis.check.bootstrap_test import LIMIT
-from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, same_term
+from skred.diagnosis.check.limits import HELD, LIMIT, NOTHING_AT_MOST
+from skred.diagnosis.evidence.prior_odds import NOTHING, SHARES, UNLISTED, same_term
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group
 
-HELD = 0.9
-"""Share of its group that a credible set holds: that of all intervals."""
 TIED_NATS = 2.0
 """An id of another group is tied with the named one where its log probability is at most so far below. Some
 such ties no recordings split: a low dam and a bias of the sensor beside it. Which group leads decides the
 verdict, not whether its name stands alone."""
-NOTHING_AT_MOST = 0.5
-"""Probability of nothing, its prior, from which on nothing is claimed whatever clean campaigns look like."""
 
 
 @dataclass(frozen=True)
@@ -79,10 +75,10 @@ def decide(probability: Mapping[str, float], p_value: float, can_tell: bool) -> 
     -------
     Decision
         Without an alarm `nothing_missing`, if relevant strengths would have been found, clean campaigns look
-        alike and nothing is not less probable than it was beforehand; else `cannot_tell`.
+        alike and nothing is not less probable than its prior; else `cannot_tell`.
     """
     if not alarmed(probability, p_value):
-        nothing = can_tell and p_value > LIMIT and probability[NOTHING] >= NOTHING_AT_MOST
+        nothing = can_tell and p_value > LIMIT and probability[NOTHING] >= SHARES[NOTHING]
         return Decision("nothing_missing" if nothing else "cannot_tell", ())
     return blamed(probability)
 

@@ -70,14 +70,14 @@ def _looked_at(
     found = dict(candidates)
     if leading:
         base.with_nothing(FINE, sampled=True)  # before every worker does it once more
-    again = pool.map(partial(_again, base), [candidates[name].best for name in leading])
+    again = pool.map(partial(computed_again, base), [candidates[name].best for name in leading])
     for name, (log_factor, disagreement) in zip(leading, again, strict=True):
         correction = log_factor - candidates[name].best.log_bayes_factor
         found[name] = replace(candidates[name], correction=correction, disagreement=disagreement)
     return found
 
 
-def _again(base: Base, curve: Curve) -> tuple[float, float]:
+def computed_again(base: Base, curve: Curve) -> tuple[float, float]:
     """A curve's log Bayes factor by many more quadrature points and importance sampling.
 
     And what sampling changes of Laplace's formula at its maximum, nothing's subtracted.

@@ -8,14 +8,16 @@ prior odds. It is cheap, so it is computed for the recordings and for bootstrap 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
-from skred.diagnosis.discrepancy.profile import KINDS, entering, knots, priors_of, spline_basis
+from skred.diagnosis.discrepancy.profile import KINDS, Kind, entering, knots, priors_of, spline_basis
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population, Rows, look_around
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.linear_mixed_model import (
@@ -61,6 +63,27 @@ def placed_mechanisms(setting: Setting) -> list[PlacedMechanism]:
         for shape in shapes[one.id]
         if shape not in shapes.get(one.same_term_as, ())
     ]
+
+
+class LinearFactors(NamedTuple):
+    """What the linear model says of everything that an id stands for.
+
+    Attributes
+    ----------
+    candidates : sequence of PlacedMechanism or Kind
+        A mechanism's shapes, or the kinds of force not in the list.
+    log_factors : (n_groups, n_candidates) array
+        Log Bayes factor of each against nothing.
+    log_shares : (n_candidates,) array
+        Log prior probability of each, given the id.
+    log_odds : float
+        Of the id against nothing beforehand.
+    """
+
+    candidates: Sequence[PlacedMechanism | Kind]
+    log_factors: FloatArray
+    log_shares: FloatArray
+    log_odds: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,24 +200,29 @@ class ScoreTest:
             factors.append(np.logaddexp.reduce(of_kind, axis=0))
         return np.array(factors)
 
-    def statistic(self, scores: Scores) -> FloatArray:
-        """Log odds that anything is missing against nothing, in the linear model, (n_groups,)."""
-        return np.asarray(np.logaddexp.reduce(list(self.log_terms(scores).values()), axis=0))
-
-    def log_terms(self, scores: Scores) -> dict[str, FloatArray]:
-        """Log odds of each id against nothing, in the linear model, (n_groups,) each."""
+    def by_id(self, scores: Scores) -> dict[str, LinearFactors]:
+        """What the linear model says of each id."""
         factors = self.log_factors(scores)
-        log_shares_of_kinds = np.log([kind.share for kind in KINDS])[:, None]
-        unlisted = np.logaddexp.reduce(self.log_factors_of_kinds(scores) + log_shares_of_kinds, axis=0)
         odds = prior_odds({candidate.mechanism for candidate in self.placed_mechanisms})
+        log_odds = {name: math.log(one / odds[NOTHING]) for name, one in odds.items()}
+        kinds = self.log_factors_of_kinds(scores).T
+        of_kinds = np.log([kind.share for kind in KINDS])
+        found = {UNLISTED: LinearFactors(KINDS, kinds, of_kinds, log_odds[UNLISTED])}
         ids = np.array([candidate.mechanism.id for candidate in self.placed_mechanisms])
-        shapes = [candidate.shape for candidate in self.placed_mechanisms]
-        terms = {UNLISTED: unlisted + math.log(odds[UNLISTED] / odds[NOTHING])}
         for name in dict.fromkeys(ids.tolist()):
             own = np.flatnonzero(ids == name)
-            of_shapes = factors[:, own] + np.log(shares([shapes[k] for k in own]))
-            terms[name] = np.logaddexp.reduce(of_shapes, axis=1) + math.log(odds[name] / odds[NOTHING])
-        return terms
+            placed = [self.placed_mechanisms[k] for k in own]
+            of_shapes = np.log(shares([one.shape for one in placed]))
+            found[name] = LinearFactors(placed, factors[:, own], of_shapes, log_odds[name])
+        return found
+
+    def statistic(self, scores: Scores) -> FloatArray:
+        """Log odds that anything is missing against nothing, in the linear model, (n_groups,)."""
+        terms = [
+            np.logaddexp.reduce(one.log_factors + one.log_shares, axis=1) + one.log_odds
+            for one in self.by_id(scores).values()
+        ]
+        return np.asarray(np.logaddexp.reduce(terms, axis=0))
 
 
 def log_factor_of_process(score: FloatArray, information: FloatArray, cover: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.check.bootstrap_test import LIMIT
+from skred.diagnosis.check.limits import LIMIT
 from skred.diagnosis.compare.between import TABLES, gains_of
 from skred.diagnosis.compare.candidate import Candidate, log_gain
 from skred.diagnosis.compare.comparison import Comparison

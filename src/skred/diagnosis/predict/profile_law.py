@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.check.bootstrap_test import BootstrapTest, bootstrap_test
+from skred.diagnosis.check.bootstrap_test import BootstrapTest, linear_test
 from skred.diagnosis.compare.comparison import ComparisonUnderErrors
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, combined, knot_by_knot, most_probable
@@ -106,7 +106,7 @@ def _check(base: Base, profile: Profile, most: int, seed: int) -> BootstrapTest:
     rng = np.random.default_rng([seed, 51])
     extension = extended(base.problem, base.law, directions)
     draws = _draws(base, extension, profile.fit, strengths, np.empty((most, 0)), rng)
-    return bootstrap_test(added, (draws.means, draws.factors), seed + 1, most)
+    return linear_test(added, (draws.means, draws.factors), seed + 1, most)
 
 
 def _left_out(base: Base, profile: Profile, event: int, seed: int) -> tuple[_Event, _Event]:

@@ -7,9 +7,10 @@ from typing import Any
 
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
-from skred.diagnosis.check.decision import NOTHING_AT_MOST, Decision
+from skred.diagnosis.check.decision import Decision
+from skred.diagnosis.check.limits import NOTHING_AT_MOST
 from skred.diagnosis.compare.location import Location
-from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
+from skred.diagnosis.evidence.prior_odds import NOTHING, SHARES, UNLISTED
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
 from skred.diagnosis.verdict.between import between_sentence
 from skred.diagnosis.verdict.hangs_on import carried, hangs_on
@@ -183,7 +184,7 @@ def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     return [
         f"Something is missing{_where(document['location'])} that {'most probably ' if doubt else ''}no"
         f" listed mechanism accounts for (a force not in the list: {percent(probability[UNLISTED])}; nothing:"
-        f" {percent(probability[NOTHING])}; check: p = {found.check.p_value:.2g}).",
+        f" {percent(probability[NOTHING])}; check: {_rare(found.check)}).",
         _tied(document),
         _by_speed(found.location),
         _closest(found, document),
@@ -216,21 +217,26 @@ def _closest(found: Diagnosis, document: dict[str, Any]) -> str:
 
 
 def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
-    """What the comparison would say alone, where it says something and the check does not."""
+    """What the comparison would say, where something is more probable than nothing and none is claimed."""
     probability = document["probability"]
-    if probability[NOTHING] >= NOTHING_AT_MOST:
+    if probability[NOTHING] >= SHARES[NOTHING]:
         return ""
     first = max((name for name in probability if name != NOTHING), key=lambda name: probability[name])
+    why = (
+        f"nothing keeps {percent(probability[NOTHING])}, and a claim leaves it less than"
+        f" {percent(NOTHING_AT_MOST)}"
+        if found.check.fired
+        else f"{100.0 * found.check.p_value:.0f} % of clean campaigns have such odds"
+    )
     return (
         f"Of what could be missing, {_title(first)} would be the most probable"
-        f" ({percent(probability[first])}). But {100.0 * found.check.p_value:.0f} % of clean campaigns have"
-        " such odds, so none is claimed."
+        f" ({percent(probability[first])}). None is claimed: {why}."
     )
 
 
-def _odd(found: Diagnosis) -> str:
-    """What the check would say alone, where it says something and the comparison does not."""
-    if not found.check.fired:
+def _odd(found: Diagnosis, document: dict[str, Any]) -> str:
+    """What the check says where nothing is probable and yet hardly any clean campaign is as odd."""
+    if not found.check.fired or document["probability"][NOTHING] < SHARES[NOTHING]:
         return ""
     return (
         "But by the check they are odder than all but 1 % of clean campaigns: by chance, or by something that"
@@ -238,9 +244,14 @@ def _odd(found: Diagnosis) -> str:
     )
 
 
+def _rare(check: BootstrapTest) -> str:
+    """How rare such odds are among clean campaigns."""
+    return f"p {'=' if len(check.simulated) else 'at most'} {check.p_value:.2g}"
+
+
 def _nothing(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     return [
-        f"The recordings give no reason to add anything (p = {found.check.p_value:.2g}; probability of"
+        f"The recordings give no reason to add anything ({_rare(found.check)}; probability of"
         f" nothing {percent(document['probability'][NOTHING])}).",
         f"A relevant strength of a listed mechanism would have been found in {percent(found.table.power)} of"
         " cases on average; the detection limits say from which strength on each would have been seen.",
@@ -249,7 +260,7 @@ def _nothing(found: Diagnosis, document: dict[str, Any]) -> list[str]:
 
 def _cannot(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     alarm = (
-        f"No alarm (p = {found.check.p_value:.2g}; probability of nothing"
+        f"No alarm ({_rare(found.check)}; probability of nothing"
         f" {percent(document['probability'][NOTHING])}), but"
     )
     power = f"{percent(found.table.power)} of cases on average"
@@ -260,7 +271,7 @@ def _cannot(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         else f"{alarm} these recordings cannot tell: a relevant strength of a listed mechanism would have"
         f" been found in only {power}, so silence means little."
     )
-    sentences = [silence, _odd(found), _hint(found, document)]
+    sentences = [silence, _odd(found, document), _hint(found, document)]
     sensor = document["next_sensor"]
     if sensor is not None:
         sentences.append(

@@ -29,15 +29,18 @@ FloatArray = NDArray[np.float64]
 
 
 @styled
-def check_figure(document: doc.Document, tree: xr.DataTree) -> Figure:
-    """The statistic of clean campaigns and of the recordings; again for each law with something added."""
+def check_figure(document: doc.Document, tree: xr.DataTree) -> Figure | None:
+    """The statistic of clean campaigns and of the recordings, for each law that any were simulated from."""
     found = tree["check"].to_dataset()
     simulated = np.asarray(found["simulated"].transpose("law", "campaign").values, dtype=float)
     title = "Is anything wrong? The recordings against clean campaigns simulated from the law"
+    shown = [number for number, values in enumerate(simulated) if np.isfinite(values).any()]
+    if not shown:
+        return None
     figure = new_figure(3.3, title)
-    panels = side_by_side(figure, len(simulated))
+    panels = side_by_side(figure, len(shown))
     checks = doc.listed(document, "report", "checks")
-    for number, axes in enumerate(panels):
+    for number, axes in zip(shown, panels, strict=True):
         values = simulated[number][np.isfinite(simulated[number])]
         _histogram(axes, values, float(found["statistic"].values[number]))
         check = checks[number] if number < len(checks) else {}
@@ -51,8 +54,6 @@ def check_figure(document: doc.Document, tree: xr.DataTree) -> Figure:
 
 
 def _histogram(axes: Axes, values: FloatArray, statistic: float) -> None:
-    if len(values) == 0:
-        values = np.array([0.0])
     low, high = float(values.min()), float(values.max())
     reach = [low, high, statistic]
     least = (max(reach) - min(reach)) / 60.0  # or else bars cannot be seen beside a distant line

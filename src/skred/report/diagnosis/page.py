@@ -78,7 +78,6 @@ def page(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Pictur
         readings=reading_rows(tree),
         most_open=MOST_OPEN,
         checks=doc.listed(report, "checks"),
-        too_few=_too_few(document),
         dropped=in_words(doc.listed(report, "not_added")),
         flat=not _number(doc.get(report, "force", "largest"), 1.0) > _NO_FORCE,
     )
@@ -115,17 +114,6 @@ def _comparison(document: doc.Document, number: int, comparison: doc.Document) -
         "ties": in_words(doc.listed(comparison, "tied_with")),
         "same": in_words(doc.listed(comparison, "same_term")),
     }
-
-
-def _too_few(document: doc.Document) -> int | None:
-    """How many clean campaigns it takes to reach the limit, where none is as odd and there were fewer."""
-    check: doc.Document = next(iter(doc.listed(document, "report", "checks")), {})
-    n, most, own = (doc.get(check, key) for key in ("n_simulated", "largest_simulated", "statistic"))
-    limit = doc.get(document, "report", "limits", "p_value")
-    if doc.get(check, "fired") is not False or not all(map(is_number, (n, own, limit))) or not limit:
-        return None
-    oddest = not is_number(most) or own > most
-    return round(1.0 / limit - 1.0) if oddest and 1.0 / (n + 1) > limit else None
 
 
 def _difference(document: doc.Document) -> dict[str, Any] | None:

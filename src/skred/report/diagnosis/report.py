@@ -48,7 +48,7 @@ def save_diagnosis_figures(document: doc.Document, tree: xr.DataTree, folder: Pa
     dict of str to Picture
         Those of `FIGURES` that apply; with _2 those of a second comparison.
     """
-    makers: dict[str, Callable[[], Figure]] = {}
+    makers: dict[str, Callable[[], Figure | None]] = {}
     if "check" in tree.children:
         makers["check"] = partial(check_figure, document, tree)
     makers["where"] = partial(where_figure, document, tree)

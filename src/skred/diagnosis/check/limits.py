@@ -1,0 +1,10 @@
+"""The limits of a claim."""
+
+from __future__ import annotations
+
+LIMIT = 0.01
+"""Share of clean campaigns that may be called wrong: the one limit of an alarm."""
+HELD = 0.9
+"""Share of its group that a credible set holds: that of all intervals."""
+NOTHING_AT_MOST = 1.0 - HELD
+"""Probability of nothing from which on it is in every set that holds as much as a credible one: no claim."""

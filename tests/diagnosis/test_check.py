@@ -1,0 +1,66 @@
+"""The odds of simulated campaigns: one shape of each mechanism stands for all."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnosis_cases import sparse_base
+
+from skred.diagnosis.check import by_fronts
+from skred.diagnosis.check.bootstrap_test import odds_test
+from skred.diagnosis.compare.screening import curve
+from skred.diagnosis.detect.score_test import LinearFactors, ScoreTest
+from skred.diagnosis.evidence.coefficient import Base
+
+
+def test_one_shape_estimates_the_evidence_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On average over the draws, whatever the linear model promises."""
+    base = sparse_base()
+    placed = [one for one in ScoreTest(base.problem, base.law, base.setting).placed_mechanisms][:4]
+    true = dict(zip(map(id, (one.shape for one in placed)), (3.0, -1.0, 0.5, 2.0), strict=True))
+
+    class Known:
+        def __init__(self, shape: Any) -> None:
+            self.log_bayes_factor = true[id(shape)]
+
+    monkeypatch.setattr(by_fronts, "curve", lambda base, mechanism, shape: Known(shape))
+    shares = np.array([0.1, 0.4, 0.3, 0.2])
+    linear = LinearFactors(placed, np.array([[-2.0, 4.0, 0.0, 1.0]]), np.log(shares), -1.5)
+    rng = np.random.default_rng(0)
+    drawn = [by_fronts._drawn(base, linear, rng) for _ in range(4000)]
+    weights = np.exp([one.log_bayes_factor + beside for one, beside in drawn])
+    exact = np.exp(-1.5) * float(shares @ np.exp(list(true.values())))
+    assert abs(weights.mean() - exact) < 4.0 * weights.std() / np.sqrt(len(weights))
+    # No draw promises more than twice what its shape has at most.
+    assert weights.max() <= 2.0 * np.exp(-1.5 + 3.0)
+
+
+def test_what_reaches_the_recordings_is_computed_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    base = sparse_base()
+    n = len(base.law.mechanisms)
+    draws = np.tile(base.population.mean, (120, 1)), np.tile(0.1 * np.eye(n), (120, 1, 1))
+    again = by_fronts.computed_again
+    looked: list[str] = []
+
+    def told(base: Base, one: Any) -> tuple[float, float]:
+        looked.append(one.mechanism.id)
+        return again(base, one)
+
+    monkeypatch.setattr(by_fronts, "computed_again", told)
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    found = odds_test(base, draws, 5, -1.5)
+    assert looked and (found.simulated < 3.0).all()  # as Markov's inequality wants it
+    looked.clear()
+    assert odds_test(base, draws, 5, 6.0).fired and not looked  # nothing is simulated at such odds
+
+
+def test_evidence_of_one_shape_is_that_of_a_comparison() -> None:
+    base = sparse_base()
+    test = ScoreTest(base.problem, base.law, base.setting)
+    one = next(one for one in test.placed_mechanisms if one.mechanism.id == "viscous_drag")
+    linear = LinearFactors([one], np.zeros((1, 1)), np.zeros(1), 0.0)
+    fitted, beside = by_fronts._drawn(base, linear, np.random.default_rng(1))
+    assert beside == pytest.approx(0.0)
+    assert fitted.log_bayes_factor == curve(base, one.mechanism, one.shape).log_bayes_factor
