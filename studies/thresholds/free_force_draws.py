@@ -20,7 +20,7 @@ from benchmarks.commit import commit
 from skred.campaign import find_campaign, read_campaign
 from skred.diagnosis.compare.comparison import ComparisonUnderErrors, compare, free_force
 from skred.diagnosis.discrepancy.profile import KINDS
-from skred.diagnosis.discrepancy.sampled_evidence import sampled_log_factor
+from skred.diagnosis.discrepancy.sampled_evidence import sampled
 from studies.files import RESULTS, write
 from studies.thresholds.compared_again import base_on
 
@@ -38,10 +38,10 @@ def both_ways(law: str, under_errors: ComparisonUnderErrors, pool: Executor) -> 
         if profile.log_bayes_factor <= 0.0:
             continue
         started = time.process_time()
-        usual = [sampled_log_factor(under_errors.base, profile, pool, seed=seed) for seed in SEEDS]
+        usual = [sampled(under_errors.base, profile, pool, seed=seed).log_bayes_factor for seed in SEEDS]
         seconds = (time.process_time() - started) / len(SEEDS)
         many = [
-            sampled_log_factor(under_errors.base, profile, pool, seed=seed, n=MANY_DRAWS, enough=0.0)
+            sampled(under_errors.base, profile, pool, seed=seed, n=MANY_DRAWS, enough=0.0).log_bayes_factor
             for seed in MANY_SEEDS
         ]
         yield {

@@ -23,7 +23,7 @@ from skred.diagnosis.discrepancy.profile import (
     log_prior_density,
     priors_of,
 )
-from skred.diagnosis.discrepancy.sampled_evidence import gains, sampled_log_factor
+from skred.diagnosis.discrepancy.sampled_evidence import gains, sampled
 from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, weighted_draws
 from skred.diagnosis.evidence.coefficient import Base
 
@@ -134,8 +134,8 @@ def test_readings_that_tell_nothing_leave_the_laplace_approximation(
         base, rows=base.rows._replace(readings=readings._replace(values=np.nan * readings.values))
     )
     profile = replace(fit_profile(base, KINDS[0]), log_bayes_factor=3.0)
-    assert sampled_log_factor(silent, profile, pool) == 3.0
-    assert sampled_log_factor(base, profile, pool) < 0.0
+    assert sampled(silent, profile, pool) is profile
+    assert sampled(base, profile, pool).log_bayes_factor < 0.0
 
 
 class Quadratic(NamedTuple):
@@ -215,12 +215,13 @@ def test_a_clear_force_has_the_evidence_of_the_laplace_approximation(
     changed = recorded(base, combined(base.setting, KINDS[0], at, 1.6 * np.array([0.0, 1.0, 1.0, 0.0])))
     profile = fit_profile(changed, KINDS[0])
     assert profile.log_bayes_factor > 5.0
-    found = sampled_log_factor(changed, profile, pool, seed=seed)
-    assert found == pytest.approx(profile.log_bayes_factor, abs=1.0)
+    found = sampled(changed, profile, pool, seed=seed)
+    assert found.error is not None and 0.0 < found.error < 0.2
+    assert found.log_bayes_factor == pytest.approx(profile.log_bayes_factor, abs=1.0)
 
 
 @pytest.mark.parametrize(
-    ("laplace", "best", "sampled"),
+    ("laplace", "best", "again"),
     [
         ((19.0, 13.0, 11.0), 20.0, (True, True, False)),  # eight nats behind the best of all
         ((1.0, -1.0, 0.0), -np.inf, (True, False, False)),  # more probable than none
@@ -231,7 +232,7 @@ def test_which_forces_are_sampled(
     pool: ThreadPoolExecutor,
     laplace: tuple[float, ...],
     best: float,
-    sampled: tuple[bool, ...],
+    again: tuple[bool, ...],
 ) -> None:
     """Those that some nats more would bring near the best of all, if they are more probable than none.
 
@@ -239,6 +240,7 @@ def test_which_forces_are_sampled(
     """
     profile: Profile = fit_profile(base, KINDS[0])
     profiles = [replace(profile, log_bayes_factor=one) for one in laplace]
-    _, again = recomputed(base, {}, profiles, pool, best)
-    changed = tuple(one.log_bayes_factor != before for one, before in zip(again, laplace, strict=True))
-    assert changed == sampled
+    _, found = recomputed(base, {}, profiles, pool, best)
+    changed = tuple(one.log_bayes_factor != before for one, before in zip(found, laplace, strict=True))
+    assert changed == again
+    assert tuple(one.error is not None for one in found) == again

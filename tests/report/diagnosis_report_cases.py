@@ -92,7 +92,7 @@ def comparison_of(
         and mechanism.added.joins(setting.base)
         and mechanism.added.shapes(setting)
     }
-    profile = SimpleNamespace(log_bayes_factor=tops.get("unlisted", -1.0), kind=KINDS[0])
+    profile = SimpleNamespace(log_bayes_factor=tops.get("unlisted", -1.0), kind=KINDS[0], error=0.15)
     under_each = tuple(
         ComparisonUnderErrors(name, SimpleNamespace(), candidates, [profile], [])
         for name in ("robust", "student")[:n_error_models]

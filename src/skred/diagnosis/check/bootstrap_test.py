@@ -35,7 +35,7 @@ _BATCH = 25
 """Campaigns refitted together: large enough for arrays, small enough to stop early."""
 _FEWEST = round(1.0 / LIMIT) - 1
 """Clean campaigns by fronts at most: the fewest that place the limit, which none of them may reach then."""
-_FEW = 24
+_FEW = 9
 """The same where nothing is too probable for a claim: they only say whether such odds are usual."""
 
 

@@ -6,5 +6,5 @@ LIMIT = 0.01
 """Share of clean campaigns that may be called wrong: the one limit of an alarm."""
 HELD = 0.9
 """Share of its group that a credible set holds: that of all intervals."""
-NOTHING_AT_MOST = 1.0 - HELD
-"""Probability of nothing from which on it is in every set that holds as much as a credible one: no claim."""
+NOTHING_AT_MOST = 0.1
+"""Probability of nothing from which on it is in every set that holds as much as a credible one: 1 - `HELD`."""

@@ -68,9 +68,8 @@ class Candidate:
     correction : float
         What many more nodes, and importance sampling over the population, change along the best curve, in
         nats; 0 where not looked at.
-    disagreement : float or None
-        Importance sampling less Laplace's formula at its maximum, nothing's subtracted; None where not
-        looked at.
+    error : float or None
+        Standard error of the log Bayes factor by importance sampling, in nats; None where not looked at.
     residue : float or None
         Log Bayes factor of a force not in the list beside it; None where not looked at.
     ways : mapping of BetweenEvents to float, or None
@@ -82,7 +81,7 @@ class Candidate:
     curves: tuple[Curve, ...]
     log_weights: FloatArray
     correction: float = 0.0
-    disagreement: float | None = None
+    error: float | None = None
     residue: float | None = None
     ways: Mapping[BetweenEvents, float] | None = None
 

@@ -26,7 +26,7 @@ from skred.diagnosis.compare.residue import with_residues
 from skred.diagnosis.compare.restarts import better_modes
 from skred.diagnosis.compare.screening import Tell, screened
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
-from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, alike, log_evidence_of
+from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, alike, log_evidence_of, most_probable
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
 from skred.diagnosis.evidence.event_quadrature import FINE, SCREENING, USUAL
@@ -78,6 +78,12 @@ class ComparisonUnderErrors:
     def in_common(self) -> dict[str, float]:
         """The same with strengths that all avalanches have in common."""
         return self._factors({name: one.in_common for name, one in self.candidates.items()})
+
+    @property
+    def errors(self) -> dict[str, float | None]:
+        """Standard error of each id's log Bayes factor, in nats; None where it was not sampled."""
+        found = {name: one.error for name, one in self.candidates.items()}
+        return found | {UNLISTED: most_probable(self.profiles).error}
 
     def _factors(self, found: dict[str, float]) -> dict[str, float]:
         return found | {UNLISTED: log_evidence_of(self.profiles), NOTHING: 0.0}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -11,7 +12,7 @@ import numpy as np
 
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.discrepancy.profile import KINDS, Profile
-from skred.diagnosis.discrepancy.sampled_evidence import sampled_log_factor
+from skred.diagnosis.discrepancy.sampled_evidence import sampled
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
 from skred.diagnosis.evidence.event_quadrature import FINE
 
@@ -53,14 +54,12 @@ def recomputed(
     worth = [k for k, factor in enumerate(force) if factor > max(most - _COUNTS - _TOO_LOW, 0.0)]
     # Each waits for jobs of the pool, and takes none of its threads for that.
     with ThreadPoolExecutor(len(KINDS)) as waiting:
-        sampled = {
-            k: waiting.submit(sampled_log_factor, base, profiles[k], pool, max(most - _COUNTS, 0.0))
-            for k in worth
+        sampled_of = {
+            k: waiting.submit(sampled, base, profiles[k], pool, max(most - _COUNTS, 0.0)) for k in worth
         }
         found = _looked_at(base, candidates, leading[:_CHECKED], pool)
-        factors = {k: one.result() for k, one in sampled.items()}
-    again = [replace(one, log_bayes_factor=factors.get(k, force[k])) for k, one in enumerate(profiles)]
-    return found, again
+        factors = {k: one.result() for k, one in sampled_of.items()}
+    return found, [factors.get(k, one) for k, one in enumerate(profiles)]
 
 
 def _looked_at(
@@ -71,19 +70,18 @@ def _looked_at(
     if leading:
         base.with_nothing(FINE, sampled=True)  # before every worker does it once more
     again = pool.map(partial(computed_again, base), [candidates[name].best for name in leading])
-    for name, (log_factor, disagreement) in zip(leading, again, strict=True):
+    for name, (log_factor, error) in zip(leading, again, strict=True):
         correction = log_factor - candidates[name].best.log_bayes_factor
-        found[name] = replace(candidates[name], correction=correction, disagreement=disagreement)
+        found[name] = replace(candidates[name], correction=correction, error=error)
     return found
 
 
 def computed_again(base: Base, curve: Curve) -> tuple[float, float]:
-    """A curve's log Bayes factor by many more quadrature points and importance sampling.
+    """A curve's log Bayes factor by many more quadrature points and importance sampling, with standard error.
 
-    And what sampling changes of Laplace's formula at its maximum, nothing's subtracted.
+    The error is that at the curve's maximum and that of nothing.
     """
     strengths = curve.strengths[curve.strengths != 0.0]
     fine = curve_at(base, curve.mechanism, curve.shape, strengths, FINE, curve.known, sampled=True)
-    changed = np.array([one.found.sampling_changed for one in fine.fits])
-    disagreement = changed[int(np.argmax(fine.log_evidence))] - changed[fine.strengths == 0.0][0]
-    return fine.log_bayes_factor, float(disagreement)
+    most, nothing = int(np.argmax(fine.log_evidence)), int(np.searchsorted(fine.strengths, 0.0))
+    return fine.log_bayes_factor, math.hypot(*(fine.fits[k].found.error for k in {most, nothing}))

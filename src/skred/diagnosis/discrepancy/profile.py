@@ -132,6 +132,8 @@ class Profile:
         Population and events with the mean in.
     modes : tuple of Mode
         Where values are to be looked for: one for each prior that may count.
+    error : float or None
+        Standard error of the log Bayes factor, in nats; None where it is by the Laplace approximation.
     """
 
     kind: Kind
@@ -143,6 +145,7 @@ class Profile:
     gain: float
     fit: Fit
     modes: tuple[Mode, ...]
+    error: float | None = None
 
 
 def priors_of(kind: Kind, at: FloatArray) -> dict[Prior, float]:

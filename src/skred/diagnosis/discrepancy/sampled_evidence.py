@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import Executor
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -30,7 +31,7 @@ _ENOUGH = 0.2
 """Standard error in nats at which there are enough draws: each is a fit of everything else."""
 
 
-def sampled_log_factor(
+def sampled(
     base: Base,
     profile: Profile,
     pool: Executor,
@@ -38,10 +39,10 @@ def sampled_log_factor(
     seed: int = 0,
     n: int = _DRAWS,
     enough: float = _ENOUGH,
-) -> float:
-    """Log Bayes factor of a kind of profile over all its priors, by importance sampling of its values.
+) -> Profile:
+    """A profile with its log Bayes factor over all priors by importance sampling of its values.
 
-    It is that by the Laplace approximation where no draw has fronts that tell anything.
+    It is left as it is, by the Laplace approximation, where no draw has fronts that tell anything.
 
     Parameters
     ----------
@@ -59,8 +60,10 @@ def sampled_log_factor(
 
     rng = np.random.default_rng([seed, 61, KINDS.index(profile.kind)])
     proposal = Mixture.on(profile.modes)
-    found = weighted_draws(log_density, proposal, rng, n, enough, least, mode_near).log_integral
-    return profile.log_bayes_factor if found == -math.inf else found
+    found = weighted_draws(log_density, proposal, rng, n, enough, least, mode_near)
+    if found.log_integral == -math.inf:
+        return profile
+    return replace(profile, log_bayes_factor=found.log_integral, error=found.error)
 
 
 def gains(base: Base, profile: Profile, values: FloatArray, pool: Executor) -> FloatArray:

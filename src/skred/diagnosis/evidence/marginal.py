@@ -72,14 +72,14 @@ class Evidence(NamedTuple):
     psi : (n_psi,) array
         Most probable population, in the coordinates of `population_target`.
     covariance : (n_psi, n_psi) array
-    sampling_changed : float
-        What importance sampling has changed of Laplace's formula, in nats; 0 where nothing was sampled.
+    error : float
+        Standard error by importance sampling, in nats; 0 where nothing was sampled.
     """
 
     log_evidence: float
     psi: FloatArray
     covariance: FloatArray
-    sampling_changed: float = 0.0
+    error: float = 0.0
 
     def population(self, n: int) -> Population:
         """The most probable population."""

@@ -121,8 +121,8 @@ def refit(
 
 def _by_sampling(nodes: Nodes, log_scale: FloatArray, found: Evidence) -> Evidence:
     """With evidence by importance sampling."""
-    sampled, _ = importance_evidence(nodes, log_scale, found, seed=0)
-    return found._replace(log_evidence=sampled, sampling_changed=sampled - found.log_evidence)
+    sampled, error = importance_evidence(nodes, log_scale, found, seed=0)
+    return found._replace(log_evidence=sampled, error=error)
 
 
 def unfitted(population: Population) -> Evidence:

@@ -114,6 +114,6 @@ def _candidate(comparison: Comparison, name: str) -> dict[str, Any]:
         "location": place_of(candidate),
         "covariate": shape.covariate,
         "sensor": shape.sensor,
-        "estimators_differ_by": candidate.disagreement,
+        "log_bayes_factor_se": candidate.error,
         "residue": candidate.residue,
     }

@@ -315,6 +315,9 @@ def _comparison(comparison: Comparison, found: Diagnosis, number: int) -> dict[s
         "probability": comparison.probability,
         "prior": comparison.odds,
         "log_bayes_factors": comparison.log_factors,
+        "log_bayes_factors_se": {
+            name: comparison.leading(name).errors[name] for name in comparison.odds if name != NOTHING
+        },
         "error_models": [
             {
                 "id": under_errors.error_model,

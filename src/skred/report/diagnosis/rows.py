@@ -136,6 +136,7 @@ def comparison_rows(document: doc.Document, comparison: doc.Document) -> Rows:
         candidate = doc.get(comparison, "candidates", name)
         mean, sd = (doc.get(candidate, "strength", key) for key in ("mean", "sd"))
         decimals = decimals_for(sd)
+        error = doc.get(comparison, "log_bayes_factors_se", name)
         rows.append(
             {
                 "id": name,
@@ -143,6 +144,7 @@ def comparison_rows(document: doc.Document, comparison: doc.Document) -> Rows:
                 "kind": kind_of(document, name),
                 "prior": share(doc.get(comparison, "prior", name)),
                 "factor": fixed(doc.get(comparison, "log_bayes_factors", name), 1),
+                "error": fixed(error, 2) if is_number(error) else "",
                 "by_model": [
                     fixed(doc.get(errors, "log_bayes_factors", name), 1)
                     for errors in doc.listed(comparison, "error_models")

@@ -54,7 +54,8 @@ def _rows(document: doc.Document) -> list[tuple[str, str]]:
     for key, words in (("locked", "locked avalanches"), ("outer_folds", "outer folds")):
         if document.get(key):
             rows.append((words, difference_text(document, doc.get(document, key))))
-    rows.append(("p-value", two_digits(doc.get(document, "evidence", "p_value"))))
+    p_value = two_digits(doc.get(document, "evidence", "p_value"))
+    rows.append(("p-value", f"at most {p_value}" if doc.get(document, "alarm_by") == "evidence" else p_value))
     return rows
 
 
