@@ -7,4 +7,4 @@ LIMIT = 0.01
 HELD = 0.9
 """Share of its group that a credible set holds: that of all intervals."""
 NOTHING_AT_MOST = 0.1
-"""Probability of nothing from which on it is in every set that holds as much as a credible one: 1 - `HELD`."""
+"""Probability of nothing from which on it is in every set that holds as much as a credible one: no claim."""
