@@ -92,7 +92,7 @@ def test_a_status_that_nobody_knows_takes_no_other_reading(results: Path, tree_c
 
 
 def test_a_run_that_cannot_be_shown_leaves_the_others(results: Path, monkeypatch: Any) -> None:
-    from skred.dashboard.run import Run
+    from skred.report.explore.run import Run
 
     fails = Run.observations.func  # type: ignore[attr-defined]
 

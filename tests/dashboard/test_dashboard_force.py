@@ -11,9 +11,10 @@ import pytest
 from bokeh.models import BoxAnnotation, Quad
 
 from skred.dashboard.catalogue import VIEWS
-from skred.dashboard.figures import CHOSEN
 from skred.dashboard.reading import read_given
-from skred.dashboard.view import Asked, Panel
+from skred.dashboard.view import Asked
+from skred.report.explore.figures import CHOSEN
+from skred.report.explore.panel import Panel
 
 
 def force_of(folder: Path) -> Panel:

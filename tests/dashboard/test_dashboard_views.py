@@ -16,13 +16,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skred.dashboard.answer import answer, entries
 from skred.dashboard.catalogue import VIEWS
 from skred.dashboard.fronts import event_speeds
-from skred.dashboard.view import Asked, Panel
+from skred.dashboard.view import Asked
 from skred.inference.added_terms import AddedTerm, added_group
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import BoundTo, Setting, Shape
 from skred.physics.terrain import Terrain
+from skred.report.explore.panel import Panel
 
 
 def panels(given: Any, view: str, run: str | None = None, **asked: Any) -> list[Panel]:

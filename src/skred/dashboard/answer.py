@@ -12,8 +12,9 @@ from markupsafe import Markup
 from skred.dashboard.catalogue import VIEWS
 from skred.dashboard.parameters import Choice, choice
 from skred.dashboard.reading import Given
-from skred.dashboard.run import OF_A_FILE, Run
-from skred.dashboard.view import Asked, NotShownError, Panel, ViewKind
+from skred.dashboard.view import Asked, ViewKind
+from skred.report.explore.panel import NotShownError, Panel
+from skred.report.explore.run import OF_A_FILE, Run
 
 _NUMBER = itertools.count()
 

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from skred.dashboard.run import Run
-from skred.dashboard.view import ViewKind
+from collections.abc import Callable, Sequence
+
+from skred.dashboard.reading import Given
+from skred.dashboard.view import Asked, ViewKind
 from skred.dashboard.views.candidates import candidate_panels
 from skred.dashboard.views.comparison import comparison_panels
 from skred.dashboard.views.events import event_panels
 from skred.dashboard.views.force import force_panels
 from skred.dashboard.views.forest import MOST_SHOWN, forest_panels
 from skred.dashboard.views.held_out import held_out_panels
-from skred.dashboard.views.loo_pit import loo_pit_panels
 from skred.dashboard.views.overview import overview_panels
-from skred.dashboard.views.pair import MOST_PAIRED, pair_panels
-from skred.dashboard.views.pareto_k import pareto_panels
-from skred.dashboard.views.predictive import predictive_panels
-from skred.dashboard.views.prior_posterior import prior_panels
-from skred.dashboard.views.rank import rank_panels
 from skred.dashboard.views.speed import speed_panels
-from skred.dashboard.views.trace import trace_panels
+from skred.report.explore.panel import Panel
+from skred.report.explore.plots.loo_pit import loo_pit_panels
+from skred.report.explore.plots.pair import MOST_PAIRED, pair_panels
+from skred.report.explore.plots.pareto_k import pareto_panels
+from skred.report.explore.plots.predictive import predictive_panels
+from skred.report.explore.plots.prior_posterior import prior_panels
+from skred.report.explore.plots.rank import rank_panels
+from skred.report.explore.plots.trace import trace_panels
+from skred.report.explore.run import Run
 
 
 def _any(run: Run) -> bool:
@@ -39,6 +43,18 @@ def _left_out(run: Run) -> bool:
 
 def _predicted(run: Run) -> bool:
     return bool(run.observed_names)
+
+
+def _of_run(make: Callable[[Run], list[Panel]]) -> Callable[[Run, Given, Asked], list[Panel]]:
+    """A plot of a run as a view of it."""
+    return lambda run, given, asked: make(run)
+
+
+def _of_parameters(
+    make: Callable[[Run, Sequence[str]], list[Panel]],
+) -> Callable[[Run, Given, Asked], list[Panel]]:
+    """A plot of some parameters as a view of those that are asked for."""
+    return lambda run, given, asked: make(run, asked.parameters)
 
 
 _FOUND, _CHECKS, _DRAWS = "Results", "Checks", "Parameters"
@@ -65,7 +81,7 @@ VIEWS: tuple[ViewKind, ...] = (
         "predictive", _FOUND, "Predictions by sensor",
         "Black: recorded. Lines and bars: what the run predicts. The black line should look like one "
         "of the blue ones, and nine in ten thin bars should hold their dot.",
-        _predicted, predictive_panels,
+        _predicted, _of_run(predictive_panels),
     ),
     ViewKind(
         "candidates", _FOUND, "Candidates",
@@ -95,14 +111,14 @@ VIEWS: tuple[ViewKind, ...] = (
         "pareto_k", _CHECKS, "Pareto k by event",
         "An event above the dashed line is so influential that leaving it out by importance sampling "
         "cannot be trusted.",
-        _left_out, pareto_panels,
+        _left_out, _of_run(pareto_panels),
     ),
     ViewKind(
         "loo_pit", _CHECKS, "LOO-PIT by sensor",
         "Left-out readings should fall anywhere in their predictions with the same chance. A line far"
         " from zero means that predictions are biased, too narrow or too wide; below α, the p-value "
         "says that this is no chance.",
-        lambda run: _predicted(run) and _left_out(run), loo_pit_panels,
+        lambda run: _predicted(run) and _left_out(run), _of_run(loo_pit_panels),
     ),
     ViewKind(
         "forest", _DRAWS, "Forest",
@@ -114,25 +130,25 @@ VIEWS: tuple[ViewKind, ...] = (
         "prior", _DRAWS, "Prior and posterior",
         "Grey: before the recordings. Blue: after them. Where both agree, the recordings taught "
         "nothing.",
-        lambda run: _posterior(run) and run.has("prior"), prior_panels, by_parameter=True,
+        lambda run: _posterior(run) and run.has("prior"), _of_parameters(prior_panels), by_parameter=True,
         drawn_from=("posterior", "prior"),
     ),
     ViewKind(
         "pair", _DRAWS, "Pairs",
         "Each dot is a draw. A narrow band says that the recordings fix a combination of both, not "
         "each by itself.",
-        _posterior, pair_panels, by_parameter=True, most_parameters=MOST_PAIRED,
+        _posterior, _of_parameters(pair_panels), by_parameter=True, most_parameters=MOST_PAIRED,
     ),
     ViewKind(
         "trace", _DRAWS, "Trace",
         "Draws in their order, a colour for each chain. Chains that mix well look alike, as noise "
         "without drift.",
-        _posterior, trace_panels, by_parameter=True,
+        _posterior, _of_parameters(trace_panels), by_parameter=True,
     ),
     ViewKind(
         "rank", _DRAWS, "Ranks",
         "A line for each chain. Chains that explore the same stay close to zero; a p-value below α "
         "says that they do not, or that draws of a chain are much alike.",
-        _posterior, rank_panels, by_parameter=True,
+        _posterior, _of_parameters(rank_panels), by_parameter=True,
     ),
 )  # fmt: skip

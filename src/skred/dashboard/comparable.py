@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from skred.dashboard.run import Run
+from skred.report.explore.run import Run
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from typing import TypeVar
 
 from markupsafe import Markup
 
-from skred.dashboard.run import Run
-from skred.dashboard.view import Panel
+from skred.report.explore.panel import Panel
+from skred.report.explore.run import Run
 
 T = TypeVar("T")
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.dashboard.run import Run
-from skred.dashboard.view import NotShownError
 from skred.errors import InputError
 from skred.inference.added_terms import AddedTerm, added_terms, contributions_with
 from skred.physics.geometry import contributions_of, path_of
@@ -16,6 +14,8 @@ from skred.physics.kernel.fronts import front_speeds
 from skred.physics.law import Law
 from skred.physics.laws import load_law
 from skred.physics.terrain import Terrain
+from skred.report.explore.panel import NotShownError
+from skred.report.explore.run import Run
 
 FloatArray = NDArray[np.float64]
 _MOST_CURVES, _MOST_DRAWS = 1200, 16

@@ -12,8 +12,8 @@ from markupsafe import Markup
 from skred.dashboard.answer import Entry
 from skred.dashboard.catalogue import VIEWS
 from skred.dashboard.reading import Given
-from skred.dashboard.run import MOST_EVENTS
 from skred.dashboard.views.events import all_events
+from skred.report.explore.run import MOST_EVENTS
 
 TITLE = "skred dashboard"
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from skred.dashboard.each import Failures
 from skred.dashboard.reading import Given
-from skred.dashboard.run import Run, apart
 from skred.dashboard.view import Asked, ViewKind
+from skred.report.explore.run import Run, apart
 
 
 @dataclass(frozen=True)

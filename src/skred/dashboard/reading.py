@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from skred.dashboard.plain_json import plain_json
-from skred.dashboard.run import Run, shown
 from skred.documents import FORMAT, TREE_FORMAT, check_size
 from skred.errors import InputError
+from skred.report.explore.plain_json import plain_json
+from skred.report.explore.run import Run, shown
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,4 +1,4 @@
-"""What a view is made of: panels of figures and tables, and what to say of them."""
+"""What a view is, and what can be asked of it."""
 
 from __future__ import annotations
 
@@ -6,39 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from skred.dashboard.run import MOST_PARAMETERS
-from skred.errors import InputError
+from skred.report.explore.panel import Panel
+from skred.report.explore.run import MOST_PARAMETERS
 
 if TYPE_CHECKING:
     from skred.dashboard.reading import Given
-    from skred.dashboard.run import Run
-
-
-class NotShownError(InputError):
-    """A view has nothing to show of a run; the message says why."""
-
-
-@dataclass(frozen=True, eq=False)
-class Panel:
-    """A figure or a table.
-
-    Attributes
-    ----------
-    title : str
-    figure : bokeh model or None
-    html : str
-        Markup of a table, its texts escaped.
-    note : str
-        Below it.
-    wide : bool
-        Whether it takes the whole width.
-    """
-
-    title: str
-    figure: Any = None
-    html: str = ""
-    note: str = ""
-    wide: bool = False
+    from skred.report.explore.run import Run
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,13 @@ import numpy as np
 from bokeh.models import ColumnDataSource, FactorRange, HoverTool, Span
 from markupsafe import Markup
 
-from skred.dashboard.figures import BLUE, legend_above, new_figure, points
 from skred.dashboard.reading import Given
-from skred.dashboard.run import Run, apart, shown
-from skred.dashboard.view import Asked, NotShownError, Panel
-from skred.dashboard.views.pareto_k import name_events
+from skred.dashboard.view import Asked
 from skred.report.diagnosis.words import title_of
+from skred.report.explore.figures import BLUE, legend_above, new_figure, points
+from skred.report.explore.panel import NotShownError, Panel
+from skred.report.explore.plots.pareto_k import name_events
+from skred.report.explore.run import Run, apart, shown
 from skred.report.shared import document as doc
 from skred.report.shared.numbers import is_number, share
 from skred.report.shared.style import GREY, PALETTE

@@ -9,11 +9,12 @@ import numpy as np
 from markupsafe import Markup
 
 from skred.dashboard.comparable import Comparable, comparable
-from skred.dashboard.figures import legend_above, new_figure, points, quietly, styled
 from skred.dashboard.reading import Given
-from skred.dashboard.run import Run
-from skred.dashboard.view import Asked, Panel
-from skred.dashboard.views.pareto_k import name_events
+from skred.dashboard.view import Asked
+from skred.report.explore.figures import legend_above, new_figure, points, quietly, styled
+from skred.report.explore.panel import Panel
+from skred.report.explore.plots.pareto_k import name_events
+from skred.report.explore.run import Run
 from skred.report.shared.style import MARKERS, PALETTE
 
 _BOKEH_MARKERS = {"o": "circle", "s": "square", "D": "diamond", "^": "triangle", "v": "inverted_triangle",

@@ -11,10 +11,11 @@ from markupsafe import Markup
 
 from skred.campaign import Sensor, Status
 from skred.dashboard.each import Failures
-from skred.dashboard.figures import quietly
 from skred.dashboard.reading import Given
-from skred.dashboard.run import MOST_EVENTS, MOST_SENSORS, Run, ids_of, shown
-from skred.dashboard.view import Asked, Panel
+from skred.dashboard.view import Asked
+from skred.report.explore.figures import quietly
+from skred.report.explore.panel import Panel
+from skred.report.explore.run import MOST_EVENTS, MOST_SENSORS, Run, ids_of, shown
 
 _MOST_DETAILS = 4000
 _WORDS: dict[int, str] = {

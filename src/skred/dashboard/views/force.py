@@ -8,11 +8,12 @@ import numpy as np
 from bokeh.layouts import column
 from bokeh.models import BoxAnnotation, Span
 
-from skred.dashboard.figures import BLUE, CHOSEN, legend_above, new_figure
 from skred.dashboard.reading import Given
-from skred.dashboard.run import Run, shown
-from skred.dashboard.view import Asked, Panel
+from skred.dashboard.view import Asked
 from skred.report.diagnosis.words import stretch_in, title_of
+from skred.report.explore.figures import BLUE, CHOSEN, legend_above, new_figure
+from skred.report.explore.panel import Panel
+from skred.report.explore.run import Run, shown
 from skred.report.shared import document as doc
 from skred.report.shared.numbers import is_number
 from skred.report.shared.style import GREY

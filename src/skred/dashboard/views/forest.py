@@ -9,11 +9,12 @@ import xarray as xr
 from bokeh.models import ColumnDataSource, FactorRange, HoverTool
 
 from skred.dashboard.each import Failures
-from skred.dashboard.figures import new_figure
 from skred.dashboard.parameters import common_parameters
 from skred.dashboard.reading import Given
-from skred.dashboard.run import Run
-from skred.dashboard.view import Asked, NotShownError, Panel
+from skred.dashboard.view import Asked
+from skred.report.explore.figures import new_figure
+from skred.report.explore.panel import NotShownError, Panel
+from skred.report.explore.run import Run
 from skred.report.shared.style import PALETTE
 
 MOST_SHOWN = 24

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from skred.dashboard.figures import new_figure, points
 from skred.dashboard.reading import Given
-from skred.dashboard.run import Run, shown
-from skred.dashboard.view import Asked, NotShownError, Panel
+from skred.dashboard.view import Asked
+from skred.report.explore.figures import new_figure, points
+from skred.report.explore.panel import NotShownError, Panel
+from skred.report.explore.run import Run, shown
 from skred.report.shared.labels import unit_text
 from skred.report.shared.recordings import Recordings
 from skred.report.shared.style import GREY

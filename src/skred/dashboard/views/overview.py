@@ -9,8 +9,9 @@ from markupsafe import Markup
 
 from skred.dashboard.each import Failures
 from skred.dashboard.reading import Given
-from skred.dashboard.run import Run, shown
-from skred.dashboard.view import Asked, Panel
+from skred.dashboard.view import Asked
+from skred.report.explore.panel import Panel
+from skred.report.explore.run import Run, shown
 from skred.report.shared import document as doc
 from skred.report.shared.numbers import is_number
 

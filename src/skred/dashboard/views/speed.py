@@ -11,7 +11,10 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from skred.campaign import Status
-from skred.dashboard.figures import (
+from skred.dashboard.fronts import EventSpeeds, event_speeds
+from skred.dashboard.reading import Given
+from skred.dashboard.view import Asked
+from skred.report.explore.figures import (
     BLUE,
     CHOSEN,
     DRAWS_FILTER,
@@ -22,10 +25,8 @@ from skred.dashboard.figures import (
     points,
     spread_out,
 )
-from skred.dashboard.fronts import EventSpeeds, event_speeds
-from skred.dashboard.reading import Given
-from skred.dashboard.run import Run, shown
-from skred.dashboard.view import Asked, NotShownError, Panel
+from skred.report.explore.panel import NotShownError, Panel
+from skred.report.explore.run import Run, shown
 from skred.report.shared.recordings import Recordings
 from skred.report.shared.style import GREY
 

@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from skred.dashboard.figures import figures_of, points, quietly, styled
-from skred.dashboard.reading import Given
-from skred.dashboard.run import Run, ids_of
-from skred.dashboard.view import Asked, NotShownError, Panel
+from skred.report.explore.figures import figures_of, points, quietly, styled
+from skred.report.explore.panel import NotShownError, Panel
+from skred.report.explore.run import Run, ids_of
 
 
-def loo_pit_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
+def loo_pit_panels(run: Run) -> list[Panel]:
     """LOO-PIT of each sensor by arviz-plots, each reading a point on the line."""
     import arviz_plots as azp
     import arviz_stats as azs

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import xarray as xr
 
-from skred.dashboard.figures import figures_of, legend_above, quietly, slim, styled
-from skred.dashboard.reading import Given
-from skred.dashboard.run import Run
-from skred.dashboard.view import Asked, NotShownError, Panel
+from skred.report.explore.figures import figures_of, legend_above, quietly, slim, styled
+from skred.report.explore.panel import NotShownError, Panel
+from skred.report.explore.run import Run
 
 
-def prior_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
+def prior_panels(run: Run, chosen: Sequence[str] = ()) -> list[Panel]:
     """Densities of prior and posterior of each parameter, by arviz-plots."""
     import arviz_plots as azp
 
-    posterior = run.parameters(asked.parameters)
-    prior = run.parameters(asked.parameters, group="prior")
+    posterior = run.parameters(chosen)
+    prior = run.parameters(chosen, group="prior")
     names = [name for name in posterior.data_vars if name in prior]
     if not names:
         raise NotShownError("the prior of this run has none of the parameters")

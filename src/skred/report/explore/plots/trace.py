@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import xarray as xr
 
-from skred.dashboard.figures import figures_of, quietly, spread_out, styled
-from skred.dashboard.reading import Given
-from skred.dashboard.run import Run
-from skred.dashboard.view import Asked, Panel
+from skred.report.explore.figures import figures_of, quietly, spread_out, styled
+from skred.report.explore.panel import Panel
+from skred.report.explore.run import Run
 
 MOST_DRAWS = 400
 """Draws of a chain that a trace shows."""
 
 
-def trace_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
+def trace_panels(run: Run, chosen: Sequence[str] = ()) -> list[Panel]:
     """A trace for each parameter, by arviz-plots."""
     import arviz_plots as azp
 
-    draws = run.parameters(asked.parameters)
+    draws = run.parameters(chosen)
     kept = spread_out(draws["draw"], MOST_DRAWS)
     tree = xr.DataTree.from_dict({"posterior": draws.isel(draw=kept)})
     with quietly():

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from skred.dashboard.plain_json import plain_json
+from skred.report.explore.plain_json import plain_json
 from skred.report.shared.labels import shortened, symbol_text, unit_text
 from skred.report.shared.recordings import Recordings, recordings_of
 

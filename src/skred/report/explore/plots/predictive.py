@@ -7,18 +7,17 @@ from typing import Any
 import numpy as np
 from bokeh.models import GlyphRenderer
 
-from skred.dashboard.figures import BLUE, figures_of, points, quietly, spread_out, styled
-from skred.dashboard.reading import Given
-from skred.dashboard.run import Run, ids_of
-from skred.dashboard.view import Asked, Panel
-from skred.dashboard.views.pareto_k import name_events
+from skred.report.explore.figures import BLUE, figures_of, points, quietly, spread_out, styled
+from skred.report.explore.panel import Panel
+from skred.report.explore.plots.pareto_k import name_events
+from skred.report.explore.run import Run, ids_of
 
 _PREDICTED, _POINTS = 40, 160
 """Predicted distributions of a sensor, and points of each."""
 _MOST_BY_EVENT = 200
 
 
-def predictive_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
+def predictive_panels(run: Run) -> list[Panel]:
     """For each sensor distributions, and intervals by event; both by arviz-plots."""
     panels = []
     for name in run.observed_names:

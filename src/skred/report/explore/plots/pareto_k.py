@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 from bokeh.models import DataRange1d, Span
 
-from skred.dashboard.figures import of_events, quietly, styled
-from skred.dashboard.reading import Given
-from skred.dashboard.run import Run
-from skred.dashboard.view import Asked, Panel
+from skred.report.explore.figures import of_events, quietly, styled
+from skred.report.explore.panel import Panel
+from skred.report.explore.run import Run
 from skred.report.shared.style import GREY
 
 
-def pareto_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
+def pareto_panels(run: Run) -> list[Panel]:
     """Pareto k of each event by arviz-plots, the limit of importance sampling as a line."""
     import arviz_plots as azp
 

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import xarray as xr
 
-from skred.dashboard.figures import figures_of, quietly, styled
-from skred.dashboard.reading import Given
-from skred.dashboard.run import Run
-from skred.dashboard.view import Asked, Panel
+from skred.report.explore.figures import figures_of, quietly, styled
+from skred.report.explore.panel import Panel
+from skred.report.explore.run import Run
 
 
-def rank_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
+def rank_panels(run: Run, chosen: Sequence[str] = ()) -> list[Panel]:
     """Differences of each chain's distribution of ranks from a uniform one, by arviz-plots."""
     import arviz_plots as azp
 
-    draws = run.parameters(asked.parameters)
+    draws = run.parameters(chosen)
     tree = xr.DataTree.from_dict({"posterior": draws})
     with quietly():
         made = figures_of(azp.plot_rank(tree, backend="bokeh", visuals={"remove_axis": False}))

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import xarray as xr
 
-from skred.dashboard.figures import apart, quietly, spread_out, styled
-from skred.dashboard.reading import Given
-from skred.dashboard.run import Run
-from skred.dashboard.view import Asked, Panel
+from skred.report.explore.figures import apart, quietly, spread_out, styled
+from skred.report.explore.panel import Panel
+from skred.report.explore.run import Run
 
 MOST_PAIRED, MOST_DRAWS = 6, 250
 """Parameters, each of which gets a row and a column; draws of a chain."""
 
 
-def pair_panels(run: Run, given: Given, asked: Asked) -> list[Panel]:
+def pair_panels(run: Run, chosen: Sequence[str] = ()) -> list[Panel]:
     """The draws of each pair of parameters, by arviz-plots, each a panel of its own."""
     import arviz_plots as azp
 
-    draws = run.parameters(asked.parameters, most=MOST_PAIRED)
+    draws = run.parameters(chosen, most=MOST_PAIRED)
     names = [str(name) for name in draws.data_vars]
     kept = spread_out(draws["draw"], MOST_DRAWS)
     tree = xr.DataTree.from_dict({"posterior": draws[names].isel(draw=kept)})
