@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-import base64
-import json
-import zlib
 from collections.abc import Callable
-from hashlib import sha256
 from pathlib import Path
-from typing import Any
-
-from bokeh.resources import INLINE
 
 from skred.dashboard.answer import answer, entries
 from skred.dashboard.page import TITLE, asset, body
 from skred.dashboard.reading import Given
 from skred.errors import InputError
 from skred.output import write_text
+from skred.report.shared.programs import bokeh_program, digest, packed, plain, program
 
 _HEAD = """<!doctype html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title>
@@ -47,28 +41,18 @@ def export(given: Given, file: Path, tell: Callable[[str], None] = lambda line: 
     """
     check_target(file)
     asked = entries(given)
-    scripts = [*_programs(), asset("ask_file.js") + asset("dashboard.js")]
-    head = _HEAD.format(title=TITLE, css=asset("dashboard.css"), scripts=" ".join(map(_source, scripts)))
+    ours = (program("unpack.js"), asset("ask_file.js"), program("marks.js"), asset("dashboard.js"))
+    scripts = [bokeh_program(), "".join(ours)]
+    head = _HEAD.format(title=TITLE, css=asset("dashboard.css"), scripts=" ".join(map(digest, scripts)))
     parts = [head, body(given, asked)]
     for number, entry in enumerate(asked):
         tell(f"view {number + 1} of {len(asked)}: {entry.key}")
-        data = _packed(answer(entry, given))
+        data = packed(plain(answer(entry, given)))
         parts.append(f'<script type="text/plain" id="answer-{entry.key}">{data}</script>\n')
     parts += [f"<script>{script}</script>\n" for script in scripts]
     parts.append("</body></html>\n")
     write_text(file, "".join(parts))
     return file
-
-
-def _source(script: str) -> str:
-    """A program that the page may run, by its digest: what a name in a file smuggles in is none of them."""
-    return f"'sha256-{base64.b64encode(sha256(script.encode('utf-8')).digest()).decode('ascii')}'"
-
-
-def _packed(view: dict[str, Any]) -> str:
-    """A view as text that the page unpacks; a third of its size, so that the file can be sent by mail."""
-    plain = json.dumps(view, allow_nan=False, separators=(",", ":")).encode("utf-8")
-    return base64.b64encode(zlib.compress(plain, level=9)).decode("ascii")
 
 
 def check_target(file: Path) -> None:
@@ -85,11 +69,3 @@ def check_target(file: Path) -> None:
         raise InputError(
             f"--export {file}: no such folder to write into, or a folder is there; choose another"
         )
-
-
-def _programs() -> list[str]:
-    """Bokeh itself, without what no figure here needs."""
-    wanted = INLINE.clone(components=["bokeh"])
-    # A browser reads every end of a line as a line feed, and digests what it read.
-    plain = (script.replace("\r\n", "\n").replace("\r", "\n") for script in wanted.js_raw)
-    return [script.replace("</script", "<\\/script") for script in plain]

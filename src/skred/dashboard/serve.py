@@ -20,6 +20,7 @@ from skred.dashboard.page import TITLE, asset, body
 from skred.dashboard.reading import Given
 from skred.dashboard.view import Asked
 from skred.errors import InputError
+from skred.report.shared.programs import program
 
 ADDRESS = "127.0.0.1"
 _OUR_NAMES = ("localhost", ADDRESS)
@@ -109,7 +110,7 @@ def session(answers: Answers) -> panel.Template:
     page.add_variable("dashboard_css", asset("dashboard.css"))
     page.add_variable("dashboard_body", body(answers.given, list(answers.entries.values())))
     page.add_variable("dashboard_ask", asset("ask_server.js"))
-    page.add_variable("dashboard_js", asset("dashboard.js"))
+    page.add_variable("dashboard_js", program("marks.js") + asset("dashboard.js"))
     page.add_panel("question", panel.pane.Bokeh(question))
     page.add_panel("reply", panel.pane.Bokeh(reply))
     return page

@@ -4,8 +4,8 @@
 (function () {
   const catalogue = JSON.parse(document.getElementById("catalogue").textContent);
   const element = (id) => document.getElementById(id);
-  const stage = element("stage"), made = new Map(), watched = new Set();
-  let view = null, run = null, chosen = null, busy = false, turn = 0;
+  const stage = element("stage"), made = new Map();
+  let view = null, run = null, chosen = null, turn = 0;
 
   const entryKeys = new Set(catalogue.entries);
   const viewOf = (id) => catalogue.views.find((one) => one.id === id);
@@ -63,26 +63,11 @@
       section.textContent = `This view did not come: ${error.message}`;
     }
     mark(section);
-    watch();
+    marks.watch();
     follow();
   }
 
   // ---- one event through all views
-  const sources = () => Bokeh.documents.flatMap((one) => [...one.all_models])
-    .filter((one) => one.type === "ColumnDataSource" && one.data.event !== undefined);
-
-  function watch() {
-    for (const source of sources()) {
-      if (watched.has(source)) continue;
-      watched.add(source);
-      source.selected.properties.indices.change.connect(() => {
-        if (busy) return;
-        const [row] = source.selected.indices;
-        choose(row === undefined ? null : Array.from(source.data.event)[row]);
-      });
-    }
-  }
-
   function choose(event) {
     chosen = event || null;
     element("event").value = chosen === null ? "" : chosen;
@@ -92,19 +77,13 @@
     follow();
   }
 
-  // Rows of the event in every source of every figure; without an event nothing is selected.
+  const marks = window.skredMarks((event) => choose(event));
+
   function follow() {
-    busy = true;
-    try {
-      for (const source of sources()) {
-        const events = Array.from(source.data.event), rows = [];
-        if (chosen !== null) events.forEach((one, row) => { if (one === chosen) rows.push(row); });
-        source.selected.indices = rows;
-      }
-      for (const one of Bokeh.documents) for (const model of one.all_models) {
-        if (model.name === "skred-draws") showDraws(one, model);
-      }
-    } finally { busy = false; }
+    marks.follow(chosen);
+    for (const one of Bokeh.documents) for (const model of one.all_models) {
+      if (model.name === "skred-draws") showDraws(one, model);
+    }
   }
 
   // Draws of the chosen event: all, or the one that the slider of the view says.
@@ -167,6 +146,6 @@
   });
 
   view = "overview";
-  window.skred = { choose, chosen: () => chosen, sources };
+  window.skred = { choose, chosen: () => chosen, sources: marks.sources };
   show();
 })();

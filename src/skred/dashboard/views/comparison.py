@@ -11,8 +11,9 @@ from markupsafe import Markup
 from skred.dashboard.comparable import Comparable, comparable
 from skred.dashboard.reading import Given
 from skred.dashboard.view import Asked
-from skred.report.explore.figures import legend_above, new_figure, points, quietly, styled
+from skred.report.explore.figures import legend_above, new_figure, points, quietly
 from skred.report.explore.panel import Panel
+from skred.report.explore.plots.compare import difference_figure
 from skred.report.explore.plots.pareto_k import name_events
 from skred.report.explore.run import Run
 from skred.report.shared.style import MARKERS, PALETTE
@@ -43,16 +44,11 @@ def _others(found: Comparable) -> Panel:
 
 
 def _panels(runs: Sequence[Run]) -> list[Panel]:
-    import arviz_plots as azp
     import arviz_stats as azs
 
     with quietly():
         table = azs.compare({str(run.number): run.loo for run in runs}, round_to="none")
-        made = azp.plot_compare(table, backend="bokeh").viz["plot"].item()
-    made.xaxis.axis_label = "difference of elpd to the best [nats]"
-    overrides = {at: f"run {name}" for at, name in made.yaxis[0].major_label_overrides.items()}
-    made.yaxis[0].major_label_overrides = overrides
-    styled(made, height=120 + 40 * len(runs), title="")
+    made = difference_figure(table, {str(run.number): f"run {run.number}" for run in runs})
     likelihood = str(runs[0].tree.attrs.get("likelihood", ""))
     title = f"arviz.compare, {len(runs)} runs{f', {likelihood}' if likelihood else ''}"
     best = next(run for run in runs if str(run.number) == table.index[0])

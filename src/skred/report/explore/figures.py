@@ -1,7 +1,7 @@
 """Bokeh figures: how all of them look, and marks that belong to an event.
 
-A source with a column `event` is what the page highlights: `dashboard.js` selects in every such source the
-rows of the event that was chosen. The same on the server and in the file.
+A source with a column `event` is what a page highlights: `marks.js` selects in every such source the rows of
+the event that was chosen. The same in reports and in the dashboard.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def new_figure(x_label: str, y_label: str, *, height: int = 280, **more: Any) ->
 
 
 def styled(made: Any, *, height: int | None = None, title: str | None = None) -> Any:
-    """Bring a figure, our own or one of arviz-plots, into the dashboard's style.
+    """Bring a figure, our own or one of arviz-plots, into the style of all.
 
     Parameters
     ----------
@@ -244,6 +244,7 @@ def legend_above(made: Any) -> None:
         legend.orientation, legend.border_line_color = "horizontal", None
         legend.background_fill_alpha, legend.padding, legend.margin = 0.0, 0, 2
         legend.label_text_font, legend.label_text_font_size = _FONT, "12px"
+        legend.label_text_color = INK
         legend.click_policy = "hide"
         labels = [str(getattr(item.label, "value", "")) for item in legend.items]
         if sum(len(label) + 5 for label in labels) > _LEGEND_WIDTH:

@@ -1,4 +1,4 @@
-"""One run in the dashboard: a tree of draws, and what is asked of it more than once."""
+"""One run: a tree of draws, and what is asked of it more than once."""
 
 from __future__ import annotations
 

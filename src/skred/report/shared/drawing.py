@@ -20,6 +20,22 @@ _UNLABELLED = 'aria-label=""'
 
 
 @dataclass(frozen=True)
+class Exploration:
+    """Figures of the same data that a page draws in place of a drawing, where one asks for them.
+
+    Attributes
+    ----------
+    data : str
+        Packed, see `skred.report.shared.programs.packed`.
+    colours : frozenset of str
+        That they refer to, as ``#rrggbb``.
+    """
+
+    data: str
+    colours: frozenset[str]
+
+
+@dataclass(frozen=True)
 class Picture:
     """A figure that was made.
 
@@ -29,11 +45,14 @@ class Picture:
         PNG, for slides and papers.
     wide, narrow : str
         Markup for the page: one of the two is shown, by the width of the screen.
+    exploration : Exploration or None
+        What can be looked at in its place.
     """
 
     file: Path
     wide: str
     narrow: str
+    exploration: Exploration | None = None
 
     @property
     def size(self) -> int:
@@ -46,14 +65,21 @@ class Picture:
 
         label = f'aria-label="{escape(" ".join(printable(words).split()))}"'
         parts = zip(("wide", "narrow"), (self.wide, self.narrow), strict=True)
-        return Markup("").join(
+        drawings = Markup("").join(
             Markup(f'<div class="{name}-figure">{text.replace(_UNLABELLED, label, 1)}</div>')
             for name, text in parts
         )
+        if self.exploration is None:
+            return drawings
+        block = Markup('<script type="text/plain" class="exploration-data">{}</script>')
+        return drawings + block.format(self.exploration.data)
 
 
 def draw(
-    makers: Mapping[str, Callable[[], Figure | None]], folder: Path, key: str = ""
+    makers: Mapping[str, Callable[[], Figure | None]],
+    folder: Path,
+    key: str = "",
+    explorations: Mapping[str, Callable[[], Exploration | None]] | None = None,
 ) -> dict[str, Picture]:
     """Make figures, each wide and narrow, and write the wide one as PNG.
 
@@ -65,6 +91,8 @@ def draw(
         An existing folder.
     key : str
         Letters that tell figures of the same name in one page apart.
+    explorations : mapping of str to callable, optional
+        By the name of the figure in whose place they are looked at.
     """
     drawn = {}
     for number, (name, make) in enumerate(makers.items()):
@@ -74,7 +102,9 @@ def draw(
         own = f"{key}f{number}"
         file = write_png(figure, folder / f"{name}.png")
         wide = inline_svg(figure, f"{own}w")
-        drawn[name] = Picture(file, wide, _for_telephones(make, f"{own}n") or inline_svg(figure, f"{own}n"))
+        narrow_one = _for_telephones(make, f"{own}n") or inline_svg(figure, f"{own}n")
+        explore = (explorations or {}).get(name)
+        drawn[name] = Picture(file, wide, narrow_one, explore() if explore is not None else None)
     return drawn
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cache
-from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from skred.report.shared import document as doc
@@ -25,6 +23,7 @@ from skred.report.shared.numbers import (
     three_digits,
     whole,
 )
+from skred.report.shared.programs import bokeh_program, digest, packed, program
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -34,7 +33,9 @@ if TYPE_CHECKING:
 
 
 _MOST_DRAWN = 4_300_000
-"""Characters of drawings in a page: with tables and words it stays below 5 MB."""
+"""Characters of drawings and explorations in a page: with tables and words it stays below 5 MB."""
+_EXPLORING = ("unpack.js", "marks.js", "explore.js")
+"""Programs of pages with figures to explore."""
 
 
 def page(template: str, figures: Mapping[str, Picture], **values: Any) -> str:
@@ -59,8 +60,11 @@ def page(template: str, figures: Mapping[str, Picture], **values: Any) -> str:
 
     figures, too_large = _that_fit(figures)
     drawings = [text for one in figures.values() for text in (one.wide, one.narrow)]
-    style = _asset("style.css") + _colours(set().union(*map(colours_in, drawings)))
-    script = _asset("report.js")
+    figures, not_explored = _explored(figures)
+    explorations = [one.exploration for one in figures.values() if one.exploration is not None]
+    colours = set().union(*map(colours_in, drawings), *(one.colours for one in explorations))
+    style = program("style.css") + _colours(colours)
+    script = "".join(map(program, ("report.js", *(_EXPLORING if explorations else ()))))
     html = (
         environment()
         .get_template(template)
@@ -68,8 +72,10 @@ def page(template: str, figures: Mapping[str, Picture], **values: Any) -> str:
             figures=figures,
             style=Markup(style),
             script=Markup(script),
-            policy=Markup(_policy(style, script)),
+            policy=Markup(_policy(style, script, bool(explorations))),
+            bokeh=Markup(packed(bokeh_program())) if explorations else None,
             too_large=too_large,
+            not_explored=not_explored,
             **values,
         )
     )
@@ -85,20 +91,29 @@ def _that_fit(figures: Mapping[str, Picture]) -> tuple[dict[str, Picture], list[
     return {name: one for name, one in figures.items() if name in kept}, [n for n in figures if n not in kept]
 
 
-def _policy(style: str, script: str) -> str:
+def _explored(figures: Mapping[str, Picture]) -> tuple[dict[str, Picture], list[str]]:
+    """Explorations that a page has room for beside its drawings, the smallest first; names of the others."""
+    sizes = {name: len(one.exploration.data) for name, one in figures.items() if one.exploration is not None}
+    room = _MOST_DRAWN - sum(one.size for one in figures.values())
+    room -= len(packed(bokeh_program())) if sizes else 0
+    kept = set[str]()
+    for name in sorted(sizes, key=lambda name: sizes[name]):
+        room -= sizes[name]
+        kept |= {name} if room >= 0 else set()
+    found = {name: one if name in kept else replace(one, exploration=None) for name, one in figures.items()}
+    return found, [name for name in sizes if name not in kept]
+
+
+def _policy(style: str, script: str, explored: bool) -> str:
     """What the page may do: show what is in it, and nothing else."""
-    sums = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in (style, script)]
+    scripts = [digest(script), *([digest(bokeh_program())] if explored else ())]
+    # Bokeh writes style elements as it draws, which differ by figure: no digest can know them. A digest beside
+    # 'unsafe-inline' would switch it off. Styles load nothing: whatever they name is not allowed either.
+    styles = "'unsafe-inline'" if explored else digest(style)
     return (
-        f"default-src 'none'; style-src 'sha256-{sums[0]}'; script-src 'sha256-{sums[1]}';"
-        " img-src data:; base-uri 'none'; form-action 'none'"
+        f"default-src 'none'; style-src {styles}; script-src {' '.join(scripts)};"
+        " img-src data:; connect-src 'none'; base-uri 'none'; form-action 'none'"
     )
-
-
-@cache
-def _asset(name: str) -> str:
-    """Style or script of all pages."""
-    text = files("skred.report").joinpath("templates", name).read_text(encoding="utf-8")
-    return text.replace("\r\n", "\n")
 
 
 def _colours(colours: set[str]) -> str:

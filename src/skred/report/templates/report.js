@@ -48,6 +48,8 @@
   let chosen = null, select = null, told = null, clear = null, bar = null;
   function choose(name) {
     chosen = name === chosen ? null : name;
+    document.dispatchEvent(new CustomEvent("skred-chosen", { detail: chosen }));
+    if (!bar) return;
     const figures = new Set(), tables = new Set();
     named.forEach((one) => {
       const is = chosen !== null && one.dataset.event === chosen;
@@ -102,6 +104,9 @@
       if (event.key === "Escape" && chosen !== null) choose(chosen);
     });
   }
+
+  // For what is drawn later; see explore.js.
+  window.skred = { choose: (name) => { if (name !== chosen) choose(name === null ? chosen : name); }, chosen: () => chosen };
 
   // Sorting: the number that a cell begins with, or else its words.
   function valueOf(row, column) {

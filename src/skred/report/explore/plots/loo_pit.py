@@ -29,7 +29,7 @@ def loo_pit_panels(run: Run) -> list[Panel]:
             collection = azp.plot_loo_pit(tree, var_names=[name], backend="bokeh")
         made, line = figures_of(collection)[name], collection.viz["ecdf_lines"][name].item()
         events = ids_of(run.group("observed_data")[name])
-        _mark(made, line, np.asarray(pit.values, dtype=float).ravel(), events)
+        mark_readings(made, line, np.asarray(pit.values, dtype=float).ravel(), events)
         panels.append(Panel(run.sensor_label(name), made))
     return panels
 
@@ -39,8 +39,19 @@ def _is_given(run: Run, name: str) -> bool:
     return name in likelihood.data_vars or name in likelihood.coords
 
 
-def _mark(made: Any, line: Any, pit: np.ndarray, events: list[str]) -> None:
-    """Put each reading on the line of the plot."""
+def mark_readings(made: Any, line: Any, pit: np.ndarray, events: list[str]) -> None:
+    """Put each reading on the line of a plot of places in predictions.
+
+    Parameters
+    ----------
+    made : bokeh figure
+    line : GlyphRenderer
+        The line of the plot.
+    pit : (n,) array
+        Places, 0 to 1.
+    events : list of str
+        The event of each.
+    """
     made.xaxis.axis_label = "LOO-PIT: share of smaller predictions [-]"
     made.yaxis.axis_label = "difference from uniform [-]"
     styled(made, height=280, title="")

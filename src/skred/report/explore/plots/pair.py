@@ -27,13 +27,15 @@ def pair_panels(run: Run, chosen: Sequence[str] = ()) -> list[Panel]:
         return [Panel("One parameter only", html="<p>A pair needs two parameters.</p>", wide=True)]
     with quietly():
         grid = azp.plot_pair(tree, backend="bokeh", marginal=False).viz["plot"]
+    n = draws.sizes["draw"]
+    note = f"{len(kept)} of the {n} draws of each chain." if len(kept) < n else ""
     panels = []
     labels = [str(draws[name].attrs["label"]) for name in names]
     axes = [str(draws[name].attrs["axis"]) for name in names]
     for row, y in enumerate(labels):
         for column, x in enumerate(labels[:row]):
             cell = grid.isel(row_index=row, col_index=column)
-            panels.append(Panel(f"{y} against {x}", _named(cell, axes[column], axes[row])))
+            panels.append(Panel(f"{y} against {x}", _named(cell, axes[column], axes[row]), note=note))
     return panels
 
 

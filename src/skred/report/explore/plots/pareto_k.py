@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from bokeh.models import DataRange1d, Span
+from numpy.typing import ArrayLike
 
 from skred.report.explore.figures import of_events, quietly, styled
 from skred.report.explore.panel import Panel
@@ -13,9 +16,24 @@ from skred.report.shared.style import GREY
 
 def pareto_panels(run: Run) -> list[Panel]:
     """Pareto k of each event by arviz-plots, the limit of importance sampling as a line."""
+    note = ""
+    if len(run.group("log_likelihood").data_vars) > 1:
+        note = f" Of the variable {run.likelihood_name}."
+    return [pareto_panel(run.loo, run.event_ids, "Pareto k by event", note)]
+
+
+def pareto_panel(loo: Any, events: list[str], title: str, note: str = "") -> Panel:
+    """Pareto k of each event.
+
+    Parameters
+    ----------
+    loo : ELPDData
+        With ``pareto_k``, (n_events,).
+    events : list of str
+    title, note : str
+    """
     import arviz_plots as azp
 
-    loo, events = run.loo, run.event_ids
     with quietly():
         collection = azp.plot_khat(loo, backend="bokeh")
     made = collection.viz["plot"].item()
@@ -29,10 +47,26 @@ def pareto_panels(run: Run) -> list[Panel]:
     made.y_range = DataRange1d()
     name_events(made, events)
     over = int(np.sum(~(np.asarray(loo.pareto_k, dtype=float) <= limit)))
-    note = f"Dashed: the limit {limit:.2f}. {over} of {len(events)} events lie above it."
-    if len(run.group("log_likelihood").data_vars) > 1:
-        note += f" Of the variable {run.likelihood_name}."
-    return [Panel("Pareto k by event", made, note=note, wide=True)]
+    said = f"Dashed: the limit {limit:.2f}. {over} of {len(events)} events lie above it."
+    return Panel(title, made, note=said + note, wide=True)
+
+
+def loo_of(pareto_k: ArrayLike, limit: float) -> Any:
+    """Pareto k of a document as ArviZ holds it.
+
+    Parameters
+    ----------
+    pareto_k : (n_events,) array
+    limit : float
+    """
+    import xarray as xr
+    from arviz_stats.utils import ELPDData
+
+    k = xr.DataArray(np.asarray(pareto_k, dtype=float), dims=["event"])
+    return ELPDData(
+        elpd=0.0, se=0.0, p=0.0, n_samples=0, n_data_points=len(k), scale="log", warning=False,
+        good_k=limit, elpd_i=k, pareto_k=k,
+    )  # fmt: skip
 
 
 def name_events(made: object, events: list[str]) -> None:

@@ -63,11 +63,22 @@ def _as_one(made: Any, others: list[GlyphRenderer]) -> None:
     xs, ys = [], []
     for one in lines:
         x, y = (np.asarray(one.data_source.data[key], dtype=np.float32) for key in ("x", "y"))
-        kept = spread_out(x, _POINTS)
-        xs.append(x[kept])
-        ys.append(y[kept])
+        x, y = _steps(x, y)
+        xs.append(x)
+        ys.append(y)
     made.renderers = [one for one in made.renderers if one not in lines]
     made.multi_line(xs, ys, color=BLUE, alpha=0.22, line_width=1.0, level="underlay")
+
+
+def _steps(x: Any, y: Any) -> tuple[Any, Any]:
+    """Corners of a line of steps: of few readings these are far fewer than its points."""
+    rises = np.flatnonzero(np.diff(y)) + 1
+    if 2 * len(rises) > _POINTS:
+        kept = spread_out(x, _POINTS)
+        return x[kept], y[kept]
+    corners = np.repeat(x[rises], 2)
+    heights = np.column_stack([y[rises - 1], y[rises]]).ravel()
+    return np.concatenate([x[:1], corners, x[-1:]]), np.concatenate([y[:1], heights, y[-1:]])
 
 
 def _intervals(run: Run, name: str, label: str) -> Any:

@@ -23,9 +23,11 @@ def trace_panels(run: Run, chosen: Sequence[str] = ()) -> list[Panel]:
     tree = xr.DataTree.from_dict({"posterior": draws.isel(draw=kept)})
     with quietly():
         made = figures_of(azp.plot_trace(tree, backend="bokeh"))
+    n = draws.sizes["draw"]
+    note = f"{len(kept)} of the {n} draws of each chain." if len(kept) < n else ""
     panels = []
     for name, figure in made.items():
         label = str(draws[name].attrs["label"])
         figure.xaxis.axis_label, figure.yaxis.axis_label = "draw", str(draws[name].attrs["axis"])
-        panels.append(Panel(label, styled(figure, height=220, title="")))
+        panels.append(Panel(label, styled(figure, height=220, title=""), note=note))
     return panels

@@ -1,0 +1,74 @@
+"""Panels as a page carries them beside a drawing: packed, with colours that follow light and dark."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from bokeh.colors import named
+from bokeh.embed import json_item
+
+from skred.report.explore.panel import NotShownError, Panel
+from skred.report.shared.drawing import Exploration
+from skred.report.shared.inline import colours_in
+from skred.report.shared.programs import packed, plain
+
+type Maker = Callable[[], Sequence[Panel]]
+
+
+def exploration(plots: str, *makers: Maker) -> Exploration | None:
+    """Make the figures that can be explored in place of a drawing.
+
+    Parameters
+    ----------
+    plots : str
+        Which plots of ArviZ they are.
+    *makers : callable
+        Each makes panels; one that has nothing to show is left out.
+
+    Returns
+    -------
+    Exploration or None
+        None where there is nothing to show: the drawing stands alone.
+    """
+    panels = [panel for make in makers for panel in _made(make) if panel.figure is not None]
+    if not panels:
+        return None
+    shown = [
+        {"title": panel.title, "note": panel.note, "wide": panel.wide, "item": _item(panel.figure)}
+        for panel in panels
+    ]
+    text = plain({"plots": plots, "panels": shown})
+    return Exploration(packed(text), frozenset(colours_in(text)))
+
+
+def _made(make: Maker) -> Sequence[Panel]:
+    try:
+        return make()
+    except NotShownError:
+        return ()
+
+
+def _item(figure: Any) -> Any:
+    """A figure as plain data: the same for the same figure, in colours of the page's style."""
+    numbers: dict[str, str] = {}  # bokeh counts its models through all figures of a process
+
+    def plainly(part: Any, key: str = "") -> Any:
+        if isinstance(part, dict):
+            inside = key if "color" in key else ""
+            return {name: plainly(one, inside if name == "value" else name) for name, one in part.items()}
+        if isinstance(part, (list, tuple)):
+            return [plainly(one, key) for one in part]
+        if isinstance(part, str) and key in ("id", "root_id"):
+            return numbers.setdefault(part, f"m{len(numbers)}")
+        return _variable(part) if isinstance(part, str) and "color" in key else part
+
+    return plainly(json_item(figure))
+
+
+def _variable(colour: str) -> str:
+    """A colour as drawings refer to it: the page's style says what it is in the light and in the dark."""
+    known = getattr(named, colour, None)
+    text = known.to_hex() if known is not None else colour
+    return f"var(--c{text[1:].lower()})" if re.fullmatch(r"#[0-9a-fA-F]{6}", text) else colour

@@ -1,0 +1,31 @@
+"""Differences of elpd to the best of some runs or laws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from skred.report.explore.figures import plain, quietly, styled
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def difference_figure(table: pd.DataFrame, words: Mapping[str, str]) -> Any:
+    """Each difference with its standard error, by arviz-plots.
+
+    Parameters
+    ----------
+    table : DataFrame
+        As `arviz.compare` returns it; of it ``elpd_diff`` and ``dse`` are drawn.
+    words : mapping of str
+        What each row is called.
+    """
+    import arviz_plots as azp
+
+    with quietly():
+        made = azp.plot_compare(table, backend="bokeh").viz["plot"].item()
+    made.xaxis.axis_label = "difference of elpd to the best [nats]"
+    named = made.yaxis[0].major_label_overrides.items()
+    made.yaxis[0].major_label_overrides = {at: plain(words[str(name)]) for at, name in named}
+    return styled(made, height=120 + 40 * len(table), title="")
