@@ -117,7 +117,7 @@ def _comparison(documents: Documents, beside: Path) -> list[str]:
     ):
         for number, name in enumerate(_plain_name(get(model, "id"), documents.folder) for model in models):
             place = Path(where) / name
-            drawn = _model_figures(documents, place, beside, f"m{number}")
+            drawn = _model_figures(documents, place, beside, f"m{number}", explored=not where)
             possible += [str(place / figure) for figure in _possible_of_a_model()]
             figures |= {} if where else {f"{name}/{figure}": picture for figure, picture in drawn.items()}
     figures |= save_comparison_figures(comparison, beside)
@@ -141,12 +141,14 @@ def _calibration(documents: Documents, beside: Path) -> list[str]:
     return _possible_of_a_model()
 
 
-def _model_figures(documents: Documents, place: Path, beside: Path, key: str = "") -> dict[str, Picture]:
+def _model_figures(
+    documents: Documents, place: Path, beside: Path, key: str = "", *, explored: bool = True
+) -> dict[str, Picture]:
     from skred.report.calibration.figures import save_model_figures
 
     (beside / place).mkdir(parents=True, exist_ok=True)
     with documents.tree(str(place / "posterior.nc")) as tree:
-        return save_model_figures(tree, beside / place, key)
+        return save_model_figures(tree, beside / place, key, explored=explored)
 
 
 def _possible_of_a_model() -> list[str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from skred.report.calibration.along_track import along_track_figure
 from skred.report.calibration.chains import joint_figure, marginals_figure, trace_figure
+from skred.report.calibration.explorations import explorations
 from skred.report.calibration.new_avalanches import new_avalanche_figure, new_avalanche_track_figure
 from skred.report.calibration.population import events_figure, population_figure
 from skred.report.calibration.predictive import predictive_figure
@@ -32,7 +33,9 @@ MODEL_FIGURES = tuple(dict.fromkeys((*_OF_CHAINS, *_POOLED, *_HIERARCHICAL)))
 """Names of all figures that there may be."""
 
 
-def save_model_figures(tree: xr.DataTree, folder: Path, key: str = "") -> dict[str, Picture]:
+def save_model_figures(
+    tree: xr.DataTree, folder: Path, key: str = "", *, explored: bool = True
+) -> dict[str, Picture]:
     """Make the figures of one calibration, and write them as PNG.
 
     Parameters
@@ -43,6 +46,8 @@ def save_model_figures(tree: xr.DataTree, folder: Path, key: str = "") -> dict[s
         An existing folder.
     key : str
         Letters that tell laws apart that stand in one page.
+    explored : bool
+        Whether they stand in a page, where they can be explored.
 
     Returns
     -------
@@ -55,4 +60,5 @@ def save_model_figures(tree: xr.DataTree, folder: Path, key: str = "") -> dict[s
     if len(law.parameters) < 2:
         del makers["joint"]
     makers |= _HIERARCHICAL if law.likelihood == "hierarchical" else _POOLED
-    return draw({name: partial(make, tree) for name, make in makers.items()}, folder, key)
+    drawn = {name: partial(make, tree) for name, make in makers.items()}
+    return draw(drawn, folder, key, explorations(tree) if explored else None)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from skred.report.comparison.explorations import explorations
 from skred.report.comparison.likelihoods import likelihoods_figure
 from skred.report.comparison.parts import law_axis, practical_band, styles, typeset
 from skred.report.comparison.pit import pit_figure
@@ -55,7 +56,8 @@ def save_comparison_figures(comparison: Document, folder: Path) -> dict[str, Pic
         ranking_figure, pit_figure,
     )  # fmt: skip
     named = zip(COMPARISON_FIGURES, makers, strict=True)
-    return draw({name: partial(make, comparison) for name, make in named}, folder)
+    drawn = {name: partial(make, comparison) for name, make in named}
+    return draw(drawn, folder, explorations=explorations(comparison))
 
 
 @styled

@@ -142,25 +142,31 @@ def _panel(axes: Axes, comparison: Document, sensor: str) -> None:
     axes.set_xlabel("place of the reading in its prediction [-]")
 
 
+def places_by_sensor(comparison: Document) -> list[tuple[str, str, Places]]:
+    """Sensor, law and places of the readings, of all that have enough."""
+    return [
+        (sensor, law, places) for sensor in _sensors(comparison) for law, places in _of(comparison, sensor)
+    ]
+
+
 def pit_rows(comparison: Document) -> list[dict[str, Any]]:
     """For each sensor and law: how many readings, where they lie, and how far from even, as text."""
     rows = []
-    for sensor in _sensors(comparison):
-        for law, places in _of(comparison, sensor):
-            _, line = places.line()
-            limit = _limit(len(places.events))
-            rows.append(
-                {
-                    "sensor": printable(sensor),
-                    "law": printable(law),
-                    "n": len(places.events),
-                    "mean": fixed(float(places.middle.mean())),
-                    "inside": share(places.share_inside(*_MIDDLE)),
-                    "departure": fixed(float(np.abs(line).max())),
-                    "limit": fixed(limit),
-                    "told": told(line, limit),
-                }
-            )
+    for sensor, law, places in places_by_sensor(comparison):
+        _, line = places.line()
+        limit = _limit(len(places.events))
+        rows.append(
+            {
+                "sensor": printable(sensor),
+                "law": printable(law),
+                "n": len(places.events),
+                "mean": fixed(float(places.middle.mean())),
+                "inside": share(places.share_inside(*_MIDDLE)),
+                "departure": fixed(float(np.abs(line).max())),
+                "limit": fixed(limit),
+                "told": told(line, limit),
+            }
+        )
     return rows
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from skred.report.diagnosis.check import check_figure
 from skred.report.diagnosis.conditional import conditional_figure, conditional_kinds
 from skred.report.diagnosis.evidence import group_of, probabilities_figure, strength_figure
+from skred.report.diagnosis.explorations import explorations
 from skred.report.diagnosis.held_out import is_compared, left_out_figure, scores_figure
 from skred.report.diagnosis.influence import has_influence, influence_figure
 from skred.report.diagnosis.places import places_figure, places_of, where_figure
@@ -68,7 +69,7 @@ def save_diagnosis_figures(document: doc.Document, tree: xr.DataTree, folder: Pa
         makers["scores"] = partial(scores_figure, tree)
     if has_influence(document):
         makers["influence"] = partial(influence_figure, document)
-    return draw(makers, folder)
+    return draw(makers, folder, explorations=explorations(document, tree))
 
 
 def _has_curve(tree: xr.DataTree, comparison: doc.Document, number: int) -> bool:

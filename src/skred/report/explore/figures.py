@@ -135,6 +135,13 @@ def slim(source: Any) -> None:
             source.data[name] = np.asarray(array, dtype=np.float32)
 
 
+def thin(source: Any, most: int) -> None:
+    """Keep evenly chosen points of a curve, at most so many."""
+    kept = spread_out(next(iter(source.data.values()), ()), most)
+    if len(kept) == most:
+        source.data = {name: np.asarray(values)[kept] for name, values in source.data.items()}
+
+
 def figures_of(collection: Any) -> dict[str, Any]:
     """Figures of a plot of arviz-plots, by the name of the variable in each."""
     found = {str(name): values.item() for name, values in collection.viz["plot"].data_vars.items()}

@@ -34,6 +34,11 @@ class Exploration:
     data: str
     colours: frozenset[str]
 
+    @property
+    def size(self) -> int:
+        """Characters that it takes in a page, with the element around it."""
+        return len(self.data) + 64
+
 
 @dataclass(frozen=True)
 class Picture:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -23,17 +23,19 @@ from skred.report.shared.numbers import (
     three_digits,
     whole,
 )
-from skred.report.shared.programs import bokeh_program, digest, packed, program
+from skred.report.shared.programs import bokeh_program, digest, packed_bokeh, program
 
 if TYPE_CHECKING:
     from jinja2 import Environment
     from markupsafe import Markup
 
-    from skred.report.shared.drawing import Picture
+    from skred.report.shared.drawing import Exploration, Picture
 
 
 _MOST_DRAWN = 4_300_000
-"""Characters of drawings and explorations in a page: with tables and words it stays below 5 MB."""
+"""Characters of drawings in a page: with tables and words it stays below 5 MB."""
+_MOST_BYTES, _ALLOWANCE = 4_960_000, 30_000
+"""Of a page with explorations, and of their colours, scripts and names in it."""
 _EXPLORING = ("unpack.js", "marks.js", "explore.js")
 """Programs of pages with figures to explore."""
 
@@ -56,13 +58,27 @@ def page(template: str, figures: Mapping[str, Picture], **values: Any) -> str:
     -------
     str
     """
+    figures, too_large = _that_fit(figures)
+    values |= {"too_large": too_large}
+    found = {name: one.exploration for name, one in figures.items() if one.exploration is not None}
+    plain = {name: replace(one, exploration=None) for name, one in figures.items()}
+    html = _rendered(template, plain, values)
+    if not found:
+        return html
+    kept = _explorable(found, _MOST_BYTES - len(html.encode("utf-8")))
+    explored = {name: replace(one, exploration=kept.get(name)) for name, one in figures.items()}
+    return _rendered(template, explored, values, [name for name in found if name not in kept])
+
+
+def _rendered(
+    template: str, figures: Mapping[str, Picture], values: Mapping[str, Any], not_explored: Sequence[str] = ()
+) -> str:
+    """Render a template with the figures that there is room for."""
     from markupsafe import Markup
 
-    figures, too_large = _that_fit(figures)
     drawings = [text for one in figures.values() for text in (one.wide, one.narrow)]
-    figures, not_explored = _explored(figures)
     explorations = [one.exploration for one in figures.values() if one.exploration is not None]
-    colours = set().union(*map(colours_in, drawings), *(one.colours for one in explorations))
+    colours = set[str]().union(*map(colours_in, drawings), *(one.colours for one in explorations))
     style = program("style.css") + _colours(colours)
     script = "".join(map(program, ("report.js", *(_EXPLORING if explorations else ()))))
     html = (
@@ -72,9 +88,8 @@ def page(template: str, figures: Mapping[str, Picture], **values: Any) -> str:
             figures=figures,
             style=Markup(style),
             script=Markup(script),
-            policy=Markup(_policy(style, script, bool(explorations))),
-            bokeh=Markup(packed(bokeh_program())) if explorations else None,
-            too_large=too_large,
+            policy=Markup(_policy(style, script, explored=bool(explorations))),
+            bokeh=Markup(packed_bokeh()) if explorations else None,
             not_explored=not_explored,
             **values,
         )
@@ -91,23 +106,21 @@ def _that_fit(figures: Mapping[str, Picture]) -> tuple[dict[str, Picture], list[
     return {name: one for name, one in figures.items() if name in kept}, [n for n in figures if n not in kept]
 
 
-def _explored(figures: Mapping[str, Picture]) -> tuple[dict[str, Picture], list[str]]:
-    """Explorations that a page has room for beside its drawings, the smallest first; names of the others."""
-    sizes = {name: len(one.exploration.data) for name, one in figures.items() if one.exploration is not None}
-    room = _MOST_DRAWN - sum(one.size for one in figures.values())
-    room -= len(packed(bokeh_program())) if sizes else 0
-    kept = set[str]()
-    for name in sorted(sizes, key=lambda name: sizes[name]):
-        room -= sizes[name]
-        kept |= {name} if room >= 0 else set()
-    found = {name: one if name in kept else replace(one, exploration=None) for name, one in figures.items()}
-    return found, [name for name in sizes if name not in kept]
+def _explorable(found: Mapping[str, Exploration], room: int) -> dict[str, Exploration]:
+    """Explorations that a page has room for beside all else, smallest first."""
+    room -= len(packed_bokeh()) + _ALLOWANCE
+    kept = {}
+    for name in sorted(found, key=lambda name: found[name].size):
+        room -= found[name].size
+        if room >= 0:
+            kept[name] = found[name]
+    return kept
 
 
-def _policy(style: str, script: str, explored: bool) -> str:
+def _policy(style: str, script: str, *, explored: bool) -> str:
     """What the page may do: show what is in it, and nothing else."""
     scripts = [digest(script), *([digest(bokeh_program())] if explored else ())]
-    # Bokeh writes style elements as it draws, which differ by figure: no digest can know them. A digest beside
+    # Bokeh writes style elements as it draws, which no digest can know beforehand; a digest beside
     # 'unsafe-inline' would switch it off. Styles load nothing: whatever they name is not allowed either.
     styles = "'unsafe-inline'" if explored else digest(style)
     return (

@@ -37,6 +37,12 @@ def bokeh_program() -> str:
 
 
 @cache
+def packed_bokeh() -> str:
+    """Bokeh, packed."""
+    return packed(bokeh_program())
+
+
+@cache
 def program(name: str) -> str:
     """A program or style of pages; the dashboard has some of them in common."""
     text = files("skred.report").joinpath("templates", name).read_text(encoding="utf-8")

@@ -6,9 +6,12 @@ from collections.abc import Sequence
 
 import xarray as xr
 
-from skred.report.explore.figures import figures_of, legend_above, quietly, slim, styled
+from skred.report.explore.figures import figures_of, legend_above, quietly, slim, styled, thin
 from skred.report.explore.panel import NotShownError, Panel
 from skred.report.explore.run import Run
+
+_POINTS = 250
+"""Of a curve: more cannot be seen, and every one is in the page."""
 
 
 def prior_panels(run: Run, chosen: Sequence[str] = ()) -> list[Panel]:
@@ -49,6 +52,7 @@ def _named(collection: object, name: str) -> None:
         renderer = marks.sel(group=group).item()
         renderer.glyph.line_color = {"prior": "#767676", "posterior": "#0072B2"}.get(group, "#222222")
         renderer.glyph.line_width = 2
+        thin(renderer.data_source, _POINTS)
         slim(renderer.data_source)
         items.append(LegendItem(label=group, renderers=[renderer]))
     figure.center = [one for one in figure.center if not isinstance(one, Legend)]

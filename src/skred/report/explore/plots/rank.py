@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
-import numpy as np
 import xarray as xr
 
-from skred.report.explore.figures import figures_of, quietly, spread_out, styled
+from skred.report.explore.figures import figures_of, quietly, styled, thin
 from skred.report.explore.panel import Panel
 from skred.report.explore.run import Run
 
@@ -26,16 +24,9 @@ def rank_panels(run: Run, chosen: Sequence[str] = ()) -> list[Panel]:
         made = figures_of(azp.plot_rank(tree, backend="bokeh", visuals={"remove_axis": False}))
     panels = []
     for name, figure in made.items():
-        _thin(figure)
+        for renderer in figure.renderers:
+            thin(renderer.data_source, _POINTS)
         figure.xaxis.axis_label = "rank of the draw, as a share [-]"
         figure.yaxis.axis_label = "difference [-]"
         panels.append(Panel(str(draws[name].attrs["label"]), styled(figure, height=230, title="")))
     return panels
-
-
-def _thin(figure: Any) -> None:
-    for renderer in figure.renderers:
-        data = getattr(renderer, "data_source", None)
-        if data is not None and len(data.data.get("x", ())) > _POINTS:
-            kept = spread_out(data.data["x"], _POINTS)
-            data.data = {name: np.asarray(values)[kept] for name, values in data.data.items()}

@@ -1,0 +1,78 @@
+"""What can be explored of a diagnosis: the plots of ArviZ of what its figures draw.
+
+Probabilities, forces along the track, evidence by place, avalanches left out and what the answer hangs on
+have none: ArviZ has no plot of these, or needs draws where a diagnosis keeps intervals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from skred.report.diagnosis.evidence import group_of
+from skred.report.diagnosis.words import comparisons, with_added
+from skred.report.shared import document as doc
+from skred.report.shared.drawing import Exploration
+from skred.report.shared.labels import name_text, symbol_text, unit_text
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from skred.report.explore.panel import Panel
+
+
+def explorations(document: doc.Document, tree: xr.DataTree) -> dict[str, Callable[[], Exploration | None]]:
+    """Makers of explorations by the name of the figure.
+
+    Parameters
+    ----------
+    document : mapping
+        The content of ``verdict.json``.
+    tree : DataTree
+        The content of ``diagnosis.nc``.
+    """
+    from skred.report.explore.exploration import exploration
+
+    found = {
+        group_of("strength", number): partial(
+            exploration, "plot_dist", partial(_added, document, tree, number)
+        )
+        for k, _ in enumerate(comparisons(document))
+    }
+    laws = range(tree["check"].sizes["law"]) if "check" in tree.children else ()
+    checks = [partial(_check, document, tree, number) for number in laws]
+    return found | {"check": partial(exploration, "plot_ppc_tstat", *checks)}
+
+
+def _check(document: doc.Document, tree: xr.DataTree, number: int) -> list[Panel]:
+    """The statistic of clean campaigns and of the recordings, for one law."""
+    from skred.report.explore.plots.tstat import statistic_panel
+
+    found = tree["check"].to_dataset().isel(law=number)
+    checks = doc.listed(document, "report", "checks")
+    added = doc.listed(checks[number] if number < len(checks) else {}, "added")
+    label = "log odds of anything against nothing [nats]"
+    recorded = float(found["statistic"])
+    return [statistic_panel(with_added(document, added), label, np.ravel(found["simulated"]), recorded)]
+
+
+def _added(document: doc.Document, tree: xr.DataTree, number: int) -> list[Panel]:
+    """The posterior of the coefficient that was added from a comparison."""
+    from skred.report.explore.plots.draws import draws_panel
+
+    added, comparison = doc.listed(document, "report", "added"), comparisons(document)[number]
+    if doc.get(comparison, "added") is None or "added" not in tree.children or number >= len(added):
+        return []
+    one = added[number]
+    name = str(doc.get(one, "parameter"))
+    words = f"{name_text(name)} {symbol_text(doc.get(one, 'symbol') or '')}".strip()
+    return [
+        draws_panel(
+            tree["added"][name].transpose("chain", "draw"),
+            f"Coefficient {words}: calibrated with all else",
+            f"{words} [{unit_text(doc.get(one, 'unit') or '1')}]",
+        )
+    ]
