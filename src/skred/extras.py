@@ -9,7 +9,7 @@ from skred.errors import InputError
 
 REQUIREMENTS = {
     "gis": ("pyogrio>=0.13", "pyproj>=3.8", "rasterio>=1.5", "shapely>=2.2"),
-    "dashboard": ("bokeh>=3.10", "panel>=1.10"),
+    "dashboard": ("panel>=1.10",),
 }
 """As ``pyproject.toml`` has them."""
 _USE = {"gis": "terrain models and lines need", "dashboard": "the dashboard needs"}

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from skred.report.explore.panel import Panel
 
 
+_MOST_PLACES = 24
+"""Sensors under laws that are shown."""
+
+
 def explorations(comparison: Document) -> dict[str, Callable[[], Exploration | None]]:
     """Makers of explorations by the name of the figure.
 
@@ -85,7 +89,11 @@ def _pit(comparison: Document) -> list[Panel]:
     """Places of the readings in their predictions, a figure for each sensor and law."""
     from skred.report.explore.plots.ecdf_pit import pit_panel
 
+    found = places_by_sensor(comparison)
+    left = f"The first {_MOST_PLACES} of {len(found)} figures." if len(found) > _MOST_PLACES else ""
     return [
-        pit_panel(f"{shortened(sensor, 30)} under {shortened(law, 24)}", places.events, places.middle)
-        for sensor, law, places in places_by_sensor(comparison)
+        pit_panel(
+            f"{shortened(sensor, 30)} under {shortened(law, 24)}", places.events, places.spread, note=left
+        )
+        for sensor, law, places in found[:_MOST_PLACES]
     ]

@@ -49,6 +49,14 @@ class Places:
         """One place for each reading."""
         return 0.5 * (self.below + self.up_to)
 
+    @property
+    def spread(self) -> FloatArray:
+        """One place for each reading, those of fronts that may not come evenly over their ranges."""
+        wide = self.up_to > self.below
+        part = np.full(len(self.below), 0.5)
+        part[wide] = (np.arange(wide.sum()) + 0.5) / max(wide.sum(), 1)
+        return np.asarray(self.below + part * (self.up_to - self.below))
+
     def line(self) -> tuple[FloatArray, FloatArray]:
         """Corners of the share of readings below a place, less that place."""
         at = np.unique(np.concatenate([[0.0, 1.0], self.below, self.up_to]))

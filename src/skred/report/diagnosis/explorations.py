@@ -37,9 +37,7 @@ def explorations(document: doc.Document, tree: xr.DataTree) -> dict[str, Callabl
     from skred.report.explore.exploration import exploration
 
     found = {
-        group_of("strength", number): partial(
-            exploration, "plot_dist", partial(_added, document, tree, number)
-        )
+        group_of("strength", k): partial(exploration, "plot_dist", partial(_added, document, tree, k))
         for k, _ in enumerate(comparisons(document))
     }
     laws = range(tree["check"].sizes["law"]) if "check" in tree.children else ()

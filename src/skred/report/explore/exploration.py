@@ -32,7 +32,7 @@ def exploration(plots: str, *makers: Maker) -> Exploration | None:
     Exploration or None
         None where there is nothing to show: the drawing stands alone.
     """
-    panels = [panel for make in makers for panel in _made(make) if panel.figure is not None]
+    panels = [panel for make in makers for panel in _made(make) if _draws(panel.figure)]
     if not panels:
         return None
     shown = [
@@ -48,6 +48,11 @@ def _made(make: Maker) -> Sequence[Panel]:
         return make()
     except NotShownError:
         return ()
+
+
+def _draws(figure: Any) -> bool:
+    """Whether there is anything in a figure: a number that is always the same has no density."""
+    return figure is not None and bool(figure.renderers)
 
 
 def _item(figure: Any) -> Any:

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+from bokeh.core.properties import value
 from bokeh.models import (
     BasicTicker,
     BasicTickFormatter,
@@ -23,6 +24,7 @@ from bokeh.models import (
     ResetTool,
     SaveTool,
     TapTool,
+    Text,
     Title,
     WheelZoomTool,
 )
@@ -38,6 +40,9 @@ EVENT = "event"
 DRAWS_FILTER = "skred-draws"
 """Name of the filters that show draws of the chosen event only."""
 _FONT = "system-ui, 'Segoe UI', 'Helvetica Neue', Arial, sans-serif"
+_CYCLE = ("#3f90da", "#ffa90e", "#bd1f01", "#94a4a2", "#832db6", "#a96b59", "#e76300")
+"""Colours of ArviZ's default style, in their order."""
+_OURS = dict(zip(_CYCLE, PALETTE, strict=True))
 _MOST_POINTS = 2000
 _LEGEND_WIDTH = 46
 """Characters of a legend in a row on a narrow screen."""
@@ -88,7 +93,18 @@ def styled(made: Any, *, height: int | None = None, title: str | None = None) ->
     for renderer in made.renderers:
         if isinstance(renderer, GlyphRenderer):
             slim(renderer.data_source)
+            _in_our_colours(renderer.glyph)
     return made
+
+
+def _in_our_colours(glyph: Any) -> None:
+    """Colours and letters of ours instead of ArviZ's, some of which are too pale on white and in the dark."""
+    for name in ("line_color", "fill_color"):
+        colour = getattr(glyph, name, None)
+        if isinstance(colour, str) and colour.lower() in _OURS:
+            setattr(glyph, name, _OURS[colour.lower()])
+    if isinstance(glyph, Text):
+        glyph.text_font, glyph.text_font_size, glyph.text_color = value(_FONT), "12px", INK
 
 
 def _is_empty(renderer: Any) -> bool:

@@ -19,7 +19,7 @@
       program.textContent = await window.skredUnpack(document.getElementById("bokeh").textContent);
       document.body.append(program);  // the page's policy knows it by its digest
       if (!window.Bokeh) throw new Error("bokeh did not start");
-      Bokeh.set_log_level("warn");
+      Bokeh.logger.set_level("warn");
       marks = window.skredMarks(window.skred.choose);
       window.skred.sources = marks.sources;
     })();
@@ -47,10 +47,11 @@
     const { plots, panels } = JSON.parse(coloured(await window.skredUnpack(one.data)));
     if (turn !== one.turn) return;
     clear(one);
-    one.place.append(make("p", "note", `ArviZ: ${plots}. Move and zoom with the tools that appear at a figure's edge; point at what is drawn.`));
+    const grid = make("div", "panels");
+    one.place.append(make("p", "note", `ArviZ: ${plots}. Tools to move, zoom and save appear where you point.`), grid);
     for (const panel of panels) {
       const { section, place } = panelOf(panel);
-      one.place.append(section);
+      grid.append(section);
       one.views.push(await Bokeh.embed.embed_item(panel.item, place));
       if (turn !== one.turn) return;
     }

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from bokeh.models import GlyphRenderer, Scatter
+
 from skred.report.explore.figures import plain, quietly, styled
 
 if TYPE_CHECKING:
@@ -28,4 +30,9 @@ def difference_figure(table: pd.DataFrame, words: Mapping[str, str]) -> Any:
     made.xaxis.axis_label = "difference of elpd to the best [nats]"
     named = made.yaxis[0].major_label_overrides.items()
     made.yaxis[0].major_label_overrides = {at: plain(words[str(name)]) for at, name in named}
+    for renderer in made.renderers:
+        if isinstance(renderer, GlyphRenderer) and isinstance(renderer.glyph, Scatter):
+            renderer.glyph.size = 8
+        elif isinstance(renderer, GlyphRenderer):
+            renderer.glyph.line_width = 2
     return styled(made, height=120 + 40 * len(table), title="")

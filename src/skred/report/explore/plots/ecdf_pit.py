@@ -11,7 +11,7 @@ from skred.report.explore.panel import Panel
 from skred.report.explore.plots.loo_pit import mark_readings
 
 
-def pit_panel(title: str, events: list[str], places: ArrayLike) -> Panel:
+def pit_panel(title: str, events: list[str], places: ArrayLike, note: str = "") -> Panel:
     """Places from 0 to 1 by arviz-plots, each reading a point on the line.
 
     Parameters
@@ -20,6 +20,7 @@ def pit_panel(title: str, events: list[str], places: ArrayLike) -> Panel:
     events : list of str
         The event of each reading.
     places : (n,) array
+    note : str
     """
     import arviz_plots as azp
 
@@ -29,4 +30,4 @@ def pit_panel(title: str, events: list[str], places: ArrayLike) -> Panel:
         collection = azp.plot_ecdf_pit(tree, group="pit", sample_dims=["of"], backend="bokeh")
     made, line = figures_of(collection)["reading"], collection.viz["ecdf_lines"]["reading"].item()
     mark_readings(made, line, values, events)
-    return Panel(title, made)
+    return Panel(title, made, note=note)

@@ -6,13 +6,15 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from bokeh.models import DataRange1d, LogScale, LogTicker
 
 from skred.report.explore.figures import BLUE, apart, points, quietly, styled
-from skred.report.explore.panel import Panel
+from skred.report.explore.panel import NotShownError, Panel
 from skred.report.explore.run import shown
 
 MOST_EVENTS = 60
 """Rows of a forest that can be told apart."""
+_LOG_BEYOND = 20.0
 _WIDTHS = {"twig": 1.2, "trunk": 4.0}
 """Of the line of 90 %, and of that of 50 %, in pixels."""
 
@@ -26,9 +28,16 @@ def event_forest_panel(draws: xr.DataArray, label: str) -> Panel:
         With ids as coordinates.
     label : str
         Name and unit.
+
+    Raises
+    ------
+    NotShownError
+        If a draw is no number.
     """
     import arviz_plots as azp
 
+    if not np.isfinite(draws.values).all():
+        raise NotShownError("not all draws are numbers")
     n = draws.sizes["event"]
     first = draws.isel(event=slice(MOST_EVENTS))
     events = [shown(one, 60) for one in first["event"].values]
@@ -46,6 +55,7 @@ def event_forest_panel(draws: xr.DataArray, label: str) -> Panel:
     made.xaxis.axis_label, made.yaxis.axis_label = label, "event"
     styled(made, height=110 + 17 * len(events), title="")
     points(made, {"x": x, "y": y}, events, tips=[("median", "@x{0.0000}")])
+    _logarithmic(made, float(first.quantile(0.05)), float(first.quantile(0.95)))
     axis = made.yaxis[0]
     axis.visible, axis.ticker = True, sorted(y.tolist())
     axis.major_label_overrides = {at: event[:14] for at, event in zip(y.tolist(), events, strict=True)}
@@ -67,3 +77,10 @@ def _with_few_renderers(made: Any, collection: Any) -> tuple[np.ndarray, np.ndar
     medians = [one.data_source.data for one in collection.viz["point_estimate"]["strength"].values]
     x, y = (np.array([float(one[key][0]) for one in medians]) for key in ("x", "y"))
     return x, y
+
+
+def _logarithmic(made: Any, low: float, high: float) -> None:
+    """A logarithmic axis where strengths span much."""
+    if low > 0.0 and high / low > _LOG_BEYOND:
+        made.x_scale, made.x_range = LogScale(), DataRange1d()
+        made.xaxis.ticker = made.xgrid.ticker = LogTicker(num_minor_ticks=0)

@@ -56,5 +56,5 @@ def mark_readings(made: Any, line: Any, pit: np.ndarray, events: list[str]) -> N
     made.yaxis.axis_label = "difference from uniform [-]"
     styled(made, height=280, title="")
     x, y = (np.asarray(line.data_source.data[key], dtype=float) for key in ("x", "y"))
-    before = np.clip(np.searchsorted(x, pit, side="right") - 1, 0, len(x) - 1)
-    points(made, {"x": pit, "y": y[before]}, events, size=6, tips=[("LOO-PIT", "@x{0.00}")])
+    step = np.clip(np.searchsorted(x, pit), 0, len(x) - 1)  # a step has the height of its right end
+    points(made, {"x": pit, "y": y[step]}, events, size=6, tips=[("LOO-PIT", "@x{0.00}")])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from bokeh.models import DataRange1d, Span
+from bokeh.models import Range1d, Span
 from numpy.typing import ArrayLike
 
 from skred.report.explore.figures import of_events, quietly, styled
@@ -44,11 +44,18 @@ def pareto_panel(loo: Any, events: list[str], title: str, note: str = "") -> Pan
     of_events(marks, events, made, tips=[("Pareto k", "@y{0.00}")])
     limit = float(loo.good_k)
     made.add_layout(Span(location=limit, dimension="width", line_color=GREY, line_dash="dashed"))
-    made.y_range = DataRange1d()
+    made.y_range = _range_with(np.asarray(loo.pareto_k, dtype=float), limit)
     name_events(made, events)
     over = int(np.sum(~(np.asarray(loo.pareto_k, dtype=float) <= limit)))
     said = f"Dashed: the limit {limit:.2f}. {over} of {len(events)} events lie above it."
     return Panel(title, made, note=said + note, wide=True)
+
+
+def _range_with(k: np.ndarray, limit: float) -> Range1d:
+    """A range that holds the limit as well."""
+    values = [*k[np.isfinite(k)], limit]
+    room = 0.06 * (max(values) - min(values)) or 0.1
+    return Range1d(min(values) - room, max(values) + room)
 
 
 def loo_of(pareto_k: ArrayLike, limit: float) -> Any:

@@ -23,10 +23,16 @@ def predictive_panels(run: Run) -> list[Panel]:
     for name in run.observed_names:
         label = run.sensor_label(name)
         note = "Predicted: a new avalanche from the release of each event." if run.is_ours else ""
+        note += " Runouts are lengths s along the track." if _is_runout(run, name) else ""
         panels.append(Panel(f"{label}: all events", _distribution(run, name, label), note=note))
         if run.group("observed_data")[name].size <= _MOST_BY_EVENT:
             panels.append(Panel(f"{label}: by event", _intervals(run, name, label)))
     return panels
+
+
+def _is_runout(run: Run, name: str) -> bool:
+    known = run.recordings.sensors if run.recordings is not None else ()
+    return any(sensor.is_runout and sensor.id == name for sensor in known)
 
 
 def _distribution(run: Run, name: str, label: str) -> Any:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import xarray as xr
 
 from skred.report.explore.figures import figures_of, legend_above, quietly, slim, styled, thin
@@ -20,7 +21,11 @@ def prior_panels(run: Run, chosen: Sequence[str] = ()) -> list[Panel]:
 
     posterior = run.parameters(chosen)
     prior = run.parameters(chosen, group="prior")
-    names = [name for name in posterior.data_vars if name in prior]
+    names = [
+        name
+        for name in posterior.data_vars
+        if name in prior and np.isfinite(posterior[name]).any() and np.isfinite(prior[name]).any()
+    ]
     if not names:
         raise NotShownError("the prior of this run has none of the parameters")
     tree = xr.DataTree.from_dict({"posterior": posterior[names], "prior": prior[names]})
@@ -35,7 +40,7 @@ def prior_panels(run: Run, chosen: Sequence[str] = ()) -> list[Panel]:
         figure.yaxis.axis_label = "density"
         figure.yaxis.ticker = []
         styled(figure, height=240, title="")
-        _around(figure, posterior[name])
+        _around(figure, posterior[name], prior[name])
         legend_above(figure)
         panels.append(Panel(label, figure))
     return panels
@@ -60,12 +65,13 @@ def _named(collection: object, name: str) -> None:
     figure.add_layout(Legend(items=items))
 
 
-def _around(figure: object, draws: xr.DataArray) -> None:
-    """Look at where the posterior is: a wide prior would press it into a line."""
+def _around(figure: object, draws: xr.DataArray, prior: xr.DataArray) -> None:
+    """Look at where the posterior is: a wide prior would press it into a line; nor beyond what can be."""
     from bokeh.models import Range1d
 
     low, high = (float(v) for v in draws.quantile([0.001, 0.999]).values)
     room = 2.0 * (high - low) or abs(high) or 1.0
-    least = float(draws.min())
-    start = max(low - room, 0.0) if least >= 0.0 else low - room
-    figure.x_range = Range1d(start, high + room)  # type: ignore[attr-defined]
+    least, most = (min(draws.min(), prior.min()), max(draws.max(), prior.max()))
+    start, end = max(low - room, float(least)), min(high + room, float(most))
+    start = max(0.0, start) if least >= 0.0 else start
+    figure.x_range = Range1d(start, end)  # type: ignore[attr-defined]

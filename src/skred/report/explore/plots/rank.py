@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import xarray as xr
 
 from skred.report.explore.figures import figures_of, quietly, styled, thin
-from skred.report.explore.panel import Panel
+from skred.report.explore.panel import NotShownError, Panel
 from skred.report.explore.run import Run
 
 _POINTS = 300
@@ -15,10 +15,18 @@ _POINTS = 300
 
 
 def rank_panels(run: Run, chosen: Sequence[str] = ()) -> list[Panel]:
-    """Differences of each chain's distribution of ranks from a uniform one, by arviz-plots."""
+    """Differences of each chain's distribution of ranks from a uniform one, by arviz-plots.
+
+    Raises
+    ------
+    NotShownError
+        If there is only one chain.
+    """
     import arviz_plots as azp
 
     draws = run.parameters(chosen)
+    if draws.sizes.get("chain", 0) < 2:
+        raise NotShownError("there is one chain only, and ranks compare chains")
     tree = xr.DataTree.from_dict({"posterior": draws})
     with quietly():
         made = figures_of(azp.plot_rank(tree, backend="bokeh", visuals={"remove_axis": False}))

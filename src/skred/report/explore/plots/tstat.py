@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from skred.report.explore.figures import figures_of, quietly, styled
+from skred.report.explore.figures import CHOSEN, figures_of, quietly, styled
 from skred.report.explore.panel import NotShownError, Panel
 
 _FEWEST = 10
@@ -46,5 +46,7 @@ def statistic_panel(title: str, label: str, simulated: ArrayLike, recorded: floa
         )
     made = figures_of(collection)["value"]
     made.xaxis.axis_label, made.yaxis.axis_label = label, "density of the simulated"
-    collection.viz["observed_tstat"]["value"].item().glyph.size = 11
-    return Panel(title, styled(made, height=300, title=""))
+    dot = collection.viz["observed_tstat"]["value"].item().glyph
+    dot.size, dot.fill_color, dot.line_color = 11, CHOSEN, CHOSEN
+    note = f"Line: {len(values)} simulated. Dot: the recordings."
+    return Panel(title, styled(made, height=300, title=""), note=note)
