@@ -15,13 +15,7 @@ from skred.dashboard.views.held_out import held_out_panels
 from skred.dashboard.views.overview import overview_panels
 from skred.dashboard.views.speed import speed_panels
 from skred.report.explore.panel import Panel
-from skred.report.explore.plots.loo_pit import loo_pit_panels
-from skred.report.explore.plots.pair import MOST_PAIRED, pair_panels
-from skred.report.explore.plots.pareto_k import pareto_panels
-from skred.report.explore.plots.predictive import predictive_panels
-from skred.report.explore.plots.prior_posterior import prior_panels
-from skred.report.explore.plots.rank import rank_panels
-from skred.report.explore.plots.trace import trace_panels
+from skred.report.explore.plots import loo_pit, pair, pareto_k, predictive, prior_posterior, rank, trace
 from skred.report.explore.run import Run
 
 
@@ -79,9 +73,8 @@ VIEWS: tuple[ViewKind, ...] = (
     ),
     ViewKind(
         "predictive", _FOUND, "Predictions by sensor",
-        "Black: recorded. Lines and bars: what the run predicts. The black line should look like one "
-        "of the blue ones, and nine in ten thin bars should hold their dot.",
-        _predicted, _of_run(predictive_panels),
+        predictive.HOW,
+        _predicted, _of_run(predictive.predictive_panels),
     ),
     ViewKind(
         "candidates", _FOUND, "Candidates",
@@ -109,16 +102,13 @@ VIEWS: tuple[ViewKind, ...] = (
     ),
     ViewKind(
         "pareto_k", _CHECKS, "Pareto k by event",
-        "An event above the dashed line is so influential that leaving it out by importance sampling "
-        "cannot be trusted.",
-        _left_out, _of_run(pareto_panels),
+        pareto_k.HOW,
+        _left_out, _of_run(pareto_k.pareto_panels),
     ),
     ViewKind(
         "loo_pit", _CHECKS, "LOO-PIT by sensor",
-        "Left-out readings should fall anywhere in their predictions with the same chance. A line far"
-        " from zero means that predictions are biased, too narrow or too wide; below α, the p-value "
-        "says that this is no chance.",
-        lambda run: _predicted(run) and _left_out(run), _of_run(loo_pit_panels),
+        loo_pit.HOW,
+        lambda run: _predicted(run) and _left_out(run), _of_run(loo_pit.loo_pit_panels),
     ),
     ViewKind(
         "forest", _DRAWS, "Forest",
@@ -128,27 +118,23 @@ VIEWS: tuple[ViewKind, ...] = (
     ),
     ViewKind(
         "prior", _DRAWS, "Prior and posterior",
-        "Grey: before the recordings. Blue: after them. Where both agree, the recordings taught "
-        "nothing.",
-        lambda run: _posterior(run) and run.has("prior"), _of_parameters(prior_panels), by_parameter=True,
+        prior_posterior.HOW,
+        lambda run: _posterior(run) and run.has("prior"), _of_parameters(prior_posterior.prior_panels), by_parameter=True,
         drawn_from=("posterior", "prior"),
     ),
     ViewKind(
         "pair", _DRAWS, "Pairs",
-        "Each dot is a draw. A narrow band says that the recordings fix a combination of both, not "
-        "each by itself.",
-        _posterior, _of_parameters(pair_panels), by_parameter=True, most_parameters=MOST_PAIRED,
+        pair.HOW,
+        _posterior, _of_parameters(pair.pair_panels), by_parameter=True, most_parameters=pair.MOST_PAIRED,
     ),
     ViewKind(
         "trace", _DRAWS, "Trace",
-        "Draws in their order, a colour for each chain. Chains that mix well look alike, as noise "
-        "without drift.",
-        _posterior, _of_parameters(trace_panels), by_parameter=True,
+        trace.HOW,
+        _posterior, _of_parameters(trace.trace_panels), by_parameter=True,
     ),
     ViewKind(
         "rank", _DRAWS, "Ranks",
-        "A line for each chain. Chains that explore the same stay close to zero; a p-value below α "
-        "says that they do not, or that draws of a chain are much alike.",
-        _posterior, _of_parameters(rank_panels), by_parameter=True,
+        rank.HOW,
+        _posterior, _of_parameters(rank.rank_panels), by_parameter=True,
     ),
 )  # fmt: skip

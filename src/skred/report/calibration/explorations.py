@@ -29,25 +29,28 @@ def explorations(tree: xr.DataTree) -> dict[str, Callable[[], Exploration | None
     tree : DataTree
         The content of ``posterior.nc``.
     """
-    from skred.report.explore.exploration import exploration
-    from skred.report.explore.plots.pair import pair_panels
-    from skred.report.explore.plots.predictive import predictive_panels
-    from skred.report.explore.plots.prior_posterior import prior_panels
-    from skred.report.explore.plots.rank import rank_panels
-    from skred.report.explore.plots.trace import trace_panels
+    from skred.report.explore.exploration import Plot, exploration
+    from skred.report.explore.plots import event_forest, pair, predictive, prior_posterior, rank, trace
     from skred.report.explore.run import Run
 
     run = Run("r1", law_of(tree).title, "calibration", "", tree)
-    predicted = partial(exploration, "plot_ppc_dist and plot_ppc_interval", partial(predictive_panels, run))
+    chains = (
+        Plot("plot_trace", trace.HOW, partial(trace.trace_panels, run)),
+        Plot("plot_rank", rank.HOW, partial(rank.rank_panels, run)),
+    )
+    joint = Plot("plot_pair", pair.HOW, partial(pair.pair_panels, run))
+    marginals = Plot("plot_prior_posterior", prior_posterior.HOW, partial(prior_posterior.prior_panels, run))
+    predicted = Plot(
+        "plot_ppc_dist and plot_ppc_interval", predictive.HOW, partial(predictive.predictive_panels, run)
+    )
+    events = Plot("plot_forest", event_forest.HOW, partial(_of_events, run))
     return {
-        "trace": partial(
-            exploration, "plot_trace and plot_rank", partial(trace_panels, run), partial(rank_panels, run)
-        ),
-        "joint": partial(exploration, "plot_pair", partial(pair_panels, run)),
-        "marginals": partial(exploration, "plot_prior_posterior", partial(prior_panels, run)),
-        "predictive": predicted,
-        "new_avalanche": predicted,
-        "events": partial(exploration, "plot_forest", partial(_of_events, run)),
+        "trace": partial(exploration, *chains),
+        "joint": partial(exploration, joint),
+        "marginals": partial(exploration, marginals),
+        "predictive": partial(exploration, predicted),
+        "new_avalanche": partial(exploration, predicted),
+        "events": partial(exploration, events),
     }
 
 

@@ -32,19 +32,21 @@ def explorations(comparison: Document) -> dict[str, Callable[[], Exploration | N
     comparison : mapping
         The content of ``compare.json``.
     """
-    from skred.report.explore.exploration import exploration
+    from skred.report.explore.exploration import Plot, exploration
+    from skred.report.explore.plots import compare, loo_pit, pareto_k
 
     alone = {"Difference of elpd": ranked(comparison)}
     both = {
         "Every avalanche its own friction": ranked(comparison),
         "Pooled: one friction for the path": ranked(get(comparison, "pooled") or {}),
     }
-    return {
-        "comparison_elpd": partial(exploration, "plot_compare", partial(_differences, alone)),
-        "likelihoods": partial(exploration, "plot_compare", partial(_differences, both)),
-        "pareto_k": partial(exploration, "plot_khat", partial(_pareto_k, comparison)),
-        "loo_pit": partial(exploration, "plot_ecdf_pit", partial(_pit, comparison)),
+    plots = {
+        "comparison_elpd": Plot("plot_compare", compare.HOW, partial(_differences, alone)),
+        "likelihoods": Plot("plot_compare", compare.HOW, partial(_differences, both)),
+        "pareto_k": Plot("plot_khat", pareto_k.HOW, partial(_pareto_k, comparison)),
+        "loo_pit": Plot("plot_ecdf_pit", loo_pit.HOW, partial(_pit, comparison)),
     }
+    return {name: partial(exploration, plot) for name, plot in plots.items()}
 
 
 def _differences(of: dict[str, list[Document]]) -> list[Panel]:
@@ -68,8 +70,7 @@ def _differences(of: dict[str, list[Document]]) -> list[Panel]:
             index=names,
         )
         words = {name: shortened(get(law, "id"), 24) for name, law in zip(names, known, strict=True)}
-        note = "Lines: one standard error, not doubled. Below 0: worse than the best."
-        panels.append(Panel(title, difference_figure(table, words), note=note))
+        panels.append(Panel(title, difference_figure(table, words)))
     return panels
 
 

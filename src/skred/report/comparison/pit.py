@@ -54,7 +54,8 @@ class Places:
         """One place for each reading, those of fronts that may not come evenly over their ranges."""
         wide = self.up_to > self.below
         part = np.full(len(self.below), 0.5)
-        part[wide] = (np.arange(wide.sum()) + 0.5) / max(wide.sum(), 1)
+        n = int(np.count_nonzero(wide))
+        part[wide] = (np.arange(n) + 0.5) / max(n, 1)
         return np.asarray(self.below + part * (self.up_to - self.below))
 
     def line(self) -> tuple[FloatArray, FloatArray]:

@@ -7,6 +7,7 @@ have none: ArviZ has no plot of these, or needs draws where a diagnosis keeps in
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -34,18 +35,29 @@ def explorations(document: doc.Document, tree: xr.DataTree) -> dict[str, Callabl
     tree : DataTree
         The content of ``diagnosis.nc``.
     """
-    from skred.report.explore.exploration import exploration
+    from skred.report.explore.exploration import Plot, exploration
+    from skred.report.explore.plots import draws, tstat
 
-    found = {
-        group_of("strength", k): partial(exploration, "plot_dist", partial(_added, document, tree, k))
+    plots = {
+        group_of("strength", k): Plot("plot_dist", draws.HOW, partial(_added, document, tree, k))
         for k, _ in enumerate(comparisons(document))
     }
-    laws = range(tree["check"].sizes["law"]) if "check" in tree.children else ()
-    checks = [partial(_check, document, tree, number) for number in laws]
-    return found | {"check": partial(exploration, "plot_ppc_tstat", *checks)}
+    plots["check"] = Plot("plot_ppc_tstat", tstat.HOW, partial(_checks, document, tree))
+    return {name: partial(exploration, plot) for name, plot in plots.items()}
 
 
-def _check(document: doc.Document, tree: xr.DataTree, number: int) -> list[Panel]:
+def _checks(document: doc.Document, tree: xr.DataTree) -> list[Panel]:
+    """The statistic of clean campaigns and of the recordings, for each law that can be drawn."""
+    from skred.report.explore.panel import NotShownError
+
+    panels = []
+    for number in range(tree["check"].sizes["law"]):
+        with suppress(NotShownError):
+            panels.append(_check(document, tree, number))
+    return panels
+
+
+def _check(document: doc.Document, tree: xr.DataTree, number: int) -> Panel:
     """The statistic of clean campaigns and of the recordings, for one law."""
     from skred.report.explore.plots.tstat import statistic_panel
 
@@ -54,7 +66,7 @@ def _check(document: doc.Document, tree: xr.DataTree, number: int) -> list[Panel
     added = doc.listed(checks[number] if number < len(checks) else {}, "added")
     label = "log odds of anything against nothing [nats]"
     recorded = float(found["statistic"])
-    return [statistic_panel(with_added(document, added), label, np.ravel(found["simulated"]), recorded)]
+    return statistic_panel(with_added(document, added), label, np.ravel(found["simulated"]), recorded)
 
 
 def _added(document: doc.Document, tree: xr.DataTree, number: int) -> list[Panel]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from bokeh.colors import named
@@ -14,40 +15,60 @@ from skred.report.shared.drawing import Exploration
 from skred.report.shared.inline import colours_in
 from skred.report.shared.programs import packed, plain
 
-type Maker = Callable[[], Sequence[Panel]]
+
+@dataclass(frozen=True)
+class Plot:
+    """A plot of ArviZ.
+
+    Attributes
+    ----------
+    name : str
+        Of the function.
+    how : str
+        How to read it.
+    make : callable
+        Makes its panels.
+    """
+
+    name: str
+    how: str
+    make: Callable[[], Sequence[Panel]]
 
 
-def exploration(plots: str, *makers: Maker) -> Exploration | None:
+def exploration(*plots: Plot) -> Exploration | None:
     """Make the figures that can be explored in place of a drawing.
 
     Parameters
     ----------
-    plots : str
-        Which plots of ArviZ they are.
-    *makers : callable
-        Each makes panels; one that has nothing to show is left out.
+    *plots : Plot
+        One that has nothing to show is left out.
 
     Returns
     -------
     Exploration or None
         None where there is nothing to show: the drawing stands alone.
     """
-    panels = [panel for make in makers for panel in _made(make) if _draws(panel.figure)]
-    if not panels:
+    shown = []
+    for plot in plots:
+        panels = [panel for panel in _made(plot) if _draws(panel.figure)]
+        if panels:
+            shown.append({"plot": plot.name, "how": plot.how, "panels": [_plain(panel) for panel in panels]})
+    if not shown:
         return None
-    shown = [
-        {"title": panel.title, "note": panel.note, "wide": panel.wide, "item": _item(panel.figure)}
-        for panel in panels
-    ]
-    text = plain({"plots": plots, "panels": shown})
+    text = plain(shown)
     return Exploration(packed(text), frozenset(colours_in(text)))
 
 
-def _made(make: Maker) -> Sequence[Panel]:
+def _made(plot: Plot) -> Sequence[Panel]:
     try:
-        return make()
+        return plot.make()
     except NotShownError:
         return ()
+
+
+def _plain(panel: Panel) -> dict[str, Any]:
+    """A panel as plain data."""
+    return {"title": panel.title, "note": panel.note, "wide": panel.wide, "item": _item(panel.figure)}
 
 
 def _draws(figure: Any) -> bool:

@@ -127,6 +127,9 @@ def _text(made: Any, title: str | None) -> None:
             axis.ticker.desired_num_ticks = 5
         if isinstance(axis.axis_label, str):
             axis.axis_label = plain(axis.axis_label)
+    for axis in made.xaxis:
+        if isinstance(axis.ticker, BasicTicker):
+            axis.ticker.desired_num_ticks = 4  # numbers beside each other need more room
     for grid in made.grid:
         grid.grid_line_color = PALE
     if title is not None:

@@ -44,17 +44,20 @@
 
   async function fill(one) {
     const turn = one.turn = (one.turn || 0) + 1;
-    const { plots, panels } = JSON.parse(coloured(await window.skredUnpack(one.data)));
+    const plots = JSON.parse(coloured(await window.skredUnpack(one.data)));
     if (turn !== one.turn) return;
     clear(one);
-    const grid = make("div", "panels");
-    one.place.append(make("p", "note", `ArviZ: ${plots}. Tools to move, zoom and save appear where you point.`), grid);
-    for (const panel of panels) {
-      const { section, place } = panelOf(panel);
-      grid.append(section);
-      one.views.push(await Bokeh.embed.embed_item(panel.item, place));
-      if (turn !== one.turn) return;
+    for (const { plot, how, panels } of plots) {
+      const grid = make("div", "panels");
+      one.place.append(make("p", "note", `ArviZ's ${plot}. ${how}`), grid);
+      for (const panel of panels) {
+        const { section, place } = panelOf(panel);
+        grid.append(section);
+        one.views.push(await Bokeh.embed.embed_item(panel.item, place));
+        if (turn !== one.turn) return;
+      }
     }
+    one.place.append(make("p", "note", "Tools to move, zoom and save a figure appear where you point at it."));
     marks.watch();
     marks.follow(window.skred.chosen());
   }

@@ -12,6 +12,9 @@ from skred.report.explore.figures import plain, quietly, styled
 if TYPE_CHECKING:
     import pandas as pd
 
+HOW = "Lines: one standard error, not doubled. Left of the dashed line: worse than the best."
+"""How to read it."""
+
 
 def difference_figure(table: pd.DataFrame, words: Mapping[str, str]) -> Any:
     """Each difference with its standard error, by arviz-plots.

@@ -8,6 +8,9 @@ import xarray as xr
 from skred.report.explore.figures import figures_of, quietly, styled
 from skred.report.explore.panel import NotShownError, Panel
 
+HOW = "Dot: mean; line below the curve: 90 %, equal-tailed."
+"""How to read it."""
+
 _FEWEST = 10
 """Draws below which there is no distribution to look at."""
 
@@ -38,5 +41,4 @@ def draws_panel(draws: xr.DataArray, title: str, label: str) -> Panel:
         )  # fmt: skip
     made = figures_of(collection)["value"]
     made.xaxis.axis_label, made.yaxis.axis_label = label, "density"
-    note = "Dot: mean; line: 90 %, equal-tailed."
-    return Panel(title, styled(made, height=280, title=""), note=note)
+    return Panel(title, styled(made, height=280, title=""))

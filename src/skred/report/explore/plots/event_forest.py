@@ -12,6 +12,9 @@ from skred.report.explore.figures import BLUE, apart, points, quietly, styled
 from skred.report.explore.panel import NotShownError, Panel
 from skred.report.explore.run import shown
 
+HOW = "Dot: median; thick line: 50 %; thin line: 90 %."
+"""How to read it."""
+
 MOST_EVENTS = 60
 """Rows of a forest that can be told apart."""
 _LOG_BEYOND = 20.0
@@ -59,9 +62,7 @@ def event_forest_panel(draws: xr.DataArray, label: str) -> Panel:
     axis = made.yaxis[0]
     axis.visible, axis.ticker = True, sorted(y.tolist())
     axis.major_label_overrides = {at: event[:14] for at, event in zip(y.tolist(), events, strict=True)}
-    note = "Dot: median; thick line: 50 %; thin line: 90 %."
-    if n > MOST_EVENTS:
-        note += f" The first {MOST_EVENTS} of {n} events."
+    note = f"The first {MOST_EVENTS} of {n} events." if n > MOST_EVENTS else ""
     return Panel(label, made, note=note)
 
 

@@ -10,6 +10,12 @@ from skred.report.explore.figures import figures_of, points, quietly, styled
 from skred.report.explore.panel import NotShownError, Panel
 from skred.report.explore.run import Run, ids_of
 
+HOW = (
+    "Left-out readings should fall anywhere in their predictions with the same chance. A line far from zero"
+    " means that predictions are biased, too narrow or too wide; below α, the p-value says that this is no chance."
+)
+"""How to read it."""
+
 
 def loo_pit_panels(run: Run) -> list[Panel]:
     """LOO-PIT of each sensor by arviz-plots, each reading a point on the line."""

@@ -13,6 +13,12 @@ from skred.report.explore.panel import Panel
 from skred.report.explore.run import Run
 from skred.report.shared.style import GREY
 
+HOW = (
+    "An event above the dashed line is so influential that leaving it out by importance sampling cannot be"
+    " trusted."
+)
+"""How to read it."""
+
 
 def pareto_panels(run: Run) -> list[Panel]:
     """Pareto k of each event by arviz-plots, the limit of importance sampling as a line."""

@@ -12,6 +12,12 @@ from skred.report.explore.panel import Panel
 from skred.report.explore.plots.pareto_k import name_events
 from skred.report.explore.run import Run, ids_of
 
+HOW = (
+    "Black: recorded. Lines and bars: what the run predicts. The black line should look like one of the blue"
+    " ones, and nine in ten thin bars should hold their dot."
+)
+"""How to read it."""
+
 _PREDICTED, _POINTS = 40, 160
 """Predicted distributions of a sensor, and points of each."""
 _MOST_BY_EVENT = 200

@@ -11,6 +11,9 @@ from skred.report.explore.figures import figures_of, legend_above, quietly, slim
 from skred.report.explore.panel import NotShownError, Panel
 from skred.report.explore.run import Run
 
+HOW = "Grey: before the recordings. Blue: after them. Where both agree, the recordings taught nothing."
+"""How to read it."""
+
 _POINTS = 250
 """Of a curve: more cannot be seen, and every one is in the page."""
 

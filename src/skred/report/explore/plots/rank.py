@@ -10,6 +10,12 @@ from skred.report.explore.figures import figures_of, quietly, styled, thin
 from skred.report.explore.panel import NotShownError, Panel
 from skred.report.explore.run import Run
 
+HOW = (
+    "A line for each chain. Chains that explore the same stay close to zero; a p-value below α says that"
+    " they do not, or that draws of a chain are much alike."
+)
+"""How to read it."""
+
 _POINTS = 300
 """Of a line: more cannot be seen, and every one is in the page."""
 

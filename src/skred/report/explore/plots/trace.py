@@ -10,6 +10,11 @@ from skred.report.explore.figures import figures_of, quietly, spread_out, styled
 from skred.report.explore.panel import Panel
 from skred.report.explore.run import Run
 
+HOW = (
+    "Draws in their order, a colour for each chain. Chains that mix well look alike, as noise without drift."
+)
+"""How to read it."""
+
 MOST_DRAWS = 400
 """Draws of a chain that a trace shows."""
 

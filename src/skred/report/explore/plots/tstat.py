@@ -9,6 +9,9 @@ from numpy.typing import ArrayLike
 from skred.report.explore.figures import CHOSEN, figures_of, quietly, styled
 from skred.report.explore.panel import NotShownError, Panel
 
+HOW = "Line: simulated. Dot: the recordings; far to the right of the line they are not what chance makes."
+"""How to read it."""
+
 _FEWEST = 10
 """Simulated values below which there is no distribution to look at."""
 
@@ -48,5 +51,5 @@ def statistic_panel(title: str, label: str, simulated: ArrayLike, recorded: floa
     made.xaxis.axis_label, made.yaxis.axis_label = label, "density of the simulated"
     dot = collection.viz["observed_tstat"]["value"].item().glyph
     dot.size, dot.fill_color, dot.line_color = 11, CHOSEN, CHOSEN
-    note = f"Line: {len(values)} simulated. Dot: the recordings."
+    note = f"{len(values)} simulated."
     return Panel(title, styled(made, height=300, title=""), note=note)
