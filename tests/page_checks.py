@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 import re
+import zlib
 from html.parser import HTMLParser
+from typing import Any
 
 MOST_BYTES = 5_000_000
 VOID = {"meta", "br", "img", "input", "hr"}
@@ -84,15 +87,38 @@ def _check_policy(page: Element) -> None:
     first = next(one for one in page.all("meta") if one.attributes.get("http-equiv"))
     assert first.attributes["http-equiv"] == "Content-Security-Policy"
     parts = dict(part.split(" ", 1) for part in re.split(r";\s*", first.attributes["content"]))
-    assert parts["default-src"] == "'none'" and "unsafe" not in first.attributes["content"]
+    assert parts["default-src"] == parts["connect-src"] == "'none'" and "unsafe" not in parts["script-src"]
     assert parts["img-src"] == "data:" and parts["base-uri"] == parts["form-action"] == "'none'"
-    for tag in ("style", "script"):
-        (element,) = page.all(tag)
-        assert not element.attributes, "from nowhere else"
-        digest = hashlib.sha256("".join(element.words).encode()).digest()
-        assert parts[f"{tag}-src"] == f"'sha256-{base64.b64encode(digest).decode()}'"
+    data = [one for one in page.all("script") if one.attributes]
+    (style,), (script,) = page.all("style"), [one for one in page.all("script") if one not in data]
+    assert not style.attributes, "from nowhere else"
+    programs, styles = [_digest("".join(script.words))], _digest("".join(style.words))
+    if data:  # figures to explore: bokeh is packed, and writes styles as it draws
+        (bokeh,) = [one for one in data if one.attributes.get("id") == "bokeh"]
+        programs.append(_digest(_unpacked(bokeh)))
+        styles = "'unsafe-inline'"
+    assert parts["script-src"].split() == programs and parts["style-src"] == styles
+    for element in data:
+        assert element.attributes["type"] == "text/plain" and len(element.attributes) == 2
+        assert element.attributes.get("id") == "bokeh" or element.attributes["class"] == "exploration-data"
+        assert re.fullmatch(r"[A-Za-z0-9+/=]+", "".join(element.words)), "data, which nothing runs"
     for element in page.all():
         assert not {name for name in element.attributes if name == "style" or name.startswith("on")}
+
+
+def _digest(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def _unpacked(element: Element) -> str:
+    return zlib.decompress(base64.b64decode("".join(element.words))).decode()
+
+
+def explorations(page: Element) -> list[list[dict[str, Any]]]:
+    """What can be explored in place of each figure that has it."""
+    blocks = [one for one in page.all("script") if one.has("exploration-data")]
+    assert all(one.parent is not None and one.parent.tag == "figure" for one in blocks)
+    return [json.loads(_unpacked(one)) for one in blocks]
 
 
 def _check_references(page: Element) -> None:

@@ -12,6 +12,7 @@ from skred.inference.pooled.problem import PooledProblem, pooled_problem
 from skred.inference.problem import Problem
 from skred.inference.recorded_data import recorded_groups
 from skred.inference.results import law_attributes
+from skred.model_selection.ranking import ranking
 from skred.physics.law import Law
 from skred.report.shared.drawing import Picture
 
@@ -214,3 +215,22 @@ def comparison() -> dict:
         "statement": ["The recordings prefer PCM.", "The difference to the next law is 4.90."],
         "seconds": 93.2,
     }
+
+
+def ranked_comparison(n: int = 8) -> dict:
+    """Three laws on some avalanches, with all that a comparison writes of the ranking."""
+    events = [f"e{k + 1}" for k in range(n)]
+    best = [-14.0 - 0.1 * k for k in range(n)]
+    one_decides = [value - 0.4 for value in best[:-1]] + [best[-1] - 6.0]
+    even = [value - 2.0 for value in best]
+    document = {**comparison(), "event_ids": events}
+    document["models"] = [
+        entry("pcm", best, best),
+        entry("voellmy", one_decides, best),
+        entry("constant", even, best),
+    ]
+    for law in document["models"]:
+        law["loo"]["pit"] = [pit("sensor 0", n), pit("runout", n)]
+    document["ranking"] = ranking(document["models"], events)
+    document["campaign"]["n_events"] = n
+    return document

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from contextlib import nullcontext
 from xml.etree import ElementTree
 
@@ -11,16 +10,13 @@ import pytest
 from diagnosis_report_cases import documents
 from hierarchical_cases import hierarchical_comparison
 from page_checks import check_page, texts, without_scripts
-from report_cases import as_saved, calibration, comparison, entry, gate, picture, pit, ryggfonn
+from report_cases import comparison, entry, gate, picture, ranked_comparison
 from test_report_html import hostile, nulls
 
 from skred.model_selection.ranking import ranking
-from skred.physics.laws import load_law
-from skred.report.calibration.figures import save_model_figures
 from skred.report.calibration.page import render_calibration
-from skred.report.comparison.laws import save_comparison_figures
 from skred.report.comparison.page import render_comparison
-from skred.report.diagnosis.report import render_diagnosis, save_diagnosis_figures
+from skred.report.diagnosis.report import render_diagnosis
 from skred.report.shared.colours import DARK_PAPER, PAPER, contrast, dark
 from skred.report.shared.drawing import Picture
 from skred.report.shared.inline import inline_svg
@@ -33,25 +29,6 @@ KINDS = ("cannot", "nothing", "unexplained", "sensor", "tie", "two")
 @pytest.fixture(autouse=True)
 def coarse_figures(monkeypatch):
     monkeypatch.setattr("skred.report.shared.style.DPI", 40)
-
-
-def ranked_comparison(n=8):
-    """Three laws on some avalanches, with all that a comparison writes of the ranking."""
-    events = [f"e{k + 1}" for k in range(n)]
-    best = [-14.0 - 0.1 * k for k in range(n)]
-    one_decides = [value - 0.4 for value in best[:-1]] + [best[-1] - 6.0]
-    even = [value - 2.0 for value in best]
-    document = {**comparison(), "event_ids": events}
-    document["models"] = [
-        entry("pcm", best, best),
-        entry("voellmy", one_decides, best),
-        entry("constant", even, best),
-    ]
-    for law in document["models"]:
-        law["loo"]["pit"] = [pit("sensor 0", n), pit("runout", n)]
-    document["ranking"] = ranking(document["models"], events)
-    document["campaign"]["n_events"] = n
-    return document
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -201,69 +178,7 @@ def test_colours_in_the_dark_lose_no_contrast():
     assert contrast("#767676", "#ffffff") == pytest.approx(4.54, abs=0.01)
 
 
-# In a browser: Debian's Chromium, driven by playwright.
-
-
-@pytest.fixture(scope="module")
-def pages(tmp_path_factory):
-    """A diagnosis and a comparison with all their figures, as files."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("skred.report.shared.style.DPI", 40)
-        folder = tmp_path_factory.mktemp("pages")
-        document, tree = documents("two")
-        diagnosis = render_diagnosis(document, tree, save_diagnosis_figures(document, tree, folder))
-        compared, problem, law = ranked_comparison(), ryggfonn(), load_law("pcm")
-        figures = save_comparison_figures(compared, folder)
-        drawn = save_model_figures(as_saved(calibration(problem, law), law, problem), folder, "m0")
-        figures |= {f"pcm/{name}": one for name, one in drawn.items()}
-        comparison_page = render_comparison(compared, figures)
-    files = {"diagnosis": diagnosis, "comparison": comparison_page}
-    for name, html in files.items():
-        check_page(html)
-        (folder / f"{name}.html").write_text(html, encoding="utf-8")
-    return folder
-
-
-@pytest.fixture(scope="module")
-def browser():
-    """Chromium without a window; skipped where there is none."""
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    program = shutil.which("chromium") or shutil.which("chromium-browser")
-    if program is None:
-        pytest.skip("there is no Chromium")
-    arguments = [
-        "--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update",
-        "--disable-sync",
-    ]  # fmt: skip
-    with api.sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=program, args=arguments)
-        yield opened
-        opened.close()
-
-
-@pytest.fixture
-def opened(browser, pages):
-    """Opens a page; fails on what it says to the console, and on every request it makes."""
-    told, contexts = [], []
-
-    def of(name, **options):
-        context = browser.new_context(**{"viewport": {"width": 1200, "height": 900}, **options})
-        contexts.append(context)
-        page = context.new_page()
-        page.on("console", lambda message: told.append(f"{message.type}: {message.text}"))
-        page.on("pageerror", lambda error: told.append(str(error)))
-        page.on(
-            "request",
-            lambda one: told.append(one.url) if not one.url.startswith(("file:", "data:")) else None,
-        )
-        page.goto((pages / f"{name}.html").as_uri())
-        return page
-
-    yield of
-    for context in contexts:
-        context.close()
-    assert told == [], "a broken policy is an error of the console as well"
-
+# In a browser: Debian's Chromium, driven by playwright; see conftest.py.
 
 NAMES = ("diagnosis", "comparison")
 

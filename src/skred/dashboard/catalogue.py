@@ -119,8 +119,8 @@ VIEWS: tuple[ViewKind, ...] = (
     ViewKind(
         "prior", _DRAWS, "Prior and posterior",
         prior_posterior.HOW,
-        lambda run: _posterior(run) and run.has("prior"), _of_parameters(prior_posterior.prior_panels), by_parameter=True,
-        drawn_from=("posterior", "prior"),
+        lambda run: _posterior(run) and run.has("prior"), _of_parameters(prior_posterior.prior_panels),
+        by_parameter=True, drawn_from=("posterior", "prior"),
     ),
     ViewKind(
         "pair", _DRAWS, "Pairs",

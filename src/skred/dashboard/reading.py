@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from skred.documents import FORMAT, TREE_FORMAT, check_size
 from skred.errors import InputError
 from skred.report.explore.plain_json import plain_json
-from skred.report.explore.run import Run, shown
+from skred.report.explore.run import Run, numbered, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -179,8 +179,7 @@ def _cleaned(tree: xr.DataTree) -> xr.DataTree:
         data = node.to_dataset()
         if name != "constant_data":
             data = data[[key for key, values in data.data_vars.items() if values.dtype.kind in "iufb"]]
-        bare = [d for d in ("chain", "draw") if d in data.sizes and d not in data.coords]
-        groups[str(name)] = data.assign_coords({d: range(data.sizes[d]) for d in bare})
+        groups[str(name)] = numbered(data)
     cleaned = xr.DataTree.from_dict(groups)
     cleaned.attrs = dict(tree.attrs)
     return cleaned

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from skred.report.shared.drawing import Exploration
 from skred.report.shared.labels import name_text, symbol_text, unit_text
 from skred.report.shared.law import law_of
+from skred.report.shared.recordings import recordings_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,9 +32,9 @@ def explorations(tree: xr.DataTree) -> dict[str, Callable[[], Exploration | None
     """
     from skred.report.explore.exploration import Plot, exploration
     from skred.report.explore.plots import event_forest, pair, predictive, prior_posterior, rank, trace
-    from skred.report.explore.run import Run
+    from skred.report.explore.run import Run, numbered
 
-    run = Run("r1", law_of(tree).title, "calibration", "", tree)
+    run = Run("r1", law_of(tree).title, "calibration", "", tree.map_over_datasets(numbered))
     chains = (
         Plot("plot_trace", trace.HOW, partial(trace.trace_panels, run)),
         Plot("plot_rank", rank.HOW, partial(rank.rank_panels, run)),
@@ -58,7 +59,8 @@ def _of_events(run: Run) -> list[Panel]:
     """A forest of each strength that every avalanche has of its own."""
     from skred.report.explore.plots.event_forest import event_forest_panel
 
-    draws = run.group("event_posterior")
+    ids = list(recordings_of(run.tree).event_ids)
+    draws = run.group("event_posterior").assign_coords(event=ids)
     return [
         event_forest_panel(
             draws[one.name], f"{name_text(one.name)} {symbol_text(one.symbol)} [{unit_text(one.unit)}]"

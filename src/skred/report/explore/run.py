@@ -281,6 +281,12 @@ class Run:
         return found if isinstance(found, dict) else {}
 
 
+def numbered(data: xr.Dataset) -> xr.Dataset:
+    """A group with numbers of its chains and draws, which ArviZ goes by."""
+    bare = [d for d in ("chain", "draw") if d in data.sizes and d not in data.coords]
+    return data.assign_coords({d: range(data.sizes[d]) for d in bare})
+
+
 def scalars_of(data: xr.Dataset) -> list[tuple[str, dict[str, int]]]:
     """Every number of a posterior with chains and draws, up to 500 of them, the scalar ones first."""
     found: list[tuple[str, dict[str, int]]] = []

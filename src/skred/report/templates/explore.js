@@ -92,7 +92,7 @@
     const figure = block.closest("figure");
     const one = { data: block.textContent, figure, views: [], place: make("div", "exploration"),
                   button: make("button", "explore", EXPLORE), told: make("span", "note") };
-    const row = make("p", "explore-row");
+    const row = make("div", "explore-row");
     one.button.type = "button";
     const drawing = figure.querySelector("svg");
     one.told.setAttribute("role", "status");

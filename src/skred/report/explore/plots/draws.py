@@ -41,4 +41,7 @@ def draws_panel(draws: xr.DataArray, title: str, label: str) -> Panel:
         )  # fmt: skip
     made = figures_of(collection)["value"]
     made.xaxis.axis_label, made.yaxis.axis_label = label, "density"
+    collection.viz["dist"]["value"].item().glyph.line_width = 2
+    collection.viz["credible_interval"]["value"].item().glyph.line_width = 3
+    collection.viz["point_estimate"]["value"].item().glyph.size = 9
     return Panel(title, styled(made, height=280, title=""))

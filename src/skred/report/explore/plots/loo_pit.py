@@ -12,7 +12,8 @@ from skred.report.explore.run import Run, ids_of
 
 HOW = (
     "Left-out readings should fall anywhere in their predictions with the same chance. A line far from zero"
-    " means that predictions are biased, too narrow or too wide; below α, the p-value says that this is no chance."
+    " means that predictions are biased, too narrow or too wide; below α, the p-value says that this is no"
+    " chance."
 )
 """How to read it."""
 

@@ -11,8 +11,10 @@ from skred.report.explore.figures import apart, quietly, spread_out, styled
 from skred.report.explore.panel import Panel
 from skred.report.explore.run import Run
 
-HOW = "Each dot is a draw. A narrow band says that the recordings fix a combination of both, not each"
-    " by itself."
+HOW = (
+    "Each dot is a draw. A narrow band says that the recordings fix a combination of both, not each by"
+    " itself."
+)
 """How to read it."""
 
 MOST_PAIRED, MOST_DRAWS = 6, 250

@@ -11,8 +11,8 @@ from skred.report.explore.panel import NotShownError, Panel
 from skred.report.explore.run import Run
 
 HOW = (
-    "A line for each chain. Chains that explore the same stay close to zero; a p-value below α says that"
-    " they do not, or that draws of a chain are much alike."
+    "A line for each chain. Chains that explore the same stay close to zero; a p-value below α says that they"
+    " do not, or that draws of a chain are much alike."
 )
 """How to read it."""
 
