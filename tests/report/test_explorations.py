@@ -221,7 +221,7 @@ def test_what_a_page_has_no_room_for_is_told(tree, tmp_path, monkeypatch):
     drawn = save_model_figures(tree, tmp_path)
     bare = {name: replace(one, exploration=None) for name, one in drawn.items()}
     size = len(render_calibration(calibrated(), bare))
-    monkeypatch.setattr("skred.report.shared.html._MOST_BYTES", size + 30_000)
+    monkeypatch.setattr("skred.report.shared.html.MOST_BYTES", size + 30_000)
     html = render_calibration(calibrated(), drawn)
     page = check_page(html)
     assert not explorations(page) and "bokeh" not in html

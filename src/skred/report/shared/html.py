@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 _MOST_DRAWN = 4_300_000
 """Characters of drawings in a page: with tables and words it stays below 5 MB."""
-_MOST_BYTES, _ALLOWANCE = 4_960_000, 30_000
+MOST_BYTES, _ALLOWANCE = 4_960_000, 30_000
 """Of a page with explorations, and of their colours, scripts and names in it."""
 _EXPLORING = ("unpack.js", "marks.js", "explore.js")
 """Programs of pages with figures to explore."""
@@ -65,7 +65,7 @@ def page(template: str, figures: Mapping[str, Picture], **values: Any) -> str:
     html = _rendered(template, plain, values)
     if not found:
         return html
-    kept = _explorable(found, _MOST_BYTES - len(html.encode("utf-8")))
+    kept = _explorable(found, MOST_BYTES - len(html.encode("utf-8")))
     explored = {name: replace(one, exploration=kept.get(name)) for name, one in figures.items()}
     return _rendered(template, explored, values, [name for name in found if name not in kept])
 
