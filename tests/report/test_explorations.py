@@ -123,6 +123,12 @@ def test_the_same_draws_make_the_same_page(tree, tmp_path):
     assert first == second
 
 
+def test_what_else_is_imported_is_not_in_the_page(tree, tmp_path):
+    pytest.importorskip("panel", reason="the extra dashboard is not installed")
+    _, html = of_calibration(tree, tmp_path)
+    assert '"defs"' not in json.dumps(explorations(check_page(html)))
+
+
 def test_a_page_without_such_figures_carries_no_bokeh(tmp_path):
     one = picture(tmp_path / "figure.png")
     html = render_comparison(comparison(), {"pareto_k": one})

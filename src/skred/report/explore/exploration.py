@@ -90,7 +90,9 @@ def _item(figure: Any) -> Any:
             return numbers.setdefault(part, f"m{len(numbers)}")
         return _variable(part) if isinstance(part, str) and "color" in key else part
 
-    return plainly(json_item(figure))
+    item: dict[str, Any] = dict(json_item(figure))
+    item["doc"].pop("defs", None)  # models of other packages, such as panel's where it is imported
+    return plainly(item)
 
 
 def _variable(colour: str) -> str:
