@@ -29,7 +29,7 @@ def test_one_shape_estimates_the_evidence_of_all(monkeypatch: pytest.MonkeyPatch
     shares = np.array([0.1, 0.4, 0.3, 0.2])
     linear = LinearFactors(placed, np.array([[-2.0, 4.0, 0.0, 1.0]]), np.log(shares), -1.5)
     rng = np.random.default_rng(0)
-    drawn = [by_fronts._drawn(base, linear, rng) for _ in range(4000)]
+    drawn = [by_fronts.drawn(base, linear, rng) for _ in range(4000)]
     weights = np.exp([one.log_bayes_factor + beside for one, beside in drawn])
     exact = np.exp(-1.5) * float(shares @ np.exp(list(true.values())))
     assert abs(weights.mean() - exact) < 4.0 * weights.std() / np.sqrt(len(weights))
@@ -61,6 +61,6 @@ def test_evidence_of_one_shape_is_that_of_a_comparison() -> None:
     test = ScoreTest(base.problem, base.law, base.setting)
     one = next(one for one in test.placed_mechanisms if one.mechanism.id == "viscous_drag")
     linear = LinearFactors([one], np.zeros((1, 1)), np.zeros(1), 0.0)
-    fitted, beside = by_fronts._drawn(base, linear, np.random.default_rng(1))
+    fitted, beside = by_fronts.drawn(base, linear, np.random.default_rng(1))
     assert beside == pytest.approx(0.0)
     assert fitted.log_bayes_factor == curve(base, one.mechanism, one.shape).log_bayes_factor

@@ -58,7 +58,7 @@ def log_odds_by_fronts(
     extension = extended(base.problem, base.law, base.directions)
     fit = refit(extension, rows, base.strengths[None, :], start, Rounds(USUAL))[0]
     simulated = replace(base, rows=rows, fit=fit)
-    of_id = {name: _drawn(simulated, one, rng) for name, one in score_test.by_id(scores).items()}
+    of_id = {name: drawn(simulated, one, rng) for name, one in score_test.by_id(scores).items()}
     terms = {name: beside + one.log_bayes_factor for name, (one, beside) in of_id.items()}
     while True:
         log_odds = float(np.logaddexp.reduce(list(terms.values())))
@@ -69,7 +69,7 @@ def log_odds_by_fronts(
         terms[first] = beside + computed_again(simulated, one)[0]
 
 
-def _drawn(base: Base, linear: LinearFactors, rng: np.random.Generator) -> tuple[Curve | Profile, float]:
+def drawn(base: Base, linear: LinearFactors, rng: np.random.Generator) -> tuple[Curve | Profile, float]:
     """One of the candidates that an id stands for, fitted; and what to add to its log Bayes factor."""
     log_prior = linear.log_shares - np.logaddexp.reduce(linear.log_shares)
     log_posterior = log_prior + linear.log_factors[0]
