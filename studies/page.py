@@ -20,6 +20,7 @@ Ryggfonn, and the record of concealed trials. What is measured again is in
 | `python -m studies.ryggfonn.build_campaigns` | builds the embedded campaigns from the raw figures |
 | `python -m studies.proof` | writes [the record](../docs/proof.md) of trials; `--add DIR` adds some |
 | `python -m studies.thresholds.alarm` | how often clean campaigns pass the alarm's limit |
+| `python -m studies.thresholds.nothing_at_most` | how probable nothing may be beside an alarm |
 | `python -m studies.thresholds.tie_rules` | which names are tied with the leading one |
 | `python -m studies.thresholds.compared_again` | compares opened trials again with the present code |
 | `python -m studies.thresholds.calibrate_odds` | chooses the tempering exponent by those |

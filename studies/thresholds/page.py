@@ -17,7 +17,7 @@ _NEAR = 0.6
 
 def sections() -> str:
     """All of them."""
-    return line_nodes() + unseen_nodes() + free_force_draws() + alarm() + tie_rules()
+    return line_nodes() + unseen_nodes() + free_force_draws() + alarm() + nothing_at_most() + tie_rules()
 
 
 def line_nodes() -> str:
@@ -110,6 +110,28 @@ def alarm() -> str:
 of simulated campaigns comes from one shape of each mechanism (`skred.diagnosis.check.by_fronts`).
 
 | clean campaigns | n | alarms | p at most 0.01 | p at most 0.1 |
+| --- | --- | --- | --- | --- |
+{rows}"""
+
+
+def nothing_at_most() -> str:
+    """What limits of the probability of nothing make of the record's alarms."""
+    found = read(RESULTS / "nothing_at_most.json")
+    rows = "".join(
+        f"| {name} | {row['limit']:g} | "
+        + " | ".join(f"{row[key]['hits']} of {row[key]['n']}" for key in ("false", "found", "found_weak"))
+        + " |\n"
+        for name, part in found["parts"].items()
+        for row in part
+    )
+    return f"""
+## How probable nothing may be beside an alarm
+
+`python -m studies.thresholds.nothing_at_most`: the alarms of the {found["batches"]} batches of the record, by
+the checks of their time, and how many of them would stay if nothing had to be less probable than a limit.
+Found: effects at a signal-to-noise of {found["from_snr"]} and more; weaker: all others.
+
+| recordings | nothing below | false alarms | found | weaker ones found |
 | --- | --- | --- | --- | --- |
 {rows}"""
 
