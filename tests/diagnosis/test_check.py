@@ -53,7 +53,8 @@ def test_what_reaches_the_recordings_is_computed_again(monkeypatch: pytest.Monke
     found = odds_test(base, draws, 5, -1.5)
     assert looked and (found.simulated < 3.0).all()  # as Markov's inequality wants it
     looked.clear()
-    assert odds_test(base, draws, 5, 6.0).fired and not looked  # nothing is simulated at such odds
+    rare = odds_test(base, draws, 5, 6.0)
+    assert rare.fired and rare.is_bound and len(rare.simulated) == 9 and not looked
 
 
 def test_evidence_of_one_shape_is_that_of_a_comparison() -> None:

@@ -68,16 +68,19 @@ def test_p_value_of_besag_and_clifford() -> None:
     assert BootstrapTest(297.0, clean).p_value == pytest.approx(4.0 / 301.0)  # three above
     assert BootstrapTest(296.0, clean).p_value == pytest.approx(4.0 / 300.0)
     assert BootstrapTest(0.0, np.zeros(4)).p_value == 1.0  # ties count as above
-    assert BootstrapTest(5.0, np.empty(0)).p_value == LIMIT  # by Markov's inequality, no more is said
+    assert BootstrapTest(5.0, np.zeros(9)).p_value == LIMIT  # by Markov's inequality, no more is said
+    assert BootstrapTest(4.0, np.zeros(9)).p_value == 0.1
+    assert BootstrapTest(5.0, np.append(np.zeros(8), 6.0)).p_value == 0.2  # the evidence is at fault
 
 
 def test_limit_of_the_check() -> None:
     assert LIMIT == 0.01
-    assert BootstrapTest(9.0, np.zeros(99)).fired and not BootstrapTest(9.0, np.zeros(98)).fired
+    assert BootstrapTest(4.0, np.zeros(99)).fired and not BootstrapTest(4.0, np.zeros(98)).fired
     assert not BootstrapTest(9.0, np.append(np.zeros(98), [10.0])).fired
     assert BootstrapTest(9.0, np.append(np.zeros(298), [10.0, 10.0])).fired
     assert not BootstrapTest(9.0, np.append(np.zeros(297), [10.0] * 3)).fired
-    assert BootstrapTest(9.0, np.empty(0)).fired
+    bound, placed = BootstrapTest(9.0, np.zeros(9)), BootstrapTest(9.0, np.zeros(99))
+    assert bound.fired and bound.is_bound and placed.fired and not placed.is_bound
 
 
 def shares(nothing: float, unlisted: float, **named: float) -> dict[str, float]:

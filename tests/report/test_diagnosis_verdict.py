@@ -182,7 +182,7 @@ def test_a_sensor_that_raises_nothing_is_not_named():
 
 @pytest.mark.parametrize(
     ("log_odds", "n", "by"),
-    [(30.0, 0, "evidence"), (4.0, 99, "check"), (-2.0, 9, None)],
+    [(30.0, 9, "evidence"), (4.0, 99, "check"), (-2.0, 9, None)],
 )
 def test_what_raised_the_alarm(log_odds, n, by):
     """The odds alone where they are high, or clean campaigns that do not reach them."""

@@ -1,4 +1,4 @@
-"""Alarms beside which nothing is less probable than a limit: false ones and those of strong and weak effects."""
+"""Alarms beside which nothing is less probable than a limit: false, of strong effects and of weak ones."""
 
 from __future__ import annotations
 

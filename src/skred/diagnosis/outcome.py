@@ -171,7 +171,7 @@ class Diagnosis:
         """
         if not alarmed(self.comparison.probability, self.check.p_value):
             return None
-        return "check" if len(self.check.simulated) else "evidence"
+        return "evidence" if self.check.is_bound else "check"
 
     @property
     def reason(self) -> str:

@@ -5,7 +5,7 @@ posterior and everything is refitted to each, so that looking at many mechanisms
 Of a comparison's odds those of simulated campaigns are computed by fronts (`by_fronts`), of a law with
 something added both are the linear model's. Sampling stops as soon as the answer is clear (Besag and
 Clifford, 1991, doi 10.1093/biomet/78.2.301). Bayes factors of clean campaigns average to one, so that odds of
-100 to 1 are rarer than one in a hundred by Markov's inequality: there nothing has to be simulated.
+100 to 1 are rarer than one in a hundred by Markov's inequality: a few campaigns show there what is usual.
 """
 
 from __future__ import annotations
@@ -36,7 +36,9 @@ _BATCH = 25
 _FEWEST = round(1.0 / LIMIT) - 1
 """Clean campaigns by fronts at most: the fewest that place the limit, which none of them may reach then."""
 _FEW = 9
-"""The same where nothing is too probable for a claim: they only say whether such odds are usual."""
+"""The same where nothing is too probable for a claim, or the odds are rare: they show what is usual."""
+_RARE = -math.log(LIMIT)
+"""Log odds that at most so many of clean campaigns have, by Markov's inequality."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +50,7 @@ class BootstrapTest:
     statistic : float
         Log odds of anything against nothing.
     simulated : (n,) array
-        The same of clean campaigns; none where the odds are so high that no clean campaign has to be seen.
+        The same of clean campaigns.
     """
 
     statistic: float
@@ -60,8 +62,16 @@ class BootstrapTest:
 
         By Besag and Clifford's rule where it stopped early.
         """
-        if not len(self.simulated):
-            return LIMIT
+        return LIMIT if self.is_bound else self._share
+
+    @property
+    def is_bound(self) -> bool:
+        """Whether the p-value is a limit, by Markov's inequality: few were simulated, and none is as odd."""
+        none = not (self.simulated >= self.statistic).any()
+        return none and self.statistic >= _RARE and self._share > LIMIT
+
+    @property
+    def _share(self) -> float:
         above = int(np.sum(self.simulated >= self.statistic))
         if above >= _ENOUGH_ABOVE:
             return above / len(self.simulated)
@@ -85,8 +95,6 @@ def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_o
     log_odds : float
         Of anything against nothing.
     """
-    if log_odds >= -math.log(LIMIT):
-        return BootstrapTest(log_odds, np.empty(0))
     test = ScoreTest(base.problem, base.law, base.setting, base.directions, base.strengths)
 
     def by_fronts(refitted: _Refitted, first: int) -> Iterator[float]:
@@ -97,8 +105,8 @@ def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_o
         for some in batched(range(len(refitted.log_odds)), threads()):
             yield from side_by_side(one, some)
 
-    may_claim = log_odds > math.log((1.0 - NOTHING_AT_MOST) / NOTHING_AT_MOST)
-    most = _FEWEST if may_claim else _FEW
+    to_place = math.log((1.0 - NOTHING_AT_MOST) / NOTHING_AT_MOST) < log_odds < _RARE
+    most = _FEWEST if to_place else _FEW
     return BootstrapTest(log_odds, _until_clear(test, draws, seed, log_odds, most, by_fronts))
 
 

@@ -266,6 +266,7 @@ def _checks(found: Diagnosis) -> list[dict[str, Any]]:
         {
             "added": list(added),
             "p_value": check.p_value,
+            "is_bound": check.is_bound,
             "fired": check.fired,
             "statistic": check.statistic,
             "n_simulated": len(check.simulated),

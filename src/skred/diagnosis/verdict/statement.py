@@ -246,7 +246,7 @@ def _odd(found: Diagnosis, document: dict[str, Any]) -> str:
 
 def _rare(check: BootstrapTest) -> str:
     """How rare such odds are among clean campaigns."""
-    return f"p {'=' if len(check.simulated) else 'at most'} {check.p_value:.2g}"
+    return f"p {'at most' if check.is_bound else '='} {check.p_value:.2g}"
 
 
 def _nothing(found: Diagnosis, document: dict[str, Any]) -> list[str]:
