@@ -12,9 +12,9 @@ SAMPLING = SamplerSettings("metropolis", draws=600, tune=1000, chains=4, seed=0)
 QUICK_MECHANISMS = 1
 """Mechanisms that a quick diagnosis adds at most: a second one takes another comparison, half of the time."""
 QUICK_REPLICAS = 100
-"""Bootstrap campaigns of a quick diagnosis: nearly the fewest with which a p-value can reach 0.01."""
+"""The same of a quick diagnosis: nearly the fewest with which a p-value can reach 0.01."""
 REPLICAS = 500
-"""Bootstrap campaigns of a diagnosis: where 1 % of clean campaigns are as odd, about five of them are."""
+"""Clean campaigns of an augmented law: where 1 % of them are as odd, about five of these are."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Effort:
     Attributes
     ----------
     replicas : int
-        Bootstrap campaigns simulated at most for each check.
+        Bootstrap campaigns simulated at most for the check of a law with something added.
     max_mechanisms : int
         1 or 2.
     exact_loo : bool

@@ -172,11 +172,12 @@ def _log_prior(curve: Curve, strengths: FloatArray) -> FloatArray:
 
 
 def _factor_at(candidate: Candidate, relative: float) -> float:
-    """Log Bayes factor of a candidate with its prior's scale multiplied."""
+    """Log Bayes factor of a candidate with its prior scale multiplied; re-computed at its own scale alone."""
     added = candidate.mechanism.added
     assert added is not None
     factors = [one.log_bayes_factor_at(relative * added.scale_of(one.shape)) for one in candidate.curves]
-    return float(logsumexp(candidate.log_weights + np.array(factors)))
+    moved = float(logsumexp(candidate.log_weights + np.array(factors)) - logsumexp(candidate.log_factors))
+    return candidate.log_bayes_factor + moved
 
 
 def _shapes(comparison: Comparison) -> xr.Dataset:

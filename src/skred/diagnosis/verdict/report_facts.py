@@ -363,6 +363,8 @@ def _added(found: Diagnosis, number: int) -> dict[str, Any]:
     return {
         "id": step.candidate.mechanism.id,
         "parameter": augmented_of(found.steps[-1].calibration).added[number].name,
+        "symbol": step.candidate.mechanism.strength.symbol,
+        "unit": step.candidate.mechanism.strength.unit,
         "shape": _shape(shape),
         "by_logarithm": standard is not None and standard.logarithm,
     }

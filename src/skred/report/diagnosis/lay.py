@@ -100,6 +100,9 @@ def _use(document: doc.Document) -> list[str]:
     told = []
     if parts:
         told = [f"With it, the typical error for avalanches that were left out goes {' and '.join(parts)}."]
+    gains = {doc.get(one, "gain") for one in doc.listed(document, "conditional", "sensors")} - {None}
+    if gains and "better" not in gains:
+        told.append("Predicted from the readings further up, no reading is clearly predicted better.")
     return [*told, "A name is the best of a list of simple causes. It is no proof of a cause."]
 
 

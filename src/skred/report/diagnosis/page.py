@@ -16,6 +16,7 @@ from skred.report.shared import document as doc
 from skred.report.shared import html
 from skred.report.shared.labels import name_text, unit_text
 from skred.report.shared.numbers import fixed, is_number
+from skred.report.shared.recordings import recordings_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,6 +59,8 @@ def page(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Pictur
         detectability=rows.detectability_rows(document),
         work=rows.work_rows(document),
         stretch=stretch_in(doc.get(document, "location")),
+        ends=_ends(document),
+        first_sensor=_first_sensor(tree),
         comparisons=compared,
         equations=equations(document),
         symbols=symbol_rows(document),
@@ -85,6 +88,18 @@ def page(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Pictur
 
 def _number(value: Any, otherwise: float) -> float:
     return float(value) if is_number(value) else otherwise
+
+
+def _ends(document: doc.Document) -> list[Any]:
+    """Intervals of both ends of the stretch; empty where there are none."""
+    ends = [doc.listed(document, "location", f"s_{end}_interval_m") for end in ("from", "to")]
+    return ends if all(len(one) == 2 and all(map(is_number, one)) for one in ends) else []
+
+
+def _first_sensor(tree: xr.DataTree) -> float | None:
+    """Where the uppermost sensor begins [m]; None where only runouts were recorded."""
+    places = [one.s_from_m for one in recordings_of(tree).sensors if not one.is_runout]
+    return min(places, default=None)
 
 
 def _way(document: doc.Document) -> str:
