@@ -91,6 +91,18 @@ def test_a_tie_says_that_it_is_one():
     assert "student errors" in text and "61 12 5.1" in text
 
 
+def test_how_well_the_place_is_known_and_what_is_gained_is_told():
+    document, tree = documents("tie")
+    place = document["location"] | {"s_from_interval_m": [900.0, 1100.0], "s_to_interval_m": [1500.0, 1700.0]}
+    sensors = [{"sensor": "LC", "gain": "no clear gain"}]
+    known = document | {"location": place, "conditional": {"sensors": sensors, "statement": "none"}}
+    text = Page(render_diagnosis(known, tree, {})).text
+    assert "it begins between 900 and 1100 m and ends between 1500 and 1700 m" in text
+    assert "no reading is clearly predicted better" in text
+    better = known | {"conditional": {"sensors": [*sensors, {"sensor": "LD", "gain": "better"}]}}
+    assert "no reading is clearly" not in Page(render_diagnosis(better, tree, {})).text
+
+
 def test_two_mechanisms_and_a_covariate():
     text = Page(rendered("two")).text
     assert "A second mechanism, given the first" in text
