@@ -77,7 +77,7 @@ def campaign_of(case: Case) -> Any:
     return replace(campaign, sensors=tuple(sensors))
 
 
-def diagnose_case(case: Case, replicas: int, *, figures: bool = True) -> dict[str, Any]:
+def diagnose_case(case: Case, *, figures: bool = True) -> dict[str, Any]:
     """Diagnose one case; its verdict, and the evidence of each mechanism under other scales of its prior."""
     from skred.diagnosis.diagnose import diagnose
     from skred.diagnosis.effort import SAMPLING, Effort
@@ -93,7 +93,8 @@ def diagnose_case(case: Case, replicas: int, *, figures: bool = True) -> dict[st
 
     problem = hierarchical_problem(campaign_of(case), error_model=case.errors, smoothing_m=case.smoothing_m)
     settings = SAMPLING
-    law, effort = load_law(case.base_model), Effort(replicas=replicas, exact_loo=case.folds > 0)
+    # All else as a person gets it who sets nothing, and so are the answers.
+    law, effort = load_law(case.base_model), Effort(exact_loo=case.folds > 0)
     found = diagnose(problem, law, settings, effort, print)
     document = verdict(found) | {"case": case._asdict()}
     if case.folds:
@@ -133,7 +134,6 @@ app = cyclopts.App(help=__doc__)
 @app.default
 def main(
     *,
-    replicas: Annotated[int, cyclopts.Parameter(help="Clean campaigns simulated for each check.")] = 120,
     out: Annotated[
         Path | None,
         cyclopts.Parameter(help="Folder for the answers; then page and figures stay as they are."),
@@ -146,7 +146,7 @@ def main(
         file = folder / f"{case.name}.json"
         if not file.exists():
             print(f"== {case.name}", flush=True)
-            write(file, diagnose_case(case, replicas, figures=out is None))
+            write(file, diagnose_case(case, figures=out is None))
     if out is not None:
         return
     found = {case.name: read(ANSWERS / f"{case.name}.json") for case in CASES}
