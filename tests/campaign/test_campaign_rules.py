@@ -228,11 +228,11 @@ def test_a_sensor_s_own_sd_is_told_at_each_reading(texts, folder_with):
 
 
 def test_bounds_are_read(texts, folder_with):
-    text = texts["recordings.csv"].replace("upper,30", "upper,200").replace("span,25,3", "span,25,0.2")
+    text = texts["recordings.csv"].replace("upper,30", "upper,40").replace("span,25,3", "span,25,0.04")
     campaign = read_campaign(folder_with({"recordings.csv": text}))
-    assert campaign.values[0, 0] == 200 and campaign.stated_sd[0, 1] == 0.2
-    with pytest.raises(CampaignError, match="0.19, expected at least 0.2 m/s, 1/1000 of the largest"):
-        read_campaign(folder_with({"recordings.csv": text.replace("25,0.2", "25,0.19")}))
+    assert campaign.values[0, 0] == 40 and campaign.stated_sd[0, 1] == 0.04
+    with pytest.raises(CampaignError, match="0.039, expected at least 0.04 m/s, 1/1000 of the largest"):
+        read_campaign(folder_with({"recordings.csv": text.replace("25,0.04", "25,0.039")}))
 
 
 def test_a_track_may_be_level_where_fronts_are_released_with_a_speed(texts, folder_with):

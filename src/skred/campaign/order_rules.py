@@ -71,7 +71,7 @@ def _stop_problems(
         release = releases.get(event)
         if release is None:
             continue
-        if stop_m + hypot(reach_m, _release_reach(release)) < release.number("release_s_m"):
+        if stop_m + hypot(reach_m, release_reach(release)) < release.number("release_s_m"):
             message = (
                 f"event '{event}' would have stopped above its release at s = "
                 f"{release.number('release_s_m'):g} m (events.csv, row {release.line}); correct one of"
@@ -91,7 +91,7 @@ def _start_problems(
         if release is None:
             continue
         place_m = release.number("release_s_m")
-        if sensor.s_from_m + _release_reach(release) < place_m:
+        if sensor.s_from_m + release_reach(release) < place_m:
             message = (
                 f"event '{row.word('event')}' starts further down, at s = {place_m:g} m (events.csv, row "
                 f"{release.line}), and so has no speed at s = {sensor.s_from_m:g} m; correct one of the two"
@@ -114,7 +114,8 @@ def _sd(row: Row, sensor: Sensor) -> float:
     return hypot(sensor.relative_sd * value, sensor.absolute_sd) if stated is None else stated
 
 
-def _release_reach(release: Row) -> float:
+def release_reach(release: Row) -> float:
+    """How far a release may be from where it was noted, m."""
     return LARGEST_SDS * (release.number_or_none("release_sd_m") or 0.0)
 
 

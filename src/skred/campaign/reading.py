@@ -8,6 +8,7 @@ import numpy as np
 
 from skred.campaign import cells, rules
 from skred.campaign.description import Description, read_description
+from skred.campaign.fall_rules import fall_problems
 from skred.campaign.order_rules import order_problems
 from skred.campaign.problems import CampaignError, Problem
 from skred.campaign.records import Campaign, Event, Quantity, Sensor, Status, Track
@@ -94,7 +95,10 @@ def read_campaign(folder: Path) -> Campaign:
         by_id = {sensor.id: sensor for sensor in sensors}
         event_ids, sensor_ids = _ids(event_table, "event"), _ids(sensor_table, "sensor")
         problems += rules.recording_problems(recording_table.rows, event_ids, sensor_ids, by_id, length_m)
-        problems += order_problems(recording_table.rows, by_id, _releases(event_table, length_m))
+        releases = _releases(event_table, length_m)
+        problems += order_problems(recording_table.rows, by_id, releases)
+        if track is not None:
+            problems += fall_problems(recording_table.rows, by_id, releases, track)
     problems += _too_many(event_table, sensor_table)
     if problems or description is None or track is None:
         raise CampaignError(_bounded(_in_order(problems)))
