@@ -227,3 +227,14 @@ def test_embedded_campaigns_are_found_anywhere(tmp_path, monkeypatch):
     for name in ("rygfonn", "", "\0", "x" * 5000, "../data"):
         with pytest.raises(CampaignError, match="ryggfonn, ryggfonn-with-dam"):
             find_campaign(name)
+
+
+def test_another_separator_is_told_once_with_the_way_in(texts, folder_with):
+    tables = {file: text.replace(",", ";") for file, text in texts.items() if file.endswith(".csv")}
+    with pytest.raises(CampaignError) as caught:
+        read_campaign(folder_with(tables))
+    [problem] = caught.value.problems
+    assert problem.file == "track.csv" and "sensors.csv, events.csv, recordings.csv" in problem.message
+    assert "skred import FOLDER --out" in problem.message
+    with pytest.raises(CampaignError, match="events.csv, row 1.*: columns are separated by semicolons"):
+        read_campaign(folder_with({"events.csv": tables["events.csv"]}))

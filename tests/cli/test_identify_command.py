@@ -311,7 +311,7 @@ def test_a_diagnosis_is_told_with_its_statement(few: Path, capsys: pytest.Captur
     assert told.err == "writing the report\n"
     document = json.loads((few / "told" / "verdict.json").read_text())
     assert " ".join(told.out.split()).count(document["statement"]) == 1
-    assert "[bold]few" in told.out and told.out.endswith("\n\nwritten: told\n")
+    assert "[bold]few" in told.out and told.out.endswith("\n\nwritten: told/report.html\n")
     assert (few / "told" / "report.html").is_file()
     assert run(["diagnose", "few", "--json"]) == 0
     told = capsys.readouterr()

@@ -1,6 +1,7 @@
 """Read a campaign: five files in, a `Campaign` or every problem out."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
@@ -12,7 +13,15 @@ from skred.campaign.fall_rules import fall_problems
 from skred.campaign.order_rules import order_problems
 from skred.campaign.problems import CampaignError, Problem
 from skred.campaign.records import Campaign, Event, Quantity, Sensor, Status, Track
-from skred.campaign.tables import MOST_PROBLEMS, Column, ReadCell, Row, Table, read_table
+from skred.campaign.tables import (
+    MOST_PROBLEMS,
+    OTHER_SEPARATOR,
+    Column,
+    ReadCell,
+    Row,
+    Table,
+    read_table,
+)
 from skred.campaign.track_rules import TRACK as TRACK_FILE
 from skred.campaign.track_rules import track_problems
 
@@ -101,7 +110,7 @@ def read_campaign(folder: Path) -> Campaign:
             problems += fall_problems(recording_table.rows, by_id, releases, track)
     problems += _too_many(event_table, sensor_table)
     if problems or description is None or track is None:
-        raise CampaignError(_bounded(_in_order(problems)))
+        raise CampaignError(_bounded(_in_order(_separator_once(problems))))
     return _campaign(description, track, sensors, _events(event_table), recording_table.rows)
 
 
@@ -193,6 +202,16 @@ def _too_many(events: Table, sensors: Table) -> list[Problem]:
     message = f"events times sensors is more than {MOST_READINGS}; split the campaign"
     found = f"{len(events.rows)} events, {len(sensors.rows)} sensors"
     return [Problem(rules.EVENTS, None, None, found, message)]
+
+
+def _separator_once(problems: Sequence[Problem]) -> list[Problem]:
+    """Tell tables that a spreadsheet saved with another separator once: one import reads them all."""
+    same = [problem for problem in problems if problem.message == OTHER_SEPARATOR]
+    if len(same) < 2:
+        return list(problems)
+    others = ", ".join(problem.file for problem in same[1:])
+    once = replace(same[0], message=f"here and in {others} {OTHER_SEPARATOR}")
+    return [once, *(problem for problem in problems if problem not in same)]
 
 
 def _in_order(problems: Sequence[Problem]) -> list[Problem]:

@@ -23,6 +23,12 @@ MOST_PROBLEMS = 1000
 FEWEST_OF_A_COLUMN = 3
 """Cells that must be wrong alike for the column to be what is wrong."""
 
+OTHER_SEPARATOR = (
+    "columns are separated by semicolons or tabs, as a spreadsheet with decimal commas saves them; this reads"
+    " them as they are: skred import FOLDER --out NEW-FOLDER"
+)
+"""What is said of a table that needs an import; of several, once."""
+
 Value = float | str | None
 ReadCell = Callable[[str], Value]
 
@@ -226,8 +232,7 @@ def _header_problems(
     known = [column.name for column in columns]
     problems = []
     if len(header) == 1 and (";" in header[0] or "\t" in header[0]):
-        message = "columns are separated by commas; save the file that way"
-        return [Problem(file, line, None, header[0], message)]
+        return [Problem(file, line, None, header[0], OTHER_SEPARATOR)]
     if len(header) > MOST_COLUMNS:
         message = f"found {len(header)} columns, at most {MOST_COLUMNS} are read; remove some"
         return [Problem(file, line, None, None, message)]

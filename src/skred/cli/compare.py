@@ -36,5 +36,5 @@ def compare(
 
     from skred.report.shared.tables import comparison_table
 
-    output.show(comparison, comparison_table, comparison["statement"], results.path / "report.html")
+    output.show(comparison, comparison_table, comparison["statement"], results.path)
     return DONE if all(model["gate"]["passed"] for model in comparison["models"]) else NOT_CONVERGED

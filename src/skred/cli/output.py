@@ -15,6 +15,9 @@ from skred.cli.options import Force, Json, Out, Quiet
 if TYPE_CHECKING:
     from skred.output import ResultsFolder
 
+REPORT = "report.html"
+"""The page of a folder of results."""
+
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +77,8 @@ def show_table(table: Any, sentences: list[str], where: Path) -> None:
     console.print(table)
     for sentence in sentences:
         console.print(Text(sentence))
-    console.print(Text(f"\nwritten: {where}"), soft_wrap=True)
+    page = where / REPORT
+    console.print(Text(f"\nwritten: {page if page.is_file() else where}"), soft_wrap=True)
 
 
 def write_json(document: dict[str, Any]) -> None:
