@@ -1,12 +1,15 @@
 """What is wrong with a campaign, said so that its owner can put it right."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 
 from skred.errors import InputError
 
 SHOWN_CHARACTERS = 60
 SHOWN_PROBLEMS_PER_FILE = 20
+FEWEST_ALIKE = 3
+"""Problems that say the same of one column are told in one line from so many on."""
+SHOWN_ROWS = 5
 
 
 def shown(text: str, longest: int = SHOWN_CHARACTERS) -> str:
@@ -119,7 +122,31 @@ def problem_lines(problems: Iterable[Problem], per_file: int = SHOWN_PROBLEMS_PE
         by_file.setdefault(problem.file, []).append(problem)
     lines: list[str] = []
     for file, of_file in by_file.items():
-        lines += [str(problem) for problem in of_file[:per_file]]
-        if len(of_file) > per_file:
-            lines.append(f"{file}: … and {len(of_file) - per_file} more problems in this file")
+        alike = _alike(of_file)
+        lines += [_line(same) for same in alike[:per_file]]
+        if len(alike) > per_file:
+            more = sum(len(same) for same in alike[per_file:])
+            lines.append(f"{file}: … and {more} more problems in this file")
     return lines
+
+
+def _alike(problems: Sequence[Problem]) -> list[list[Problem]]:
+    """Problems of one file, those together that say the same of several rows of a column."""
+    told: dict[tuple[object, ...], list[Problem]] = {}
+    for position, problem in enumerate(problems):
+        column = position if problem.row is None or problem.column is None else problem.column
+        told.setdefault((column, problem.message), []).append(problem)
+    groups: list[list[Problem]] = []
+    for same in told.values():
+        groups += [same] if len(same) >= FEWEST_ALIKE else [[problem] for problem in same]
+    return sorted(groups, key=lambda same: problems.index(same[0]))
+
+
+def _line(same: Sequence[Problem]) -> str:
+    """One line for problems that say the same."""
+    first = same[0]
+    if len(same) == 1:
+        return str(first)
+    rows = ", ".join(str(problem.row) for problem in same[1:SHOWN_ROWS])
+    more = f" and {len(same) - SHOWN_ROWS} more" if len(same) > SHOWN_ROWS else ""
+    return f"{first} (so in {len(same)} rows: {first.row}, {rows}{more})"

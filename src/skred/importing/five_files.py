@@ -8,12 +8,12 @@ from skred.campaign import CampaignError, Problem
 from skred.campaign.cells import CellError, has_unit, number
 from skred.campaign.reading import EVENTS, RECORDINGS, SENSORS
 from skred.importing.draft import DraftTable, Where, with_where
+from skred.importing.mapping import Cells, Place
 from skred.importing.mapping import Mapping as Declared
-from skred.importing.mapping import Place
 from skred.importing.numbers import Notation, notation_of
 from skred.importing.places import Places
 from skred.importing.questions import Question, Unclear
-from skred.importing.readings import BOUNDS, bound_question
+from skred.importing.readings import BOUNDS, bound_question, number_of, silence
 from skred.importing.sheet import TABLE, Sheet
 
 TEXT = frozenset(("sensor", "quantity", "event", "status"))
@@ -123,9 +123,27 @@ def rows_with_points(
             try:
                 cells[new] = notation.with_point(cells[new]) if cells[new] else ""
             except CellError as error:
-                problems.append(Problem(sheet.file, line, written[new], cells[new], str(error)))
+                message = _in_columns(cells[new], notation) if new == "value" else ""
+                problem = Problem(sheet.file, line, written[new], cells[new], message or str(error))
+                problems.append(problem)
         rows.append((line, cells))
     return rows
+
+
+def _in_columns(text: str, notation: Notation) -> str:
+    """How a cell with more than a number is written in the format's columns; empty where it is not known."""
+    if silence(text, Cells()) is not None:
+        return (
+            "no number; leave it empty, with the status 'missing' (no reading) or 'not_reached' (the"
+            " avalanche stopped above)"
+        )
+    try:
+        said = number_of(text, notation)
+    except CellError:
+        return ""
+    cells = {"value": said.value, "value_to": said.value_to, "sd": said.sd}
+    listed = [f"{name} {cell.replace('.', notation.decimal)}" for name, cell in cells.items() if cell]
+    return f"this takes more than one column here: write {', '.join(listed)}, status {said.status}"
 
 
 def _is_numeric(table: str, name: str) -> bool:

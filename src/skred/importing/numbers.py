@@ -5,14 +5,19 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from skred.campaign.cells import CellError, number
-from skred.campaign.problems import CampaignError, Problem
+from skred.campaign.problems import CampaignError, Problem, shown
 from skred.importing.questions import Question, Unclear, set_option
 from skred.importing.sheet import TABLE, NumberText, Section
 
 THOUSANDS = (".", ",", "'", " ")
-_WITH_SIGN = re.compile(r"(?<![\d.,])\d*([.,])\d+(?![\d.,])")
+_WITH_SIGN = re.compile(r"(?<![\w.,])\d*([.,])\d+(?![\d.,])")
 _LIKE_THOUSANDS = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
 _BOTH = {sign: re.compile(rf"\d{{1,3}}(?:[{other}]\d{{3}})+[{sign}]\d+") for sign, other in (".,", ",.")}
+_PLAIN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_EXPONENT = re.compile(r"(?<=\d)[eE](?=[+-]?\d)")
+_NO_PART = re.compile(r"[^\d\s.,'+-]")
+"""What no number has, in any notation."""
+_DIGITS = re.compile(r"[+-]?\d(?:[\d.,' ]*\d)?")
 _TYPOGRAPHIC = str.maketrans({"\u2212": "-", "\u00a0": " ", "\u202f": " ", "\u2019": "'"})
 
 
@@ -39,6 +44,7 @@ class Notation:
             number(text)
             return str(text)
         plain = text.translate(_TYPOGRAPHIC)
+        self._refuse_words(plain)
         if self.thousands:
             plain = self._without_thousands(plain)
         elif re.search(r"\d[' ]\d{3}", plain):
@@ -51,8 +57,33 @@ class Notation:
                 f'--set table.thousands="{other}" if it stands between thousands'
             )
         plain = plain.replace(self.decimal, ".")
+        if not _PLAIN.fullmatch(plain):
+            raise CellError(f"expected one number, such as {self.example}; correct it")
         number(plain)
         return plain
+
+    @property
+    def example(self) -> str:
+        """A number with a part after the decimal sign."""
+        return f"12{self.decimal}5"
+
+    def _refuse_words(self, text: str) -> None:
+        """Refuse a cell that holds something else than a number, whatever the number's signs are."""
+        if not re.search(r"\d", text):
+            raise CellError(
+                f"there is no number; write digits, such as {self.example}, or leave the cell empty if its"
+                " column allows that"
+            )
+        if not _NO_PART.search(_EXPONENT.sub("", text)):
+            return
+        numbers = _DIGITS.findall(text)
+        before, _, after = (part.strip() for part in text.partition(numbers[0]))
+        if len(numbers) > 1 or (before and after):
+            raise CellError(f"expected one number, such as {self.example}, and nothing else in the cell")
+        word, rest = before, ", and how uncertain it is as standard deviation"
+        if after:
+            word, rest = after, " in the column's unit, which its name says or an option declares"
+        raise CellError(f"'{shown(word, 20)}' is no part of a number; write {numbers[0]} alone{rest}")
 
     def _without_thousands(self, text: str) -> str:
         """Take the signs between thousands out; elsewhere they are refused."""
