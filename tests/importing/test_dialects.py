@@ -217,3 +217,95 @@ def test_excel_hint_of_the_separator(tmp_path: Path, track: Path, capsys: pytest
     code, _, err = skred(capsys, "import", file, "--track", track, *options(), "--out", tmp_path / "out")
     assert code == 0, err
     assert read_campaign(tmp_path / "out").values[0, 0] == 30.5
+
+
+FIVE_CELLS = {
+    ">30": "write value 30, status at_least",
+    "at least 30,5": "write value 30,5, status at_least",
+    "12-18": "write value 12, value_to 18, status between",
+    "50 ± 5": "write value 50, sd 5, status observed",
+    "unknown": "leave it empty, with the status 'missing'",
+    "-": "leave it empty, with the status 'missing'",
+    "50 km/h": "'km/h' is no part of a number; write 50 alone",
+    "10 %": "'%' is no part of a number; write 10 alone",
+    "ca. 30,5": "'ca.' is no part of a number; write 30,5 alone",
+    "ca.30": "'ca.' is no part of a number; write 30 alone",
+    "1,2,3": "expected one number, such as 12,5",
+}
+
+
+@pytest.mark.parametrize(("cell", "advice"), FIVE_CELLS.items())
+def test_what_is_no_number_is_told_so_that_obeying_helps(
+    cell: str, advice: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = in_dialect(TEXTS, tmp_path / "other")
+    text = (folder / "recordings.csv").read_text(encoding="utf-8-sig")
+    (folder / "recordings.csv").write_text(
+        text.replace("upper;30;", f"upper;{cell};").replace(";25;", ";25,5;")
+    )
+    code, _, err = skred(capsys, "import", folder)
+    assert code == 2 and "recordings.csv, row 2, column value" in err and advice in err, err
+    assert "12.5" not in err and "thousands" not in err
+
+
+def test_a_word_beside_a_decimal_comma_in_a_wide_table(
+    tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = with_decimal(WIDE, ",")
+    rows[1][3] = "ca. 320,5"
+    file = wide_file(tmp_path, rows, separator=";")
+    code, _, err = skred(capsys, "import", file, "--track", track, *options())
+    assert code == 2 and "'ca.' is no part of a number; write 320,5 alone" in err and "thousands" not in err
+
+
+def test_cells_that_are_wrong_alike_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = in_dialect(TEXTS, tmp_path / "other", decimal=",")
+    text = (folder / "recordings.csv").read_text(encoding="utf-8-sig")
+    for speed in ("30", "25", "10", "20"):
+        text = text.replace(f";{speed};", f";0.0{speed};", 1)
+    (folder / "recordings.csv").write_text(text)
+    code, _, err = skred(capsys, "import", folder, "--decimal", ",")
+    [line] = [line for line in err.splitlines() if "recordings.csv" in line]
+    assert code == 2 and line.endswith("(so in 4 rows: 2, 3, 4, 6)")
+
+
+def test_a_unit_in_the_header_of_the_five_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plain = read_campaign(write_texts(tmp_path / "plain", TEXTS))
+    folder = in_dialect(TEXTS, tmp_path / "other")
+    text = (folder / "recordings.csv").read_text(encoding="utf-8-sig").replace("value;", "value [km/h];", 1)
+    (folder / "recordings.csv").write_text(text)
+    code, _, err = skred(capsys, "import", folder)
+    assert code == 2 and "are speeds in km/h" in err and "--set velocity.unit=km/h|m/s" in err
+    arguments = ["import", folder, "--set", "velocity.unit=km/h", "--out", tmp_path / "out"]
+    code, _, err = skred(capsys, *arguments)
+    assert code == 0, err
+    read = read_campaign(tmp_path / "out")
+    assert read.values[0].tolist() == pytest.approx([30 / 3.6, 25 / 3.6, 10 / 3.6, plain.values[0, 3]])
+    (folder / "recordings.csv").write_text(text.replace("km/h", "m/s", 1))
+    code, _, err = skred(capsys, "import", folder, "--out", tmp_path / "same")
+    assert code == 0 and read_campaign(tmp_path / "same").fingerprint() == plain.fingerprint(), err
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16-le"])
+def test_a_byte_order_mark_that_stands_twice(
+    encoding: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = in_dialect(TEXTS, tmp_path / "other", encoding="utf-8")
+    for file in folder.glob("*.csv"):
+        file.write_bytes(("\ufeff\ufeff" + file.read_text(encoding="utf-8")).encode(encoding))
+    code, out, err = skred(capsys, "import", folder, "--out", tmp_path / "out")
+    assert code == 0 and "feff" not in out, err
+    [line] = [line for line in out.splitlines() if line.split()[:1] == ["first"]]
+    assert line.split()[1:4] == ["0", "30", "25"]
+
+
+def test_a_file_that_is_not_there_is_told_with_the_nearest_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = in_dialect(TEXTS, tmp_path / "other")
+    _, _, err = skred(capsys, "import", folder / "recordngs.csv")
+    assert f"is '{folder / 'recordings.csv'}' meant?" in err
+    _, _, err = skred(capsys, "import", folder / "zzz")
+    assert "there is no such file; correct the path" in err
+    _, _, err = skred(capsys, "validate", "rygfonn")
+    assert "is 'ryggfonn' meant?" in err

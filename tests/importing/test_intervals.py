@@ -52,10 +52,10 @@ def test_decimal_commas_thousands_and_a_standard_deviation() -> None:
         ("12-12", "both ends of the interval are the same"),
         (">= 12-18", "a bound is one number"),
         ("2026-12-18", "a date stands here"),
-        ("12-18-20", "expected a number"),
-        ("1e-5 to", "expected a number"),
-        ("12 til", "expected a number"),
-        ("1" + " " * 100_000 + "x", "expected a number"),
+        ("12-18-20", "expected one number"),
+        ("1e-5 to", "expected one number"),
+        ("12 til", "'til' is no part of a number"),
+        ("1" + " " * 100_000 + "x", "'x' is no part of a number"),
     ],
 )
 def test_what_is_no_interval(cell: str, told: str) -> None:

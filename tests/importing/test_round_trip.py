@@ -25,12 +25,12 @@ SPEEDS = st.one_of(st.integers(1, 60).map(float), st.floats(0.5, 60))
 
 @st.composite
 def campaigns(draw: Any) -> Campaign:
-    """Campaigns of every kind of reading on a straight slope 500 m long."""
-    x_m = np.array([0.0, *np.cumsum(draw(st.lists(st.floats(10, 50), min_size=5, max_size=8)))])
+    """Campaigns of every kind of reading on a straight slope, no speed above a free fall."""
+    x_m = np.array([0.0, *np.cumsum(draw(st.lists(st.floats(200, 500), min_size=5, max_size=8)))])
     track = Track(x_m, 2000.0 - 0.75 * x_m)
     length = track.length_m
     ids = draw(st.lists(WORDS, min_size=2, max_size=4, unique=True))
-    places = [draw(st.floats(0, 0.4 * length)) for _ in ids[1:]]
+    places = [draw(st.floats(0.35 * length, 0.4 * length)) for _ in ids[1:]]
     sensors = [
         Sensor(one, "front_velocity", at, at, 0.1, 1.0) for one, at in zip(ids[1:], places, strict=True)
     ]

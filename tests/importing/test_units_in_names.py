@@ -111,13 +111,14 @@ def test_other_units_of_a_sensor_are_asked_about(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     more = (*with_sensors(tmp_path), "--set", "velocity.unit=m/s")
-    code, err = imported(capsys, tmp_path, ["event", name], ["a", "120"], *more)
+    row = "20" if "velocity" in known else "120"
+    code, err = imported(capsys, tmp_path, ["event", name], ["a", row], *more)
     assert code == 2 and f"column {name}: its unit '{unit}' is none of" in err, err
     units = "m/s|km/h" if "velocity" in known else "m|km"
     assert f'--column "{name}={known} unit={units}"' in err, err
     # The line is taken as it stands, once one of the units is left.
     answer = f"{name}={known} unit={units.split('|')[0]}"
-    code, err = imported(capsys, tmp_path, ["event", name], ["a", "120"], *more, "--column", answer)
+    code, err = imported(capsys, tmp_path, ["event", name], ["a", row], *more, "--column", answer)
     assert code == 0, err
     assert read_campaign(tmp_path / "out").sensor_ids == (known.split()[1].removeprefix("sensor="),)
 
@@ -157,7 +158,7 @@ def test_a_sensor_whose_id_looks_like_a_property_is_a_sensor(
 def test_standard_deviations_have_units_of_their_own(
     reading: str, name: str, sd: float, tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    header, row = ["event", reading, name], ["a", "54", "1.5"]
+    header, row = ["event", reading, name], ["a", "36", "1.5"]
     columns = ("event=event", f"{reading}=front_velocity at=90 sensor=v")
     code, err = imported(capsys, tmp_path, header, row, columns=columns)
     assert code == 0, err
@@ -201,7 +202,7 @@ def test_other_units_of_standard_deviations_are_asked_about(
 def test_the_unit_of_standard_deviations_is_shown(
     tmp_path: Path, track: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    file = wide_file(tmp_path, [["event", "v [km/h]", "sd v [m/s]"], ["a", "54", "1.5"]])
+    file = wide_file(tmp_path, [["event", "v [km/h]", "sd v [m/s]"], ["a", "36", "1.5"]])
     columns = [word for word in options("v [km/h]=front_velocity at=90 sensor=v") if word != "--quiet"]
     _, out, _ = skred(capsys, "import", file, "--track", track, *columns)
     [line] = [line for line in out.splitlines() if "sd v [m/s]" in line]

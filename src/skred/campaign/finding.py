@@ -1,7 +1,9 @@
 """Find a campaign by its folder, or by its name if it is embedded in the package."""
 
+from difflib import get_close_matches
 from pathlib import Path
 
+from skred.campaign.cells import LONGEST_WORD
 from skred.campaign.problems import CampaignError, Problem
 
 _PACKAGE = Path(__file__).resolve().parents[1]
@@ -55,5 +57,7 @@ def find_campaign(name_or_dir: str) -> Path:
     except (OSError, ValueError):
         pass  # not a path at all, such as one with a NUL byte or thousands of characters
     names = ", ".join(embedded) or "none"
-    message = f"neither a folder nor an embedded campaign; give a folder, or one of: {names}"
+    near = get_close_matches(name[:LONGEST_WORD], embedded, n=1)
+    meant = f"is '{near[0]}' meant? Otherwise " if near else ""
+    message = f"neither a folder nor an embedded campaign; {meant}give a folder, or one of: {names}"
     raise CampaignError([Problem(name or "(empty)", None, None, None, message)])

@@ -143,7 +143,7 @@ def _decoded(raw: bytes, file: str) -> str | Problem:
         row = raw[: raw.index(b"\0")].count(b"\n") + 1
         return Problem(file, row, None, None, "the file holds NUL bytes; save it as plain text in UTF-8")
     try:
-        text = raw.decode("utf-8-sig")
+        text = raw.decode("utf-8").lstrip("\ufeff")  # some programs write the byte order mark twice
     except UnicodeDecodeError as error:
         row = error.object[: error.start].count(b"\n") + 1
         found = f"byte 0x{error.object[error.start]:02x}"

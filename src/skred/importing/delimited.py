@@ -14,6 +14,8 @@ from skred.importing.sources import Source, refuse
 ENCODINGS = ("utf-8", "latin-1", "cp1252", "cp1250", "mac-roman", "cp850")
 """What may be declared for a file that is not UTF-8."""
 SEPARATORS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar"}
+_MARK = "\ufeff"
+"""The byte order mark, which some programs write once more at each saving."""
 _HINT = re.compile(r"sep=(.)\r?\n", re.I)
 
 
@@ -56,14 +58,14 @@ def _decoded(source: Source, encoding: str | None, section: Section) -> tuple[st
     content = source.content
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         try:
-            return content.decode("utf-16"), "UTF-16"
+            return content.decode("utf-16").lstrip(_MARK), "UTF-16"
         except UnicodeDecodeError:
             raise refuse(source.name, "the text is not UTF-16 as its mark says; save it as UTF-8") from None
     if b"\0" in content:
         row = content[: content.index(b"\0")].count(b"\n") + 1
         raise refuse(source.name, "the file holds NUL bytes; save it as CSV in UTF-8", row)
     try:
-        return content.decode("utf-8-sig"), "UTF-8"
+        return content.decode("utf-8").lstrip(_MARK), "UTF-8"
     except UnicodeDecodeError as error:
         if encoding is not None and encoding != "utf-8":
             try:

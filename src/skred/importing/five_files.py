@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from skred.campaign import CampaignError, Problem
 from skred.campaign.cells import CellError, has_unit, number
+from skred.campaign.problems import shown
 from skred.campaign.reading import EVENTS, RECORDINGS, SENSORS
 from skred.importing.draft import DraftTable, Where, with_where
 from skred.importing.mapping import Cells, Place
@@ -15,10 +16,13 @@ from skred.importing.places import Places
 from skred.importing.questions import Question, Unclear
 from skred.importing.readings import BOUNDS, bound_question, number_of, silence
 from skred.importing.sheet import TABLE, Sheet
+from skred.importing.units import base_and_unit, unit_of
 
 TEXT = frozenset(("sensor", "quantity", "event", "status"))
 """Columns of the format that hold words; all others hold numbers."""
 COLUMNS = {"sensors": SENSORS, "events": EVENTS, "recordings": RECORDINGS}
+READINGS = ("value", "value_to", "sd")
+"""Columns of recordings that hold speeds and runouts."""
 FACTORS = {"km/h": 1 / 3.6, "km": 1000.0}
 """What turns a unit into the format's."""
 _LIKE_NUMBER = re.compile(r"[+-]?[\d.,' ]+")
@@ -51,9 +55,11 @@ def read_five_files(
     """
     problems, questions = list[Problem](), list[Question]()
     tables, notations = dict[str, DraftTable](), dict[str, Notation]()
-    names = _covariates(sheets["events"], declared, questions)
+    names = {"events": _covariates(sheets["events"], declared, questions)}
+    names["recordings"], asked = _with_units(sheets["recordings"], declared)
+    questions += asked
     for table, sheet in sheets.items():
-        written = _written(sheet, names if table == "events" else {}, problems)
+        written = _written(sheet, names.get(table, {}), problems)
         numeric = [new for new in written if _is_numeric(table, new)]
         cells = ((line, written[new], text) for new in numeric for line, text in sheet.cells(written[new]))
         try:
@@ -150,6 +156,23 @@ def _is_numeric(table: str, name: str) -> bool:
     """Whether a column of that name holds numbers."""
     known = {column.name for column in COLUMNS[table]}
     return name not in TEXT if name in known else table == "events" and has_unit(name)
+
+
+def _with_units(sheet: Sheet, declared: Declared) -> tuple[dict[str, str], list[Question]]:
+    """New names of columns of readings whose names say a unit of speeds; the column holds runouts too."""
+    names, questions = dict[str, str](), list[Question]()
+    for name in sheet.columns:
+        base, written = base_and_unit(name)
+        unit = unit_of("front_velocity", name) if base in READINGS and written else None
+        if not unit:
+            continue
+        names[name] = base
+        if unit == "m/s" or declared.velocity.unit is not None or questions:
+            continue
+        asked = f"are speeds in {unit} (value, value_to and sd alike; runouts stay in their own unit)?"
+        where = f"{sheet.file}, column {shown(name)}"
+        questions.append(Question(("velocity", "unit"), where, asked, ("km/h", "m/s")))
+    return names, questions
 
 
 def _covariates(sheet: Sheet, declared: Declared, questions: list[Question]) -> dict[str, str]:

@@ -3,15 +3,21 @@
 import stat
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from itertools import islice
 from pathlib import Path
 
-from skred.campaign.problems import CampaignError, Problem
+from skred.campaign.cells import LONGEST_WORD
+from skred.campaign.problems import CampaignError, Problem, shown
 from skred.campaign.tables import LARGEST_FILE_BYTES
 
 CAMPAIGN = "campaign.toml"
 TABLES = ("track", "sensors", "events", "recordings")
 """The tables of the campaign format, as files and as sheets of a workbook."""
+MOST_NAMES = 1000
+"""So many names of a folder are compared with one that is not there."""
 _OLD_EXCEL = b"\xd0\xcf\x11\xe0"
 _ZIP = b"PK\x03\x04"
 
@@ -78,7 +84,7 @@ def open_source(path: Path, inside: Path | None = None) -> Source:
         with place.open("rb") as opened:
             content = opened.read(LARGEST_FILE_BYTES + 1)
     except FileNotFoundError:
-        raise refuse(str(path), "there is no such file; correct the path") from None
+        raise refuse(str(path), f"there is no such file; {_nearest(path)}") from None
     except (OSError, RuntimeError, ValueError) as error:
         if isinstance(error, CampaignError):
             raise
@@ -92,6 +98,16 @@ def open_source(path: Path, inside: Path | None = None) -> Source:
     if not content.strip():
         raise refuse(name, "the file is empty")
     return Source(name, content)
+
+
+def _nearest(path: Path) -> str:
+    """What to do about a file that is not there: the most similar name beside it, if there is one."""
+    with suppress(OSError):
+        names = [one.name for one in islice(path.parent.iterdir(), MOST_NAMES)]
+        near = get_close_matches(path.name, names, n=1)
+        if near:
+            return f"is '{shown(str(path.parent / near[0]), LONGEST_WORD)}' meant?"
+    return "correct the path"
 
 
 def sort_out(files: Sequence[Path]) -> Sources:
