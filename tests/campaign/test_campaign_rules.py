@@ -235,6 +235,21 @@ def test_bounds_are_read(texts, folder_with):
         read_campaign(folder_with({"recordings.csv": text.replace("25,0.04", "25,0.039")}))
 
 
+@pytest.mark.parametrize("cell", [">30", "at least 30", "<= 30"])
+def test_a_bound_in_a_value_is_told_its_column(cell, texts, folder_with):
+    text = texts["recordings.csv"].replace("first,upper,30", f"first,upper,{cell}")
+    with pytest.raises(CampaignError, match="number alone, with the status at_least or at_most"):
+        read_campaign(folder_with({"recordings.csv": text}))
+
+
+def test_a_unit_in_a_header_is_told_once(texts, folder_with):
+    text = texts["recordings.csv"].replace("value,", "value [km/h],", 1)
+    with pytest.raises(CampaignError) as caught:
+        read_campaign(folder_with({"recordings.csv": text}))
+    [problem] = caught.value.problems
+    assert problem.column == "value [km/h]" and "skred import FOLDER --out" in problem.message
+
+
 def test_a_track_may_be_level_where_fronts_are_released_with_a_speed(texts, folder_with):
     level = "x_m,z_m\n0,300\n60,300\n120,300\n500,300\n"
     with pytest.raises(CampaignError, match="ends no lower than it starts"):
@@ -358,7 +373,10 @@ def test_long_lists_are_cut_when_shown_and_bounded_when_collected(texts, folder_
     with pytest.raises(CampaignError) as caught:
         read_campaign(folder_with({"recordings.csv": texts["recordings.csv"] + lines}))
     assert len(caught.value.problems) == 50
-    assert "and 30 more problems" in str(caught.value)
+    assert str(caught.value).endswith("(so in 50 rows: 12, 13 'e1', 14 'e2', 15 'e3', 16 'e4' and 45 more)")
+    steps = "".join(f"{300 - i},{100 - i}\n" for i in range(51))
+    with pytest.raises(CampaignError, match="track.csv: … and 30 more problems"):
+        read_campaign(folder_with({"track.csv": f"x_m,z_m\n{steps}"}))
     lines = "".join(f"first,upper,x{i},,observed\n" for i in range(3000))
     with pytest.raises(CampaignError) as caught:
         read_campaign(folder_with({"recordings.csv": texts["recordings.csv"] + lines}))

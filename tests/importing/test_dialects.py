@@ -261,12 +261,14 @@ def test_a_word_beside_a_decimal_comma_in_a_wide_table(
 def test_cells_that_are_wrong_alike_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = in_dialect(TEXTS, tmp_path / "other", decimal=",")
     text = (folder / "recordings.csv").read_text(encoding="utf-8-sig")
-    for speed in ("30", "25", "10", "20"):
-        text = text.replace(f";{speed};", f";0.0{speed};", 1)
+    for value in ("30", "25", "10", "320", "20", "180"):
+        text = text.replace(f";{value};", f";0.{value};", 1)
     (folder / "recordings.csv").write_text(text)
     code, _, err = skred(capsys, "import", folder, "--decimal", ",")
     [line] = [line for line in err.splitlines() if "recordings.csv" in line]
-    assert code == 2 and line.endswith("(so in 4 rows: 2, 3, 4, 6)")
+    assert code == 2 and line.endswith(
+        "(so in 6 rows: 2, 3 '0.25', 4 '0.10', 5 '0.320', 6 '0.20' and 1 more)"
+    )
 
 
 def test_a_unit_in_the_header_of_the_five_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,6 +17,7 @@ STATUSES = ("observed", "not_reached", "missing", "at_least", "at_most", "betwee
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+", re.ASCII)
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}([,' _\u00a0\u202f]\d{3})+(\.\d+)?", re.ASCII)
+_BOUND = re.compile(r"[<>≤≥]|(at|min|max|up to)\b", re.IGNORECASE)
 _UNIT = re.compile(
     r".*[^_]_(?:1|percent|permille|degC|deg|rad|Hz|K|"
     r"(?:m|km|cm|mm|s|min|h|d|kg|N|kN|Pa|hPa|kPa|MPa|J|kJ|W)[1-4]?)"
@@ -89,6 +90,18 @@ def not_negative(text: str) -> float:
 def optional_number(text: str) -> float | None:
     """Read a number, or nothing from an empty cell."""
     return None if text == "" else number(text)
+
+
+def reading(text: str) -> float | None:
+    """Read the value of a reading; a bound that stands in it has a column of its own."""
+    try:
+        return optional_number(text)
+    except CellError as error:
+        if not _BOUND.match(text):
+            raise
+        raise CellError(
+            f"{error}; a bound is the number alone, with the status at_least or at_most"
+        ) from None
 
 
 def optional_positive(text: str) -> float | None:

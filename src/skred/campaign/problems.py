@@ -7,7 +7,7 @@ from skred.errors import InputError
 
 SHOWN_CHARACTERS = 60
 SHOWN_PROBLEMS_PER_FILE = 20
-FEWEST_ALIKE = 3
+FEWEST_ALIKE = 6
 """Problems that say the same of one column are told in one line from so many on."""
 SHOWN_ROWS = 5
 
@@ -147,6 +147,8 @@ def _line(same: Sequence[Problem]) -> str:
     first = same[0]
     if len(same) == 1:
         return str(first)
-    rows = ", ".join(str(problem.row) for problem in same[1:SHOWN_ROWS])
-    more = f" and {len(same) - SHOWN_ROWS} more" if len(same) > SHOWN_ROWS else ""
-    return f"{first} (so in {len(same)} rows: {first.row}, {rows}{more})"
+    rows = ", ".join(
+        f"{problem.row}" + ("" if problem.found == first.found else f" '{problem.found}'")
+        for problem in same[1:SHOWN_ROWS]
+    )
+    return f"{first} (so in {len(same)} rows: {first.row}, {rows} and {len(same) - SHOWN_ROWS} more)"

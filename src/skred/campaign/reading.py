@@ -52,7 +52,7 @@ EVENTS = (
 RECORDINGS = (
     Column("event", cells.word),
     Column("sensor", cells.word),
-    Column("value", cells.optional_number),
+    Column("value", cells.reading),
     Column("value_to", cells.optional_number, required=False),
     Column("sd", cells.optional_positive, required=False),
     Column("status", cells.status),

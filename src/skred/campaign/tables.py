@@ -243,15 +243,26 @@ def _header_problems(
             message = f"expected a printable name of at most {LONGEST_WORD} characters; rename the column"
         elif name in header[:position]:
             message = "the column appears twice; remove or rename one"
+        elif _without_unit(name) in known:
+            message = (
+                "a unit is no part of this name; skred import FOLDER --out NEW-FOLDER reads it, or write the"
+                f" numbers in the format's unit and call the column {_without_unit(name)}"
+            )
         elif name not in known and not extra_allowed:
             message = f"unknown column; expected {', '.join(known)}: rename or remove it"
         else:
             continue
         problems.append(Problem(file, line, name, name, message))
     for column in columns:
-        if column.required and column.name not in header:
+        if column.required and column.name not in (*header, *map(_without_unit, header)):
             problems.append(Problem(file, line, column.name, None, "the column is missing; add it"))
     return problems
+
+
+def _without_unit(name: str) -> str:
+    """A column's name without a unit in brackets behind it; empty where it has none."""
+    base, bracket, _ = name.replace("(", "[").partition("[")
+    return base.strip() if bracket else ""
 
 
 def _read_rows(
