@@ -4,7 +4,8 @@ import pytest
 from page_checks import check_page
 from test_report_html import Page
 
-from skred.report.prediction.page import period, render_prediction
+from skred.report.prediction.page import render_prediction
+from skred.report.prediction.words import period
 
 ADDED = [
     {"title": "another surface", "place_m": [978.75, 1778.75], "used": True, "why": ""},

@@ -11,6 +11,7 @@ import xarray as xr
 from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY
+from skred.prediction.bands import banded, runouts_exceeded_by
 from skred.prediction.own_places import own_places, places_left_out
 from skred.prediction.probabilities import PARTS
 from skred.prediction.source import Source
@@ -18,6 +19,7 @@ from skred.prediction.statement import prediction_statement
 from skred.prediction.terms import added_rows
 from skred.prediction.track import PredictionTrack
 from skred.prediction.wanted import Wanted
+from skred.prediction.without_added import without_added
 
 
 def prediction_document(
@@ -26,10 +28,12 @@ def prediction_document(
     data: xr.Dataset | None,
     wanted: Wanted | None = None,
     source: Source | None = None,
+    base: xr.Dataset | None = None,
 ) -> dict[str, Any]:
     """Summary of a prediction as plain data; without `data` it is marked as failed and has no numbers.
 
-    Its ``statement`` says in sentences what it means.
+    `base` is the same by the base law, where something was added to that. The document's ``statement`` says
+    in sentences what it means.
     """
     problem, law, campaign = calibration.problem, calibration.law, calibration.problem.campaign
     assert isinstance(problem, HierarchicalProblem)
@@ -71,6 +75,7 @@ def prediction_document(
     document["places_left_out"] = [{"name": name, "s_m": s} for name, s in left_out]
     empty = ("simulation", "reading_errors", "runout", "places", "at")
     document |= dict.fromkeys(empty) if data is None else _numbers(problem, track, data)
+    document["without_added"] = None if source is None else without_added(source, track, base)
     document["statement"] = prediction_statement(document)
     return document
 
@@ -85,11 +90,6 @@ def recorded_runouts(problem: HierarchicalProblem, track: PredictionTrack) -> tu
 
 
 def _numbers(problem: HierarchicalProblem, track: PredictionTrack, data: xr.Dataset) -> dict[str, Any]:
-    quantiles = []
-    for k, share in enumerate(data["share"].values):
-        band = _banded(data, "runout_quantile", share=k)
-        at_least = bool(band["value"] >= track.length_m)
-        quantiles.append({"share": float(share), "unit": "m", **band, "at_least": at_least})
     last = data.sizes["s"] - 1
     return {
         "simulation": json.loads(data.attrs["simulation"]),
@@ -98,12 +98,12 @@ def _numbers(problem: HierarchicalProblem, track: PredictionTrack, data: xr.Data
             "runout": json.loads(data.attrs["reading_error_runout"]),
         },
         "runout": {
-            "exceeded_by": quantiles,
-            "end_of_track": {"s_m": track.length_m, **_banded(data, "runout_probability", s=last)},
+            "exceeded_by": runouts_exceeded_by(data, track),
+            "end_of_track": {"s_m": track.length_m, **banded(data, "runout_probability", s=last)},
             "once_in": json.loads(data.attrs["runout_once_in"]),
             "does_not_start": float(data.attrs["share_that_does_not_start"]),
             "beyond_recorded": [
-                {"s_m": s, **_banded(data, "runout_probability", s=_nearest(data, s))}
+                {"s_m": s, **banded(data, "runout_probability", s=_nearest(data, s))}
                 for s in recorded_runouts(problem, track)
             ],
             "all": _runout_parts(data, "runout"),
@@ -120,13 +120,13 @@ def _place(data: xr.Dataset, name: str, s_m: float) -> dict[str, Any]:
     return {
         "name": name,
         "s_m": s_m,
-        "beyond": _banded(data, "runout_probability", s=k),
+        "beyond": banded(data, "runout_probability", s=k),
         "faster": [
-            {"speed_m_s": float(speed), **_banded(data, "speed_probability", s=k, speed=j)}
+            {"speed_m_s": float(speed), **banded(data, "speed_probability", s=k, speed=j)}
             for j, speed in enumerate(data["speed"].values)
         ],
         "speed_exceeded_by": [
-            {"share": float(q), **_banded(data, "speed_quantile", s=k, share=j)}
+            {"share": float(q), **banded(data, "speed_quantile", s=k, share=j)}
             for j, q in enumerate(data["share"].values)
         ],
         "mean_speed_m_s": float(data["mean_speed"][k]),
@@ -144,8 +144,3 @@ def _runout_parts(data: xr.Dataset, name: str) -> dict[str, float] | None:
         return None
     parts = {f"sd_{part}_m": float(data[f"{name}_sd_{part}"]) for part in (*PARTS, "total")}
     return {"mean_m": float(data[f"{name}_mean"]), **parts}
-
-
-def _banded(data: xr.Dataset, name: str, **place: int) -> dict[str, float]:
-    keys = (("value", ""), ("low", "_low"), ("high", "_high"))
-    return {key: float(data[f"{name}{suffix}"].isel(place)) for key, suffix in keys}

@@ -100,17 +100,35 @@ def predict(
     simulation = simulation or Simulation()
     wanted.check_on(track.length_m, simulation.avalanches)
     save(calibration.tree, folder / "posterior.nc")
-    data, added = None, () if source is None else source.stored.added
+    data, base, added = None, None, () if source is None else source.stored.added
     if calibration.gate.passed:
         tell(f"{law.id}: predicting on {track.name}")
         data = prediction_of(problem, law, calibration.tree, track, simulation, added=added, wanted=wanted)
+        base = _without_added(source, track, simulation, wanted, tell)
     else:
         tell(f"{law.id}: the chains did not converge: {'; '.join(calibration.gate.problems)}")
-    document = prediction_document(calibration, track, data, wanted, source)
+    document = prediction_document(calibration, track, data, wanted, source, base)
     document["seconds"] = time.monotonic() - started
     tell("writing the results")
     write_prediction(document, data, problem, folder)
     return document
+
+
+def _without_added(
+    source: Source | None, track: PredictionTrack, simulation: Simulation, wanted: Wanted, tell: Tell
+) -> xr.Dataset | None:
+    """The same avalanches by the base law, where something was added to it and its chains converged."""
+    base = None if source is None else source.without
+    if source is None or base is None:
+        return None
+    law, seed = base.calibration.law, int(source.stored.calibration.tree.attrs["seed"])
+    if not base.calibration.gate.passed:
+        tell(f"{law.id} without what was added: its chains did not converge, so it is not compared")
+        return None
+    tell(f"{law.id}: predicting without what was added")
+    return prediction_of(
+        base.problem, law, base.calibration.tree, track, simulation, wanted=wanted, seed=seed
+    )
 
 
 def prediction_of(
@@ -122,6 +140,7 @@ def prediction_of(
     *,
     added: Sequence[AddedTerm] = (),
     wanted: Wanted | None = None,
+    seed: int | None = None,
 ) -> xr.Dataset:
     """Avalanches of a calibration's populations on a track.
 
@@ -137,6 +156,8 @@ def prediction_of(
     added : sequence of AddedTerm
         What was added to the law; of it is used what acts on this track.
     wanted : Wanted, optional
+    seed : int, optional
+        Of the avalanches; by default that of the calibration.
 
     Returns
     -------
@@ -147,7 +168,8 @@ def prediction_of(
     wanted = wanted or Wanted()
     populations, chosen = _populations(problem, law, tree, simulation.populations)
     named = shown_places(problem, track, wanted)
-    places, seed = _places(problem, track, named), int(tree.attrs["seed"])
+    places = _places(problem, track, named)
+    seed = int(tree.attrs["seed"]) if seed is None else seed
     draws = tree[POPULATION if POPULATION in tree.children else "posterior"].to_dataset()
     law_here = moved(law, added, draws, track, chosen)
     fronts = new_fronts(

@@ -11,6 +11,8 @@ from skred.errors import InputError
 from skred.inference.stored import Stored, read_stored
 
 _KINDS = {"verdict.json": "diagnosis", "prediction.json": "prediction", "summary.json": "calibration"}
+_WITHOUT = ("base_same_errors.nc", "base.nc")
+"""The base law without what was added, under the same error model: the first that there is."""
 _NO_PROFILE = (
     "the verdict is `unexplained`: a force that is in no list is missing, and the folder has no draws of it"
     " (profile.nc); diagnose again"
@@ -30,6 +32,10 @@ class Source:
         Where it is from.
     verdict : str or None
         Of a diagnosis.
+    without : Stored or None
+        Where something was added: the base law calibrated under the same error model.
+    without_file : str or None
+        Where that is from.
     """
 
     stored: Stored
@@ -37,6 +43,8 @@ class Source:
     folder: str
     file: str
     verdict: str | None = None
+    without: Stored | None = None
+    without_file: str | None = None
 
     @property
     def told(self) -> str:
@@ -77,16 +85,19 @@ def source_of(folder: Path) -> Source:
 
 
 def _source(folder: Path, document: str, kind: str) -> Source:
-    file, verdict = "posterior.nc", None
+    file, verdict, without, without_file = "posterior.nc", None, None, None
     try:
         content = read_document(folder / document)
         if kind == "diagnosis":
             verdict = str(content.get("verdict"))
             file = _file_of_diagnosis(folder, verdict)
         stored = read_stored(folder / file)
+        if kind == "diagnosis" and stored.added:
+            without_file = next((name for name in _WITHOUT if (folder / name).is_file()), None)
+            without = None if without_file is None else read_stored(folder / without_file)
     except InputError as error:
         raise InputError(f"--from {error}") from error
-    return Source(stored, kind, folder.name or str(folder), file, verdict)
+    return Source(stored, kind, folder.name or str(folder), file, verdict, without, without_file)
 
 
 def _file_of_diagnosis(folder: Path, verdict: str) -> str:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from skred.inference.between_events import BetweenEvents
+from skred.prediction.without_added import comparison_sentences
+from skred.prediction.words import chance, percent, ranged
 
 
 def prediction_statement(document: dict[str, Any]) -> list[str]:
@@ -19,6 +21,7 @@ def prediction_statement(document: dict[str, Any]) -> list[str]:
         *_distances(document),
         *_once_in(document),
         *_at_places(document),
+        *comparison_sentences(document),
         _parts(document),
         *_conditions(document),
     ]
@@ -64,11 +67,11 @@ def _distances(document: dict[str, Any]) -> list[str]:
     end = runout["end_of_track"]
     if end["high"] >= 0.001:
         sentences.append(
-            f"{_chance(end)} reach the end of the track (s = {length:.0f} m): their runout is at least that."
+            f"{chance(end)} reach the end of the track (s = {length:.0f} m): their runout is at least that."
         )
     if runout["does_not_start"] >= 0.001:
         sentences.append(
-            f"{_percent(runout['does_not_start'])} do not start: friction holds them at the release."
+            f"{percent(runout['does_not_start'])} do not start: friction holds them at the release."
         )
     return sentences
 
@@ -109,12 +112,12 @@ def _left_out(places: Sequence[dict[str, Any]]) -> list[str]:
 def _at(place: dict[str, Any]) -> str:
     """A named place in a sentence."""
     name = "the reference" if place["name"] == "reference" else place["name"]
-    told = f"{_chance(place['reached'])} reach {name} (s = {place['s_m']:.0f} m)"
+    told = f"{chance(place['reached'])} reach {name} (s = {place['s_m']:.0f} m)"
     if "annual" in place["reached"]:
-        told += f", a year {_chance(place['reached']['annual'])}"
+        told += f", a year {chance(place['reached']['annual'])}"
     for quantity, words in (("speed", "faster than"), ("pressure", "with an impact pressure above")):
         unit, above = place[quantity]["unit"], place[quantity]["above"]
-        told += "".join(f"; {_chance(row)} {words} {row['threshold']:g} {unit}" for row in above)
+        told += "".join(f"; {chance(row)} {words} {row['threshold']:g} {unit}" for row in above)
     return f"{told}."
 
 
@@ -160,7 +163,7 @@ def _conditions(document: dict[str, Any]) -> list[str]:
         _frequency(document),
         "Recorded avalanches are a selection: they went far enough to reach the instruments. The prediction"
         f" does not correct for that.{_outside(document)}",
-        f"Probabilities below about {_percent(1.0 / campaign['n_events'])} (1 in {campaign['n_events']}) and"
+        f"Probabilities below about {percent(1.0 / campaign['n_events'])} (1 in {campaign['n_events']}) and"
         " values outside the recorded range are extrapolations. They rest on the law and on parameters that"
         " are log-normal across avalanches.",
         f"Intervals are {document['interval']['kind']} and hold"
@@ -170,9 +173,9 @@ def _conditions(document: dict[str, Any]) -> list[str]:
     if document["at"]:
         (light, heavy), (low, high) = (document["pressure"][k] for k in ("density_kg_m3", "drag_coefficient"))
         sentences.append(
-            f"Impact pressure is {document['pressure']['formula']}, with a density of {light:g} to {heavy:g}"
-            f" kg/m3 and a drag coefficient of {low:g} to {high:g}, each value as likely. The recordings"
-            " hold no pressure: these ranges are assumptions, and an engineer chooses them for the obstacle."
+            f"Impact pressure is {document['pressure']['formula']}, with a density of"
+            f" {ranged(light, heavy, 'kg/m3')}, and a drag coefficient of {ranged(low, high)}. The recordings"
+            " hold no pressure: these are assumptions, and an engineer chooses them for the obstacle."
         )
     if not track["is_own"]:
         sentences.append(
@@ -190,24 +193,9 @@ def _outside(document: dict[str, Any]) -> str:
     above = {"value": 1 - shortest["value"], "low": 1 - shortest["high"], "high": 1 - shortest["low"]}
     low, high = shortest["s_m"], longest["s_m"]
     return (
-        f" Of the predicted ones, {_chance(above)} stop above the shortest recorded runout"
-        f" (s = {low:.0f} m) and {_chance(longest)} run beyond the longest (s = {high:.0f} m)."
+        f" Of the predicted ones, {chance(above)} stop above the shortest recorded runout"
+        f" (s = {low:.0f} m) and {chance(longest)} run beyond the longest (s = {high:.0f} m)."
     )
-
-
-def _chance(band: dict[str, float]) -> str:
-    return f"{_percent(band['value'])} ({_percent(band['low'])} to {_percent(band['high'])})"
-
-
-def _percent(value: float) -> str:
-    """Never rounded to an exact 0 or 100."""
-    if 0.0 < value < 0.0005:
-        return "<0.1 %"
-    if 0.9995 < value < 1.0:
-        return ">99.9 %"
-    decimals = 1 if value < 0.0995 or value > 0.9005 else 0
-    text = f"{100 * value:.{decimals}f} %"
-    return text.replace(".0 %", " %")
 
 
 def _end_or(value: float, length: float) -> str:

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from skred.report.prediction.figures import FIGURES as ALONG_TRACK
 from skred.report.prediction.places import has_places, places_figure
+from skred.report.prediction.without_added import base_chance, comparison_rows
+from skred.report.prediction.words import percent, period
 from skred.report.shared import document as doc
 from skred.report.shared.drawing import Picture, draw
 from skred.report.shared.html import page
-from skred.report.shared.numbers import decimals_for, is_number, rounded, three_digits
+from skred.report.shared.numbers import three_digits
 from skred.report.shared.style import write_svg
 
 if TYPE_CHECKING:
@@ -22,6 +24,7 @@ FIGURES = {**ALONG_TRACK, "places": places_figure}
 """Makers of all figures by their names."""
 _SECTIONS = {
     "places": "At the named places",
+    "without": "With and without what was added",
     "years": "How often in a year",
     "track": "Along the track",
     "pressure": "Impact pressure",
@@ -54,8 +57,10 @@ def render_prediction(document: doc.Document, figures: Mapping[str, Picture]) ->
     str
         A self-contained page, see `skred.report.shared.html.page`.
     """
+    compared = comparison_rows(document)
     has = {
         "places": has_places(document),
+        "without": bool(compared),
         "years": doc.get(document, "rate") is not None and (has_places(document) or bool(_once_in(document))),
         "pressure": has_places(document),
     }
@@ -73,6 +78,7 @@ def render_prediction(document: doc.Document, figures: Mapping[str, Picture]) ->
         left_out=_left_out(document),
         added=_added_terms(document),
         once_in=_once_in(document),
+        compared=compared,
         percent=percent,
         period=period,
     )
@@ -96,13 +102,14 @@ def is_caveat(line: Any) -> bool:
 def _lead(document: doc.Document) -> list[str]:
     """The answer for someone who reads nothing else."""
     told = []
-    for place in doc.listed(document, "at"):
+    for k, place in enumerate(doc.listed(document, "at")):
         chance = percent(doc.get(place, "reached", "value"))
         low, high = (percent(doc.get(place, "reached", end)) for end in ("low", "high"))
         name = "The reference" if place["name"] == "reference" else str(place["name"])
         told.append(
             f"{name} (s = {place['s_m']:.0f} m): {chance} of avalanches like those recorded come here"
             f" (90 % interval {low} to {high}).{_fast(place)}{_period(place)}"
+            f"{base_chance(document, k)}"
         )
     if not told:
         rows = doc.listed(document, "runout", "exceeded_by")
@@ -154,29 +161,3 @@ def _left_out(document: doc.Document) -> list[doc.Document]:
     """What does not act here, each once: a force in no list has a row for each of its knots."""
     rows = [row for row in doc.listed(document, "added") if row["used"] is False]
     return list({str(row["title"]): row for row in rows}.values())
-
-
-def period(band: Any) -> str:
-    """A return period with its interval; one without an end is said in words."""
-    value, low, high = (doc.get(band, key) for key in ("value", "low", "high"))
-    if not is_number(value):
-        return "longer than can be said" if not is_number(low) else f"more than {_years(low)}"
-    end = f"to {_years(high)}" if is_number(high) else "or more"
-    return f"{_years(value)} ({_years(low)} {end})"
-
-
-def _years(value: float) -> str:
-    """Two significant digits: a return period is never known better."""
-    return rounded(value, decimals_for(value))
-
-
-def percent(value: Any) -> str:
-    """A probability in percent, never rounded to an exact 0 or 100."""
-    if not is_number(value):
-        return "n/a"
-    if 0.0 < value < 0.0005:
-        return "<0.1 %"
-    if 0.9995 < value < 1.0:
-        return ">99.9 %"
-    text = f"{100 * value:.{1 if value < 0.0995 or value > 0.9005 else 0}f} %"
-    return text.replace(".0 %", " %")

@@ -1,0 +1,54 @@
+"""Chances and return periods in words, on the page and in the terminal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from skred.report.shared import document as doc
+from skred.report.shared.numbers import ABSENT, decimals_for, is_number, rounded, three_digits
+
+_SURE = 0.0005
+"""Nearer to 0 or 1 than this a simulated probability is not told: it is no certainty."""
+
+
+def percent(value: Any) -> str:
+    """A probability in percent, never as an exact 0 or 100."""
+    if not is_number(value):
+        return ABSENT
+    if value < _SURE:
+        return "<0.1 %"
+    if value > 1.0 - _SURE:
+        return ">99.9 %"
+    text = f"{100 * value:.{1 if value < 0.0995 or value > 0.9005 else 0}f} %"
+    return text.replace(".0 %", " %")
+
+
+def chance(band: Any) -> str:
+    """A probability with its interval."""
+    value, low, high = (percent(doc.get(band, key)) for key in ("value", "low", "high"))
+    return f"{value} ({low} to {high})"
+
+
+def banded(band: Any) -> str:
+    """A value with its interval."""
+    value, low, high = (three_digits(doc.get(band, key)) for key in ("value", "low", "high"))
+    return f"{value} ({low} to {high})"
+
+
+def period(band: Any) -> str:
+    """A return period with its interval; one without an end is said in words."""
+    value, interval = period_and_interval(band)
+    return f"{value} ({interval})" if interval else value
+
+
+def period_and_interval(band: Any) -> tuple[str, str]:
+    """A return period, and its interval: empty where there is none."""
+    value, low, high = (doc.get(band, key) for key in ("value", "low", "high"))
+    if not is_number(value):
+        return ("longer than can be said" if not is_number(low) else f"more than {_years(low)}"), ""
+    return _years(value), f"{_years(low)} {f'to {_years(high)}' if is_number(high) else 'or more'}"
+
+
+def _years(value: float) -> str:
+    """Two significant digits: a return period is never known better."""
+    return rounded(value, decimals_for(value))

@@ -1,0 +1,103 @@
+"""A prediction with what a diagnosis added stands beside that of the base law of the same folder."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from page_checks import check_page
+from prediction_cases import folder_of, plane, term_of, tree_of
+
+from skred.campaign import find_campaign, read_campaign
+from skred.cli.main import run
+from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
+from skred.inference.results import save
+from skred.physics.mechanisms.spec import Shape
+from skred.prediction.source import source_of
+
+ASKED = ["--per-year", "0.2", "--pressure", "30"]
+
+
+@pytest.fixture(scope="module")
+def problem() -> HierarchicalProblem:
+    return hierarchical_problem(read_campaign(find_campaign("ryggfonn")))
+
+
+def diagnosed(problem: HierarchicalProblem, folder: Path, base: str = "base.nc") -> Path:
+    """A diagnosis made up: friction on a stretch was added, and the law without it has more friction."""
+    term = term_of(problem, "coulomb", "segment_friction", Shape(1200.0, 1500.0))
+    folder_of(folder, tree_of(problem, "coulomb", [term], [3.0]), "verdict.json", "augmented.nc")
+    tree = tree_of(problem, "coulomb")
+    posterior = tree["posterior"].to_dataset()
+    posterior["dry_friction"] = 1.1 * posterior["dry_friction"]
+    tree["posterior"] = posterior
+    tree.attrs["seed"] = 77  # the avalanches are those of the augmented law's seed
+    save(tree, folder / base)
+    return folder
+
+
+def test_the_base_law_stands_beside(
+    problem: HierarchicalProblem, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = diagnosed(problem, tmp_path / "diagnosed")
+    plain = folder_of(tmp_path / "plain", tree_of(problem, "coulomb"))
+    tree = tree_of(problem, "coulomb")
+    posterior = tree["posterior"].to_dataset()
+    tree["posterior"] = posterior.assign(dry_friction=1.1 * posterior["dry_friction"])
+    save(tree, plain / "posterior.nc")
+    out, alone = tmp_path / "out", tmp_path / "alone"
+    there = ["--at", "house=1900", *ASKED]
+    assert run(["predict", "--from", str(folder), "--out", str(out), *there]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert run(["predict", "--from", str(plain), "--out", str(alone), "--quiet", *there]) == 0
+    document, base = (json.loads((one / "prediction.json").read_text()) for one in (out, alone))
+    beside = document["without_added"]
+    assert beside["file"] == "base.nc" and beside["at"] == base["at"]
+    assert beside["runout"]["exceeded_by"] == base["runout"]["exceeded_by"]
+    assert base["without_added"] is None and document["at"] != beside["at"]
+    assert "reach it, by the base law" in told and "years, by the base law" in told
+    assert "The difference between both is what hangs on what was added." in told
+    page = (out / "report.html").read_text(encoding="utf-8")
+    check_page(page)
+    for said in ("With and without what was added", "By the base law, without what was added,", "base.nc"):
+        assert said in page
+    assert "With and without" not in (alone / "report.html").read_text(encoding="utf-8")
+    assert (out / "places.csv").read_text().splitlines()[0] == (
+        alone / "places.csv"
+    ).read_text().splitlines()[0]
+
+
+def test_where_the_effect_is_left_out_that_is_told(
+    problem: HierarchicalProblem, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, out = diagnosed(problem, tmp_path / "diagnosed"), tmp_path / "out"
+    words = ["predict", "--from", str(folder), "--out", str(out), "--track", str(plane(tmp_path))]
+    assert run([*words, "--at", "house=900"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    meaning = "the coefficients used here were fitted beside it"
+    assert meaning in told
+    page = " ".join((out / "report.html").read_text(encoding="utf-8").split())
+    box = page[page.index("Left out:") :].partition("</p>")[0]
+    assert meaning in box and "fitted beside what was added, which is left out here" in page
+
+
+def test_without_places_runouts_are_compared(
+    problem: HierarchicalProblem, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, out = diagnosed(problem, tmp_path / "diagnosed"), tmp_path / "out"
+    track = ["--track", str(plane(tmp_path))]
+    assert run(["predict", "--from", str(folder), "--out", str(out), *track]) == 0
+    assert "m, by the base law" in capsys.readouterr().out
+    assert "runout s that 50 % exceed" in (out / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_base_law_under_the_same_errors_is_taken_first(
+    problem: HierarchicalProblem, tmp_path: Path
+) -> None:
+    folder = diagnosed(problem, tmp_path / "diagnosed", "base_same_errors.nc")
+    (folder / "base.nc").write_bytes(b"not read")
+    assert source_of(folder).without_file == "base_same_errors.nc"
+    (folder / "base.nc").unlink()
+    (folder / "base_same_errors.nc").unlink()
+    assert source_of(folder).without is None
