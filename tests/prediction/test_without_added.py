@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from html import escape
 from pathlib import Path
 
 import pytest
@@ -11,8 +12,11 @@ from prediction_cases import folder_of, plane, term_of, tree_of
 
 from skred.campaign import find_campaign, read_campaign
 from skred.cli.main import run
+from skred.errors import InputError
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
+from skred.inference.influence_words import carried
 from skred.inference.results import save
+from skred.output import write_json
 from skred.physics.mechanisms.spec import Shape
 from skred.prediction.source import source_of
 
@@ -101,3 +105,65 @@ def test_the_base_law_under_the_same_errors_is_taken_first(
     (folder / "base.nc").unlink()
     (folder / "base_same_errors.nc").unlink()
     assert source_of(folder).without is None
+
+
+def test_the_diagnosis_speaks_against_itself(
+    problem: HierarchicalProblem, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In the words of the verdict's own statement, before the table, and on the page."""
+    folder, out = diagnosed(problem, tmp_path / "diagnosed"), tmp_path / "out"
+    influence = {
+        "carried_by": ["a<b", "c"],
+        "events": [{"event": name} for name in ("a<b", "c", "d")],
+        "log_bayes_factor": 29.9,
+        "without_them": 3.2,
+        "needed": 7.0,
+    }
+    verdict = {
+        "format": 1,
+        "verdict": "missing_physics",
+        "mechanism": "segment_friction",
+        "probability": {"segment_friction": 0.62, "unlisted": 0.06, "obstacle": 0.3},
+        "indistinguishable": ["obstacle"],
+        "influence": influence,
+    }
+    write_json(folder / "verdict.json", verdict)
+    assert run(["predict", "--from", str(folder), "--out", str(out)]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    page = (out / "report.html").read_text(encoding="utf-8")
+    check_page(page)
+    words = carried(["a<b", "c"], 3, 29.9, 3.2, 7.0)
+    assert words.startswith("2 of 3 avalanches carry this answer (a<b and c)")
+    for said in (words, "another surface on a stretch 62 %; a force not in the list 6 %", "(30 %)"):
+        assert 0 <= told.index(said) < told.index("the next avalanche")
+        assert escape(said, quote=False) in page and told.count(said) == 1
+    write_json(folder / "verdict.json", verdict | {"influence": {"carried_by": ["a"]}})
+    with pytest.raises(InputError, match="not as skred writes it"):
+        source_of(folder)
+
+
+def test_most_do_not_start_is_told_first(
+    problem: HierarchicalProblem, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, out = folder_of(tmp_path / "made", tree_of(problem, "coulomb")), tmp_path / "out"
+    words = ["predict", "--from", str(folder), "--out", str(out), "--at", "house=900"]
+    assert run([*words, "--track", str(plane(tmp_path, degrees=5.0))]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    first = ">99.9 % do not start: friction holds most fronts at the release"
+    assert told.index(first) < told.index("the next avalanche") and told.count(first) == 1
+    page = (out / "report.html").read_text(encoding="utf-8")
+    check_page(page)
+    assert page.index("Read this first.") < page.index("In short")
+    assert page.count(escape(first)) == 2
+
+
+def test_a_place_above_every_release_is_refused(
+    problem: HierarchicalProblem, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, out = folder_of(tmp_path / "made", tree_of(problem, "coulomb")), tmp_path / "out"
+    words = ["predict", "--from", str(folder), "--out", str(out), "--at", "hut=90"]
+    assert run([*words, "--release", "100", "--release", "300"]) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert "--at hut=90: lies above every release, of which the highest is at s = 100.0 m" in told
+    assert not out.exists()
+    assert run([*words, "--release", "90", "--quiet"]) == 0

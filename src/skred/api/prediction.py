@@ -121,7 +121,7 @@ def predict(
         source = source_of(Path(from_folder))
         chosen, problem = source.stored.calibration.law, source.stored.problem
     where = prediction_track(problem, None if track is None else Path(track), scenarios)
-    wanted.check_on(where.length_m)
+    wanted.check_on(where.length_m, highest_release_m=where.highest_release_m)
     with fresh_folder() as folder:
         document, calibration = predict_to(
             problem, chosen, settings, folder, tell, where=where, wanted=wanted, source=source

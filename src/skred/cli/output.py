@@ -2,7 +2,7 @@
 
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -53,30 +53,41 @@ class Output:
             print(line, file=sys.stderr, flush=True)
 
     def show(
-        self, result: dict[str, Any], table: Callable[[Any], Any], sentences: list[str], where: Path
+        self,
+        result: dict[str, Any],
+        table: Callable[[Any], Any],
+        sentences: list[str],
+        where: Path,
+        first: Sequence[str] = (),
     ) -> None:
-        """Write a result to stdout: as JSON, or as its table, what it says, and where the rest is."""
+        """Write a result to stdout: as JSON, or as its table, what it says, and where the rest is.
+
+        Of the sentences, those to be read `first` stand before the table.
+        """
         from skred.output import plain
 
         if self.as_json:
             write_json(plain(result))
         elif not self.quiet:
-            show_table(table(result), sentences, where)
+            show_table(table(result), sentences, where, first)
 
 
 OUTPUT = Output()
 """What a command does unless told otherwise."""
 
 
-def show_table(table: Any, sentences: list[str], where: Path) -> None:
+def show_table(table: Any, sentences: list[str], where: Path, first: Sequence[str] = ()) -> None:
     """A table, what it says, and where the rest is."""
     from rich.console import Console
     from rich.text import Text
 
     console = Console()
+    for sentence in first:
+        console.print(Text(f"Take care: {sentence}", style="bold"))
     console.print(table)
     for sentence in sentences:
-        console.print(Text(sentence))
+        if sentence not in first:
+            console.print(Text(sentence))
     page = where / REPORT
     console.print(Text(f"\nwritten: {page if page.is_file() else where}"), soft_wrap=True)
 

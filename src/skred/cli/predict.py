@@ -58,12 +58,13 @@ def predict(
         checked = campaign_of(campaign or "ryggfonn")
         problem = hierarchical_of(checked, likelihood.errors, likelihood.smoothing)
 
+    from skred.prediction.statement import cautions
     from skred.prediction.track import prediction_track
     from skred.report.folders import write_reports
     from skred.report.prediction.table import prediction_table
 
     where = prediction_track(problem, track, scenarios)
-    wanted.check_on(where.length_m)
+    wanted.check_on(where.length_m, highest_release_m=where.highest_release_m)
     if source is None:
         tell_hints(problem, output.tell)
     tell_track_hints(where, track, output.tell)
@@ -80,7 +81,8 @@ def predict(
             progress=output.progress,
         )
         write_reports(results.unfinished)
-    output.show(prediction, prediction_table, prediction["statement"], results.path)
+    first = [*prediction["warnings"], *cautions(prediction)]
+    output.show(prediction, prediction_table, prediction["statement"], results.path, first)
     return DONE if prediction["gate"]["passed"] else NOT_CONVERGED
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 from skred.units import unit_text
 
@@ -18,11 +17,6 @@ def percent(share: float) -> str:
 def counted(n: int, one: str, many: str = "") -> str:
     """A number and what it counts, in the singular where it is one."""
     return f"{n} {one if n == 1 else many or one + 's'}"
-
-
-def enumerated(names: Sequence[str]) -> str:
-    """Names as one says them: ``a``, ``a and b``, ``a, b and c``."""
-    return " and ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
 
 
 def plus_minus(mean: float, sd: float, unit: str) -> str:

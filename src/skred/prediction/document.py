@@ -15,7 +15,7 @@ from skred.prediction.bands import banded, runouts_exceeded_by
 from skred.prediction.own_places import own_places, places_left_out
 from skred.prediction.probabilities import PARTS
 from skred.prediction.source import Source
-from skred.prediction.statement import prediction_statement
+from skred.prediction.statement import prediction_statement, warnings_of
 from skred.prediction.terms import added_rows
 from skred.prediction.track import PredictionTrack
 from skred.prediction.wanted import Wanted
@@ -76,6 +76,7 @@ def prediction_document(
     empty = ("simulation", "reading_errors", "runout", "places", "at")
     document |= dict.fromkeys(empty) if data is None else _numbers(problem, track, data)
     document["without_added"] = None if source is None else without_added(source, track, base)
+    document["warnings"] = warnings_of(document)
     document["statement"] = prediction_statement(document)
     return document
 

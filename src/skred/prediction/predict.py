@@ -98,7 +98,7 @@ def predict(
     track = prediction_track(problem) if track is None else track
     wanted = wanted or Wanted()
     simulation = simulation or Simulation()
-    wanted.check_on(track.length_m, simulation.avalanches)
+    wanted.check_on(track.length_m, simulation.avalanches, highest_release_m=track.highest_release_m)
     save(calibration.tree, folder / "posterior.nc")
     data, base, added = None, None, () if source is None else source.stored.added
     if calibration.gate.passed:

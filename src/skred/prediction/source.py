@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from skred.documents import read_document
+from skred.documents import AGAIN, read_document
 from skred.errors import InputError
 from skred.inference.stored import Stored, read_stored
+from skred.prediction.diagnosis_cautions import diagnosis_cautions
 
 _KINDS = {"verdict.json": "diagnosis", "prediction.json": "prediction", "summary.json": "calibration"}
 _WITHOUT = ("base_same_errors.nc", "base.nc")
@@ -36,6 +37,10 @@ class Source:
         Where something was added: the base law calibrated under the same error model.
     without_file : str or None
         Where that is from.
+    cautions : tuple of str
+        Where something was added: what the diagnosis says against itself.
+    recorded : dict or None
+        ``description`` and ``source`` of the campaign, where the folder has them.
     """
 
     stored: Stored
@@ -45,6 +50,8 @@ class Source:
     verdict: str | None = None
     without: Stored | None = None
     without_file: str | None = None
+    cautions: tuple[str, ...] = ()
+    recorded: dict[str, str] | None = None
 
     @property
     def told(self) -> str:
@@ -58,7 +65,7 @@ class Source:
     def as_dict(self) -> dict[str, Any]:
         """As plain data."""
         named = {"kind": self.kind, "folder": self.folder, "file": self.file, "verdict": self.verdict}
-        return named | {"told": self.told}
+        return named | {"told": self.told, "cautions": list(self.cautions)}
 
 
 def source_of(folder: Path) -> Source:
@@ -86,6 +93,7 @@ def source_of(folder: Path) -> Source:
 
 def _source(folder: Path, document: str, kind: str) -> Source:
     file, verdict, without, without_file = "posterior.nc", None, None, None
+    cautions: list[str] = []
     try:
         content = read_document(folder / document)
         if kind == "diagnosis":
@@ -95,9 +103,41 @@ def _source(folder: Path, document: str, kind: str) -> Source:
         if kind == "diagnosis" and stored.added:
             without_file = next((name for name in _WITHOUT if (folder / name).is_file()), None)
             without = None if without_file is None else read_stored(folder / without_file)
+        if stored.added:
+            cautions = _cautions(folder / document, content)
     except InputError as error:
         raise InputError(f"--from {error}") from error
-    return Source(stored, kind, folder.name or str(folder), file, verdict, without, without_file)
+    return Source(
+        stored,
+        kind,
+        folder.name or str(folder),
+        file,
+        verdict,
+        without,
+        without_file,
+        tuple(cautions),
+        _recorded(content),
+    )
+
+
+def _cautions(file: Path, content: dict[str, Any]) -> list[str]:
+    """What a verdict says against itself; a prediction passes on what it took from one."""
+    try:
+        if "from" in content:
+            return [str(line) for line in content["from"]["cautions"]] if content["from"] else []
+        return diagnosis_cautions(content)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        lacks = f"{type(error).__name__}: {error}"
+        raise InputError(f"{file}: not as skred writes it ({lacks:.80}); {AGAIN}") from error
+
+
+def _recorded(content: dict[str, Any]) -> dict[str, str] | None:
+    """What a campaign says of itself: a diagnosis' report has it, and a prediction."""
+    for holder in (content.get("report"), content):
+        campaign = holder.get("campaign") if isinstance(holder, dict) else None
+        if isinstance(campaign, dict) and "description" in campaign:
+            return {key: str(campaign.get(key) or "") for key in ("description", "source")}
+    return None
 
 
 def _file_of_diagnosis(folder: Path, verdict: str) -> str:

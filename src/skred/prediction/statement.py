@@ -10,6 +10,9 @@ from skred.inference.between_events import BetweenEvents
 from skred.prediction.without_added import comparison_sentences
 from skred.prediction.words import chance, percent, ranged
 
+MOST = 0.5
+"""Share of avalanches from which on it is said first that they do not start."""
+
 
 def prediction_statement(document: dict[str, Any]) -> list[str]:
     """Sentences on runout, speed and uncertainty, and on the assumptions."""
@@ -17,7 +20,9 @@ def prediction_statement(document: dict[str, Any]) -> list[str]:
         problems = "; ".join(document["gate"]["problems"])
         return [f"The chains did not converge, so nothing is predicted: {problems}."]
     return [
+        *document["warnings"],
         *source_sentences(document),
+        *cautions(document),
         *_distances(document),
         *_once_in(document),
         *_at_places(document),
@@ -25,6 +30,22 @@ def prediction_statement(document: dict[str, Any]) -> list[str]:
         _parts(document),
         *_conditions(document),
     ]
+
+
+def warnings_of(document: dict[str, Any]) -> list[str]:
+    """What makes numbers read as something that they are not: before everything else."""
+    if not document["valid"] or document["runout"]["does_not_start"] < MOST:
+        return []
+    return [
+        f"{percent(document['runout']['does_not_start'])} do not start: friction holds most fronts at the"
+        f" release, {document['track']['release']}. So low chances at the places below are no all-clear."
+        " Choose a release (--release) where the track is steep enough for an avalanche to start."
+    ]
+
+
+def cautions(document: dict[str, Any]) -> list[str]:
+    """What the diagnosis that this is made from says against itself."""
+    return [] if document["from"] is None else list(document["from"]["cautions"])
 
 
 def source_sentences(document: dict[str, Any]) -> list[str]:
@@ -69,7 +90,7 @@ def _distances(document: dict[str, Any]) -> list[str]:
         sentences.append(
             f"{chance(end)} reach the end of the track (s = {length:.0f} m): their runout is at least that."
         )
-    if runout["does_not_start"] >= 0.001:
+    if 0.001 <= runout["does_not_start"] < MOST:
         sentences.append(
             f"{percent(runout['does_not_start'])} do not start: friction holds them at the release."
         )

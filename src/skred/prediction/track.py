@@ -65,6 +65,11 @@ class PredictionTrack:
         """Arc length of the lower end [m]."""
         return self.terrain.length_m
 
+    @property
+    def highest_release_m(self) -> float:
+        """Where the highest front starts [m]; of releases that are not known well, 0."""
+        return 0.0 if self.releases.sd.any() else float(self.releases.mean.min())
+
     def fingerprint(self) -> str:
         """SHA-256 of the track's points."""
         points = np.array([self.track.x_m, self.track.z_m], dtype="<f8") + 0.0

@@ -139,17 +139,25 @@ class Wanted:
                 f"--return-period: at most {MOST_PLACES}, found {len(self.return_periods_years)}"
             )
 
-    def check_on(self, length_m: float, avalanches: int = AVALANCHES) -> None:
-        """Refuse places that are not on a track, and return periods that a simulation cannot tell.
+    def check_on(
+        self, length_m: float, avalanches: int = AVALANCHES, *, highest_release_m: float = 0.0
+    ) -> None:
+        """Refuse places that no avalanche can come to, and return periods that a simulation cannot tell.
 
         Raises
         ------
         InputError
-            If a place lies outside, or a time is too long.
+            If a place lies outside the track or above every release, or a time is too long.
         """
         for name, s_m in self.places:
             if not 0.0 <= s_m <= length_m:
                 raise InputError(f"--at {name}={s_m:g}: expected a place on the track, 0 to {length_m:.1f} m")
+            if s_m < highest_release_m:
+                raise InputError(
+                    f"--at {name}={s_m:g}: lies above every release, of which the highest is at"
+                    f" s = {highest_release_m:.1f} m; no avalanche comes there: choose a place further down,"
+                    " or a --release above it (s counts from the first point of the track, downhill)"
+                )
         rarest = max(self.return_periods_years, default=0.0)
         if self.rate is not None and self.rate.mean * rarest > avalanches / _FEWEST_BEYOND:
             longest = avalanches / (_FEWEST_BEYOND * self.rate.mean)

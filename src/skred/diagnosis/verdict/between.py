@@ -9,9 +9,10 @@ import numpy as np
 from skred.diagnosis.augment.added_strength import AddedStrength
 from skred.diagnosis.augment.coefficient import augmented_of, multiples_of_events, some_draws
 from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.words import enumerated, percent
+from skred.diagnosis.words import percent
 from skred.inference.between_events import BetweenEvents
 from skred.inference.calibrate import Calibration
+from skred.inference.influence_words import enumerated
 
 _OUT_OF_QUESTION = 0.005
 """Probability below which a way is not told: it would be rounded to less than 1 %."""

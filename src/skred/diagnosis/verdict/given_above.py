@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from skred.diagnosis.words import enumerated
+from skred.inference.influence_words import enumerated
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.units import unit_text
 

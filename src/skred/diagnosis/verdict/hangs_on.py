@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from skred.diagnosis.influence.influence import Influence, ReadingsLeftOut
-from skred.diagnosis.words import enumerated
+from skred.inference import influence_words
 
 _KINDS = {"zeros": "readings of zero", "near a stop": "speeds beside the same avalanche's stop"}
 
@@ -12,12 +12,9 @@ def carried(found: Influence | None) -> str:
     """That few avalanches carry the answer, where they do; begins with a small letter."""
     if found is None or not found.carried_by:
         return ""
-    one, many = len(found.carried_by) == 1, f"{len(found.carried_by)} of {len(found.events)} avalanches"
-    evidence = f"{found.log_bayes_factor:.1f} nats with all, {found.without_them:.1f} without"
-    return (
-        f"{many} {'carries' if one else 'carry'} this answer ({enumerated(found.carried_by)}), and without"
-        f" {'it' if one else 'them'} it would not be given (log Bayes factor {evidence}, {found.needed:.1f}"
-        " needed)"
+    assert found.without_them is not None
+    return influence_words.carried(
+        found.carried_by, len(found.events), found.log_bayes_factor, found.without_them, found.needed
     )
 
 

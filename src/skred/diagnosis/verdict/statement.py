@@ -15,7 +15,8 @@ from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdd
 from skred.diagnosis.verdict.between import between_sentence
 from skred.diagnosis.verdict.hangs_on import carried, hangs_on
 from skred.diagnosis.verdict.improvement import improvement
-from skred.diagnosis.words import enumerated, percent, plus_minus
+from skred.diagnosis.words import percent, plus_minus
+from skred.inference.influence_words import enumerated
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.stretches import U_1, U_2
 

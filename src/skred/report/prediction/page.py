@@ -101,7 +101,7 @@ def is_caveat(line: Any) -> bool:
 
 def _lead(document: doc.Document) -> list[str]:
     """The answer for someone who reads nothing else."""
-    told = []
+    told = [str(line) for line in doc.listed(document, "warnings")]
     for k, place in enumerate(doc.listed(document, "at")):
         chance = percent(doc.get(place, "reached", "value"))
         low, high = (percent(doc.get(place, "reached", end)) for end in ("low", "high"))
@@ -111,7 +111,7 @@ def _lead(document: doc.Document) -> list[str]:
             f" (90 % interval {low} to {high}).{_fast(place)}{_period(place)}"
             f"{base_chance(document, k)}"
         )
-    if not told:
+    if not doc.listed(document, "at"):
         rows = doc.listed(document, "runout", "exceeded_by")
         said = "; ".join(
             f"{100 * row['share']:g} % run {'at least to' if row['at_least'] else 'beyond'}"
