@@ -355,7 +355,7 @@ def test_files(problem: HierarchicalProblem, tmp_path: Path) -> None:
     assert data["mean_speed"].attrs["units"] == "m s-1" and data["x"].attrs["units"] == "m"
     for name in ("campaign_fingerprint", "seed", "versions", "settings", "law", "gate", "release"):
         assert name in data.attrs
-    assert prediction_table(document).row_count == 3 + 6 * 4
+    assert prediction_table(document).row_count == 3 + 8 * 4
     figures = write_reports(tmp_path)
     drawn = {file.name: file.read_bytes() for file in figures}
     names = {f"{name}.{kind}" for name in ("prediction", "uncertainty", "places") for kind in ("png", "svg")}

@@ -63,7 +63,7 @@ def source_sentences(document: dict[str, Any]) -> list[str]:
         elif ends:
             told.append(
                 f"Used: {title}{where}, at the most probable place; how uncertain the place is does not widen"
-                " the intervals."
+                " the intervals. (The verdict gives the median of each end, which can differ from that.)"
             )
         if rows[0]["used"] and rows[0]["between_events"] != BetweenEvents.COMMON:
             told.append("Each new avalanche has its own strength of it, as those recorded differ.")
@@ -103,7 +103,7 @@ def _once_in(document: dict[str, Any]) -> list[str]:
     told = []
     for row in document["runout"]["once_in"]:
         ends = [row[key] for key in ("value", "low", "high")]
-        value, low, high = ("none" if end is None else _end_or(end, length) for end in ends)
+        value, low, high = ("no avalanche" if end is None else _end_or(end, length) for end in ends)
         if row["value"] is None:
             told.append(f"in {row['years']:g} years fewer than one avalanche starts")
         else:
@@ -111,7 +111,7 @@ def _once_in(document: dict[str, Any]) -> list[str]:
     if not told:
         return []
     rare = any(row["low"] is None and row["value"] is not None for row in document["runout"]["once_in"])
-    more = " None: by what is as likely of the frequency, fewer than one starts in that time."
+    more = " No avalanche: the interval allows that fewer than one starts in that time."
     return [f"On average, with the frequency that you gave: {'; '.join(told)}.{more if rare else ''}"]
 
 
@@ -150,7 +150,9 @@ def _frequency(document: dict[str, Any]) -> str:
             "Probabilities are per avalanche like those recorded, not per year: the recordings do not say how"
             " often avalanches occur."
         )
-    sd = f" with a standard deviation of {rate['sd_per_year']:g}" if rate["sd_per_year"] else ""
+    sd = ", taken as exact because no standard deviation was given"
+    if rate["sd_per_year"]:
+        sd = f" with a standard deviation of {rate['sd_per_year']:g}"
     return (
         f"Probabilities in a year take your frequency of {rate['per_year']:g} avalanches a year{sd}; the"
         " recordings do not know it. It must be that of avalanches like those recorded, which are a"

@@ -163,7 +163,7 @@ class Wanted:
             longest = avalanches / (_FEWEST_BEYOND * self.rate.mean)
             raise InputError(
                 f"--return-period {rarest:g}: with {self.rate.mean:g} avalanches a year, such runouts are"
-                f" rarer than the simulation can tell; at most {longest:.3g} years"
+                f" rarer than the simulation can tell; at most {longest:.0f} years"
             )
 
     def as_dict(self) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from skred.report.prediction.figures import FIGURES as ALONG_TRACK
 from skred.report.prediction.places import has_places, places_figure
 from skred.report.prediction.without_added import base_chance, comparison_rows
-from skred.report.prediction.words import percent, period
+from skred.report.prediction.words import once, percent, period, ranged
 from skred.report.shared import document as doc
 from skred.report.shared.drawing import Picture, draw
 from skred.report.shared.html import page
@@ -81,6 +81,8 @@ def render_prediction(document: doc.Document, figures: Mapping[str, Picture]) ->
         compared=compared,
         percent=percent,
         period=period,
+        once=once,
+        ranged=ranged,
     )
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from skred.report.prediction.words import percent, period_and_interval
 from skred.report.shared.labels import printable, shortened
-from skred.report.shared.numbers import share, three_digits, whole
+from skred.report.shared.numbers import three_digits, whole
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -37,13 +38,7 @@ def prediction_table(document: dict[str, Any]) -> Table:
         bound = "≥ " if row["at_least"] else ""
         table.add_row(what, bound + whole(row["value"]), f"{whole(row['low'])} to {whole(row['high'])}", "m")
     for row in document["runout"].get("once_in", ()):
-        value, low, high = (
-            "none" if row[key] is None else whole(row[key]) for key in ("value", "low", "high")
-        )
-        bound = "≥ " if row["at_least"] else ""
-        table.add_row(
-            f"runout reached once in {row['years']:g} years", bound + value, f"{low} to {high}", "m"
-        )
+        table.add_row(f"runout reached once in {row['years']:g} years", *_once_in(row), "m")
     for place in document["at"]:
         _place_rows(table, place)
     return table
@@ -62,12 +57,25 @@ def _place_rows(table: Table, place: dict[str, Any]) -> None:
             table.add_row(Text(what), *_chance(row), "-")
         tenth = next(row for row in place[name]["exceeded_by"] if row["share"] == 0.1)
         value, low, high = (three_digits(tenth[key]) for key in ("value", "low", "high"))
-        table.add_row(Text(f"{where}: {words} exceeded by 10 %"), value, f"{low} to {high}", unit)
+        table.add_row(Text(f"{where}: {words} exceeded by 10 % of all"), value, f"{low} to {high}", unit)
+        coming = [row for row in place[name]["given_reached"] if row["share"] == 0.1]
+        for row in coming:
+            value, low, high = (three_digits(row[key]) for key in ("value", "low", "high"))
+            what = f"{where}: {words} exceeded by 10 % of those that come"
+            table.add_row(Text(what), value, f"{low} to {high}", unit)
     period = place["reached"].get("return_period_years")
     if period is not None:
-        value, low, high = (three_digits(period[key]) for key in ("value", "low", "high"))
-        table.add_row(Text(f"{where}: return period of arrival"), value, f"{low} to {high}", "years")
+        table.add_row(Text(f"{where}: return period of arrival"), *period_and_interval(period), "years")
 
 
 def _chance(band: dict[str, float]) -> tuple[str, str]:
-    return share(band["value"]), f"{share(band['low'])} to {share(band['high'])}"
+    return percent(band["value"]), f"{percent(band['low'])} to {percent(band['high'])}"
+
+
+def _once_in(row: dict[str, Any]) -> tuple[str, str]:
+    """The runout for a return period, and its interval: a dash where fewer than one avalanche starts."""
+    value, low, high = ("-" if row[key] is None else whole(row[key]) for key in ("value", "low", "high"))
+    if row["high"] is None:
+        return value, "-"
+    bound = "≥ " if row["at_least"] else ""
+    return bound + value, f"at most {high}" if row["low"] is None else f"{low} to {high}"

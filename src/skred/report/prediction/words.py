@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from skred.report.shared import document as doc
-from skred.report.shared.numbers import ABSENT, decimals_for, is_number, rounded, three_digits
+from skred.report.shared.numbers import ABSENT, decimals_for, is_number, rounded, three_digits, whole
 
 _SURE = 0.0005
 """Nearer to 0 or 1 than this a simulated probability is not told: it is no certainty."""
@@ -47,6 +47,25 @@ def period_and_interval(band: Any) -> tuple[str, str]:
     if not is_number(value):
         return ("longer than can be said" if not is_number(low) else f"more than {_years(low)}"), ""
     return _years(value), f"{_years(low)} {f'to {_years(high)}' if is_number(high) else 'or more'}"
+
+
+def once(row: Any) -> str:
+    """The runout for a return period with its interval; in words where no avalanche starts in that time."""
+    value, low, high = (doc.get(row, key) for key in ("value", "low", "high"))
+    if not is_number(value):
+        told = "fewer than one avalanche starts in that time"
+        return f"{told} (at most s = {whole(high)} m)" if is_number(high) else told
+    bound = "at least " if doc.get(row, "at_least") else ""
+    return f"{bound}{whole(value)} ({whole(low) if is_number(low) else 'no avalanche'} to {whole(high)})"
+
+
+def ranged(limits: Any, unit: str) -> str:
+    """A range whose values are all as likely; one value where both ends are the same."""
+    low, high = limits
+    one = f" {unit}" if unit else ""
+    if low == high:
+        return f"{low:g}{one} (one value, taken as exact)"
+    return f"{low:g} to {high:g}{one} (each value as likely)"
 
 
 def _years(value: float) -> str:
