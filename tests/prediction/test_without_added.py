@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from html import escape
 from pathlib import Path
@@ -167,3 +168,26 @@ def test_a_place_above_every_release_is_refused(
     assert "--at hut=90: lies above every release, of which the highest is at s = 100.0 m" in told
     assert not out.exists()
     assert run([*words, "--release", "90", "--quiet"]) == 0
+
+
+def test_how_it_was_made_is_on_the_page(problem: HierarchicalProblem, tmp_path: Path) -> None:
+    folder, out = folder_of(tmp_path / "made", tree_of(problem, "coulomb")), tmp_path / "out"
+    track = plane(tmp_path)
+    words = ["predict", "--from", str(folder), "--quiet", "--out", str(out), "--track", str(track)]
+    assert run([*words, "--at", "a=900", "--density", "200", "--per-year", "0.2"]) == 0
+    document = json.loads((out / "prediction.json").read_text())
+    assert document["made"]["seed"] == 3 and document["made"]["command"].startswith("skred ")
+    page = (out / "report.html").read_text(encoding="utf-8")
+    check_page(page)
+    digest = hashlib.sha256(track.read_bytes()).hexdigest()
+    for said in (
+        document["made"]["date"],
+        digest,
+        "m along the slope,",
+        "200 kg/m³ (one value, taken as exact)",
+        "the frequency is taken as exact",
+        "no document of this track",
+    ):
+        assert said in page, said
+    assert "What was recorded is black" not in page
+    assert "density of 200 kg/m3, taken as exact" in " ".join(document["statement"])

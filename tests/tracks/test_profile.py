@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from pathlib import Path
@@ -13,6 +14,7 @@ from map_cases import bowl, on_map, plane, write_dem, write_line
 from skred.errors import InputError
 from skred.physics.terrain import build_terrain
 from skred.prediction.track import read_track
+from skred.prediction.track_origin import track_origin
 from skred.tracks.build import Wanted, make_track
 from skred.tracks.files import track_table
 from skred.tracks.profile import rise_notice, shape, smoothed, smoothed_twice_as_m
@@ -234,3 +236,37 @@ def test_a_rock_step_is_ground(tmp_path: Path) -> None:
     assert len(read_track(tmp_path / "track.csv").x_m) == len(document["profile"]["x_m"])
     with pytest.raises(InputError, match="At a cliff, lay the line beside it, or smooth more"):
         make_track(Wanted(dem, line, smoothing_m=0.0))
+
+
+@pytest.mark.parametrize(("end", "told"), [((8.0, 8.0), "refuses it"), ((60.0, 60.0), "smooths it more")])
+def test_a_short_track_is_told(tmp_path: Path, end: tuple[float, float], told: str) -> None:
+    line = write_line(tmp_path / "line.gpkg", [(3.0, 3.0), end])
+    made = make_track(Wanted(write_dem(tmp_path / "dem.tif", plane, cell=1.0), line))
+    (notice,) = made["notices"]
+    assert notice.startswith("the track is only ") and told in notice and "in metres" in notice
+
+
+def test_both_lengths_are_told(tmp_path: Path) -> None:
+    """s counts along the slope, a map does not."""
+    made = make_track(Wanted(write_dem(tmp_path / "dem.tif", plane), write_line(tmp_path / "l.gpkg", DOWN)))
+    profile = made["profile"]
+    lengths = f"{profile['s_m'][-1]:.0f} m long along the slope and {profile['x_m'][-1]:.0f} m on the map"
+    assert any(lengths in line for line in track_statement(made))
+
+
+def test_a_prediction_knows_where_its_track_is_from(tmp_path: Path) -> None:
+    line = write_line(tmp_path / "line.gpkg", DOWN)
+    made = make_track(Wanted(write_dem(tmp_path / "dem.tif", plane), line))
+    table, beside = tmp_path / "track.csv", tmp_path / "track.json"
+    table.write_text(track_table(made))
+    track = read_track(table)
+    assert track_origin(table, track)["made_from"] is None
+    beside.write_text(json.dumps(made))
+    origin = track_origin(table, track)
+    assert origin["sha256"] == hashlib.sha256(table.read_bytes()).hexdigest()
+    assert origin["made_from"]["terrain"]["file"] == "dem.tif"
+    assert origin["made_from"]["line"]["sha256"] == hashlib.sha256(line.read_bytes()).hexdigest()
+    assert origin["made_from"]["reference_system"].startswith("EPSG:")
+    for other in ("{}", "[", json.dumps({**made, "profile": {**made["profile"], "z_m": [1.0]}})):
+        beside.write_text(other)
+        assert track_origin(table, track)["made_from"] is None

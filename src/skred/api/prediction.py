@@ -191,6 +191,7 @@ def predict_to(
     wanted: Wanted,
     source: Source | None = None,
     progress: bool = False,
+    command: str | None = None,
 ) -> tuple[dict[str, Any], Calibration]:
     """Predict, after a calibration where none is given, and write the documents into a folder."""
     from skred.inference.calibrate import calibrate as sample
@@ -201,4 +202,7 @@ def predict_to(
         calibration = sample(problem, law, settings, progress=progress)
     else:
         calibration = source.stored.calibration
-    return predict_avalanches(calibration, folder, where, tell, wanted=wanted, source=source), calibration
+    document = predict_avalanches(
+        calibration, folder, where, tell, wanted=wanted, source=source, command=command
+    )
+    return document, calibration

@@ -62,7 +62,8 @@ Places = Annotated[
     Parameter(
         name="--at",
         negative="",
-        help="A place to predict at, NAME=S, m; repeat it. By default the sensors and the reference.",
+        help="A place to predict at, NAME=S; repeat it. S is the length along the slope from the track's"
+        " first point, m, not the distance on the map. By default the sensors and the reference.",
     ),
 ]
 SpeedThresholds = Annotated[
@@ -76,16 +77,22 @@ PressureThresholds = Annotated[
     Parameter(name="--pressure", negative="", help="Impact pressure to exceed, kPa; repeat it."),
 ]
 Density = Annotated[
-    str, Parameter(help="LOW,HIGH of the density of the flow, kg/m3; each value in between as likely.")
+    str,
+    Parameter(
+        help="LOW,HIGH of the density of the flow, kg/m3, each value in between as likely; or one, exact."
+    ),
 ]
 DragCoefficient = Annotated[
-    str, Parameter(help="LOW,HIGH of the obstacle's drag coefficient; each value in between as likely.")
+    str,
+    Parameter(
+        help="LOW,HIGH of the obstacle's drag coefficient, each value in between as likely; or one, exact."
+    ),
 ]
 PerYear = Annotated[
     str | None,
     Parameter(
-        help="RATE or RATE,SD of avalanches like those recorded, per year: adds probabilities in a year and"
-        " return periods."
+        help="RATE (exact) or RATE,SD of avalanches like those recorded, per year: adds probabilities in a"
+        " year and return periods."
     ),
 ]
 ReturnPeriods = Annotated[

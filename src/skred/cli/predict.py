@@ -3,6 +3,8 @@
 Everything heavy is imported inside the functions, so that ``--help`` is instant.
 """
 
+import shlex
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -79,6 +81,7 @@ def predict(
             wanted=wanted,
             source=source,
             progress=output.progress,
+            command=shlex.join(["skred", *sys.argv[1:]]),
         )
         write_reports(results.unfinished)
     first = [*prediction["warnings"], *cautions(prediction)]

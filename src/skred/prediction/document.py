@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
@@ -29,11 +30,12 @@ def prediction_document(
     wanted: Wanted | None = None,
     source: Source | None = None,
     base: xr.Dataset | None = None,
+    command: str | None = None,
 ) -> dict[str, Any]:
     """Summary of a prediction as plain data; without `data` it is marked as failed and has no numbers.
 
-    `base` is the same by the base law, where something was added to that. The document's ``statement`` says
-    in sentences what it means.
+    `base` is the same by the base law, where something was added to that; `command` is what was typed. The
+    document's ``statement`` says in sentences what it means.
     """
     problem, law, campaign = calibration.problem, calibration.law, calibration.problem.campaign
     assert isinstance(problem, HierarchicalProblem)
@@ -44,6 +46,7 @@ def prediction_document(
             "name": campaign.name,
             "fingerprint": calibration.tree.attrs["campaign_fingerprint"],
             "n_events": campaign.n_events,
+            **_described(calibration, source),
         },
         "law": {"id": law.id, "title": law.title, "equation": law.equation},
         "changed_priors": dict(law.changed_priors),
@@ -55,6 +58,8 @@ def prediction_document(
             "fingerprint": track.fingerprint(),
             "reference_s_m": track.reference_s_m,
             "release": track.release_text,
+            "horizontal_length_m": float(np.ptp(track.track.x_m)),
+            "origin": track.origin,
             "releases_s_m": sorted(set(track.releases.mean.tolist())),
         },
         "error_model": {"id": problem.error_model.id, "title": problem.error_model.title},
@@ -76,9 +81,22 @@ def prediction_document(
     empty = ("simulation", "reading_errors", "runout", "places", "at")
     document |= dict.fromkeys(empty) if data is None else _numbers(problem, track, data)
     document["without_added"] = None if source is None else without_added(source, track, base)
+    document["made"] = {
+        "command": command,
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "seed": int(calibration.tree.attrs["seed"]),
+    }
     document["warnings"] = warnings_of(document)
     document["statement"] = prediction_statement(document)
     return document
+
+
+def _described(calibration: Calibration, source: Source | None) -> dict[str, str]:
+    """What the campaign says of itself; a calibration that was read again does not know."""
+    if source is not None:
+        return source.recorded or {"description": "", "source": ""}
+    campaign = calibration.problem.campaign
+    return {"description": campaign.description, "source": campaign.source}
 
 
 def recorded_runouts(problem: HierarchicalProblem, track: PredictionTrack) -> tuple[float, float] | tuple[()]:

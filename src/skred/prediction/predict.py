@@ -68,6 +68,7 @@ def predict(
     simulation: Simulation | None = None,
     wanted: Wanted | None = None,
     source: Source | None = None,
+    command: str | None = None,
 ) -> dict[str, Any]:
     """Predict with a calibrated law.
 
@@ -86,6 +87,8 @@ def predict(
         Named places, thresholds and frequency.
     source : Source, optional
         Where the calibration was read from, with what was added to its law.
+    command : str, optional
+        What was typed.
 
     Returns
     -------
@@ -107,7 +110,7 @@ def predict(
         base = _without_added(source, track, simulation, wanted, tell)
     else:
         tell(f"{law.id}: the chains did not converge: {'; '.join(calibration.gate.problems)}")
-    document = prediction_document(calibration, track, data, wanted, source, base)
+    document = prediction_document(calibration, track, data, wanted, source, base, command)
     document["seconds"] = time.monotonic() - started
     tell("writing the results")
     write_prediction(document, data, problem, folder)

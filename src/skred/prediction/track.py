@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from skred.errors import InputError
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.hierarchical.releases import Releases
 from skred.physics.terrain import Terrain, build_terrain
+from skred.prediction.track_origin import track_origin
 
 FloatArray = NDArray[np.float64]
 Scenarios = Sequence[tuple[float, float]]
@@ -48,6 +50,8 @@ class PredictionTrack:
         How likely each release is; None where all are as likely.
     as_recorded : bool
         Whether the releases are the recorded ones, in their order.
+    origin : dict or None
+        Where a table that was given comes from.
     """
 
     name: str
@@ -59,6 +63,7 @@ class PredictionTrack:
     reference_s_m: float | None
     weights: FloatArray | None = None
     as_recorded: bool = False
+    origin: dict[str, Any] | None = None
 
     @property
     def length_m(self) -> float:
@@ -109,7 +114,15 @@ def prediction_track(
     if not scenarios:
         text += ", the first point of the track, because no --release was given"
     return PredictionTrack(
-        file.name, track, terrain, releases, text, is_own=False, reference_s_m=None, weights=weights
+        file.name,
+        track,
+        terrain,
+        releases,
+        text,
+        is_own=False,
+        reference_s_m=None,
+        weights=weights,
+        origin=track_origin(file, track),
     )
 
 

@@ -20,6 +20,7 @@ from skred.tracks.profile import (
     rise_notice,
     sampled,
     shape,
+    short_notice,
     smoothed,
     smoothed_twice_as_m,
 )
@@ -117,7 +118,7 @@ def make_track(wanted: Wanted) -> dict[str, Any]:
         require_ground(elevations, along, points, z, wanted.smoothing_m)
         profile = _profile(along, points, z, wanted.smoothing_m)
         s_m = np.array(profile["s_m"])
-        notices += rise_notice(s_m, z)
+        notices += [*rise_notice(s_m, z), *short_notice(float(s_m[-1]))]
         return {
             "format": FORMAT,
             "skred": of_skred(),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from skred.campaign.track_rules import STEEPEST_DEG
 from skred.errors import InputError
-from skred.physics.terrain import smoothed_slopes
+from skred.physics.terrain import SMOOTHING_M, USUAL_PATH_M, default_smoothing, smoothed_slopes
 from skred.tracks.elevations import Elevations
 from skred.tracks.plan import Plan
 
@@ -210,3 +210,22 @@ def smoothed_twice_as_m(first_m: float, second_m: float) -> float:
     Both average with Gaussian weights, whose variances add.
     """
     return math.hypot(first_m, second_m)
+
+
+def short_notice(length_m: float) -> list[str]:
+    """That a track is too short for the smoothing of a path, and what becomes of it then.
+
+    Parameters
+    ----------
+    length_m : float
+        Along the slope.
+    """
+    if length_m >= USUAL_PATH_M:
+        return []
+    refused = f" and `skred predict --track` refuses it: its smoothing of {SMOOTHING_M:g} m is longer"
+    return [
+        f"the track is only {length_m:.3g} m long: commands that read it smooth it by"
+        f" {default_smoothing(length_m):.2g} m instead of {SMOOTHING_M:g},"
+        f"{refused if length_m < SMOOTHING_M else ' and a law calibrated on a longer one smooths it more'};"
+        " check that the line is the whole path, in metres"
+    ]

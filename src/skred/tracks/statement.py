@@ -17,7 +17,22 @@ def track_statement(document: Mapping[str, Any]) -> list[str]:
         As `skred.tracks.build.make_track` returns it.
     """
     notices = [f"Notice: {notice}." for notice in document["notices"]]
-    return [*notices, *_extension(document), *_smoothing(document), *release_sentences(document["releases"])]
+    return [
+        *notices,
+        _lengths(document),
+        *_extension(document),
+        *_smoothing(document),
+        *release_sentences(document["releases"]),
+    ]
+
+
+def _lengths(document: Mapping[str, Any]) -> str:
+    """That places count along the slope, and how much that differs from the map."""
+    along, map_m = (document["profile"][name][-1] for name in ("s_m", "x_m"))
+    return (
+        f"The track is {along:.0f} m long along the slope and {map_m:.0f} m on the map. Places s (--at,"
+        " --release) are lengths along the slope from its first point."
+    )
 
 
 def _extension(document: Mapping[str, Any]) -> Iterator[str]:

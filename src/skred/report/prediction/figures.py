@@ -44,6 +44,8 @@ _COMMON, _LEAD, _ZOOM_BELOW = 0.8, 0.12, 0.6
 """The enlarged part starts so far above the place that so many avalanches pass, if it is so much shorter."""
 _TERRAIN = 0.45
 """Share of the panel that the terrain takes below the bars of distances."""
+_ASIDE = 0.16
+"""How far beside its peak a curve's name stands, as a share of the track."""
 _WHITE = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.8}
 _ABOVE: dict[str, Any] = {
     "textcoords": "offset points", "ha": "center", "va": "bottom", "fontsize": 8, "bbox": _WHITE,
@@ -186,10 +188,18 @@ def _speeds(axes: Axes, data: xr.Dataset, colour: str, *, named: bool) -> None:
         )
         axes.plot(s_m, value, color=tone, linestyle=_DASHES[k % 3], linewidth=1.6, label=label)
         if named:
-            peak = int(value.argmax())
-            axes.annotate(f"{100 * q:g} %", (s_m[peak], value[peak]), (0, 4), **_ABOVE)
+            _name(axes, s_m, value, k, f"{100 * q:g} %")
     axes.set_ylim(0, 1.05 * max(1.0, float(data["speed_quantile_high"].max())))
     axes.grid(axis="y")
+
+
+def _name(axes: Axes, s_m: FloatArray, value: FloatArray, number: int, text: str) -> None:
+    """Name one of three curves near its peak, where none of the names lies on another."""
+    peak = int(value.argmax())
+    aside, offset, upright = ((0.0, -4, "top"), (_ASIDE, 0, "center"), (0.0, 4, "bottom"))[number % 3]
+    place = min(float(s_m[peak] + aside * (s_m[-1] - s_m[0])), float(s_m[-1]))
+    at = (place, float(np.interp(place, s_m, value)))
+    axes.annotate(text, at, (0, offset), **_ABOVE | {"va": upright})
 
 
 def _runout(axes: Axes, data: xr.Dataset, colour: str) -> None:

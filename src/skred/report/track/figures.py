@@ -51,7 +51,9 @@ def track_figure(document: Mapping[str, Any]) -> Figure:
 def _summary(document: Mapping[str, Any]) -> str:
     """Length and fall in words."""
     written, step = document["smoothing"]["written"], document["step_m"]
-    return f"{written['length_m']:.0f} m long, {written['fall_m']:.0f} m of fall, a point every {step:.3g} m"
+    horizontal = document["profile"]["x_m"][-1]
+    length = f"{written['length_m']:.0f} m along the slope, {horizontal:.0f} m on the map"
+    return f"{length}, {written['fall_m']:.0f} m of fall, a point every {step:.3g} m"
 
 
 def _elevation(axes: Axes, profile: Mapping[str, Any]) -> None:
