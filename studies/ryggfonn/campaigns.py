@@ -35,6 +35,7 @@ _SOURCE = (
     "MoT-Voellmy."
 )
 _DESCRIPTION = "22 dry-snow avalanches at Ryggfonn, Norway, 1975-2007, on the thalweg"
+_MET_A_DAM = f" The avalanches of 1983 and later met a dam at s = {NATURAL_CROWN_S_M:.0f} m that this track does not have."
 
 
 def build(
@@ -71,7 +72,7 @@ def build(
     campaign = Campaign(
         name="ryggfonn" + ("-with-dam" if with_dam else "") + ("-spans" if spans else ""),
         description=f"{_DESCRIPTION} {'with' if with_dam else 'without'} the dam; see README.md for how well "
-        "the sensors' places are known.",
+        f"the sensors' places are known.{'' if with_dam else _MET_A_DAM}",
         source=_SOURCE,
         origin="measured",
         reference_s_m=crown_s_m,

@@ -83,7 +83,7 @@ def show_table(table: Any, sentences: list[str], where: Path, first: Sequence[st
 
     console = Console()
     for sentence in first:
-        console.print(Text(f"Take care: {sentence}", style="bold"))
+        console.print(Text(sentence, style="bold"))
     console.print(table)
     for sentence in sentences:
         if sentence not in first:

@@ -45,7 +45,7 @@ def _probability(verdict: Mapping[str, Any]) -> list[str]:
     told = [
         f"{_title(name)} {percent(float(probability[name]))}"
         for name in (named, _NOT_LISTED)
-        if name in probability
+        if name is not None and name in probability
     ]
     return [f"Probability by the diagnosis: {'; '.join(told)}."] if told else []
 
