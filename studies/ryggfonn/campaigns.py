@@ -35,7 +35,10 @@ _SOURCE = (
     "MoT-Voellmy."
 )
 _DESCRIPTION = "22 dry-snow avalanches at Ryggfonn, Norway, 1975-2007, on the thalweg"
-_MET_A_DAM = f" The avalanches of 1983 and later met a dam at s = {NATURAL_CROWN_S_M:.0f} m that this track does not have."
+_MET_A_DAM = (
+    f" The avalanches of 1983 and later met a dam at s = {NATURAL_CROWN_S_M:.0f} m that this track does not"
+    " have."
+)
 
 
 def build(
