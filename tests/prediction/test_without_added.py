@@ -176,7 +176,7 @@ def test_how_it_was_made_is_on_the_page(problem: HierarchicalProblem, tmp_path: 
     words = ["predict", "--from", str(folder), "--quiet", "--out", str(out), "--track", str(track)]
     assert run([*words, "--at", "a=900", "--density", "200", "--per-year", "0.2"]) == 0
     document = json.loads((out / "prediction.json").read_text())
-    assert document["made"]["seed"] == 3 and document["made"]["command"].startswith("skred ")
+    assert document["made"]["seed"] == 3 and document["made"]["command"].startswith("skred")
     page = (out / "report.html").read_text(encoding="utf-8")
     check_page(page)
     digest = hashlib.sha256(track.read_bytes()).hexdigest()
