@@ -98,7 +98,8 @@ def calibrated():
     interval = {"kind": "equal-tailed", "probability": 0.9}
     return {
         "format": 1, "campaign": "ryggfonn", "likelihood": "pooled", "interval": interval, "fits": True,
-        "fit": [fit], "fit_level": 0.01, "settings": {"draws": 1000}, "versions": {"skred": "0.1.0"},
+        "fit": [fit], "fit_level": 0.01, "fit_caution": "That says little: of the scatter.",
+        "settings": {"draws": 1000}, "versions": {"skred": "0.1.0"},
         **{key: law[key] for key in keys},
     }  # fmt: skip
 
@@ -109,6 +110,8 @@ def test_a_calibration_is_a_page_for_everyone(change):
     lay = next(one for one in page.all("p") if one.has("lay")).text
     assert ("Do not use these numbers" in lay) == ("gate" in change)
     assert "0.287" in page.text and "A simple model (pcm)" in lay
+    assert ("found no disagreement. That says little" in lay) == (change in ({}, {"fit": None}))
+    assert "That says little: of the scatter." in page.text
 
 
 def test_anything_may_be_null_in_a_calibration():

@@ -6,7 +6,8 @@ gaps. At every sensor the recorded mean and standard deviation over avalanches a
 predicted ones (posterior predictive check: Gelman, Meng and Stern, 1996, Statistica Sinica 6, 733-807).
 That is two comparisons a sensor. The limit is simultaneous, from the largest deviation in each predicted set
 (single-step max-T: Westfall and Young, 1993, "Resampling-based multiple testing", Wiley). The check is
-conservative, because the model was fitted to the same recordings.
+conservative, because the model was fitted to the same recordings. So it can find a misfit, but a law that
+passes need not be a good one: what a law misses widens the scatter that was fitted, and then lies within it.
 """
 
 from __future__ import annotations
@@ -25,6 +26,13 @@ FloatArray = NDArray[np.float64]
 FIT_LEVEL = 0.01
 """Probability, at most, that a right model is said to miss anywhere. It is the level of the bootstrap test of
 a diagnosis, so that both alarm equally rarely."""
+_CAUTION = {
+    "pooled": "the scatter around the response was fitted to the same readings, and can take up what the"
+    " law misses",
+    "hierarchical": "how much avalanches differ was fitted to the same readings, and can take up what the law"
+    " misses",
+}
+"""Why passing the check says little, by likelihood."""
 _MOST_NAMED = 3
 """Sensors that a sentence describes one by one; of more it says how many."""
 _MEAN, _SD = range(2)
@@ -54,7 +62,7 @@ class SensorFit:
     inside : float or None
         Share of the recorded readings inside the central 90 % of the predicted ones.
     fits : bool
-        Whether neither lies beyond the limit.
+        Whether neither lies beyond the limit: no misfit was found. It need not fit.
     """
 
     sensor: str
@@ -72,7 +80,7 @@ class SensorFit:
 
 
 def fit_entries(problem: Problem, predicted: FloatArray) -> dict[str, Any]:
-    """The check of fit as plain data: ``fit`` by sensor, ``fits`` and ``fit_level``.
+    """The check of fit as plain data: ``fit`` by sensor, ``fits``, ``fit_level`` and ``fit_caution``.
 
     Parameters
     ----------
@@ -86,6 +94,7 @@ def fit_entries(problem: Problem, predicted: FloatArray) -> dict[str, Any]:
         "fit": [asdict(row) for row in rows],
         "fits": all(row.fits for row in rows),
         "fit_level": FIT_LEVEL,
+        "fit_caution": f"That says little: {_CAUTION[problem.likelihood]}.",
         "bounds_left_out": int((problem.campaign.status >= Status.AT_LEAST).sum()),
     }
 
@@ -146,7 +155,7 @@ def adjusted_p_values(recorded: FloatArray, predicted: FloatArray, testable: NDA
 
 
 def calibration_statement(entry: dict[str, Any]) -> list[str]:
-    """Whether the chains of a calibration converged, and whether the model fits: two questions.
+    """Whether the chains of a calibration converged, and whether a misfit was found: two questions.
 
     Priors that are not the law's own are told first.
 
@@ -169,8 +178,9 @@ def _calibration_statement(entry: dict[str, Any]) -> list[str]:
     if entry["fits"]:
         return [
             f"The chains converged ({measured}).",
-            "The model fits: at no sensor do the mean or the standard deviation of the recordings lie beyond"
-            f" what it predicts (level {100 * entry['fit_level']:g} % over all sensors).",
+            "No misfit was found in the mean or the standard deviation of the readings at any sensor"
+            f" (level {100 * entry['fit_level']:g} % over all sensors). {entry['fit_caution']}"
+            " Whether another law predicts better is a question of a comparison.",
             *unseen,
         ]
     return [

@@ -71,10 +71,14 @@ def lay_words(document: doc.Document) -> list[str]:
         ]
     told += _known(document)
     if doc.get(document, "fits") is False:
-        missed = [one["sensor"] for one in _fit_rows(document) if one["fits"] == "no"]
+        missed = [one["sensor"] for one in _fit_rows(document) if one["misfit"] == "yes"]
         told.append(f"The model does not describe what was recorded at {', '.join(missed)}.")
     elif doc.get(document, "fits") is True:
-        told.append("Nothing recorded lies beyond what the model predicts. That does not make it right.")
+        told.append(
+            "The check below compares the average of what each sensor recorded, and how much that varies,"
+            " with the model, and found no disagreement. That says little, because the model was adjusted to"
+            " the same recordings. Another model can still be better: compare it with others."
+        )
     what = "single new avalanches" if doc.listed(document, "new_avalanche") else "the mean of many avalanches"
     return [*told, f"The predictions below are of {what}. All numbers hold for this path only."]
 
@@ -119,7 +123,7 @@ def _fit_rows(document: doc.Document) -> list[dict[str, Any]]:
                 "inside": share(inside) if is_number(inside) else fixed(None),
                 "p_mean": share(doc.get(one, "p_mean")) if is_number(doc.get(one, "p_mean")) else fixed(None),
                 "p_sd": share(doc.get(one, "p_sd")) if is_number(doc.get(one, "p_sd")) else fixed(None),
-                "fits": {True: "yes", False: "no"}.get(doc.get(one, "fits"), "n/a"),
+                "misfit": {True: "no", False: "yes"}.get(doc.get(one, "fits"), "n/a"),
             }
         )
     return rows
