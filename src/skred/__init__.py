@@ -1,7 +1,8 @@
 """Bayesian calibration and comparison of avalanche block models against recordings.
 
 `calibrate`, `compare`, `identify`, `diagnose` and `predict` do what the commands of these names do, and
-return a `Result`. See ``docs/python.md``. Nothing heavy is imported before it is used.
+return a `Result`. What cannot be used raises `InputError`. See ``docs/python.md``. Nothing heavy is imported
+before it is used.
 """
 
 from __future__ import annotations
@@ -9,12 +10,14 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from skred.errors import InputError
 from skred.parallel.folders import let_pytensor_write
 
 if TYPE_CHECKING:
     from skred.api.calibration import calibrate, compare
     from skred.api.diagnosis import diagnose, identify
     from skred.api.fronts import front_readings
+    from skred.api.model import model
     from skred.api.prediction import predict
     from skred.api.problems import laws, mechanisms, read_campaign
     from skred.api.results import Result
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
 let_pytensor_write()  # before anything imports it
 
 __all__ = [
+    "InputError",
     "Result",
     "calibrate",
     "compare",
@@ -30,6 +34,7 @@ __all__ = [
     "identify",
     "laws",
     "mechanisms",
+    "model",
     "predict",
     "read_campaign",
 ]
@@ -37,6 +42,7 @@ _ROOMS = {
     "calibration": ("calibrate", "compare"),
     "diagnosis": ("diagnose", "identify"),
     "fronts": ("front_readings",),
+    "model": ("model",),
     "prediction": ("predict",),
     "problems": ("laws", "mechanisms", "read_campaign"),
     "results": ("Result",),

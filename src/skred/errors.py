@@ -2,4 +2,15 @@
 
 
 class InputError(ValueError):
-    """Something given on the command line or in a file cannot be used; the message says what to do."""
+    """Something given on the command line, in a file or to a function cannot be used.
+
+    The message says what was expected and what to do.
+    """
+
+
+class UnknownNameError(InputError, KeyError):
+    """A name that nothing has; the message tells those that there are. It is what a mapping raises, too."""
+
+    def __str__(self) -> str:
+        """The message; a KeyError would show its repr."""
+        return Exception.__str__(self)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytensor.tensor as pt
 import pytest
 
 import skred
@@ -124,6 +125,43 @@ def test_numbers_may_be_of_numpy(value: Any) -> None:
 def test_front_readings(smoothing_m: Any) -> None:
     with pytest.raises(InputError, match="smoothing_m: expected a number from 0 to 1000"):
         skred.front_readings("pcm", smoothing_m=smoothing_m, dry_friction=0.2, turbulent_drag=0.003)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"dry_friction": -0.2}, "dry_friction: expected numbers of at least 0, found -0.2"),
+        ({"dry_friction": "0.2"}, "dry_friction: expected a number, or several in one row, found '0.2'"),
+        ({"dry_friction": None}, "dry_friction: expected a number"),
+        ({"dry_friction": True}, "dry_friction: expected a number"),
+        ({"dry_friction": []}, "dry_friction: expected a number"),
+        (
+            {"dry_friction": [0.2, np.nan]},
+            "dry_friction: expected a number, or several in one row, all finite",
+        ),
+        ({"dry_friction": [[0.2]]}, "dry_friction: .* an array of the shape"),
+        ({"dry_friction": [[0.2], [1, 2]]}, "dry_friction: .* rows of different lengths"),
+        (
+            {"dry_friction": [0.2, 0.3], "xi_h": [1, 2, 3]},
+            "xi_h: expected one number or 2, as dry_friction has",
+        ),
+        ({"dry_friction": pt.dmatrix()}, "dry_friction: .* 2 dimensions"),
+        ({"dry_friction": pt.constant(-1.0)}, "dry_friction: expected numbers of at least 0"),
+        ({"xi_h": 0.0}, "dry_friction, xi_h: these make the coefficient turbulent_drag of 'voellmy' inf"),
+        ({"xi_h": 0.0, "dry_friction": pt.dscalar()}, "these make the coefficient turbulent_drag"),
+        ({"xi": 3.0}, "xi: no parameter of 'voellmy'; there are: dry_friction, xi_h"),
+        ({"release_s_m": -1.0}, "release_s_m: expected numbers of at least 0"),
+        ({"release_s_m": [1.0, 1e9]}, "release_s_m: expected places on the track"),
+    ],
+)
+def test_constants_of_fronts(given: dict[str, Any], told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        skred.front_readings("voellmy", **{"dry_friction": 0.2, "xi_h": 3000.0, **given})
+
+
+def test_a_parameter_that_is_missing() -> None:
+    with pytest.raises(InputError, match="xi_h: expected a number or several, found none; parameters of"):
+        skred.front_readings("voellmy", dry_friction=0.2)
 
 
 def test_the_same_law_is_taken_once() -> None:

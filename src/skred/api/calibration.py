@@ -79,7 +79,7 @@ def calibrate(
 
     Raises
     ------
-    skred.errors.InputError
+    skred.InputError
         If the campaign, the law, the priors or an option cannot be used.
     """
     from skred.inference.fit import calibration_statement
@@ -147,7 +147,7 @@ def compare(
 
     Raises
     ------
-    skred.errors.InputError
+    skred.InputError
         As of `calibrate`.
     """
     import xarray as xr

@@ -47,7 +47,7 @@ def identify(
 
     Raises
     ------
-    skred.errors.InputError
+    skred.InputError
         As of `calibrate`.
     """
     from skred.diagnosis.detect.run import identify_to
@@ -103,7 +103,7 @@ def diagnose(
 
     Raises
     ------
-    skred.errors.InputError
+    skred.InputError
         As of `calibrate`.
     """
     from skred.diagnosis.effort import SAMPLING, effort_of

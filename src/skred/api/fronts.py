@@ -37,7 +37,8 @@ def front_readings(
     smoothing_m : float, optional
         Smoothing length of the terrain [m]; by default 10, in proportion less on tracks below 600 m.
     **parameters : scalar or (n,) tensor or array
-        Of the law, by name, each in its unit.
+        Of the law, by name, each in its unit. Numbers are checked: none may be below 0. Symbolic tensors are
+        not; their priors must keep them within what a law takes.
 
     Returns
     -------
@@ -46,30 +47,27 @@ def front_readings(
 
     Raises
     ------
-    skred.errors.InputError
-        If the campaign, the law or the smoothing length cannot be used.
-    TypeError
-        If parameters are missing or unknown; the message names those of the law.
+    skred.InputError
+        If the campaign, the law or the smoothing length cannot be used; if parameters are missing, unknown,
+        or no numbers that the law takes; if their lengths differ.
     """
     import pytensor.tensor as pt
 
+    from skred.api.front_inputs import checked_columns, checked_names
     from skred.inference.pooled.forward_op import front_readings as readings
     from skred.physics.geometry import contributions_of, path_of, sensor_table
     from skred.physics.terrain import build_terrain
 
     smoothing_m = arguments.smoothing(smoothing_m)
     [chosen], recorded = chosen_laws([law], None), campaign_of(campaign)
-    if set(parameters) != set(chosen.parameter_names):
-        raise TypeError(
-            f"front_readings: expected the parameters {', '.join(chosen.parameter_names)} of {chosen.id!r},"
-            f" found {', '.join(sorted(parameters)) or 'none'}"
-        )
+    checked_names(chosen, parameters)
+    columns = checked_columns(chosen, parameters, release_s_m, recorded.track.length_m)
     track = recorded.track
     terrain = build_terrain(track.x_m, track.z_m, smoothing_m=smoothing_m)
     places = [None if one.is_runout else (one.s_from_m, one.s_to_m) for one in recorded.sensors]
-    coefficients = chosen.strengths(*(pt.as_tensor(parameters[name]) for name in chosen.parameter_names))
-    columns = [pt.atleast_1d(pt.cast(one, "float64")) for one in (*coefficients, pt.as_tensor(release_s_m))]
-    *strengths, releases = pt.broadcast_arrays(*columns)
+    *given, places_of_release = (pt.as_tensor(one) for one in columns.values())
+    rows = [pt.atleast_1d(pt.cast(one, "float64")) for one in (*chosen.strengths(*given), places_of_release)]
+    *strengths, releases = pt.broadcast_arrays(*rows)
     law_terms = contributions_of(chosen.mechanisms, terrain)
     found: TensorVariable = readings(
         pt.stack(strengths, axis=1), releases, path_of(terrain), law_terms, sensor_table(places)

@@ -87,7 +87,7 @@ def predict(
 
     Raises
     ------
-    skred.errors.InputError
+    skred.InputError
         As of `calibrate`, and if the track cannot be used.
     """
     from skred.prediction.source import source_of

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from skred.api.arguments import LIKELIHOODS, one_of, scales
 from skred.api.arguments import smoothing as smoothing_length
+from skred.api.named import ByName
 from skred.errors import InputError
 
 if TYPE_CHECKING:
@@ -49,12 +50,16 @@ def laws() -> dict[str, Law]:
     Returns
     -------
     dict of Law
-        As ``laws()["pcm"]``. A law has `parameters` and an `equation`; `law.build(problem)` is its PyMC
-        model.
+        As ``laws()["pcm"]``. A law has `parameters` and an `equation`; its PyMC model is that of `model`.
+
+    Raises
+    ------
+    skred.InputError
+        Also a KeyError: where a law is asked for by another name than these.
     """
     from skred.physics.laws import installed_laws
 
-    return {law.id: law for law in installed_laws()[0]}
+    return ByName("law laws", {law.id: law for law in installed_laws()[0]})
 
 
 def mechanisms() -> dict[str, Mechanism]:
@@ -65,10 +70,15 @@ def mechanisms() -> dict[str, Mechanism]:
     dict of Mechanism
         Forces on a front, and faults of the instruments. Of these only forces that act alike along the whole
         track can be added to a law.
+
+    Raises
+    ------
+    skred.InputError
+        Also a KeyError: where a mechanism is asked for by another name than these.
     """
     from skred.physics.mechanisms.library import mechanisms as installed
 
-    return installed()
+    return ByName("mechanism mechanisms", installed())
 
 
 def chosen_laws(given: list[str | Law], priors: Mapping[str, float] | None) -> list[Law]:

@@ -205,6 +205,13 @@ class Campaign:
             if getattr(self, name).shape != (self.n_events, self.n_sensors):
                 raise ValueError(f"{name} needs the shape {self.n_events, self.n_sensors}: events, sensors")
 
+    def __repr__(self) -> str:
+        """One line."""
+        return (
+            f"<Campaign {self.name}: {self.n_events} events, {self.n_sensors} sensors"
+            f" ({', '.join(self.sensor_ids)!s:.60}), track of {self.track.length_m:.0f} m>"
+        )
+
     @property
     def n_events(self) -> int:
         """Number of avalanches."""

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from html import escape
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.errors import InputError
 from skred.physics.mechanisms.spec import Mechanism, Strength
 
 
@@ -31,7 +33,7 @@ class Parameter:
     paper_symbol: str = ""
 
 
-class SymbolClashError(ValueError):
+class SymbolClashError(InputError):
     """One name or symbol that stands for two things.
 
     Attributes
@@ -117,18 +119,22 @@ class Law:
 
         Raises
         ------
-        ValueError
-            If the mechanism cannot be a part of a law, or the law has it, its name or its symbol already.
+        InputError
+            If it is no mechanism or cannot be a part of a law, or the law has it, its name or its symbol
+            already.
         """
         if not isinstance(mechanism, Mechanism):
-            return NotImplemented
+            raise InputError(
+                f"law + mechanism: expected a mechanism, such as skred.mechanisms()['viscous_drag'], found"
+                f" {mechanism!r:.60}"
+            )
         if mechanism.column is None or mechanism.profile is None:
-            raise ValueError(
+            raise InputError(
                 f"{mechanism.id!r} cannot be a part of a law: it acts at a place, on an instrument or by a"
                 " covariate that a diagnosis has to find; expected a mechanism with a column and a profile"
             )
         if mechanism.id in (own.id for own in self.mechanisms):
-            raise ValueError(f"the law {self.id!r} has {mechanism.id!r} already")
+            raise InputError(f"the law {self.id!r} has {mechanism.id!r} already")
         self.check_symbols(mechanism.strength, mechanism.id, self.mechanisms)
         return replace(
             self,
@@ -169,6 +175,21 @@ class Law:
                     raise SymbolClashError(
                         f"the {what} {word!r} is used twice, by {owner!r} and by {other!r}", (owner, other)
                     )
+
+    def __repr__(self) -> str:
+        """One line."""
+        told = ", ".join(f"{one.name} {one.symbol} [{one.unit}]" for one in self.parameters)
+        return f"<Law {self.id}: {self.title}; {told}>"
+
+    def _repr_html_(self) -> str:
+        """For notebooks."""
+        rows = "".join(
+            f"<tr><td>{escape(one.name)}</td><td>{escape(one.symbol)}</td><td>{escape(one.unit)}</td></tr>"
+            for one in self.parameters
+        )
+        head = "<tr><th>parameter</th><th>symbol</th><th>unit</th></tr>"
+        said = f"<p>{escape(self.id)}: {escape(self.title)}<br>{escape(self.equation)}</p>"
+        return f"{said}<table><thead>{head}</thead><tbody>{rows}</tbody></table>"
 
     @property
     def equation(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.metadata import EntryPoint
 
-from skred.errors import InputError
+from skred.errors import InputError, UnknownNameError
 from skred.physics.law import Law, SymbolClashError
 from skred.physics.mechanisms import library
 from skred.physics.mechanisms.placed import can_join
@@ -13,7 +13,7 @@ from skred.physics.plugins import OWN_PACKAGE, Refused, RefusedError, entries_of
 GROUP = "skred.laws"
 
 
-class UnknownLawError(InputError):
+class UnknownLawError(UnknownNameError):
     """A law was asked for that no installed package provides."""
 
 

@@ -267,6 +267,11 @@ class Mechanism:
     group: Group = Group.PHYSICS
     same_term_as: str = ""
 
+    def __repr__(self) -> str:
+        """One line."""
+        strength = self.strength
+        return f"<Mechanism {self.id}: {self.title}; {strength.name} {strength.symbol} [{strength.unit}]>"
+
     def term(self, terrain: Terrain) -> tuple[Column, FloatArray]:
         """Its column and its profile there, as a part of a base law.
 
