@@ -238,3 +238,12 @@ def test_another_separator_is_told_once_with_the_way_in(texts, folder_with):
     assert "skred import FOLDER --out" in problem.message
     with pytest.raises(CampaignError, match="events.csv, row 1.*: columns are separated by semicolons"):
         read_campaign(folder_with({"events.csv": tables["events.csv"]}))
+
+
+def test_a_folder_of_results_is_told_in_one_line(tmp_path, folder_with):
+    (tmp_path / "summary.json").write_text("{}", encoding="utf-8")
+    problem = only_problem(tmp_path)
+    assert "holds results of skred calibrate, not a campaign" in str(problem)
+    campaign = folder_with({})
+    (campaign / "summary.json").write_text("{}", encoding="utf-8")
+    assert read_campaign(campaign).n_events == 3

@@ -28,6 +28,16 @@ from skred.campaign.track_rules import track_problems
 # Events times sensors: the arrays of a campaign hold one number for each pair.
 MOST_READINGS = 5_000_000
 
+_RESULTS = {
+    "summary.json": "calibrate",
+    "compare.json": "compare",
+    "identify.json": "identify",
+    "verdict.json": "diagnose",
+    "prediction.json": "predict",
+    "scorecard.json": "prove",
+}
+"""Documents that commands write, which a campaign is mistaken for."""
+
 TRACK = (
     Column("x_m", cells.coordinate),
     Column("z_m", cells.number),
@@ -123,6 +133,16 @@ def _require_folder(folder: Path) -> None:
     if not is_folder:
         message = "expected a folder with the five files of a campaign; correct the path"
         raise CampaignError([Problem(str(folder), None, None, None, message)])
+    if not (folder / "campaign.toml").is_file() and (commands := _commands_that_wrote(folder)):
+        message = (
+            f"holds results of {' and '.join(commands)}, not a campaign; give the campaign's folder or name"
+        )
+        raise CampaignError([Problem(str(folder), None, None, None, message)])
+
+
+def _commands_that_wrote(folder: Path) -> list[str]:
+    """The commands whose results a folder holds."""
+    return [f"skred {command}" for file, command in _RESULTS.items() if (folder / file).is_file()]
 
 
 def _covariate_reader(name: str) -> ReadCell:
