@@ -146,3 +146,14 @@ def test_a_page_needs_a_name_and_a_folder(results: Path, tmp_path: Path) -> None
     for file in (tmp_path / "page.txt", tmp_path / "nowhere" / "page.html", tmp_path):
         with pytest.raises(InputError, match="--export"):
             check_target(file)
+
+
+def test_a_page_that_is_there_is_replaced_by_force_only(results: Path, tmp_path: Path, capsys: Any) -> None:
+    page = tmp_path / "page.html"
+    page.write_text("mine", encoding="utf-8")
+    asked = ["dashboard", str(results / "pcm"), "--export", str(page), "--quiet"]
+    assert run(asked) == 2
+    assert "is there already; choose another, or --force to replace it" in capsys.readouterr().err
+    assert page.read_text(encoding="utf-8") == "mine"
+    assert run([*asked, "--force"]) == 0
+    assert page.stat().st_size > 100_000

@@ -27,11 +27,19 @@ Port = Annotated[
     int,
     Parameter(validator=validators.Number(gte=0, lte=65535), help="Port to serve on; 0 for any free one."),
 ]
+Replace = Annotated[
+    bool, Parameter(name="--force", negative="", help="Replace the file of --export, where it is there.")
+]
 NoOpen = Annotated[bool, Parameter(name="--no-open", negative="", help="Do not open a browser.")]
 
 
 def dashboard(
-    *places: Shown, export: Export = None, port: Port = 0, no_open: NoOpen = False, quiet: Quiet = False
+    *places: Shown,
+    export: Export = None,
+    force: Replace = False,
+    port: Port = 0,
+    no_open: NoOpen = False,
+    quiet: Quiet = False,
 ) -> int:
     """Show results of several runs in one page: draws, checks, comparisons, speeds, candidates.
 
@@ -48,13 +56,13 @@ def dashboard(
     from skred.dashboard.reading import read_given
 
     if export is not None:
-        check_target(export)
+        check_target(export, force=force)
     given = read_given(places)
     tell = (lambda line: None) if quiet else _tell
     for trouble in given.troubles:
         tell(f"not shown: {trouble.message}")
     if export is not None:
-        print(write_page(given, export, tell))
+        print(write_page(given, export, tell, force=force))
         return DONE
     from skred.dashboard.serve import serve
 

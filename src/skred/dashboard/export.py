@@ -23,7 +23,9 @@ base-uri 'none'; form-action 'none'">
 """
 
 
-def export(given: Given, file: Path, tell: Callable[[str], None] = lambda line: None) -> Path:
+def export(
+    given: Given, file: Path, tell: Callable[[str], None] = lambda line: None, *, force: bool = False
+) -> Path:
     """Write the dashboard as one page that needs neither network nor server.
 
     Parameters
@@ -33,13 +35,15 @@ def export(given: Given, file: Path, tell: Callable[[str], None] = lambda line: 
         Ends in ``.html``.
     tell : callable
         Takes a line for each view that is made.
+    force : bool
+        Replace a file that is there.
 
     Raises
     ------
     InputError
         If the file is not to be a page, or cannot be there.
     """
-    check_target(file)
+    check_target(file, force=force)
     asked = entries(given)
     ours = (program("unpack.js"), asset("ask_file.js"), program("marks.js"), asset("dashboard.js"))
     scripts = [bokeh_program(), "".join(ours)]
@@ -55,8 +59,8 @@ def export(given: Given, file: Path, tell: Callable[[str], None] = lambda line: 
     return file
 
 
-def check_target(file: Path) -> None:
-    """Refuse a file that cannot be written, before the work.
+def check_target(file: Path, *, force: bool = False) -> None:
+    """Refuse a file that cannot be written or is there already, before the work.
 
     Raises
     ------
@@ -69,3 +73,5 @@ def check_target(file: Path) -> None:
         raise InputError(
             f"--export {file}: no such folder to write into, or a folder is there; choose another"
         )
+    if file.exists() and not force:
+        raise InputError(f"--export {file}: is there already; choose another, or --force to replace it")
