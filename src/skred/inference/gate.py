@@ -87,13 +87,16 @@ def check_gate(tree: xr.DataTree, parameters: Sequence[str]) -> Gate:
     # Written so that NaN fails too.
     if not r_hat <= R_HAT_LIMIT:
         problems.append(
-            f"r-hat {r_hat:.3f} exceeds {R_HAT_LIMIT}: more --tune, or look at the trace for modes"
+            f"r-hat {r_hat:.3f} exceeds {R_HAT_LIMIT}: more draws for tuning (tune=, --tune), or look at"
+            " the trace for modes"
         )
     for name, size in (("bulk", ess_bulk), ("tail", ess_tail)):
         if not size >= ESS_LIMIT:
-            problems.append(f"{name} effective sample size {size:.0f} below {ESS_LIMIT:.0f}: more --draws")
+            problems.append(
+                f"{name} effective sample size {size:.0f} below {ESS_LIMIT:.0f}: more draws (draws=, --draws)"
+            )
     if divergences:
-        problems.append(f"{divergences} divergent transitions: use --sampler metropolis")
+        problems.append(f"{divergences} divergent transitions: use Metropolis (sampler=, --sampler)")
     return Gate(r_hat, ess_bulk, ess_tail, divergences, tuple(problems))
 
 

@@ -192,9 +192,7 @@ class TabulatedLogDensity(ArrayOp):
         TypeError
             Always.
         """
-        raise TypeError(
-            "TabulatedLogDensity has no gradient: use --sampler metropolis for a law with mechanisms added"
-        )
+        raise TypeError("TabulatedLogDensity has no gradient: use Metropolis for a law with mechanisms added")
 
 
 @register_funcify_default_op_cache_key(TabulatedLogDensity)
