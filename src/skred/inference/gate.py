@@ -96,7 +96,10 @@ def check_gate(tree: xr.DataTree, parameters: Sequence[str]) -> Gate:
                 f"{name} effective sample size {size:.0f} below {ESS_LIMIT:.0f}: more draws (draws=, --draws)"
             )
     if divergences:
-        problems.append(f"{divergences} divergent transitions: use Metropolis (sampler=, --sampler)")
+        problems.append(
+            f"{divergences} divergent transitions: use Metropolis"
+            " (sampler='metropolis', --sampler metropolis)"
+        )
     return Gate(r_hat, ess_bulk, ess_tail, divergences, tuple(problems))
 
 
