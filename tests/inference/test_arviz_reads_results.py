@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.stats import halfnorm
 
 from skred.campaign import Status
 from skred.inference.by_sensor import observed_by_sensor, sensors_with_readings
@@ -90,6 +91,18 @@ def test_comparisons_need_no_names(results: Any) -> None:
     assert table["elpd_diff"].tolist() == [0.0, 0.0]
     points = azp.plot_khat(az.loo(tree, pointwise=True)).viz["khat"]
     assert len(points) == 1
+
+
+def test_the_sensitivity_to_priors_needs_no_more(results: Any) -> None:
+    tree, calibration = results
+    names = [parameter.name for parameter in calibration.problem.parameters(calibration.law)]
+    assert set(tree["log_prior"].data_vars) == set(names)
+    scale = calibration.law.mechanisms[0].strength.prior_scale
+    if calibration.problem.likelihood == "pooled":
+        draws = tree["posterior"]["dry_friction"].values
+        assert_allclose(tree["log_prior"]["dry_friction"], halfnorm(scale=scale).logpdf(draws))
+    table = az.psense_summary(tree)
+    assert set(table.index) == set(names) and np.isfinite(table["prior"].astype(float)).all()
 
 
 def test_a_sensors_name_asks_for_the_joint_terms_of_its_avalanches(results: Any) -> None:

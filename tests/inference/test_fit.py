@@ -17,6 +17,7 @@ from skred.inference.fit import (
     fit_sentences,
     missed_sensors,
 )
+from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.inference.results import summary
 
 ALL = np.full((2, 8), True)
@@ -116,3 +117,13 @@ def test_sentences_name_the_worst_first() -> None:
     many = {"fit": [row(f"v{k}", False) for k in range(9)]}
     assert missed_sensors(many) == "9 of 9 sensors"
     assert fit_sentences(many)[-1] == "It misses at 6 further sensors too."
+
+
+def test_what_a_pass_is_worth_is_told_by_the_likelihood(problem: Any) -> None:
+    recorded = np.where(problem.observed, problem.campaign.values, 0.0)
+    predicted = recorded + np.random.default_rng(4).standard_normal((40, *recorded.shape))
+    for kind, part in (
+        (problem, "the scatter around the response was fitted"),
+        (hierarchical_problem(problem.campaign), "how much avalanches differ was fitted"),
+    ):
+        assert fit_entries(kind, predicted)["fit_caution"].startswith(f"That says little: {part}")

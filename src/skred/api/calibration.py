@@ -96,7 +96,7 @@ def calibrate(
         calibration = calibrate_to(problem, chosen, settings, folder)
         document = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         document["statement"] = calibration_statement(calibration.entry())
-        return Result("calibrate", subject, document, calibration.tree, folder)
+        return Result("calibrate", subject, document, calibration.whole_tree, folder)
 
 
 def calibrate_to(

@@ -19,6 +19,7 @@ from skred.inference.along_track import with_along_track
 from skred.inference.gate import Gate, check_gate
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY, interval
 from skred.inference.joint_metropolis import JointMetropolis
+from skred.inference.log_prior import with_log_prior
 from skred.inference.problem import Problem
 from skred.inference.results import assemble, save, summary
 from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior
@@ -58,9 +59,15 @@ class Calibration:
         """The sampler's step, compiled for the model; every event's term can be weighted."""
         return JointMetropolis(model=self.model, pointwise="recordings")
 
+    @cached_property
+    def whole_tree(self) -> xr.DataTree:
+        """The tree with the densities of the priors, as it is written and handed out."""
+        return with_log_prior(self.tree, self.model)
+
     def __getstate__(self) -> dict[str, Any]:
-        """Without compiled functions; they are compiled again when they are needed."""
-        return {name: value for name, value in vars(self).items() if name not in ("model", "step")}
+        """Without compiled functions and what they make; it is made again when it is needed."""
+        again = ("model", "step", "whole_tree")
+        return {name: value for name, value in vars(self).items() if name not in again}
 
     def entry(self) -> dict[str, Any]:
         """The calibration as plain data, with units: convergence, parameters, fit and predictions."""
@@ -117,7 +124,7 @@ def calibrate_surely(problem: Problem, law: Law, settings: SamplerSettings) -> C
 
 def write_calibration(calibration: Calibration, folder: Path) -> None:
     """Write ``posterior.nc`` and ``summary.json``, from which the figures of a calibration are made."""
-    tree = with_along_track(calibration.tree, calibration.law, calibration.problem)
+    tree = with_along_track(calibration.whole_tree, calibration.law, calibration.problem)
     save(tree, folder / "posterior.nc")
     attributes = calibration.tree.attrs
     document = {

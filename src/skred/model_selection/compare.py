@@ -99,7 +99,7 @@ def score(
         entries.append(entry)
         law_folder = folder / law.id
         law_folder.mkdir(exist_ok=True, parents=True)
-        save(with_along_track(calibration.tree, law, problem), law_folder / "posterior.nc")
+        save(with_along_track(calibration.whole_tree, law, problem), law_folder / "posterior.nc")
     return _document(problem, settings, calibration, rank(entries, trees))
 
 
