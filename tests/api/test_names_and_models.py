@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from operator import methodcaller
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ import pytest
 
 import skred
 from skred.api.problems import problem_of
+
+as_a_notebook = methodcaller("_repr_html_")
 
 
 @pytest.mark.parametrize(
@@ -49,8 +52,8 @@ def test_everything_shows_itself_in_one_line() -> None:
     }
     for text, part in shown.items():
         assert part in text and "\n" not in text and "0x" not in text and len(text) < 300
-    assert "<td>mu</td>" in skred.laws()["pcm"]._repr_html_()
-    assert "<td>pcm</td>" in skred.laws()._repr_html_()
+    assert "<td>mu</td>" in as_a_notebook(skred.laws()["pcm"])
+    assert "<td>pcm</td>" in as_a_notebook(skred.laws())
 
 
 @pytest.mark.parametrize("likelihood", ["pooled", "hierarchical"])
