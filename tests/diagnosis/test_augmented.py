@@ -317,7 +317,7 @@ def test_what_cannot_be_is_refused(base: Base, drag: Curve, problem: AugmentedPr
         replace(problem, campaign=CAMPAIGN)
     with pytest.raises(ValueError, match="calibrate that law"):
         problem.log_likelihood(load_law("pcm"), {})
-    with pytest.raises(TypeError, match="metropolis"):
+    with pytest.raises(TypeError, match="use Metropolis"):
         strengths = pt.matrix()
         inputs = [pt.as_tensor_variable(value) for value in problem.tables.arrays.values()]
         density = TabulatedLogDensity()(np.zeros((3, 1)), np.ones((1, 1)), strengths, np.zeros(1), *inputs)
