@@ -328,8 +328,9 @@ def test_what_is_explored_follows_light_and_dark(opened):
     explored(page, PARETO)
     shown = [page.evaluate(colour)]
     page.emulate_media(color_scheme="light")
-    page.wait_for_function("c => (" + colour + ")() !== c", arg=shown[0], timeout=10_000)
-    shown.append(page.evaluate(colour))
+    # Between both there is no figure for a moment.
+    other = "c => { const found = (" + colour + ")(); return found && found !== c ? found : null; }"
+    shown.append(page.wait_for_function(other, arg=shown[0], timeout=20_000).json_value())
     papers = (DARK_PAPER, PAPER)
     assert all(contrast(one, paper) > 7.0 for one, paper in zip(shown, papers, strict=True))
     assert hexed(page.evaluate("getComputedStyle(document.body).backgroundColor")) == PAPER
