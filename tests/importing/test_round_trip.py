@@ -27,7 +27,7 @@ SPEEDS = st.one_of(st.integers(1, 60).map(float), st.floats(0.5, 60))
 def campaigns(draw: Any) -> Campaign:
     """Campaigns of every kind of reading on a straight slope, no speed above a free fall."""
     x_m = np.array([0.0, *np.cumsum(draw(st.lists(st.floats(200, 500), min_size=5, max_size=8)))])
-    track = Track(x_m, 2000.0 - 0.75 * x_m)
+    track = Track(x_m, 4000.0 - 0.75 * x_m)
     length = track.length_m
     ids = draw(st.lists(WORDS, min_size=2, max_size=4, unique=True))
     places = [draw(st.floats(0.35 * length, 0.4 * length)) for _ in ids[1:]]
