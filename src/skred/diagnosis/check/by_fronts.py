@@ -3,8 +3,8 @@
 A comparison refits every mechanism in every shape, which is too slow for a hundred campaigns. Here each is
 refitted in one of its shapes, drawn by what the linear model thinks of them and by their prior, half each.
 With the weight of importance sampling this estimates the evidence over all shapes without bias, wherever the
-linear model errs: tangents promise evidence where fronts stop near sensors, and miss it where strengths have
-to be large. What leads where the odds reach those of the recordings is computed again by more points, as a
+linear model errs: tangents overstate it where fronts stop near sensors, and miss it where strengths have to
+be large. What leads where the odds reach those of the recordings is computed again by more points, as a
 comparison does.
 """
 

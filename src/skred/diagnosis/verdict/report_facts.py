@@ -270,7 +270,6 @@ def _checks(found: Diagnosis) -> list[dict[str, Any]]:
             "fired": check.fired,
             "statistic": check.statistic,
             "n_simulated": len(check.simulated),
-            "largest_simulated": float(check.simulated.max(initial=-math.inf)),
         }
         for added, check in checks_of(found)
     ]
