@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from skred.diagnosis.augment.problem import as_diagnosed
 from skred.diagnosis.compare.comparison import with_errors
 from skred.diagnosis.compare.recomputed import recomputed
-from skred.diagnosis.compare.refinement import Place, candidates_of, leading
+from skred.diagnosis.compare.refinement import candidates_of, leading, screened_parts
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import Base, curve_near, fit_base
 from skred.diagnosis.evidence.conditional_map import Population
@@ -35,14 +35,13 @@ def engine_log_bayes_factor(base: Base, mechanism: Mechanism, shapes: Sequence[S
     """Log Bayes factor of a mechanism against nothing, averaged over some shapes alone.
 
     Screened, the leading shapes computed anew, and then with more quadrature points, as a comparison does; no
-    shape is split into others.
+    shape is parted.
     """
-    screened = [curve(base, mechanism, one) for one in shapes]
-    places: dict[int, Place] = {}
-    while todo := [k for k in leading(screened, places) if k not in places]:
+    parts = screened_parts([curve(base, mechanism, one) for one in shapes])
+    while todo := [k for k in leading(parts) if parts[k].level == 0]:
         for k in todo:
-            places[k] = Place((curve_near(base, screened[k], shapes[k]),))
-    candidates = candidates_of(screened, places)
+            (parts[k],) = parts[k].parted([curve_near(base, parts[k].curve, parts[k].curve.shape)])
+    candidates = candidates_of(parts)
     with ThreadPoolExecutor(1) as pool:
         again, _ = recomputed(base, candidates, [], pool)
     return again[mechanism.id].log_bayes_factor

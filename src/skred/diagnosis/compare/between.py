@@ -15,14 +15,12 @@ from functools import partial
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import FINE, Budget
+from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.diagnosis.tabulated.between_evidence import BetweenTarget, Way, between_evidence, search, way_of
 from skred.diagnosis.tabulated.wide_tables import wide_tables
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism
 
-_LOOKED_AT = 4
-"""Mechanisms that are looked at, the most probable ones with the strength in common: one that is far behind
-would have to gain more by what avalanches differ in than these do."""
 TABLES = Budget(64, 64, 128, 1.5, 1.8), FINE
 """Quadrature points of an event in each table: to find where modes are, and then there."""
 
@@ -40,8 +38,9 @@ def may_differ(mechanism: Mechanism) -> bool:
 def with_ways(base: Base, candidates: Mapping[str, Candidate], pool: Executor) -> dict[str, Candidate]:
     """Candidates, the most probable ones with what they gain where avalanches differ in their strength."""
     found = dict(candidates)
-    differ = [one for one in candidates.values() if may_differ(one.mechanism) and one.alone > 0.0]
-    leading = sorted(differ, key=lambda one: -one.alone)[:_LOOKED_AT]
+    differ = [one for one in candidates.values() if may_differ(one.mechanism)]
+    least = max(max((one.alone for one in differ), default=0.0) - COUNTS, 0.0)
+    leading = [one for one in differ if one.alone > least]
     gains = pool.map(partial(gains_of, base), [one.best for one in leading])
     for one, gained in zip(leading, gains, strict=True):
         found[one.mechanism.id] = replace(one, ways=gained)

@@ -33,6 +33,7 @@ from skred.diagnosis.evidence.event_quadrature import FINE, SCREENING, USUAL
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds, stated
 from skred.diagnosis.evidence.refit import Rounds, refit
+from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
 from skred.parallel.processes import worker_pool
 from skred.parallel.threads import side_by_side
@@ -40,12 +41,6 @@ from skred.parallel.threads import side_by_side
 FloatArray = NDArray[np.float64]
 ERROR_SHARES = {"robust": 0.55, "student": 0.15, "correlated": 0.15, "scaled": 0.15}
 """Prior probability of each error model in the comparison."""
-_PREFERRED_BY = 1.0
-"""Nats by which another error model must be better for the base law alone to be compared under as well."""
-_OTHER_ERRORS = 5.0
-"""Nats that a candidate may have more under the less probable of two error models, beside as many again as it
-has under the other. Where a model is farther behind than that, mechanisms to which these are too few are not
-compared under it, and count for nothing there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,12 +162,12 @@ def compare(base: Base, tell: Tell = lambda done, of: None) -> Comparison:
     height = {name: math.log(ERROR_SHARES[name]) + heights[name] for name in bases}
     preferred = max(height, key=lambda name: height[name])
     chosen = [DEFAULT_ERRORS]
-    if height[preferred] > height[DEFAULT_ERRORS] + _PREFERRED_BY:
+    if height[preferred] > height[DEFAULT_ERRORS] + DECIDES_NOTHING:
         chosen.insert(0, preferred)
     under_each = [_under_errors(chosen[0], bases[chosen[0]], tell)]
     for name in chosen[1:]:
         before, behind = under_each[0].screened, height[preferred] - height[name]
-        if behind > _OTHER_ERRORS:
+        if behind > COUNTS:
             before = worth_comparing(before, behind)
         if before:
             best = max(under_each[0].log_factors.values()) + behind
@@ -235,7 +230,7 @@ def worth_comparing(curves: Sequence[Curve], behind: float) -> list[Curve]:
         Nats that the other one is behind it.
     """
     heights = np.array([one.log_bayes_factor for one in curves])
-    may_have = heights + np.maximum(heights, 0.0) + _OTHER_ERRORS - behind
+    may_have = heights + np.maximum(heights, 0.0) + COUNTS - behind
     best = max(float(heights.max()), 0.0)
     names = {one.mechanism.id for one, most in zip(curves, may_have, strict=True) if most > best}
     return [one for one in curves if one.mechanism.id in names]

@@ -15,17 +15,7 @@ from skred.diagnosis.discrepancy.profile import KINDS, Profile
 from skred.diagnosis.discrepancy.sampled_evidence import sampled
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
 from skred.diagnosis.evidence.event_quadrature import FINE
-
-_CHECKED = 5
-"""Mechanisms re-computed at most, which bounds the time."""
-_BEHIND = 6.0
-"""Nats behind the best of all at which nothing is re-computed: it counts for a ninetieth, as stated
-(`prior_odds.POWER`), and what a mechanism has changes by a nat or so."""
-_COUNTS = 4.0
-"""Nats behind the best at which what a force has need not be known better than its first draws tell: two nats
-more there are a tenth of a nat for all together."""
-_TOO_LOW = 4.0
-"""Nats that a force may have more than by the Laplace approximation, where fronts stop near sensors."""
+from skred.diagnosis.evidence.tolerance import COUNTS
 
 
 def recomputed(
@@ -46,18 +36,14 @@ def recomputed(
     """
     height = {name: candidate.log_bayes_factor for name, candidate in candidates.items()}
     force = [one.log_bayes_factor for one in profiles]
-    most = max(best, *height.values(), *force)
-    leading = sorted(
-        (name for name in height if height[name] > most - _BEHIND), key=lambda name: -height[name]
-    )
-    # A force that is less probable than none would raise no alarm with some nats more.
-    worth = [k for k, factor in enumerate(force) if factor > max(most - _COUNTS - _TOO_LOW, 0.0)]
+    # What is less probable than nothing raises no alarm with some nats more.
+    least = max(max(best, *height.values(), *force) - COUNTS, 0.0)
+    leading = [name for name in height if height[name] > least]
+    worth = [k for k, factor in enumerate(force) if factor > least]
     # Each waits for jobs of the pool, and takes none of its threads for that.
     with ThreadPoolExecutor(len(KINDS)) as waiting:
-        sampled_of = {
-            k: waiting.submit(sampled, base, profiles[k], pool, max(most - _COUNTS, 0.0)) for k in worth
-        }
-        found = _looked_at(base, candidates, leading[:_CHECKED], pool)
+        sampled_of = {k: waiting.submit(sampled, base, profiles[k], pool, least) for k in worth}
+        found = _looked_at(base, candidates, leading, pool)
         factors = {k: one.result() for k, one in sampled_of.items()}
     return found, [factors.get(k, one) for k, one in enumerate(profiles)]
 

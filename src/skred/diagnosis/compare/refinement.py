@@ -1,183 +1,148 @@
-"""Local refinement: leading places computed anew, then split as finely as the recordings resolve.
+"""Local refinement: what holds much of a mechanism's evidence is computed anew and parted, again and again.
 
-Screening takes one place for all that is near it. Where a mechanism leads, its place is computed with more
-quadrature points, and moved, shortened and lengthened. A part that holds most of the evidence is parted in
-its turn, in smaller steps. A strong effect on a stretch whose ends are wrong by a tenth of its length loses
-several nats, and a force of any shape would not.
+Screening takes one shape for all that are near it. A shape that holds much of its mechanism's evidence is
+computed with more quadrature points, and moved, shortened and lengthened; the parts share its weight, and
+such as hold much of the evidence then are parted in their turn, in smaller steps. A strong effect on a
+stretch whose ends are wrong by a tenth of its length loses several nats, and a force of any shape would not.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.evidence.coefficient import Curve
+from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms.placed import parts_of
 from skred.physics.mechanisms.spec import Setting, Shape
 from skred.physics.mechanisms.stretches import shares
 
 Near = Callable[[Curve, Shape], Curve]
-_WITHIN = 3.0
-"""Nats behind its mechanism's best within which a place is refined: what its parts have more may differ so
-much."""
-_AT_MOST = 2
-"""Places of a mechanism that are refined at most at a time, which bounds the time."""
-_TURNS = 3
-"""Turns after the leader's: others lead once a place has fallen behind."""
-_MORE, _MORE_OF_OWN = 20.0, 0.6
-"""Nats that the parts of a place may have more than it, or share of its own if that is more: a place that
-does not come up to the best of all even so is not refined. Drag between the dam and the sensor above it has
-71 nats by screening and 112 in parts, under M1 at Ryggfonn."""
-_SPLIT_FROM = 1.0
-"""Nats in favour of a place from which it is split: parts of a place without evidence have hardly any."""
-_HOLDS_MOST = 0.5
-"""Share of its place's evidence from which a part is parted itself: most of it then hangs on where it is."""
+_HOLDS_MUCH = 0.2
+"""Share of its mechanism's evidence from which a shape is parted: four at most."""
+_MORE = 2.0
+"""As many times its nats a mechanism may have once it is parted: 1.6 times were seen, of drag between the dam
+and the sensor above it at Ryggfonn. One that does not come up to the best even so is not parted."""
 _LEVELS = 4
-"""How many times places are parted: the last steps are an eighth of the first, some metres."""
+"""How many times a shape is parted: the last steps are an eighth of the first, some metres."""
 _SMALLER = 0.5
 """Steps within a part, in those that led to it. At 0.38 a part of a stretch would stand for as much of the
 prior as it has of the weight; half finds narrow maxima that 0.38 misses, and costs them up to 0.6 nats each
 time."""
 
 
-@dataclass(frozen=True, eq=False)
-class Place:
-    """A place and, where it was split, its parts.
+class Part(NamedTuple):
+    """A shape, and what it stands for.
 
     Attributes
     ----------
-    curves : tuple of Curve
-        The place itself first.
-    log_shares : tuple of float
-        Prior weight of each within the place; they sum to 1.
+    curve : Curve
+    log_weight : float
+        Prior probability among its mechanism's shapes.
+    level : int
+        How many times it was parted: 0 is as it was screened.
     """
 
-    curves: tuple[Curve, ...]
-    log_shares: tuple[float, ...] = (0.0,)
+    curve: Curve
+    log_weight: float
+    level: int = 0
 
     @property
-    def log_bayes_factor(self) -> float:
-        """Over the parts."""
-        return float(np.logaddexp.reduce([s + c.log_bayes_factor for s, c in self._members]))
+    def log_factor(self) -> float:
+        """Log Bayes factor, its prior weight included."""
+        return self.log_weight + self.curve.log_bayes_factor
 
-    @property
-    def _members(self) -> list[tuple[float, Curve]]:
-        return list(zip(self.log_shares, self.curves, strict=True))
-
-    @property
-    def holds_most(self) -> int | None:
-        """Number of the part that holds most of the evidence, if one does."""
-        factors = np.array([share + one.log_bayes_factor for share, one in self._members])
-        first = int(np.argmax(factors))
-        return first if factors[first] - self.log_bayes_factor > math.log(_HOLDS_MOST) else None
-
-    def parted(self, number: int, parts: Sequence[Curve]) -> Place:
-        """With parts that share the weight of one that is in it."""
-        share = self.log_shares[number] - math.log(1 + len(parts))
-        before = [share if k == number else own for k, own in enumerate(self.log_shares)]
-        return Place((*self.curves, *parts), (*before, *(share for _ in parts)))
+    def parted(self, others: Sequence[Curve]) -> list[Part]:
+        """Itself and others, which share its weight; others alone where it was screened only."""
+        curves = [self.curve, *others] if self.level else others
+        log_weight = self.log_weight - math.log(len(curves))
+        return [Part(one, log_weight, self.level + 1) for one in curves]
 
 
 def refine(
     setting: Setting, curves: Sequence[Curve], near: Near, pool: ThreadPoolExecutor
 ) -> dict[str, Candidate]:
-    """Candidates whose leading places are computed anew and then split; the others as they were screened.
-
-    The leading mechanism comes first: others have to keep up with what its parts have. Once a place is looked
-    at it may fall behind others that then lead, and are looked at in their turn.
+    """Candidates whose leading shapes are computed anew and parted; the others as they were screened.
 
     Parameters
     ----------
     setting : Setting
-        In which places are split.
+        In which shapes are parted.
     curves : sequence of Curve
-        Of all places, screened.
+        Of all shapes, screened.
     near : callable
         Computes the curve at a shape near that of another curve.
     pool : ThreadPoolExecutor
     """
-    places: dict[int, Place] = {}
-    first = max(curves, key=lambda one: one.log_bayes_factor).mechanism.id
-    for turn in range(1 + _TURNS):
-        todo = [k for k in leading(curves, places) if k not in places]
-        todo = [k for k in todo if turn > 0 or curves[k].mechanism.id == first]
-        if not todo:
-            break
-        computed = pool.map(near, [curves[k] for k in todo], [curves[k].shape for k in todo])
-        places.update({k: Place((one,)) for k, one in zip(todo, computed, strict=True)})
-        height = {k: max(curves[k].log_bayes_factor, places[k].log_bayes_factor) for k in todo}
-        _split(setting, [k for k in todo if height[k] > _SPLIT_FROM], places, near, pool)
-    return candidates_of(curves, places)
-
-
-def _split(
-    setting: Setting,
-    numbers: Sequence[int],
-    places: dict[int, Place],
-    near: Near,
-    pool: ThreadPoolExecutor,
-) -> None:
-    """Places in parts, and in smaller steps the part that holds most of the evidence, if one does."""
-    splitting = {k: 0 for k in numbers}
-    for level in range(_LEVELS):
-        jobs = [
-            (k, places[k].curves[number], shape)
-            for k, number in splitting.items()
-            for shape in _parts(setting, places[k], number, _SMALLER**level)
+    parts = screened_parts(curves)
+    while todo := leading(parts):
+        jobs = [(k, shape) for k in todo for shape in _finer(setting, parts, k)]
+        computed = pool.map(near, [parts[k].curve for k, _ in jobs], [shape for _, shape in jobs])
+        others = defaultdict[int, list[Curve]](list)
+        for (k, _), one in zip(jobs, computed, strict=True):
+            others[k].append(one)
+        parts = [
+            new for k, one in enumerate(parts) for new in (one.parted(others[k]) if k in todo else [one])
         ]
-        computed = pool.map(near, [part for _, part, _ in jobs], [shape for *_, shape in jobs])
-        found: dict[int, list[Curve]] = {k: [] for k in splitting}
-        for (k, *_), one in zip(jobs, computed, strict=True):
-            found[k].append(one)
-        places.update({k: places[k].parted(number, found[k]) for k, number in splitting.items()})
-        most = {k: places[k].holds_most for k in splitting}
-        splitting = {k: number for k, number in most.items() if number is not None}
+    return candidates_of(parts)
 
 
-def _parts(setting: Setting, place: Place, number: int, steps: float) -> list[Shape]:
-    """The finer shapes that a part stands for beside its own; steps are in those of the whole place."""
-    part, whole = place.curves[number], place.curves[0].shape
-    mechanism, shape = part.mechanism, part.shape
-    if shape.s_from_m is not None and shape.s_to_m is not None:
-        assert whole.s_from_m is not None and whole.s_to_m is not None
-        steps *= (whole.s_to_m - whole.s_from_m) / (shape.s_to_m - shape.s_from_m)
-    known = {one.shape for one in place.curves}
-    return [one for one in dict.fromkeys(parts_of(mechanism, setting, shape, steps)) if one not in known]
-
-
-def leading(curves: Sequence[Curve], places: Mapping[int, Place]) -> list[int]:
-    """Numbers of the places of each mechanism that lead it, as far as is known."""
-    height = np.array([(places.get(k) or one).log_bayes_factor for k, one in enumerate(curves)])
-    found: list[int] = []
+def screened_parts(curves: Sequence[Curve]) -> list[Part]:
+    """What was screened, with its prior weight."""
+    parts = list[Part]()
     for name in dict.fromkeys(one.mechanism.id for one in curves):
-        members = np.array([k for k, one in enumerate(curves) if one.mechanism.id == name])
-        best = members[np.argsort(-height[members])][:_AT_MOST]
-        least = height[members].max() - _WITHIN
-        found += [int(k) for k in best if height[k] > least and _may_have(height[k]) > height.max()]
-    return found
+        own = [one for one in curves if one.mechanism.id == name]
+        weights = shares([one.shape for one in own])
+        parts += [Part(one, math.log(share)) for one, share in zip(own, weights, strict=True)]
+    return parts
 
 
-def _may_have(height: float) -> float:
-    """Nats that the parts of a place may have."""
-    return height + max(_MORE, _MORE_OF_OWN * height)
-
-
-def candidates_of(curves: Sequence[Curve], places: Mapping[int, Place]) -> dict[str, Candidate]:
-    """Curves by mechanism; parts of a place share the weight of the one that they stand in for."""
-    gathered: dict[str, tuple[list[Curve], list[float]]] = {}
-    for name in dict.fromkeys(one.mechanism.id for one in curves):
-        own = [k for k, one in enumerate(curves) if one.mechanism.id == name]
-        members, weights = gathered.setdefault(name, ([], []))
-        for k, share in zip(own, shares([curves[k].shape for k in own]), strict=True):
-            place = places.get(k, Place((curves[k],)))
-            members += place.curves
-            weights += [math.log(share) + own_share for own_share in place.log_shares]
-    return {
-        name: Candidate(members[0].mechanism, tuple(members), np.array(weights))
-        for name, (members, weights) in gathered.items()
+def leading(parts: Sequence[Part]) -> list[int]:
+    """Numbers of those to part: where their mechanism has evidence and may come up to the best one."""
+    height = {
+        name: float(np.logaddexp.reduce([one.log_factor for one in own])) for name, own in _by_id(parts)
     }
+    least = max(max(height.values()) - COUNTS, 0.0)
+    return [
+        k
+        for k, one in enumerate(parts)
+        if one.level < _LEVELS
+        and _MORE * (own := height[one.curve.mechanism.id]) > least
+        and one.log_factor > own + math.log(_HOLDS_MUCH)
+    ]
+
+
+def candidates_of(parts: Sequence[Part]) -> dict[str, Candidate]:
+    """Parts by mechanism."""
+    return {
+        name: Candidate(
+            own[0].curve.mechanism,
+            tuple(one.curve for one in own),
+            np.array([one.log_weight for one in own]),
+        )
+        for name, own in _by_id(parts)
+    }
+
+
+def _by_id(parts: Sequence[Part]) -> Iterable[tuple[str, list[Part]]]:
+    """The parts of each mechanism."""
+    found = defaultdict[str, list[Part]](list)
+    for one in parts:
+        found[one.curve.mechanism.id].append(one)
+    return found.items()
+
+
+def _finer(setting: Setting, parts: Sequence[Part], number: int) -> list[Shape]:
+    """Shapes to compute beside one, or with it where it was screened only."""
+    part = parts[number]
+    mechanism, shape = part.curve.mechanism, part.curve.shape
+    known = {one.curve.shape for one in parts if one.curve.mechanism.id == mechanism.id}
+    finer = dict.fromkeys(parts_of(mechanism, setting, shape, _SMALLER**part.level))
+    own = [] if part.level else [shape]
+    return own + [one for one in finer if one not in known]

@@ -18,10 +18,8 @@ from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, fit_base
+from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms.spec import Group
-
-_LOOKED_AT = 2
-"""Mechanisms that are looked at, the most probable ones: a force beside others would explain most itself."""
 
 
 def with_residues(
@@ -30,8 +28,8 @@ def with_residues(
     """Candidates, where a force not in the list has more evidence the best mechanisms with it beside them."""
     found, force = dict(candidates), log_evidence_of(profiles)
     physics = [one for one in candidates.values() if one.mechanism.group is Group.PHYSICS]
-    leading = sorted(physics, key=lambda one: -one.log_bayes_factor)[:_LOOKED_AT]
-    looked = [one for one in leading if 0.5 * force < one.log_bayes_factor < force]
+    least = max((one.log_bayes_factor for one in physics), default=0.0) - COUNTS
+    looked = [one for one in physics if max(least, 0.5 * force) < one.log_bayes_factor < force]
     for one, residue in zip(looked, pool.map(partial(_residue, base), looked), strict=True):
         # What a mechanism leaves is no residue if it is more than what it explains.
         if residue < one.log_bayes_factor:

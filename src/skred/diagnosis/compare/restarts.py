@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, event_modes, log_joint
 from skred.diagnosis.evidence.event_quadrature import FINE, event_nodes
+from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
 
 FloatArray = NDArray[np.float64]
-_GAINED = 1.0
-"""Nats by which another mode must be higher: less is what is left of integration errors."""
 
 
 def better_modes(likelihood: EventLikelihood, points: FloatArray, population: Population) -> FloatArray:
@@ -40,4 +39,4 @@ def better_modes(likelihood: EventLikelihood, points: FloatArray, population: Po
     start = spread.points[np.arange(n_rows), best]
     again = event_modes(likelihood, start, population).points
     heights = [log_joint(likelihood, one, population) for one in (points, again)]
-    return np.where((heights[1] > heights[0] + _GAINED)[:, None], again, points)
+    return np.where((heights[1] > heights[0] + DECIDES_NOTHING)[:, None], again, points)

@@ -18,14 +18,9 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import efficient_scores, mean_prior
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
+from skred.diagnosis.evidence.tolerance import ARRIVED, MOST_ROUNDS, STEP_SHARES
 
 FloatArray = NDArray[np.float64]
-_ROUNDS = 6
-"""Gauss-Newton steps at most: at kinks where fronts stop a climb could go to and fro."""
-_SHARES = (1.0, 0.4, 0.15, 0.05)
-"""Shares of a step that are tried one after the other: a full step can stop fronts that went on."""
-_SETTLED = 0.05
-"""Nats gained by a step below which a climb has arrived."""
 
 
 def start_from(base: Base, fit: Fit) -> tuple[Population, FloatArray]:
@@ -62,12 +57,12 @@ def climb(base: Base, kind: Kind, at: FloatArray, start: Expansion, cover: Float
     """
     maximum = start
     precision = np.linalg.inv(cover)
-    for _ in range(_ROUNDS):
+    for _ in range(MOST_ROUNDS):
         step = np.linalg.solve(maximum.information + precision, maximum.score - precision @ maximum.values)
         height = maximum.fit.found.log_evidence - prior_penalty(maximum.values, precision)
         expected = 0.5 * float(step @ (maximum.score - precision @ maximum.values))
-        for share in _SHARES:
-            if share * (2.0 - share) * expected < _SETTLED:
+        for share in STEP_SHARES:
+            if share * (2.0 - share) * expected < ARRIVED:
                 return _arrived(maximum, precision)
             values = maximum.values + share * step
             fit = _fit_at(base, kind, at, values, start_from(base, maximum.fit))
@@ -77,7 +72,7 @@ def climb(base: Base, kind: Kind, at: FloatArray, start: Expansion, cover: Float
         else:
             break
         maximum = _around(base, kind, at, values, fit)
-        if gained < _SETTLED:
+        if gained < ARRIVED:
             break
     return _arrived(maximum, precision)
 

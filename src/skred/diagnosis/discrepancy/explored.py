@@ -15,14 +15,9 @@ from numpy.typing import NDArray
 from skred.diagnosis.discrepancy.profile import Prior
 from skred.diagnosis.evidence.adaptive_sampling import Mode
 from skred.diagnosis.evidence.refit import Fit
+from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING
 
 FloatArray = NDArray[np.float64]
-SURE = 1.0
-"""Nats that decide nothing: priors not climbed under that could add less together are left."""
-_NO_FORCE = -0.5
-"""Log Bayes factor below which the force is less probable than none under every prior, and climbs end."""
-_MODES_WITHIN = 4.0
-"""Nats behind the most probable prior from which on none is worth to be sampled under."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +131,7 @@ class ExploredPriors:
         """
         left = {prior: self.factor(prior) for prior in self.shares if prior not in self.maxima}
         known = np.logaddexp.reduce([self.factor(prior) for prior in self.shares])
-        if not left or known < _NO_FORCE or np.logaddexp.reduce(list(left.values())) < known - SURE:
+        if not left or known < 0.0 or np.logaddexp.reduce(list(left.values())) < known - DECIDES_NOTHING:
             return []
         return [max(left, key=lambda one: left[one])]
 
@@ -149,7 +144,7 @@ class ExploredPriors:
     def modes(self) -> tuple[Mode, ...]:
         """Where values may be, under each prior that is not far behind the most probable one."""
         factors = {prior: self.factor(prior, self._most) for prior in self.shares}
-        least = max(factors.values()) - _MODES_WITHIN
+        least = max(factors.values()) - COUNTS
         chosen = {prior: factor for prior, factor in factors.items() if factor > least}
         return tuple(
             self.approximation(prior, self._most).mode(self._counted(prior, self._most), factor)

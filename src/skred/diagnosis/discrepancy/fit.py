@@ -14,7 +14,6 @@ from scipy.stats import multivariate_normal
 
 from skred.diagnosis.discrepancy.climb import climb, expanded_at, start_from
 from skred.diagnosis.discrepancy.explored import (
-    SURE,
     Expansion,
     ExploredPriors,
     occam_penalty,
@@ -32,6 +31,7 @@ from skred.diagnosis.discrepancy.profile import (
 from skred.diagnosis.evidence.adaptive_sampling import Mode
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import Population
+from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
 
 FloatArray = NDArray[np.float64]
 Start = tuple[FloatArray, tuple[Population, FloatArray]]
@@ -128,7 +128,7 @@ def _maximum_under(
     """
     found = _maximum_from_one(base, kind, at, starts, cover)
     best = max(starts, key=lambda one: one.fit.found.log_evidence)
-    if best.fit.found.log_evidence < found.fit.found.log_evidence + SURE:
+    if best.fit.found.log_evidence < found.fit.found.log_evidence + DECIDES_NOTHING:
         return found
     return _highest([found, climb(base, kind, at, best, cover)], cover)
 

@@ -17,13 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
+from skred.diagnosis.evidence.tolerance import ENOUGH, MOST_ROUNDS
+
 FloatArray = NDArray[np.float64]
 DRAWS = 200
 """Draws of a turn, where a density takes no time."""
-ENOUGH = 0.1
-"""Standard error of a log integral, in nats, at which there are enough draws."""
-_MOST = 6
-"""Turns of sampling at most, which bounds the time. The first one is a search."""
 _ODD = 0.1
 """Share of all weight on one draw from which on a mode is looked for there: the proposals have missed one."""
 _NEW_SHARE = 0.3
@@ -214,7 +212,7 @@ def weighted_draws(
             return Weighted(draws, heights, proposal)
         shares = _shares(heights - np.logaddexp.reduce(of_each, axis=0))
         following = proposals[-1].adapted(draws, shares)
-        last = len(turns) == _MOST
+        last = len(turns) == MOST_ROUNDS
         fresh = slice(n * min(first, len(turns) - 1), None)
         own = np.concatenate([log_q[n * k : n * (k + 1)] for k, log_q in enumerate(of_each)])
         found = Weighted(draws[fresh], heights[fresh] - own[fresh], following)

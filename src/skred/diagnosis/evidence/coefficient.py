@@ -28,6 +28,7 @@ from skred.diagnosis.evidence.extension import Extension, extended, setting_of, 
 from skred.diagnosis.evidence.linear_mixed_model import mean_prior
 from skred.diagnosis.evidence.marginal import coordinates, evidence, prior_log_scale
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
+from skred.diagnosis.evidence.tolerance import COUNTS, MOST_ROUNDS
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.hierarchical.surface import Nodes
 from skred.physics.law import Law
@@ -37,10 +38,6 @@ from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
 FloatArray = NDArray[np.float64]
 _NEAR = (-3.5, -2.0, -1.0, 0.0, 1.0, 2.0, 3.5)
 """Strengths around what was found before, in its standard deviations: to two thousandths of the density."""
-_PASSES = 6
-"""Times that strengths are put around what was found at most, which bounds the time."""
-_CUT = 5.0
-"""Nats below the maximum at which a posterior may end: what is beyond is a hundredth of it or so."""
 _SMALLEST = 1e-3
 """Strength, and standard deviation of one, below which nothing is told apart, in scales of the prior."""
 _BETWEEN = 60
@@ -164,7 +161,7 @@ class Curve:
         """Whether the posterior goes on beyond the strengths at an end that is not 0."""
         strengths, log_density = self.fine()
         ends = log_density[[0, -1]][strengths[[0, -1]] != 0.0]
-        return bool((ends > log_density.max() - _CUT).any())
+        return bool((ends > log_density.max() - COUNTS).any())
 
     @cached_property
     def log_bayes_factor(self) -> float:
@@ -200,7 +197,7 @@ def curve_near(base: Base, near: Curve, shape: Shape) -> Curve:
     """
     assert near.mechanism.added is not None
     least = _SMALLEST * near.mechanism.added.scale_of(shape)
-    for _ in range(_PASSES):
+    for _ in range(MOST_ROUNDS):
         before = near.moments
         near = curve_at(base, near.mechanism, shape, _strengths_near(near), USUAL, near.known)
         after = near.moments

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.score_information import reading_slopes
+from skred.diagnosis.evidence.tolerance import ARRIVED, DECIDES_NOTHING
 from skred.inference.error_model import Errors, EventReadings
 from skred.inference.reading_density import log_likelihoods
 
@@ -20,10 +21,8 @@ _LARGEST_STEP = 1.0
 """Largest change of a log strength in one step: tangents say nothing of a front three times as strong."""
 _STARTING_DAMPING = 1e-3
 """Of the Levenberg-Marquardt steps, relative to the diagonal: nearly none."""
-_SETTLED = 1e-2
-"""Nats gained by a step below which a row has arrived."""
-_LOST, _GAINED = 20.0, 1.0
-"""Nats less than at best that the readings of a lost row have, and that another place must have more."""
+_LOST = 20.0
+"""Nats less than at best that the readings of a lost row have."""
 _ASIDE = np.multiply.outer((-1.0, 1.0), (0.01, 0.03, 0.08, 0.2, 0.5, 1.0)).ravel()
 """Where to look for lost rows: changes of the logarithm of the first strength, from what moves a stop by ten
 metres to what the largest step of a climb is."""
@@ -257,7 +256,7 @@ def _climbed(likelihood: EventLikelihood, start: FloatArray, population: Populat
         best[active[better]] = new[better]
         damping[active] = np.where(better, 0.2 * damping[active], np.maximum(20.0 * damping[active], 0.1))
         _store(found, active, around)
-        active = active[~better | (gained > _SETTLED)]
+        active = active[~better | (gained > ARRIVED)]
         if len(active) == 0:
             break
     # Tangents are those before each row's last, small step; the points are after it.
@@ -286,7 +285,7 @@ def _aside(
     which = np.repeat(np.arange(n_rows), n_places)
     heights = log_joint(likelihood.take(which), around, population).reshape(n_rows, n_places)
     before = log_joint(likelihood, points, population)
-    gained = heights.max(axis=1) > before + _GAINED
+    gained = heights.max(axis=1) > before + DECIDES_NOTHING
     best = around.reshape(n_rows, n_places, -1)[np.arange(n_rows), heights.argmax(axis=1)]
     return np.where(gained[:, None], best, points), gained
 

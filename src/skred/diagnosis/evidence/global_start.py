@@ -34,6 +34,7 @@ from skred.diagnosis.evidence.linear_mixed_model import (
     most_probable_covariance,
 )
 from skred.diagnosis.evidence.refit import Fit, unfitted
+from skred.diagnosis.evidence.tolerance import ARRIVED, STEP_SHARES
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 
 FloatArray = NDArray[np.float64]
@@ -41,10 +42,6 @@ STARTS = (0.0, 0.3, 1.2)
 """Where climbs begin, in scales of the prior: nil, and either side of its median (0.67)."""
 _ROUNDS = 15
 """Steps at most. Where fronts stop a climb could go to and fro."""
-_SHARES = (1.0, 0.35, 0.12, 0.04)
-"""Shares of a step that are tried one after the other."""
-_SETTLED = 1e-2
-"""Nats gained by a step below which a climb has arrived."""
 _SAME = 1.0
 """Standard deviations apart below which two climbs have come to the same maximum."""
 _CLIMB = 4
@@ -122,7 +119,7 @@ class _Climb:
         if not self.either_sign:
             step = step.held(np.flatnonzero(state.strengths + step.strength < 0.0), -state.strengths)
         share, open_ = np.ones(n_groups), np.ones(n_groups, dtype=bool)
-        for part in _SHARES:
+        for part in STEP_SHARES:
             share[open_] = part
             there = self.at(
                 state.strengths + share * step.strength,
@@ -160,6 +157,12 @@ def _chosen(one: _State, other: _State, taken: NDArray[np.bool_]) -> _State:
     )
 
 
+def first_strengths(scale: float, either_sign: bool) -> FloatArray:
+    """Strengths at which climbs begin, nil among them, in the coefficient's unit."""
+    signs = np.array([-1.0, 1.0] if either_sign else [1.0])
+    return np.unique(np.multiply.outer(signs, scale * np.array(STARTS)))
+
+
 def global_starts(
     extension: Extension,
     rows: Rows,
@@ -184,8 +187,7 @@ def global_starts(
     either_sign : bool
         Whether the coefficient may be negative.
     """
-    signs = np.array([-1.0, 1.0] if either_sign else [1.0])
-    starts = np.unique(np.multiply.outer(signs, scale * np.array(STARTS)))
+    starts = first_strengths(scale, either_sign)
     n_groups, n_events = len(starts), len(rows.event)
     climb = _Climb(extension, rows, held, scale, either_sign)
     population = Population(*(np.repeat(part, n_groups, axis=0) for part in begin[0]))
@@ -193,7 +195,7 @@ def global_starts(
     nil = float(state.height[starts == 0.0][0])
     for _ in range(_ROUNDS):
         before, state = state, climb.moved(state)
-        if (state.height <= before.height + _SETTLED).all():
+        if (state.height <= before.height + ARRIVED).all():
             break
     all_rows = rows.repeated(n_groups)
     sd = joint_step(state.modes, all_rows, state.population, climb.prior, state.strengths, climb.precision).sd

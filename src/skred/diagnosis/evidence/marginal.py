@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.evidence.adaptive_sampling import DRAWS, ENOUGH, Mixture, Mode, Weighted, weighted_draws
+from skred.diagnosis.evidence.adaptive_sampling import DRAWS, Mixture, Mode, Weighted, weighted_draws
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.linear_mixed_model import MeanPrior
 from skred.diagnosis.evidence.population_target import (
@@ -21,6 +21,7 @@ from skred.diagnosis.evidence.population_target import (
     log_targets,
     slopes,
 )
+from skred.diagnosis.evidence.tolerance import ENOUGH
 from skred.inference.hierarchical.surface import Nodes
 
 FloatArray = NDArray[np.float64]

@@ -20,11 +20,10 @@ from skred.diagnosis.evidence.marginal import (
     importance_evidence,
     prior_log_scale,
 )
+from skred.diagnosis.evidence.tolerance import MOST_ROUNDS
 from skred.inference.hierarchical.surface import Nodes
 
 FloatArray = NDArray[np.float64]
-_MOST_ROUNDS = 6
-"""Rounds of a refit at most: a population could go to and fro."""
 MOST_NODES = 200_000
 """Quadrature points in memory together, but for those of one group at least: some hundred megabytes."""
 _FAR_MEAN, _FAR_SPREAD = 0.7, 0.35
@@ -94,7 +93,7 @@ def refit(
     log_scale = prior_log_scale(mean_prior(extension.law))
     state = list(fits) if fits is not None else [Fit(unfitted(start[0]), start[1])] * n_groups
     active = list(range(n_groups))
-    for number in range(_MOST_ROUNDS):
+    for number in range(MOST_ROUNDS):
         spent = rounds.budget if number > 0 or rounds.first is None else rounds.first
         at_once, moved = max(MOST_NODES // (n_events * spent.total), 1), list[int]()
         for some in map(list, batched(active, at_once)):
@@ -110,7 +109,7 @@ def refit(
                 found = evidence(part, log_scale, before)
                 if number + 1 < rounds.least or _moved(before, found.psi, n):
                     moved.append(k)
-                if rounds.sampled and (k not in moved or number + 1 == _MOST_ROUNDS):
+                if rounds.sampled and (k not in moved or number + 1 == MOST_ROUNDS):
                     found = _by_sampling(part, log_scale, found)
                 state[k] = Fit(found, own)
         active = moved

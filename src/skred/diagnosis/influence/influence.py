@@ -28,14 +28,13 @@ from skred.diagnosis.evidence.conditional_map import Rows
 from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.evidence.refit import Fit
+from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
 from skred.parallel.threads import side_by_side
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 MOST = 1.0 / 3.0
 """Share of the avalanches that an answer may hang on and be said to be carried by few: more is not few."""
-_SHAPES_WITHIN = 2.0
-"""Nats behind a mechanism's best shape within which shapes are computed again: the others hold little."""
 
 
 @dataclass(frozen=True)
@@ -185,7 +184,7 @@ Again = Callable[[Base, _Part], float]
 def _of_mechanism(candidate: Candidate) -> Again:
     """The log Bayes factor of a mechanism by a part of the recordings, over its leading shapes."""
     factors = candidate.log_factors
-    chosen = np.flatnonzero(factors > factors.max() - _SHAPES_WITHIN)
+    chosen = np.flatnonzero(factors > factors.max() - DECIDES_NOTHING)
 
     def again(base: Base, part: _Part) -> float:
         rest, found = part.base(base), list[tuple[float, Curve]]()
