@@ -244,7 +244,7 @@ def test_priors_are_probabilities_everywhere_or_local() -> None:
     assert sum(np.exp(share) for share in priors.values()) == pytest.approx(1.0)
     local = {one: share for one, share in priors.items() if one.centre_m is not None}
     assert sum(np.exp(share) for share in local.values()) == pytest.approx(0.5)
-    assert {one.centre_m for one in local} == {375.0 + 150.0 * k for k in range(8)}
+    assert {one.centre_m for one in local} == {360.0 + 120.0 * k for k in range(10)}
     for one in priors:
         sd = np.sqrt(np.diag(one.cover(at)))
         assert sd.max() == pytest.approx(one.amplitude, rel=0.02)

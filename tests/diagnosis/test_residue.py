@@ -12,7 +12,7 @@ from diagnosis_cases import base_of
 from rolling_cases import rolling, speed
 
 from skred.campaign import Campaign
-from skred.diagnosis.compare.candidate import BESIDE, Candidate, log_gain
+from skred.diagnosis.compare.candidate import Candidate, log_gain
 from skred.diagnosis.compare.comparison import free_force
 from skred.diagnosis.compare.residue import with_residues
 from skred.diagnosis.compare.screening import curve
@@ -65,6 +65,6 @@ def test_without_a_second_effect_nothing_is_looked_for() -> None:
 
 
 def test_what_a_force_beside_adds() -> None:
-    assert BESIDE == pytest.approx(0.1)
-    assert log_gain(-50.0) == pytest.approx(np.log(0.9)) and log_gain(0.0) == pytest.approx(0.0)
-    assert log_gain(50.0) == pytest.approx(50.0 + np.log(0.1))
+    """With it or without it, at even odds."""
+    assert log_gain(-50.0) == pytest.approx(np.log(0.5)) and log_gain(0.0) == pytest.approx(0.0)
+    assert log_gain(50.0) == pytest.approx(50.0 + np.log(0.5))

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.evidence.coefficient import Curve
-from skred.diagnosis.evidence.prior_odds import NOTHING, SHARES, UNLISTED
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.physics.mechanisms.spec import Group, Mechanism
 from skred.physics.mechanisms.stretches import is_opposed
@@ -25,8 +24,9 @@ real forces have otherwise. Set on 28 opened trials, whose true forms differ on 
 
 _UNLIKELY = 0.1
 """Probability up to which a way in which avalanches may differ is not modelled in place of a likelier one."""
-BESIDE = SHARES[UNLISTED] / (1.0 - SHARES[NOTHING])
-"""Prior probability that a force in no list acts beside a mechanism: as that it acts where anything does."""
+BESIDE = 0.5
+"""Prior probability that a force in no list acts beside a mechanism, where such a force by itself has more
+evidence than it: then something acts beside it or in its place, and the odds are even."""
 
 
 def log_gain(residue: float | None, ways: Mapping[BetweenEvents, float] | None = None) -> float:

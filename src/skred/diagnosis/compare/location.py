@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.diagnosis.check.limits import HELD
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
 from skred.diagnosis.discrepancy.profile import Kind, Profile, most_probable, spline_basis
 from skred.diagnosis.evidence.extension import extended
@@ -17,8 +18,6 @@ from skred.physics.mechanisms.stretches import is_opposed
 FloatArray = NDArray[np.float64]
 _DRAWS = 4000
 """Draws of the profile for the band: its factor is then known to about a hundredth."""
-_BAND = 0.9
-"""Probability that the band holds the whole profile, as of all intervals."""
 _STANDS_OUT = 1.5
 """Standard deviations from 0 that knots of the stretch have: neighbours of the highest that go with it."""
 
@@ -116,7 +115,7 @@ def _band(profile: Profile, basis: FloatArray) -> tuple[FloatArray, FloatArray, 
     sd = np.sqrt(np.maximum(np.einsum("kc,kl,lc->c", basis, profile.covariance, basis), 1e-300))
     rng = np.random.default_rng(3)
     draws = rng.multivariate_normal(np.zeros(len(profile.mean)), profile.covariance, _DRAWS) @ basis
-    return mean, sd, float(np.quantile(np.abs(draws / sd).max(axis=1), _BAND))
+    return mean, sd, float(np.quantile(np.abs(draws / sd).max(axis=1), HELD))
 
 
 def _resolution(profile: Profile) -> float:

@@ -68,10 +68,10 @@ class Laplace(NamedTuple):
         """Log Bayes factor if no values gain more than `most`; at least that of no force at all."""
         return max(self._above_none(most), 0.0) - self.occam_penalty
 
-    def mode(self, most: float, log_factor: float) -> Mode:
+    def mode(self, most: float) -> Mode:
         """Where values are; around none where no force at all is better."""
         mean = self.values if self._above_none(most) > 0.0 else np.zeros_like(self.values)
-        return Mode(mean, self.covariance, log_factor)
+        return Mode(mean, self.covariance)
 
     def _above_none(self, most: float) -> float:
         return min(self.gain, most) - self.prior_penalty
@@ -145,10 +145,10 @@ class ExploredPriors:
         """Where values may be, under each prior that is not far behind the most probable one."""
         factors = {prior: self.factor(prior, self._most) for prior in self.shares}
         least = max(factors.values()) - COUNTS
-        chosen = {prior: factor for prior, factor in factors.items() if factor > least}
         return tuple(
-            self.approximation(prior, self._most).mode(self._counted(prior, self._most), factor)
-            for prior, factor in chosen.items()
+            self.approximation(prior, self._most).mode(self._counted(prior, self._most))
+            for prior, factor in factors.items()
+            if factor > least
         )
 
     def _counted(self, prior: Prior, most: float) -> float:

@@ -82,7 +82,7 @@ def fit_profile(base: Base, kind: Kind, near: Start | None = None, again: Prior 
 
 
 def mode_at(base: Base, profile: Profile, values: FloatArray) -> Mode:
-    """The mode near some values, under the prior that suits them best; its log factor is 0."""
+    """The mode near some values, under the prior that suits them best."""
     kind, at = profile.kind, profile.knots_m
     shares = priors_of(kind, at)
     prior = max(
@@ -93,7 +93,7 @@ def mode_at(base: Base, profile: Profile, values: FloatArray) -> Mode:
     begin = expanded_at(base, kind, at, values, start_from(base, profile.fit))
     maximum = climb(base, kind, at, begin, cover)
     left = np.linalg.inv(maximum.information + np.linalg.inv(cover))
-    return Mode(maximum.values, 0.5 * (left + left.T), 0.0)
+    return Mode(maximum.values, 0.5 * (left + left.T))
 
 
 def _highest(maxima: Sequence[Expansion], cover: FloatArray) -> Expansion:

@@ -100,10 +100,9 @@ AMPLITUDES = (1.0 / 3.0, 1.0, 3.0)
 applies to every coefficient of the profile, but only once to a one-parameter mechanism."""
 LENGTHS_M = (40.0, 120.0, 400.0)
 """Correlation lengths, all of equal prior probability: from a dam to a good part of a track."""
-NEAR_M = 120.0
-"""Standard deviation of the window of a profile that is local: about the length of a listed stretch."""
-_CENTRES_M = 150.0
-"""Distance of the windows' centres, so that they overlap."""
+NEAR_M = LENGTHS_M[1]
+"""Standard deviation of the window of a profile that is local, and distance of the windows' centres: about
+the length of a listed stretch."""
 MOST_KNOTS = 32
 """Coefficients at most: what the cost of a fit grows with."""
 _LEAST_STEP_M = 30.0
@@ -153,7 +152,7 @@ def priors_of(kind: Kind, at: FloatArray) -> dict[Prior, float]:
 
     Everywhere or local with equal probability, as listed forces are; each equally shared.
     """
-    n = max(round((at[-1] - at[0]) / _CENTRES_M), 1)
+    n = max(round((at[-1] - at[0]) / NEAR_M), 1)
     centres = at[0] + (np.arange(n) + 0.5) * (at[-1] - at[0]) / n
     sizes = [(kind.amplitude * part, length) for part in AMPLITUDES for length in LENGTHS_M]
     everywhere = [Prior(*size) for size in sizes]

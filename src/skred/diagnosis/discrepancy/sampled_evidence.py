@@ -21,14 +21,13 @@ from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, weighted_d
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.refit import Rounds, refit
+from skred.diagnosis.evidence.tolerance import ENOUGH
 
 FloatArray = NDArray[np.float64]
 _AT_ONCE = 32
 """Draws fitted together."""
 _DRAWS = 2 * _AT_ONCE
 """Of a turn: two lots, one for each of two cores."""
-_ENOUGH = 0.2
-"""Standard error in nats at which there are enough draws: each is a fit of everything else."""
 
 
 def sampled(
@@ -38,7 +37,7 @@ def sampled(
     least: float = -math.inf,
     seed: int = 0,
     n: int = _DRAWS,
-    enough: float = _ENOUGH,
+    enough: float = ENOUGH,
 ) -> Profile:
     """A profile with its log Bayes factor over all priors by importance sampling of its values.
 

@@ -24,14 +24,8 @@ DRAWS = 200
 """Draws of a turn, where a density takes no time."""
 _ODD = 0.1
 """Share of all weight on one draw from which on a mode is looked for there: the proposals have missed one."""
-_NEW_SHARE = 0.3
-"""Share of the draws on a mode that was found so: its weight is not known yet."""
-_WIDER = 1.1
-"""Width of the proposals in that of the modes, which is rather too narrow."""
 _DEGREES = 7.0
 """Degrees of freedom of the proposals: tails heavy enough to bound the weights."""
-_TEMPERED = 0.5
-"""Tempering exponent of the modes' factors, which are rough, where they say how many draws each one gets."""
 
 
 class Mode(NamedTuple):
@@ -41,13 +35,10 @@ class Mode(NamedTuple):
     ----------
     mean : (size,) array
     covariance : (size, size) array
-    log_factor : float
-        Log of the integral around it, but for what all modes have in common.
     """
 
     mean: FloatArray
     covariance: FloatArray
-    log_factor: float = 0.0
 
 
 class Mixture(NamedTuple):
@@ -58,7 +49,7 @@ class Mixture(NamedTuple):
     log_weights : (n_modes,) array
     means : (n_modes, size) array
     covariances : (n_modes, size, size) array
-        Of the modes; the densities are somewhat wider.
+        Of the modes; the densities' tails are wider.
     """
 
     log_weights: FloatArray
@@ -67,17 +58,16 @@ class Mixture(NamedTuple):
 
     @classmethod
     def on(cls, modes: Sequence[Mode]) -> Mixture:
-        """Around each mode."""
-        tempered = _TEMPERED * np.array([mode.log_factor for mode in modes])
+        """Around each mode, with as many draws: the first turn says how much there is."""
         means = np.array([mode.mean for mode in modes])
         covariances = np.array([mode.covariance for mode in modes])
-        return cls(tempered - np.logaddexp.reduce(tempered), means, covariances)
+        return cls(np.full(len(modes), -math.log(len(modes))), means, covariances)
 
     @property
     def _factors(self) -> FloatArray:
         variances = np.einsum("kii->ki", self.covariances)
         regular = self.covariances + 1e-10 * variances[:, :, None] * np.eye(self.means.shape[1])
-        result: FloatArray = _WIDER * np.linalg.cholesky(regular)
+        result: FloatArray = np.linalg.cholesky(regular)
         return result
 
     def drawn(self, n: int, rng: np.random.Generator) -> FloatArray:
@@ -119,9 +109,10 @@ class Mixture(NamedTuple):
         return Mixture(np.log(0.5 * np.exp(self.log_weights) + 0.5 * total), means, covariances)
 
     def joined_by(self, mode: Mode) -> Mixture:
-        """With one mode more, and a share of the draws on it."""
+        """With one mode more, and as many draws on it as the others have on average."""
+        log_share = -math.log(1 + len(self.means))
         return Mixture(
-            np.append(self.log_weights + math.log1p(-_NEW_SHARE), math.log(_NEW_SHARE)),
+            np.append(self.log_weights + math.log1p(-math.exp(log_share)), log_share),
             np.vstack([self.means, mode.mean]),
             np.concatenate([self.covariances, mode.covariance[None]]),
         )

@@ -16,26 +16,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.evidence.conditional_map import (
+    LARGEST_STEP,
     EventLikelihood,
     Modes,
     Population,
     Rows,
     event_modes,
 )
-from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
+from skred.inference.hierarchical.rough_population import (
+    PRIOR_EVENTS,
+    SPREAD_LOG_SD,
+    SPREAD_MEDIAN,
+    STARTING_SPREAD,
+)
 from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 MEDIAN_LOG_MEAN, MEDIAN_LOG_SD = -0.64, 1.1
 """Mean and standard deviation of the log of a half-normal variable of scale 1."""
-_PRIOR_EVENTS = 2.0
-"""Events that the prior's spread, without correlation, counts for in a covariance."""
-_STARTING_SPREAD = 0.3
-"""Spread of the population that a fit begins with: wider than most."""
-_LARGEST_MOVE = 1.5
-"""Largest change of an event's log strength in one joint step: tangents say nothing of a front five times as
-strong."""
 
 
 class MeanPrior(NamedTuple):
@@ -172,7 +171,7 @@ class JointStep(NamedTuple):
         """What the events' points move by, (n_rows, n_base + 1), with a share of the step of each group."""
         both = np.column_stack([self.mean, self.strength])[rows.group]
         whole = self.along + np.einsum("rij,rj->ri", self.by_both, both)
-        size = np.maximum(np.abs(whole).max(axis=1, keepdims=True) / _LARGEST_MOVE, 1.0)
+        size = np.maximum(np.abs(whole).max(axis=1, keepdims=True) / LARGEST_STEP, 1.0)
         moved: FloatArray = share[rows.group, None] * whole / size
         return moved
 
@@ -310,7 +309,7 @@ def _most_probable_covariance(moment: FloatArray, n_events: int) -> FloatArray:
         ratio = squares * np.exp(-2.0 * log_spread)
         slope = n_events - ratio + (log_spread - math.log(SPREAD_MEDIAN)) / SPREAD_LOG_SD**2
         log_spread = log_spread - np.clip(slope / (2.0 * ratio + SPREAD_LOG_SD**-2.0), -1.0, 1.0)
-    regular = moment + _PRIOR_EVENTS * SPREAD_MEDIAN**2 * np.eye(moment.shape[1])
+    regular = moment + PRIOR_EVENTS * SPREAD_MEDIAN**2 * np.eye(moment.shape[1])
     scale = np.sqrt(_diagonal(regular))
     spread = np.exp(log_spread)
     result: FloatArray = regular * (spread / scale)[:, :, None] * (spread / scale)[:, None, :]
@@ -321,4 +320,4 @@ def starting_population(law: Law, n_groups: int = 1) -> Population:
     """A wide population at the prior's median strengths."""
     n = len(law.mechanisms)
     mean = np.tile(mean_prior(law).mean, (n_groups, 1))
-    return Population(mean, np.tile(_STARTING_SPREAD**2 * np.eye(n), (n_groups, 1, 1)))
+    return Population(mean, np.tile(STARTING_SPREAD**2 * np.eye(n), (n_groups, 1, 1)))

@@ -15,6 +15,7 @@ from skred.diagnosis.evidence.adaptive_sampling import DRAWS, Mixture, Mode, Wei
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.linear_mixed_model import MeanPrior
 from skred.diagnosis.evidence.population_target import (
+    MOST_CORRELATED,
     NARROWEST,
     factor_at,
     log_correlation_constant,
@@ -31,9 +32,11 @@ _RESAMPLED_FROM = 4
 
 
 def _allowed(psi: FloatArray, n: int) -> FloatArray:
-    """The nearest coordinates whose spreads are not too narrow."""
+    """The nearest coordinates whose spreads are not too narrow, nor correlations too close to one."""
     allowed = psi.copy()
     allowed[n : 2 * n] = np.maximum(psi[n : 2 * n], NARROWEST)
+    most = math.atanh(MOST_CORRELATED)
+    allowed[2 * n :] = np.clip(psi[2 * n :], -most, most)
     return allowed
 
 
@@ -103,7 +106,7 @@ def coordinates(population: Population, group: int = 0) -> FloatArray:
     for j in range(n):
         for i in range(j + 1, n):
             left = math.sqrt(max(covariance[i, i] - float(np.sum(factor[i, :j] ** 2)), 1e-12))
-            partial.append(math.atanh(float(np.clip(factor[i, j] / left, -0.95, 0.95))))
+            partial.append(math.atanh(float(np.clip(factor[i, j] / left, -MOST_CORRELATED, MOST_CORRELATED))))
     return np.concatenate([population.mean[group], np.log(spread), partial])
 
 

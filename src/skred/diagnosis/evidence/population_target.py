@@ -26,6 +26,8 @@ _STEP = 2e-3
 NARROWEST = _LOG_MEDIAN - 6.0 * _LOG_SD
 """Least log of a spread, six standard deviations of its prior below the median: 0.0036. Narrower populations
 are between the nodes, whose sums then promise what is not there, tens of nats."""
+MOST_CORRELATED = 0.99
+"""Largest partial correlation that a climb goes to: beyond, a covariance has no inverse in these numbers."""
 
 
 @compiled()

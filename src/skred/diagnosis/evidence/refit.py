@@ -26,8 +26,8 @@ from skred.inference.hierarchical.surface import Nodes
 FloatArray = NDArray[np.float64]
 MOST_NODES = 200_000
 """Quadrature points in memory together, but for those of one group at least: some hundred megabytes."""
-_FAR_MEAN, _FAR_SPREAD = 0.7, 0.35
-"""Change of a population after which quadrature points are made anew: of its mean in spreads, of a log
+_FAR = 0.5
+"""Change of a population after which quadrature points are made anew: of its mean in spreads, and of a log
 spread."""
 
 
@@ -134,7 +134,7 @@ def _moved(before: FloatArray, after: FloatArray, n: int) -> bool:
     """Whether a population is far from the one that its nodes were made for."""
     mean = np.abs(after[:n] - before[:n]) / np.exp(before[n : 2 * n])
     spread = np.abs(after[n : 2 * n] - before[n : 2 * n])
-    return bool(mean.max() > _FAR_MEAN or spread.max() > _FAR_SPREAD)
+    return bool(max(mean.max(), spread.max()) > _FAR)
 
 
 def _split(nodes: Nodes, n_groups: int, n_events: int) -> list[Nodes]:

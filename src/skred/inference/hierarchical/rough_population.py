@@ -19,9 +19,9 @@ SPREAD_MEDIAN, SPREAD_LOG_SD = 0.13, 0.6
 """Prior of a population's standard deviation of a strength's logarithm: log-normal."""
 _SEARCH, _ITERATIONS, _ENOUGH = 30, 300, 1e-4
 """Steps after which the population is found, steps at most, and change below which they end."""
-_STARTING_SPREAD = 0.3
+STARTING_SPREAD = 0.3
 """Spread to begin with: wider than most, so that no event is out of reach."""
-_PRIOR_EVENTS = 2.0
+PRIOR_EVENTS = 2.0
 """Events that a prior spread counts for where correlations are estimated: keeps a covariance regular with few
 events."""
 _REACH = 2.5
@@ -93,7 +93,7 @@ def rough_population(surfaces: Surfaces, prior_mean: FloatArray, prior_sd: Float
         change = np.abs(centre - mean).max() + np.abs(spread**2 - np.diag(covariance)).max()
         mean, covariance = centre, np.outer(spread, spread) * correlation
         if iteration == _SEARCH:  # found; from here on what the data leave open is the prior's
-            covariance = np.minimum(spread, _STARTING_SPREAD) ** 2 * np.eye(n)
+            covariance = np.minimum(spread, STARTING_SPREAD) ** 2 * np.eye(n)
         elif iteration > _SEARCH and change < _ENOUGH:
             break
     own = _own_variance(points, weight, within, event, n_events)
@@ -151,7 +151,7 @@ def _spreads(moment: FloatArray, n_events: int) -> tuple[FloatArray, FloatArray]
         ratio = squares * np.exp(-2.0 * log_spread)
         slope = n_events - ratio + (log_spread - math.log(SPREAD_MEDIAN)) / SPREAD_LOG_SD**2
         log_spread = log_spread - np.clip(slope / (2.0 * ratio + SPREAD_LOG_SD**-2.0), -1.0, 1.0)
-    regular = moment + _PRIOR_EVENTS * SPREAD_MEDIAN**2 * np.eye(len(moment))
+    regular = moment + PRIOR_EVENTS * SPREAD_MEDIAN**2 * np.eye(len(moment))
     scale = np.sqrt(np.diag(regular))
     return np.exp(log_spread), regular / np.outer(scale, scale)
 
