@@ -106,7 +106,7 @@ def _terrain(track: Track, constant: xr.Dataset, smoothing_m: float) -> Terrain:
     """The terrain of the calibration: made anew where that gives the same cells, else as it was stored."""
     edge = np.asarray(constant["cell_edge"].values, dtype=float)
     if np.isfinite(smoothing_m):
-        terrain = build_terrain(track.x_m, track.z_m, smoothing_m=smoothing_m)
+        terrain = build_terrain(track.x_m, track.z_m, smoothing_m=smoothing_m).continued_up(float(edge[0]))
         if terrain.edge_s_m.shape == edge.shape and np.allclose(terrain.edge_s_m, edge):
             return terrain
     slope = np.asarray(constant["slope"].values, dtype=float)

@@ -75,6 +75,19 @@ class Terrain:
         """Slope angle phi per cell [rad], downhill positive."""
         return np.arctan2(self.sin_slope, self.cos_slope)
 
+    def continued_up(self, first_m: float) -> Terrain:
+        """With its first slope going on above its first point, to a negative place [m] or just beyond."""
+        cell = float(self.edge_s_m[1] - self.edge_s_m[0])
+        n = max(int(np.ceil((float(self.edge_s_m[0]) - first_m) / cell)), 0)
+        above = float(self.edge_s_m[0]) - cell * np.arange(n, 0, -1)
+        return Terrain(
+            np.concatenate([above, self.edge_s_m]),
+            np.concatenate([np.full(n, self.sin_slope[0]), self.sin_slope]),
+            np.concatenate([np.full(n, self.cos_slope[0]), self.cos_slope]),
+            np.concatenate([np.zeros(n), self.curvature]),
+            self.smoothing_m,
+        )
+
 
 def default_smoothing(length_m: float) -> float:
     """Smoothing length [m] of a track of that length: 10 m, and in proportion less below 600 m."""

@@ -70,7 +70,7 @@ class Motion:
         if self.added is None:
             return place
         shift = sum(s * term.release for s, term in zip(self.added[population], self.terms, strict=True))
-        return np.clip(place + shift, 0.0, terrain.length_m)
+        return np.clip(place + shift, terrain.edge_s_m[0], terrain.length_m)
 
 
 @dataclass(frozen=True, eq=False)

@@ -156,7 +156,7 @@ def _given(scenarios: Scenarios, length_m: float) -> tuple[Releases, FloatArray 
             raise InputError(f"--release {place:g}:{weight:g}: expected a weight above 0")
     places, weights = np.array(scenarios, dtype=float).T
     none = np.zeros(len(places))
-    releases = Releases(places, none, float(length_m), none, none)
+    releases = Releases(places, none, 0.0, float(length_m), none, none)
     if np.ptp(weights) == 0.0:
         named = " or ".join(f"{place:.0f}" for place in places)
         return releases, None, f"s = {named} m" + (", each as likely" if len(places) > 1 else "")

@@ -18,7 +18,6 @@ from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, fit_base
-from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms.spec import Group
 
 
@@ -28,8 +27,7 @@ def with_residues(
     """Candidates, where a force not in the list has more evidence the best mechanisms with it beside them."""
     found, force = dict(candidates), log_evidence_of(profiles)
     physics = [one for one in candidates.values() if one.mechanism.group is Group.PHYSICS]
-    least = max((one.log_bayes_factor for one in physics), default=0.0) - COUNTS
-    looked = [one for one in physics if max(least, 0.5 * force) < one.log_bayes_factor < force]
+    looked = [one for one in physics if 0.5 * force < one.log_bayes_factor < force]
     for one, residue in zip(looked, pool.map(partial(_residue, base), looked), strict=True):
         # What a mechanism leaves is no residue if it is more than what it explains.
         if residue < one.log_bayes_factor:

@@ -157,7 +157,7 @@ class Extension:
             place = place + strengths[:, k] * direction.release
             if direction.log_readings is not None:
                 log_factor[:, :-1] += np.outer(strengths[:, k], direction.log_readings)
-        place = np.clip(place, 0.0, releases.length)
+        place = np.clip(place, releases.first, releases.length)
         return rows, place, releases.speeds(events, points[:, -1]), np.exp(log_factor)
 
     def predict(self, events: IntArray, points: FloatArray, strengths: FloatArray) -> FloatArray:
@@ -203,7 +203,7 @@ class Extension:
         )
         readings = readings * factors
         jacobian = jacobian * factors[:, :, None]
-        inside = (releases > 0.0) & (releases < noted.length)
+        inside = (releases > noted.first) & (releases < noted.length)
         by_release = jacobian[:, :, rows.shape[1]] * inside[:, None]
         by_logs = jacobian[:, :, : self.n_base] * rows[:, None, : self.n_base]
         by_deviation = by_release * noted.sd[events][:, None]

@@ -37,6 +37,7 @@ from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.population import population_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.hierarchical.releases import terrain_with_releases
 from skred.physics.law import Law
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
@@ -242,7 +243,8 @@ def unseen(predictor: Predictor, campaign: Campaign, seed: int = 0) -> HeldOut:
 def problem_of(predictor: Predictor, campaign: Campaign) -> HierarchicalProblem:
     """The campaign's recordings as the predictor reads them."""
     x_m, z_m = campaign.track.x_m, campaign.track.z_m
-    terrain = build_terrain(x_m, z_m, smoothing_m=predictor.smoothing_m)
+    track = build_terrain(x_m, z_m, smoothing_m=predictor.smoothing_m)
+    terrain = terrain_with_releases(track, campaign.events)
     errors = ERROR_MODELS[predictor.error_model]
     return HierarchicalProblem(campaign, terrain, errors, predictor.place_sd_m)
 

@@ -29,7 +29,7 @@ from skred.inference.hierarchical.population import (
     population_variables,
     spread_parameters,
 )
-from skred.inference.hierarchical.releases import Releases, releases_of
+from skred.inference.hierarchical.releases import Releases, releases_of, terrain_with_releases
 from skred.inference.hierarchical.rough_population import RoughPopulation, envelope_around, rough_population
 from skred.inference.hierarchical.surface import Surfaces, build_surfaces
 from skred.inference.problem import Problem
@@ -201,7 +201,7 @@ class HierarchicalProblem(Problem):
     @cached_property
     def releases(self) -> Releases:
         """Where the events start and how fast, and how well that is known."""
-        return releases_of(self.campaign.events, self.terrain.length_m)
+        return releases_of(self.campaign.events, self.terrain)
 
     def fronts(self, mechanisms: Sequence[Mechanism]) -> Fronts:
         """Everything that the likelihood of an event's readings under a law depends on."""
@@ -340,7 +340,8 @@ def hierarchical_problem(
     ValueError
         If no event has a reading.
     """
-    terrain = build_terrain(campaign.track.x_m, campaign.track.z_m, smoothing_m=smoothing_m, cell_m=cell_m)
+    track = build_terrain(campaign.track.x_m, campaign.track.z_m, smoothing_m=smoothing_m, cell_m=cell_m)
+    terrain = terrain_with_releases(track, campaign.events)
     problem = HierarchicalProblem(campaign, terrain, ERROR_MODELS[error_model])
     if not (problem.observed | problem.readings.bounded).any():
         raise ValueError("no reading is observed: there is nothing to calibrate against")
