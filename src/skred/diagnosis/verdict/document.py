@@ -37,9 +37,6 @@ from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.mechanisms.stretches import equation_of
 
-_NO_LIMIT = 20.0
-"""Prior scales from which on a detection limit is none: no strength that could be is so large."""
-
 
 def verdict(found: Outcome) -> dict[str, Any]:
     """The verdict of a diagnosis, as `verdict.json` holds it."""
@@ -139,15 +136,10 @@ def _detection_limits(table: Identifiability) -> dict[str, Any]:
         row.mechanism.id: {
             "parameter": row.mechanism.strength.name,
             "unit": row.mechanism.strength.unit,
-            "value": row.limit if row.limit < _NO_LIMIT * _scale(row) else None,
+            "value": row.limit if np.isfinite(row.limit) else None,
         }
         for row in table.rows
     }
-
-
-def _scale(row: Detectability) -> float:
-    assert row.mechanism.added is not None
-    return row.mechanism.added.scale
 
 
 def _diagnostics(

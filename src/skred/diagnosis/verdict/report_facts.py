@@ -31,6 +31,7 @@ from skred.diagnosis.outcome import (
 )
 from skred.diagnosis.predict.held_out import K_LIMIT, HeldOut
 from skred.diagnosis.verdict.mechanisms import candidate_documents
+from skred.documents import FORMAT
 from skred.inference.calibrate import Calibration
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
@@ -40,9 +41,6 @@ from skred.physics.law import Law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Mechanism, Shape
 from skred.physics.mechanisms.stretches import is_opposed
-
-FORMAT = 1
-"""Of the key ``report`` and of ``diagnosis.nc``; another one cannot be read by this version."""
 
 
 def report_facts(found: Outcome) -> dict[str, Any]:
