@@ -9,6 +9,7 @@ where the events' modes are, not on whether the readings fit.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,6 +67,21 @@ class Detectability:
     limit_m: tuple[float, float] | None
     power: float
     alike: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """As documents have it; null where there is no limit."""
+        limit, best = (one if np.isfinite(one) else None for one in (self.limit, self.best_limit))
+        return {
+            "id": self.mechanism.id,
+            "kept": self.kept,
+            "limit": limit,
+            "best_limit": best,
+            "best_stretch_m": self.limit_m,
+            "relevant": _added(self.mechanism).relevant,
+            "unit": self.mechanism.strength.unit,
+            "power": self.power,
+            "alike": list(self.alike),
+        }
 
 
 @dataclass(frozen=True, eq=False)

@@ -103,22 +103,8 @@ def identify_document(
 
 def _row(told: Detectability) -> dict[str, Any]:
     mechanism = told.mechanism
-    added = mechanism.added
-    assert added is not None
-    return {
-        "id": mechanism.id,
-        "title": mechanism.title,
-        "group": str(mechanism.group),
-        "parameter": mechanism.strength.name,
-        "unit": mechanism.strength.unit,
-        "kept": told.kept,
-        "limit": told.limit if np.isfinite(told.limit) else None,
-        "best_limit": told.best_limit if np.isfinite(told.best_limit) else None,
-        "best_stretch_m": told.limit_m,
-        "relevant": added.relevant,
-        "power": told.power,
-        "alike": list(told.alike),
-    }
+    named = {"title": mechanism.title, "group": str(mechanism.group), "parameter": mechanism.strength.name}
+    return told.as_dict() | named
 
 
 def _next_sensor(table: Identifiability) -> dict[str, Any] | None:

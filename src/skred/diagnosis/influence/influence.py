@@ -3,9 +3,9 @@
 Of a single avalanche no refit is needed: evidence is what all others have, times the density of this one
 given them. So the Bayes factor without it is that of all, less what it is predicted better with the answer.
 Without several, or without a kind of reading, population and every avalanche are refitted to what is left, at
-all strengths of the named mechanism's leading shapes, or with the whole profile. Nothing is chosen again: the
-question is whether what was answered would still stand. Of a speed that is left out it stays known that the
-front came there.
+all strengths of those shapes that hold most of the evidence, or with the whole profile. Nothing is chosen
+again: the question is whether what was answered would still stand. Of a speed that is left out it stays known
+that the front came there.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.check.limits import LIMIT
+from skred.diagnosis.check.limits import HELD, LIMIT
 from skred.diagnosis.compare.between import TABLES, gains_of
 from skred.diagnosis.compare.candidate import Candidate, log_gain
 from skred.diagnosis.compare.comparison import Comparison
@@ -34,8 +34,6 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 MOST = 1.0 / 3.0
 """Share of the avalanches that an answer may hang on and be said to be carried by few: more is not few."""
-_SHAPES_WITHIN = 2.0
-"""Nats behind a mechanism's best shape within which shapes are computed again: the others hold little."""
 
 
 @dataclass(frozen=True)
@@ -183,9 +181,11 @@ Again = Callable[[Base, _Part], float]
 
 
 def _of_mechanism(candidate: Candidate) -> Again:
-    """The log Bayes factor of a mechanism by a part of the recordings, over its leading shapes."""
+    """The log Bayes factor of a mechanism by a part of the recordings, over shapes that hold most of it."""
     factors = candidate.log_factors
-    chosen = np.flatnonzero(factors > factors.max() - _SHAPES_WITHIN)
+    order = np.argsort(-factors)
+    held = np.cumsum(np.exp(factors[order] - np.logaddexp.reduce(factors)))
+    chosen = order[: int(np.searchsorted(held, HELD)) + 1]
 
     def again(base: Base, part: _Part) -> float:
         rest, found = part.base(base), list[tuple[float, Curve]]()

@@ -133,8 +133,9 @@ def _others(
     """What the others say of each event: draws by their weights, or of the refit where there is one."""
     problem, rng = calibration.problem, np.random.default_rng([seed, 31])
     assert isinstance(problem, HierarchicalProblem)
-    augmented = isinstance(problem, AugmentedProblem)
-    extension = problem.extension if augmented else extended(problem, calibration.law)
+    extension = extended(problem, calibration.law)
+    if isinstance(problem, AugmentedProblem):
+        extension = problem.extension
     every = draws_of(calibration, posterior_of(calibration), rng)
     parts = []
     for event in range(problem.campaign.n_events):
