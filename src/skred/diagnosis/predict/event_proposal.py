@@ -15,8 +15,6 @@ from skred.inference.reading_density import log_likelihoods
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-_NEAR = 0.3
-"""Width around points that an earlier sample missed, in the population's."""
 _CENTRES = 6
 """Sets of readings that points are drawn around, at most: the time goes with their square."""
 
@@ -117,10 +115,10 @@ def _centres(likelihood: EventLikelihood) -> IntArray:
 
 
 def _around(near: FloatArray, typical: Population, n_draws: int) -> _Parts:
-    """Points to draw around, the same for all draws of the population."""
+    """Points to draw around, as wide as the population and the same for all its draws."""
     n_axes = typical.mean.shape[1] + 1
-    factor = _NEAR * np.eye(n_axes)
-    factor[:-1, :-1] = _NEAR * np.linalg.cholesky(typical.covariance[0])
+    factor = np.eye(n_axes)
+    factor[:-1, :-1] = np.linalg.cholesky(typical.covariance[0])
     shape = n_draws, len(near), n_axes
     return _Parts(np.broadcast_to(near, shape), np.broadcast_to(factor, (*shape, n_axes)))
 
