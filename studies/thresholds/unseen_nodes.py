@@ -39,8 +39,7 @@ def score(base: Base, event: int, added: Any, budget: Budget, seed: int) -> floa
     """Log score of an avalanche."""
     extension, draws = added
     rows = base.rows.take(np.array([event]))
-    given = draws.means, draws.factors, draws.strengths
-    densities = log_densities(extension, rows, *given, seed, budget)[:, 0]
+    densities = log_densities(extension, rows, draws, seed, budget)[:, 0]
     return float(np.logaddexp.reduce(densities) - np.log(len(densities)))
 
 

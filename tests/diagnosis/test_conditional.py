@@ -103,7 +103,7 @@ def test_scores_of_an_avalanche_add_up_to_its_own(ryggfonn: HierarchicalProblem,
     """The chain rule, against the quadrature that scores avalanches as a whole."""
     extension, of = pcm(ryggfonn, drag=drag), draws(200, (0.002, 0.0005) if drag else None)
     found = predicted(extension, of)
-    densities = log_densities(extension, campaign_rows(extension), *of, 0)
+    densities = log_densities(extension, campaign_rows(extension), of, 0)
     whole = np.logaddexp.reduce(densities, axis=0) - np.log(len(densities))
     # Not where an avalanche is known not to have come: that is no reading.
     every = (ryggfonn.campaign.status != Status.NOT_REACHED).all(axis=1) & (whole > -25.0)

@@ -20,6 +20,9 @@ from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.evidence.coefficient import curve_at, fit_base
 from skred.diagnosis.evidence.covariates import Standard
 from skred.diagnosis.evidence.population_draws import population_draws, typical
+from skred.diagnosis.evidence.predictive import Predicted
+from skred.diagnosis.predict.draws import LeftOut
+from skred.diagnosis.predict.draws import predictions as by_draws
 from skred.diagnosis.predict.gain import realised_gain
 from skred.diagnosis.predict.predictor_document import as_dict, from_dict
 from skred.diagnosis.predict.unseen import (
@@ -27,7 +30,6 @@ from skred.diagnosis.predict.unseen import (
     Term,
     extension_of,
     log_scores,
-    predictions,
     predictor_of,
     unseen,
 )
@@ -81,6 +83,11 @@ def by_hand(n_draws: int = 3, *terms: Term, strengths: Any = None) -> Predictor:
     factors = np.linspace(0.1, 0.2, n_draws)[:, None, None]
     drawn = np.empty((n_draws, 0)) if strengths is None else np.asarray(strengths, dtype=float)
     return Predictor("constant", "robust", 8.0, 10.0, means, factors, terms, drawn)
+
+
+def predictions(predictor: Predictor, unseen: Campaign) -> Predicted:
+    said = LeftOut(extension_of(predictor, unseen), predictor.draws)
+    return by_draws([said] * unseen.n_events, 0)
 
 
 @pytest.mark.slow
@@ -194,7 +201,7 @@ def test_predictions_hold_what_they_should() -> None:
 def test_a_predictor_comes_back_as_it_was(augmented: Calibration) -> None:
     predictor = predictor_of(augmented, 50)
     again = from_dict(json.loads(json.dumps(as_dict(predictor), allow_nan=False)))
-    assert predictor.n_draws == 50 and again.terms == predictor.terms
+    assert len(predictor.means) == 50 and again.terms == predictor.terms
     assert (again.law, again.error_model) == (predictor.law, predictor.error_model)
     for name in ("means", "factors", "strengths"):
         assert_array_equal(getattr(again, name), getattr(predictor, name))

@@ -11,20 +11,23 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skred.campaign import Campaign
 from skred.campaign.parts import of_events, without_silent_sensors
 from skred.diagnosis.detect.too_little import too_little
 from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
-from skred.diagnosis.predict.held_out import HeldOut, errors
+from skred.diagnosis.predict.held_out import errors
 from skred.diagnosis.predict.unseen import log_scores, problem_of, unseen
 from skred.diagnosis.verdict.predictors import predictors_of
 from skred.errors import InputError
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.paired import sum_se
 
+FloatArray = NDArray[np.float64]
 Tell = Callable[[str], None]
+_WHEN = ("before", "after")
 _ERRORS = ("rmse_velocity", "rmse_runout", "coverage_90")
 
 
@@ -55,24 +58,21 @@ def open_locked(found: Outcome, locked: Campaign, seed: int) -> dict[str, Any]:
     """What locked avalanches make of a diagnosis; null where nothing was added, or calibrated at all."""
     document: dict[str, Any] = {"events": list(locked.event_ids)}
     keys = ("log_score", *_ERRORS)
-    document |= {f"{key}_{when}": None for when in ("before", "after") for key in keys}
+    document |= {f"{key}_{when}": None for when in _WHEN for key in keys}
     document |= {"elpd_diff": None, "elpd_se": None}
     if isinstance(found, NotDiagnosed):
         return document
-    scored = [unseen(one, locked, seed) for one in predictors_of(found) if one is not None]
-    problem = problem_of(predictors_of(found)[0], locked)
-    for when, one in zip(("before", "after"), scored, strict=False):
-        document |= {f"{key}_{when}": value for key, value in _numbers(one, problem).items()}
+    predictors = [one for one in predictors_of(found) if one is not None]
+    problem, scored = problem_of(predictors[0], locked), [unseen(one, locked, seed) for one in predictors]
+    for when, one in zip(_WHEN, scored, strict=False):
+        numbers = {"log_score": one.pointwise.tolist(), **errors(one, problem)}
+        document |= {f"{key}_{when}": value for key, value in numbers.items()}
     if len(scored) == 2:
         document |= _difference(scored[1].pointwise - scored[0].pointwise)
     return document
 
 
-def _numbers(found: HeldOut, problem: HierarchicalProblem) -> dict[str, Any]:
-    return {"log_score": found.pointwise.tolist(), **errors(found, problem)}
-
-
-def _difference(pairs: Any) -> dict[str, float | None]:
+def _difference(pairs: FloatArray) -> dict[str, float | None]:
     """Sum of paired differences, and its standard error where there are several."""
     return {"elpd_diff": float(pairs.sum()), "elpd_se": sum_se(pairs) if len(pairs) > 1 else None}
 
@@ -119,23 +119,25 @@ def outer_folds(
         Takes one line for each fold.
     """
     folds = folds_of(problem, k, seed)
-    entries, pairs = list[dict[str, Any]](), list[float]()
+    entries, pairs = list[dict[str, Any]](), list[FloatArray]()
     for number, fold in enumerate(folds):
         tell(f"outer fold {number + 1} of {k}: the diagnosis without {len(fold)} avalanches")
         others = _without(problem, fold, f"--outer-folds {k}")
         entry, difference = _fold(diagnose(others), of_events(problem.campaign, fold), seed)
         entries.append(entry)
-        pairs += difference
-    return {"k": k, "folds": entries, **_difference(np.array(pairs))}
+        pairs.append(difference)
+    return {"k": k, "folds": entries, **_difference(np.concatenate(pairs))}
 
 
-def _fold(found: Outcome, left_out: Campaign, seed: int) -> tuple[dict[str, Any], list[float]]:
+def _fold(found: Outcome, left_out: Campaign, seed: int) -> tuple[dict[str, Any], FloatArray]:
     """One fold, and the differences of its avalanches."""
     before, after = predictors_of(found)
     first = log_scores(before, left_out, seed)
     second = first if after is None else log_scores(after, left_out, seed)
     difference = second - first
-    names = _added(found) if isinstance(found, Diagnosis) else []
+    names = [step.candidate.mechanism.id for step in found.steps] if isinstance(found, Diagnosis) else []
+    if isinstance(found, Diagnosis) and isinstance(found.finding, ProfileAdded):
+        names = [UNLISTED]
     entry = {
         "events": list(left_out.event_ids),
         "verdict": found.decision.verdict,
@@ -146,14 +148,7 @@ def _fold(found: Outcome, left_out: Campaign, seed: int) -> tuple[dict[str, Any]
         "log_score_after": second.tolist(),
         "elpd_diff": float(difference.sum()),
     }
-    return entry, difference.tolist()
-
-
-def _added(found: Diagnosis) -> list[str]:
-    """Ids of what was added."""
-    if isinstance(found.finding, ProfileAdded):
-        return [UNLISTED]
-    return [step.candidate.mechanism.id for step in found.steps]
+    return entry, difference
 
 
 def _without(problem: HierarchicalProblem, rows: Sequence[int], option: str) -> HierarchicalProblem:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from skred.units import unit_text
 
 
@@ -21,14 +19,21 @@ def counted(n: int, one: str, many: str = "") -> str:
 
 def plus_minus(mean: float, sd: float, unit: str) -> str:
     """A number with its standard deviation, two significant digits of it, and its unit."""
-    shown = unit_text(unit)
-    decimals = 1 - math.floor(math.log10(sd)) if sd > 0.0 else 3
-    if 0 <= decimals <= _MOST_DECIMALS:
-        text = f"{mean:.{decimals}f} ± {sd:.{decimals}f}"
-    else:
-        text = f"{mean:.3g} ± {sd:.2g}"
-    return f"{text} {shown}".rstrip()
+    spread = f"{sd:#.2g}"
+    decimals = len(spread.partition(".")[2])
+    text = f"{mean:.3g} ± {sd:.2g}" if "e" in spread else f"{mean:.{decimals}f} ± {sd:.{decimals}f}"
+    return f"{text} {unit_text(unit)}".rstrip()
 
 
-_MOST_DECIMALS = 4
-"""Decimals beyond which a number reads better with an exponent."""
+def error_text(value: float, unit: str) -> str:
+    """An error of speeds or of runouts, as precisely as it counts."""
+    return f"{value:.{_DECIMALS[unit]}f}"
+
+
+_DECIMALS = {"m": 0, "m s-1": 1}
+"""Of errors by their unit: readings are no more precise."""
+TOLD_FROM = 0.05
+"""Probability from which what is not the answer is told of: below it, its name misleads more than it
+informs."""
+MOST_NAMED = 5
+"""Sensors or avalanches that a sentence tells of one by one."""

@@ -9,6 +9,7 @@ where the events' modes are, not on whether the readings fit.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,21 +20,23 @@ from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, campaign_rows
 from skred.diagnosis.evidence.linear_mixed_model import Scores, efficient_scores, without
 from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.intervals import INTERVAL_PROBABILITY
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.library import built_in
 from skred.physics.mechanisms.spec import Added, Group, Mechanism
 
 FloatArray = NDArray[np.float64]
-LIMIT_Z, LIMIT_FOR = 2.85, 13
-"""Score above which a mechanism counts as seen, and for a library of how many it was calculated."""
-_NINE_IN_TEN = 1.2816
-"""Standard normal quantile of 0.9: how far above that score nine in ten scores are."""
+LIMIT_Z = 2.85
+"""Score above which a mechanism counts as seen: the largest of as many as are built in is above it in about 3
+of a hundred clean campaigns."""
 ALIKE = 0.9
 """Size of the cosine between two efficient scores above which mechanisms look alike: then four fifths of the
 information about one is information about the other."""
+NO_LIMIT = 20.0
+"""Prior scales from which on a detection limit is none: no strength that could be is so large."""
 _PLACES = 12
-"""Places tried for one more sensor, evenly over the recorded part and a little above."""
-_NO_INFORMATION = 1e-6
-"""About a strength in scales of its prior: rounding errors."""
+"""Places tried for one more sensor: close enough to each other for what a reading there says to change little
+between them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +49,7 @@ class Detectability:
     kept : float
         Share of its information left, at its typical place.
     limit : float
-        Strength found in 90 % of cases, at its typical place, in its unit.
+        Strength found in 90 % of cases, at its typical place, in its unit; infinite from `NO_LIMIT` on.
     limit_m : (float, float) or None
         The stretch where that limit is lowest.
     best_limit : float
@@ -64,6 +67,21 @@ class Detectability:
     limit_m: tuple[float, float] | None
     power: float
     alike: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """As documents have it; null where there is no limit."""
+        limit, best = (one if np.isfinite(one) else None for one in (self.limit, self.best_limit))
+        return {
+            "id": self.mechanism.id,
+            "kept": self.kept,
+            "limit": limit,
+            "best_limit": best,
+            "best_stretch_m": self.limit_m,
+            "relevant": _added(self.mechanism).relevant,
+            "unit": self.mechanism.strength.unit,
+            "power": self.power,
+            "alike": list(self.alike),
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +131,7 @@ def limit_z(n_mechanisms: int) -> float:
     In a longer list more of them stand out by chance. The limit rises with its length, so that some mechanism
     stands out in as many clean campaigns as with the list that `LIMIT_Z` was calculated for.
     """
-    return -float(ndtri(ndtr(-LIMIT_Z) * LIMIT_FOR / n_mechanisms))
+    return -float(ndtri(ndtr(-LIMIT_Z) * len(built_in()) / n_mechanisms))
 
 
 def mean_power(table: list[Detectability]) -> float:
@@ -124,37 +142,33 @@ def mean_power(table: list[Detectability]) -> float:
 
 def told(score_test: ScoreTest, scores: Scores) -> list[Detectability]:
     """One row for each mechanism."""
-    _, information, raw = score_test.of_candidates(scores)
-    order = score_test.order
-    cosine = scores.information[0][np.ix_(order, order)]
-    scales = np.array([_added(candidate.mechanism).scale for candidate in score_test.placed_mechanisms])
-    informed = information[0] * scales**2 > _NO_INFORMATION
-    own_or_one = np.where(informed, information[0], 1.0)
-    cosine = np.where(np.outer(informed, informed), cosine / np.sqrt(np.outer(own_or_one, own_or_one)), 0.0)
-    ids = np.array([candidate.mechanism.id for candidate in score_test.placed_mechanisms])
+    _, (information,), (raw,) = score_test.of_candidates(scores)
+    placed, order = score_test.placed_mechanisms, score_test.order
+    scales = np.array([_added(one.mechanism).scale for one in placed])
+    z, at = limit_z(len(mechanisms())), ndtri(INTERVAL_PROBABILITY)
+    own = np.sqrt(information)
+    cosine = np.abs(scores.information[0][np.ix_(order, order)]) / np.outer(own, own)
+    seen = (z + at) / own < NO_LIMIT * scales
+    limits = np.where(seen, (z + at) / own, np.inf)
+    look_alike = (cosine > ALIKE) & np.outer(seen, seen)
+    ids = np.array([one.mechanism.id for one in placed])
     table = []
-    for name in dict.fromkeys(ids):
+    for name in dict.fromkeys(ids.tolist()):
         members = np.flatnonzero(ids == name)
-        own = information[0, members]
-        best = members[int(np.argmax(own))]
-        typical = members[int(np.argsort(own)[len(own) // 2])]
-        mechanism, shape = (
-            score_test.placed_mechanisms[best].mechanism,
-            score_test.placed_mechanisms[best].shape,
-        )
-        added = _added(mechanism)
-        alike = {str(ids[k]) for k in np.flatnonzero(np.abs(cosine[best]) > ALIKE)} - {name}
+        in_order = members[np.argsort(information[members])]
+        typical, best = in_order[len(members) // 2], in_order[-1]
+        mechanism, shape = placed[best].mechanism, placed[best].shape
         stretch = None if shape.s_from_m is None or shape.s_to_m is None else (shape.s_from_m, shape.s_to_m)
-        kept = information[0, typical] / raw[0, typical] if informed[typical] else 0.0
+        kept = information[typical] / raw[typical] if seen[typical] else 0.0
         table.append(
             Detectability(
                 mechanism,
                 float(np.clip(kept, 0.0, 1.0)),
-                _limit(information[0, typical], informed[typical]),
-                _limit(information[0, best], informed[best]),
+                float(limits[typical]),
+                float(limits[best]),
                 stretch,
-                float(np.mean(ndtr(np.sqrt(own) * added.relevant - limit_z(len(mechanisms()))))),
-                tuple(sorted(alike)),
+                float(np.mean(ndtr(own[members] * _added(mechanism).relevant - z))),
+                tuple(sorted(set(ids[look_alike[best]].tolist()) - {name})),
             )
         )
     return table
@@ -165,21 +179,19 @@ def _added(mechanism: Mechanism) -> Added:
     return mechanism.added
 
 
-def _limit(information: float, informed: bool) -> float:
-    """Strength found in 90 % of cases; infinite where the recordings say nothing."""
-    if not informed:
-        return float("inf")
-    return (limit_z(len(mechanisms())) + _NINE_IN_TEN) / float(np.sqrt(information))
+def places_of_a_sensor(problem: HierarchicalProblem, recorded_m: tuple[float, float]) -> FloatArray:
+    """Places to try for one more velocity sensor: evenly over the recorded part and a little above."""
+    first, last = recorded_m
+    release = float(problem.releases.mean.max())
+    low = max(release + 20.0, first - 0.5 * (last - first))
+    return np.linspace(low, min(last, problem.terrain.length_m - 1.0), _PLACES)
 
 
 def extra_sensors(
     score_test: ScoreTest, points: FloatArray, population: Population
 ) -> tuple[FloatArray, list[Scores]]:
     """Places for one more velocity sensor, and the information with each."""
-    first, last = score_test.setting.recorded_m
-    release = float(score_test.problem.releases.mean.max())
-    low = max(release + 20.0, first - 0.5 * (last - first))
-    places = np.linspace(low, min(last, score_test.problem.terrain.length_m - 1.0), _PLACES)
+    places = places_of_a_sensor(score_test.problem, score_test.setting.recorded_m)
     problem = with_sensors(score_test.problem, places)
     n_new = len(places)
     setting = replace(

@@ -23,10 +23,6 @@ from skred.physics.law import Law
 
 Tell = Callable[[str], None]
 FILE = "identify.json"
-_ROUNDS = 40
-"""Rounds of expectation-maximisation at most: from the prior's medians more than from a posterior."""
-_NO_LIMIT = 20.0
-"""Prior scales from which on a detection limit is none, as in the verdict."""
 
 
 def identify_to(
@@ -67,16 +63,14 @@ def base_of(problem: HierarchicalProblem, law: Law) -> Base:
     points = np.zeros((len(rows.event), len(law.mechanisms) + 1))
     points[:, :-1] = population.mean[0]
     likelihood = EventLikelihood(extension, rows, np.empty(0))
-    start = fit_population(likelihood, mean_prior(law), (population, points), n_rounds=_ROUNDS)
+    start = fit_population(likelihood, mean_prior(law), (population, points))
     return fit_base(problem, law, *start)
 
 
 def identifiability(base: Base) -> Identifiability:
     """What the recordings can tell around a fitted law."""
     score_test = ScoreTest(base.problem, base.law, base.setting)
-    # A direction that changes no reading has no cosine with any other: nothing looks like it.
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return look(score_test, base.rows, base.fit.points, base.population)
+    return look(score_test, base.rows, base.fit.points, base.population)
 
 
 def identify_document(
@@ -109,26 +103,8 @@ def identify_document(
 
 def _row(told: Detectability) -> dict[str, Any]:
     mechanism = told.mechanism
-    added = mechanism.added
-    assert added is not None
-    return {
-        "id": mechanism.id,
-        "title": mechanism.title,
-        "group": str(mechanism.group),
-        "parameter": mechanism.strength.name,
-        "unit": mechanism.strength.unit,
-        "kept": told.kept if told.limit < _NO_LIMIT * added.scale else 0.0,
-        "limit": _seen(told.limit, added.scale),
-        "best_limit": _seen(told.best_limit, added.scale),
-        "best_stretch_m": told.limit_m,
-        "relevant": added.relevant,
-        "power": told.power,
-        "alike": list(told.alike),
-    }
-
-
-def _seen(limit: float, scale: float) -> float | None:
-    return limit if limit < _NO_LIMIT * scale else None
+    named = {"title": mechanism.title, "group": str(mechanism.group), "parameter": mechanism.strength.name}
+    return told.as_dict() | named
 
 
 def _next_sensor(table: Identifiability) -> dict[str, Any] | None:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Rows
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.predict.draws import Draws, LeftOut
-from skred.diagnosis.predict.event_proposal import Sample, Sizes, sample
+from skred.diagnosis.predict.event_proposal import Sample, sample
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.inference.error_model import ErrorModel, EventReadings
 from skred.inference.hierarchical.problem import HierarchicalProblem
@@ -35,13 +35,9 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 ENOUGH = 100.0
 """Effective draws below which an avalanche is drawn again around what was missed, and it is told."""
-_USUAL, _MORE = Sizes(4, 2, (1.3,)), Sizes(16, 8, (1.3, 5.0))
-"""Points for each draw of the population: as usual, and where those were too few. Beside a stop the linear
-model is far too narrow: nothing is read of how far above a sensor a front stopped."""
-_AGAIN = 2
-"""Times that an avalanche is drawn again at most."""
-_MOST_DRAWS, _LEAST_DRAWS, _IN_ALL = 300, 100, 40_000
-"""Draws of the population for an avalanche: at most, at least, and together for all avalanches."""
+_POINTS = (4, 16, 16)
+"""Points around each place for each draw of the population: at first, and twice more where too few of those
+counted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,14 +113,7 @@ def conditional(others: Sequence[LeftOut], seed: int) -> Conditional:
     seed : int
         The same for two laws, so that they differ by themselves and not by random numbers.
     """
-    n_draws = int(np.clip(_IN_ALL // len(others), _LEAST_DRAWS, _MOST_DRAWS))
-
-    def of_event(event: int) -> FloatArray:
-        extension, draws = others[event]
-        draws = draws.take(np.linspace(0, len(draws.means) - 1, n_draws).round().astype(int))
-        return _event(extension, event, draws, seed)
-
-    parts = np.array(side_by_side(of_event, range(len(others))))
+    parts = np.array(side_by_side(lambda event: _event(*others[event], event, seed), range(len(others))))
     mean, low, high, log_score, crps, n_above, effective = parts.transpose(1, 0, 2)
     n_above = np.nan_to_num(n_above).astype(np.int64)
     return Conditional(mean, low, high, log_score, crps, n_above, effective)
@@ -166,7 +155,7 @@ def readings_of(problem: HierarchicalProblem, event: int, sets: BoolArray) -> Ev
     )
 
 
-def _event(extension: Extension, event: int, draws: Draws, seed: int) -> FloatArray:
+def _event(extension: Extension, draws: Draws, event: int, seed: int) -> FloatArray:
     """What `Conditional` has of one avalanche, (7, n_sensors)."""
     problem = extension.problem
     readings, errors = problem.readings, problem.error_model
@@ -182,11 +171,12 @@ def _event(extension: Extension, event: int, draws: Draws, seed: int) -> FloatAr
     )
     rng = np.random.default_rng([seed, 61, event])
     likelihood = EventLikelihood(extension, rows, draws.strengths.mean(axis=0))
-    found = sample(likelihood, draws, _USUAL, np.empty((0, extension.n_base + 1)), rng)
-    for _ in range(_AGAIN):
+    first, *more = _POINTS
+    found = sample(likelihood, draws, first, np.empty((0, extension.n_base + 1)), rng)
+    for each in more:
         missed = found.missed(ENOUGH)
         if len(missed):
-            found = sample(likelihood, draws, _MORE, missed, rng)
+            found = sample(likelihood, draws, each, missed, rng)
     fronts = found.fronts[:, :-1]
     drawn = errors.draw(fronts, readings.sd(event, fronts), readings.is_velocity, rng)
     for sensor, before, with_it in zip(given.sensors, given.above, given.with_it, strict=True):

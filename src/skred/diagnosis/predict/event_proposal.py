@@ -8,44 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
-from skred.diagnosis.evidence.conditional_map import (
-    EventLikelihood,
-    Modes,
-    Population,
-    event_modes,
-    log_joint,
-)
-from skred.diagnosis.predict.draws import Draws
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population
+from skred.diagnosis.predict.draws import Draws, modes_near
+from skred.inference.joint_metropolis import DEGREES_OF_FREEDOM
 from skred.inference.reading_density import log_likelihoods
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-_DEGREES = 6.0
-"""Of the Student t around where readings put an avalanche."""
-_NEAR = (0.3, 0.05)
-"""Widths around points that an earlier sample missed, in the population's."""
 _CENTRES = 6
-"""Sets of readings that points are drawn around, at most."""
-_LEAST_SCALE = 1e-6
-"""Of a covariance, relative to its diagonal: what a factorisation needs."""
-
-
-class Sizes(NamedTuple):
-    """Points for each draw of the population.
-
-    Attributes
-    ----------
-    of_population : int
-        From it.
-    around_each : int
-        Around where each set of readings puts the avalanche, at each width.
-    widths : tuple of float
-        As many times the standard deviations of the linear model.
-    """
-
-    of_population: int
-    around_each: int
-    widths: tuple[float, ...]
+"""Sets of readings that points are drawn around, at most: the time goes with their square."""
 
 
 class Sample(NamedTuple):
@@ -78,15 +49,10 @@ class Sample(NamedTuple):
 
 
 class _Parts(NamedTuple):
-    """Student t densities for each draw of the population: (n_draws, n_centres, ...)."""
+    """Student t densities for each draw of the population, (n_draws, n_centres, ...); triangular factors."""
 
     centres: FloatArray
     factors: FloatArray
-
-    def at_widths(self, widths: tuple[float, ...]) -> _Parts:
-        """The same at several widths."""
-        factors = [width * self.factors for width in widths]
-        return _Parts(np.tile(self.centres, (1, len(widths), 1)), np.concatenate(factors, axis=1))
 
     def with_more(self, more: _Parts) -> _Parts:
         """These and others."""
@@ -94,7 +60,7 @@ class _Parts(NamedTuple):
 
 
 def sample(
-    likelihood: EventLikelihood, draws: Draws, sizes: Sizes, near: FloatArray, rng: np.random.Generator
+    likelihood: EventLikelihood, draws: Draws, each: int, near: FloatArray, rng: np.random.Generator
 ) -> Sample:
     """Draw one avalanche, and weigh the draws by sets of its readings.
 
@@ -104,31 +70,27 @@ def sample(
         Its rows are sets of readings of one avalanche, the empty one first; at the mean of the strengths.
     draws : Draws
         By the other avalanches.
+    each : int
+        Points around each centre for each draw of the population, and twice as many from it.
     near : (n_near, n_base + 1) array
         Further points to draw around: those that an earlier sample missed, see `Sample.missed`.
     """
-    n, n_base = draws.means.shape
-    normal = rng.standard_normal((n, sizes.of_population, n_base + 1))
-    logs = draws.means[:, None] + normal[..., :-1] @ draws.factors.transpose(0, 2, 1)
-    wide = np.concatenate([logs, normal[..., -1:]], axis=2)
+    points = wide = draws.points(2 * each, rng)
+    log_prior = log_proposal = _log_population(wide, draws)
     chosen = _centres(likelihood)
     if len(chosen):
-        typical = _typical(draws)
-        modes = _modes(likelihood.take(chosen), typical, wide)
-        parts = _parts(modes, likelihood.strengths, draws).at_widths(sizes.widths)
-        parts = parts.with_more(_around(near, typical, n).at_widths(_NEAR))
-        points = np.concatenate([wide, _drawn(parts, sizes.around_each, rng)], axis=1)
+        typical = draws.typical
+        modes = modes_near(likelihood.take(chosen), typical, wide)
+        parts = _parts(modes, likelihood.strengths, draws).with_more(_around(near, typical, len(wide)))
+        points = np.concatenate([wide, _drawn(parts, each, rng)], axis=1)
         log_prior = _log_population(points, draws)
-        shares = np.array([sizes.of_population] + [sizes.around_each] * parts.centres.shape[1], dtype=float)
+        shares = np.array([2.0] + [1.0] * parts.centres.shape[1])
         every = np.concatenate([log_prior[..., None], _log_t(points, parts)], axis=2)
         log_proposal = np.logaddexp.reduce(every + np.log(shares / shares.sum()), axis=2)
-        log_ratio = (log_prior - log_proposal).ravel()
-    else:
-        points, log_ratio = wide, np.zeros(wide.shape[0] * wide.shape[1])
-    each = points.shape[1]
-    flat, strengths = points.reshape(n * each, -1), draws.strengths.repeat(each, axis=0)
+    flat, strengths = points.reshape(-1, points.shape[2]), draws.strengths.repeat(points.shape[1], axis=0)
     event = likelihood.rows.event[0]
     fronts = likelihood.extension.predict(np.full(len(flat), event), flat, strengths)
+    log_ratio = (log_prior - log_proposal).ravel()
     return Sample(flat, fronts, log_ratio + _log_likelihoods(likelihood, fronts))
 
 
@@ -152,13 +114,6 @@ def _centres(likelihood: EventLikelihood) -> IntArray:
     return order[np.linspace(0, len(order) - 1, _CENTRES).round().astype(int)]
 
 
-def _typical(draws: Draws) -> Population:
-    """One population for all draws."""
-    covariance = np.einsum("nij,nkj->ik", draws.factors, draws.factors) / len(draws.factors)
-    covariance += np.atleast_2d(np.cov(draws.means.T, bias=True))
-    return Population(draws.means.mean(axis=0)[None], covariance[None])
-
-
 def _around(near: FloatArray, typical: Population, n_draws: int) -> _Parts:
     """Points to draw around, as wide as the population and the same for all its draws."""
     n_axes = typical.mean.shape[1] + 1
@@ -168,19 +123,11 @@ def _around(near: FloatArray, typical: Population, n_draws: int) -> _Parts:
     return _Parts(np.broadcast_to(near, shape), np.broadcast_to(factor, (*shape, n_axes)))
 
 
-def _modes(likelihood: EventLikelihood, population: Population, tried: FloatArray) -> Modes:
-    """Where each set of readings puts the avalanche, for a typical population."""
-    flat, n_rows = tried.reshape(-1, tried.shape[2]), len(likelihood.rows.event)
-    many = likelihood.take(np.repeat(np.arange(n_rows), len(flat)))
-    heights = log_joint(many, np.tile(flat, (n_rows, 1)), population).reshape(n_rows, -1)
-    return event_modes(likelihood, flat[heights.argmax(axis=1)], population)
-
-
 def _parts(modes: Modes, strengths: FloatArray, draws: Draws) -> _Parts:
     """Where the readings put the avalanche by each draw: the linear model around each mode."""
     n_draws, n_base = draws.means.shape
     at, information = modes.tangents_at, modes.information
-    precision = Population(draws.means, draws.factors @ draws.factors.transpose(0, 2, 1)).precision
+    precision = Population(draws.means, draws.covariances).precision
     off = np.zeros((n_draws, len(at), n_base + 1))
     off[..., :-1] = draws.means[:, None]
     off -= at
@@ -188,34 +135,31 @@ def _parts(modes: Modes, strengths: FloatArray, draws: Draws) -> _Parts:
     slope = np.einsum("ci,cij->cj", modes.slope, modes.by_points)
     crossed = modes.by_points.transpose(0, 2, 1) @ modes.weighed(modes.by_strengths)
     pull += slope - np.einsum("cij,nj->nci", crossed, draws.strengths - strengths)
-    total = information + precision[:, None]
-    covariance = np.linalg.inv(total)
-    centres = at + np.einsum("ncij,ncj->nci", covariance, pull)
-    covariance = 0.5 * (covariance + covariance.swapaxes(2, 3))
-    diagonal = np.einsum("ncii->nci", covariance)
-    diagonal *= 1.0 + _LEAST_SCALE
-    return _Parts(centres, np.linalg.cholesky(covariance))
+    # Of the precision, not of its inverse: that need not be positive as it is rounded.
+    factors = np.linalg.inv(np.linalg.cholesky(information + precision[:, None])).swapaxes(2, 3)
+    return _Parts(at + np.einsum("ncij,nckj,nck->nci", factors, factors, pull), factors)
 
 
 def _drawn(parts: _Parts, each: int, rng: np.random.Generator) -> FloatArray:
     """Points around the centres, (n_draws, n_centres * each, n_axes)."""
     n, n_centres, n_axes = parts.centres.shape
     normal = rng.standard_normal((n, n_centres, each, n_axes))
-    normal /= np.sqrt(rng.chisquare(_DEGREES, (n, n_centres, each)) / _DEGREES)[..., None]
+    heavy = rng.chisquare(DEGREES_OF_FREEDOM, (n, n_centres, each)) / DEGREES_OF_FREEDOM
+    normal /= np.sqrt(heavy)[..., None]
     points = parts.centres[:, :, None] + normal @ parts.factors.swapaxes(2, 3)
     return points.reshape(n, n_centres * each, n_axes)
 
 
 def _log_t(points: FloatArray, parts: _Parts) -> FloatArray:
     """Log density of points around each centre, (n_draws, n_points, n_centres)."""
-    n_axes = points.shape[2]
+    n_axes, degrees = points.shape[2], DEGREES_OF_FREEDOM
     whiten = np.linalg.inv(parts.factors)
     off = points[:, :, None] - parts.centres[:, None]
     squares = (np.einsum("ncij,npcj->npci", whiten, off) ** 2).sum(axis=3)
-    constant = gammaln(0.5 * (_DEGREES + n_axes)) - gammaln(0.5 * _DEGREES)
-    constant -= 0.5 * n_axes * np.log(_DEGREES * np.pi)
+    constant = gammaln(0.5 * (degrees + n_axes)) - gammaln(0.5 * degrees)
+    constant -= 0.5 * n_axes * np.log(degrees * np.pi)
     scale = np.log(np.einsum("ncii->nci", parts.factors)).sum(axis=2)
-    found: FloatArray = constant - scale[:, None] - 0.5 * (_DEGREES + n_axes) * np.log1p(squares / _DEGREES)
+    found: FloatArray = constant - scale[:, None] - 0.5 * (degrees + n_axes) * np.log1p(squares / degrees)
     return found
 
 

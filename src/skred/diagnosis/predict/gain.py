@@ -43,7 +43,7 @@ def realised_gain(document: Any, campaign: Campaign, fresh: Campaign) -> dict[st
         return None
     if not isinstance(document, Mapping) or "before" not in document:
         raise InputError("predictors: expected an object with before and after")
-    check_same_path(campaign, fresh)
+    _check_same_path(campaign, fresh)
     before, after = from_dict(document["before"]), document.get("after")
     if after is None:
         return None
@@ -53,14 +53,8 @@ def realised_gain(document: Any, campaign: Campaign, fresh: Campaign) -> dict[st
     return {"realised": float(difference.mean()), "se": se, "n_fresh": n}
 
 
-def check_same_path(campaign: Campaign, other: Campaign) -> None:
-    """Whether two campaigns have one track and the same sensors.
-
-    Raises
-    ------
-    InputError
-        If not.
-    """
+def _check_same_path(campaign: Campaign, other: Campaign) -> None:
+    """Refuse a campaign of another track, or of other sensors."""
     same_track = np.array_equal(campaign.track.x_m, other.track.x_m)
     if not same_track or not np.array_equal(campaign.track.z_m, other.track.z_m):
         raise InputError(f"{other.name}: its track is not that of {campaign.name}")

@@ -11,25 +11,18 @@ from arviz_stats.base import array_stats
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
-from skred.diagnosis.augment.components import new_rows
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.extension import extended
-from skred.diagnosis.evidence.predictive import Predicted, predict_event
-from skred.diagnosis.predict.draws import Draws, LeftOut
+from skred.diagnosis.evidence.predictive import Predicted
+from skred.diagnosis.predict.draws import N_DRAWS, LeftOut, draws_of, posterior_of, predictions
 from skred.inference.calibrate import Calibration
-from skred.inference.hierarchical.population import population_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.leave_one_out import Samples, exact_leave_one_out, samples_of
-from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
 K_LIMIT = 0.7
 """Pareto k above which importance sampling is not trusted: Vehtari and others, 2024,
 https://jmlr.org/papers/v25/19-556.html."""
-_DRAWS = 300
-"""Populations drawn for the predictions of an avalanche."""
-_FRONTS = 4
-"""New fronts for each of them, 1200 in all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +44,7 @@ class HeldOut:
     covered : (n_events, n_sensors) array
         1 where the central 90 % of the predictions hold the reading, NaN where there is none.
     others : tuple of LeftOut
-        What the others say of each event; empty for avalanches that no calibration has seen.
+        What the others say of each event.
     """
 
     pointwise: FloatArray
@@ -61,6 +54,23 @@ class HeldOut:
     predicted: Predicted
     covered: FloatArray
     others: tuple[LeftOut, ...] = field(default=(), repr=False)
+
+    @classmethod
+    def of(
+        cls,
+        pointwise: FloatArray,
+        others: Sequence[LeftOut],
+        seed: int,
+        pareto_k: FloatArray | None = None,
+        refitted: tuple[str, ...] = (),
+        not_converged: tuple[str, ...] = (),
+    ) -> HeldOut:
+        """With the predictions that the others make; nothing was reweighted where there is no Pareto k."""
+        readings, found = others[0].extension.problem.readings, predictions(others, seed)
+        seen = readings.observed
+        k = np.zeros(len(pointwise)) if pareto_k is None else pareto_k
+        predicted, covered = found.where(seen), found.covered(readings.values, seen)
+        return cls(pointwise, k, refitted, not_converged, predicted, covered, tuple(others))
 
     @property
     def elpd(self) -> float:
@@ -96,8 +106,7 @@ def held_out(calibration: Calibration, seed: int, *, exact: bool = False) -> Hel
         samples = samples_of(calibration.model, calibration.step, refits.draws)
         failed, refitted = refits.failed, dict(zip(again, samples, strict=True))
     others = _others(calibration, weights, refitted, seed)
-    predicted, covered = _predictions(others, seed)
-    return HeldOut(pointwise, k, tuple(events[e] for e in again), failed, predicted, covered, others)
+    return HeldOut.of(pointwise, others, seed, k, tuple(events[e] for e in again), failed)
 
 
 def leave_out_weights(densities: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -122,42 +131,20 @@ def _others(
     calibration: Calibration, weights: FloatArray, refitted: Mapping[int, Samples], seed: int
 ) -> tuple[LeftOut, ...]:
     """What the others say of each event: draws by their weights, or of the refit where there is one."""
-    problem, law = calibration.problem, calibration.law
+    problem, rng = calibration.problem, np.random.default_rng([seed, 31])
     assert isinstance(problem, HierarchicalProblem)
-    extension = problem.extension if isinstance(problem, AugmentedProblem) else extended(problem, law)
-    posterior = calibration.tree["posterior"].to_dataset()
-    names = [parameter.name for parameter in problem.parameters(law)]
-    rng = np.random.default_rng([seed, 31])
-    samples = {n: posterior[n].transpose("chain", "draw").values.ravel() for n in names}
-    every = _draws(problem, law, samples, rng)
+    extension = extended(problem, calibration.law)
+    if isinstance(problem, AugmentedProblem):
+        extension = problem.extension
+    every = draws_of(calibration, posterior_of(calibration), rng)
     parts = []
     for event in range(problem.campaign.n_events):
         draws, share = every, weights[:, event]
         if event in refitted:
-            draws = _draws(problem, law, refitted[event], rng)
+            draws = draws_of(calibration, refitted[event], rng)
             share = np.full(len(draws.means), 1.0 / len(draws.means))
-        parts.append(LeftOut(extension, draws.take(rng.choice(len(share), size=_DRAWS, p=share))))
+        parts.append(LeftOut(extension, draws.take(rng.choice(len(share), size=N_DRAWS, p=share))))
     return tuple(parts)
-
-
-def _draws(problem: HierarchicalProblem, law: Law, samples: Samples, rng: np.random.Generator) -> Draws:
-    """Populations, and what one avalanche from each has of what is added."""
-    added = None
-    if isinstance(problem, AugmentedProblem):
-        added = new_rows(problem.added, samples, rng, 1)[:, 0]
-    means, factors = population_of(law, samples)
-    return Draws(means, factors, np.empty((len(means), 0)) if added is None else added)
-
-
-def _predictions(others: Sequence[LeftOut], seed: int) -> tuple[Predicted, FloatArray]:
-    """Predictions of each event's readings by the others, and whether 90 % intervals hold them."""
-    readings, rng = others[0].extension.problem.readings, np.random.default_rng([seed, 32])
-    parts = []
-    for event, (extension, draws) in enumerate(others):
-        fronts = draws.take(np.repeat(np.arange(len(draws.means)), _FRONTS))
-        parts.append(predict_event(extension, event, *fronts, rng))
-    found = Predicted(*(np.array(values) for values in zip(*parts, strict=True)))
-    return found.where(readings.observed), found.covered(readings.values, readings.observed)
 
 
 def errors(found: HeldOut, problem: Any) -> dict[str, float | None]:

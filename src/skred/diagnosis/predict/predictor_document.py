@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.campaign.cells import LARGEST_NUMBER
+from skred.diagnosis.detect.detectability import NO_LIMIT
 from skred.diagnosis.discrepancy.profile import AMPLITUDES, KINDS, MOST_KNOTS
 from skred.diagnosis.evidence.covariates import Standard
-from skred.diagnosis.predict.unseen import Predictor, ProfileTerm, Term
+from skred.diagnosis.predict.unseen import FARTHEST, Predictor, ProfileTerm, Term
+from skred.documents import FORMAT
 from skred.errors import InputError
 from skred.inference.error_model import ERROR_MODELS
 from skred.physics.law import Law
@@ -19,15 +22,8 @@ from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Mechanism, Shape
 
 FloatArray = NDArray[np.float64]
-FORMAT = 1
-"""Version of the document."""
-MOST_DRAWS, MOST_TERMS, MOST_CONSTANTS = 10_000, 4, 8
-"""Draws, terms and constants of a term in a document at most: many times what is ever written."""
-_MOST_EDGES = 20_000
-"""Places of a profile at most, many times those of a track."""
-_LARGEST_LOG, _LARGEST_SCALES, _LARGEST_M, _LARGEST_SPEED, _LARGEST_NUMBER = 50.0, 20.0, 1e6, 1e3, 1e12
-"""Beyond which a number is no draw of a posterior: logarithms, strengths in scales of their priors, places,
-speeds, others."""
+MOST_ROWS, MOST_PARTS = 10_000, 8
+"""Of a document: draws or places, and terms or constants of a term. Many times what is ever written."""
 
 
 def as_dict(predictor: Predictor) -> dict[str, Any]:
@@ -86,17 +82,17 @@ def from_dict(document: Any) -> Predictor:
             f"predictor: no error model {error_model!r:.40}; there are: {', '.join(ERROR_MODELS)}"
         )
     entries = known.get("terms")
-    if not isinstance(entries, list) or len(entries) > MOST_TERMS:
-        raise InputError(f"predictor: terms: expected a list of at most {MOST_TERMS}")
+    if not isinstance(entries, list) or len(entries) > MOST_PARTS:
+        raise InputError(f"predictor: terms: expected a list of at most {MOST_PARTS}")
     terms = tuple(_term(_mapping(entry, "terms"), law) for entry in entries)
     n = len(law.mechanisms)
-    means = _numbers(known, "means", (n,), _LARGEST_LOG)
-    factors = _numbers(known, "factors", (n, n), _LARGEST_LOG)
+    means = _numbers(known, "means", (n,), FARTHEST)
+    factors = _numbers(known, "factors", (n, n), FARTHEST)
     profile = None if known.get("profile") is None else _profile(_mapping(known["profile"], "profile"))
     n_added = len(terms) + (0 if profile is None else len(profile.knots_m))
-    strengths = _numbers(known, "strengths", (n_added,), _LARGEST_NUMBER)
+    strengths = _numbers(known, "strengths", (n_added,), LARGEST_NUMBER)
     _check_draws(means, factors, strengths, [*_scales(terms), *_knot_scales(profile)])
-    place = _number(known, "place_sd_m", _LARGEST_M)
+    place = _number(known, "place_sd_m")
     smoothing = _number(known, "smoothing_m", 1000.0)
     if not place > 0.0 or smoothing < 0.0:
         raise InputError("predictor: place_sd_m must be positive, smoothing_m not negative")
@@ -111,8 +107,8 @@ def _profile(entry: Mapping[str, Any]) -> ProfileTerm:
             f"predictor: no force profile {name!r:.40}; there are: {', '.join(one.equation for one in KINDS)}"
         )
     knots = _places(entry, "knots_m", MOST_KNOTS)
-    edge = _places(entry, "edge_m", _MOST_EDGES)
-    speed = _column(entry, "front_speed", _MOST_EDGES, _LARGEST_SPEED)
+    edge = _places(entry, "edge_m", MOST_ROWS)
+    speed = _column(entry, "front_speed", MOST_ROWS)
     if len(speed) != len(edge) or np.any(speed < 0.0):
         raise InputError("predictor: front_speed: expected one for each edge_m, none negative")
     return ProfileTerm(kind, knots, edge, speed)
@@ -120,7 +116,7 @@ def _profile(entry: Mapping[str, Any]) -> ProfileTerm:
 
 def _places(document: Mapping[str, Any], key: str, most: int) -> FloatArray:
     """Increasing places on the track [m], two or more."""
-    places = _column(document, key, most, _LARGEST_M)
+    places = _column(document, key, most)
     if len(places) < 2 or places[0] < 0.0 or np.any(np.diff(places) <= 0.0):
         raise InputError(f"predictor: {key}: expected two or more increasing places on the track")
     return places
@@ -152,7 +148,7 @@ def _check_draws(
     if np.any(np.triu(factors, 1) != 0.0) or np.any(diagonal < 1e-6):
         raise InputError("predictor: factors: expected lower triangular ones with a positive diagonal")
     for (name, scale), drawn in zip(scales, strengths.T, strict=True):
-        if np.abs(drawn).max() > _LARGEST_SCALES * scale:
+        if np.abs(drawn).max() > NO_LIMIT * scale:
             raise InputError(f"predictor: strengths of {name}: beyond all that is physical")
 
 
@@ -172,8 +168,8 @@ def _shape(entry: Mapping[str, Any], mechanism: Mechanism) -> Shape:
     if (first is None) != (last is None) or (first is not None and last is not None and not first < last):
         raise InputError(f"predictor: {mechanism.id}: expected s_from_m below s_to_m, or neither")
     constants = _mapping(entry.get("constants", {}), "constants")
-    if len(constants) > MOST_CONSTANTS:
-        raise InputError(f"predictor: {mechanism.id}: more than {MOST_CONSTANTS} constants")
+    if len(constants) > MOST_PARTS:
+        raise InputError(f"predictor: {mechanism.id}: more than {MOST_PARTS} constants")
     pairs = tuple((name, _number(constants, name)) for name in constants)
     if any(not value > 0.0 for _, value in pairs):
         raise InputError(f"predictor: {mechanism.id}: constants must be positive")
@@ -190,8 +186,8 @@ def _standard(entry: Mapping[str, Any]) -> Standard | None:
     kinds = standard.get("kinds")
     if not isinstance(kinds, list) or len(kinds) not in (0, 2) or not all(isinstance(k, str) for k in kinds):
         raise InputError("predictor: standard: kinds: expected two texts or none")
-    centre = _number(standard, "centre", _LARGEST_NUMBER)
-    scale = _number(standard, "scale", _LARGEST_NUMBER)
+    centre = _number(standard, "centre")
+    scale = _number(standard, "scale")
     if not scale > 1e-12:
         raise InputError("predictor: standard: scale must be positive")
     logarithm = standard.get("logarithm", False)  # not there in those of before
@@ -213,7 +209,7 @@ def _text(document: Mapping[str, Any], key: str) -> str:
     return value
 
 
-def _number(document: Mapping[str, Any], key: str, largest: float = _LARGEST_M) -> float:
+def _number(document: Mapping[str, Any], key: str, largest: float = LARGEST_NUMBER) -> float:
     value = document.get(key)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise InputError(f"predictor: {key}: expected a number, found {value!r:.40}")
@@ -222,19 +218,19 @@ def _number(document: Mapping[str, Any], key: str, largest: float = _LARGEST_M) 
     return float(value)
 
 
-def _column(document: Mapping[str, Any], key: str, most: int, largest: float) -> FloatArray:
+def _column(document: Mapping[str, Any], key: str, most: int) -> FloatArray:
     """A list of numbers."""
     value = document.get(key)
     if not isinstance(value, list) or len(value) > most:
         raise InputError(f"predictor: {key}: expected a list of at most {most} numbers")
-    return np.array([_number({key: one}, key, largest) for one in value], dtype=float)
+    return np.array([_number({key: one}, key) for one in value], dtype=float)
 
 
 def _numbers(document: Mapping[str, Any], key: str, shape: tuple[int, ...], largest: float) -> FloatArray:
     """Draws as an array, (n_draws, *shape)."""
-    expected = f"predictor: {key}: expected 1 to {MOST_DRAWS} draws of {shape} finite numbers"
+    expected = f"predictor: {key}: expected 1 to {MOST_ROWS} draws of {shape} finite numbers"
     value = document.get(key)
-    if not isinstance(value, list) or not 1 <= len(value) <= MOST_DRAWS or not _plain(value, 1 + len(shape)):
+    if not isinstance(value, list) or not 1 <= len(value) <= MOST_ROWS or not _plain(value, 1 + len(shape)):
         raise InputError(expected)
     try:
         array = np.array(value, dtype=float).reshape(len(value), *shape)

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,21 +25,14 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, event_mode
 from skred.diagnosis.evidence.event_quadrature import USUAL, event_nodes
 from skred.diagnosis.evidence.extension import Extension, extended
 from skred.diagnosis.evidence.marginal import evidence, importance_draws, population_at
-from skred.diagnosis.evidence.predictive import Predicted, predict_event
-from skred.diagnosis.evidence.refit import Fit, Rounds, refit
-from skred.diagnosis.predict.draws import Draws, LeftOut
+from skred.diagnosis.evidence.refit import Fit, refit
+from skred.diagnosis.predict.draws import N_DRAWS, Draws, LeftOut
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.predict.unseen import log_densities
 from skred.parallel.threads import side_by_side
 from skred.physics.mechanisms.spec import Direction
 
 FloatArray = NDArray[np.float64]
-_DRAWS = 200
-"""Populations and profiles drawn: as many as a predictor keeps."""
-_FRONTS = 1200
-"""New fronts for the predictions of an avalanche, as of mechanisms."""
-_BUDGET = USUAL.times(2)
-"""Quadrature points of a population fitted to the others: their draws are weighed, not only its maximum."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +63,6 @@ class ProfileLaw:
     draws_after: Draws
 
 
-class _Event(NamedTuple):
-    """What the others say of one avalanche."""
-
-    log_score: float
-    predicted: Predicted
-    others: LeftOut
-
-
 def profile_law(under_errors: ComparisonUnderErrors, most: int, seed: int) -> ProfileLaw:
     """Add the most probable profile of a comparison.
 
@@ -92,10 +76,9 @@ def profile_law(under_errors: ComparisonUnderErrors, most: int, seed: int) -> Pr
     base, profile = under_errors.base, most_probable(under_errors.profiles)
     events = range(len(base.rows.event))
     parts = side_by_side(lambda event: _left_out(base, profile, event, seed), events)
-    before, after = (_held_out(base, [part[k] for part in parts]) for k in range(2))
+    before, after = (_held_out(base, others, seed) for others in zip(*parts, strict=True))
     check, rng = _check(base, profile, most, seed), np.random.default_rng([seed, 55])
-    _, without = _plain(base, rng)
-    _, within = with_profile(base, profile, rng)
+    without, within = _plain(base, rng).draws, with_profile(base, profile, rng).draws
     return ProfileLaw(profile, base.problem.error_model.id, check, before, after, without, within)
 
 
@@ -109,41 +92,34 @@ def _check(base: Base, profile: Profile, most: int, seed: int) -> BootstrapTest:
     return linear_test(added, (draws.means, draws.factors), seed + 1, most)
 
 
-def _left_out(base: Base, profile: Profile, event: int, seed: int) -> tuple[_Event, _Event]:
-    """One avalanche as the others have it, without the profile and with it."""
-    rest = _without(base, event)
-    rng = _rng(seed, event)
-    before = _before(base, rest, event, rng)
+def _left_out(base: Base, profile: Profile, event: int, seed: int) -> tuple[LeftOut, LeftOut]:
+    """What the others say of one avalanche, without the profile and with it."""
+    rest, rng = _without(base, event), _rng(seed, event)
+    before = _plain(rest, rng)
     others = np.flatnonzero(base.rows.event != event)
     population = profile.fit.found.population(len(base.law.mechanisms))
     near = profile.mean, (population, profile.fit.points[others])
-    again = fit_profile(rest, profile.kind, near, profile.prior)
-    return before, _event(base, *with_profile(rest, again, rng), event, rng)
+    return before, with_profile(rest, fit_profile(rest, profile.kind, near, profile.prior), rng)
 
 
 def base_left_out(base: Base, seed: int) -> HeldOut:
     """Each avalanche as the base law has it, fitted to the others."""
     events = range(len(base.rows.event))
-    return _held_out(base, [_before(base, _without(base, k), k, _rng(seed, k)) for k in events])
+    return _held_out(base, [_plain(_without(base, event), _rng(seed, event)) for event in events], seed)
 
 
 def _rng(seed: int, event: int) -> np.random.Generator:
     return np.random.default_rng([seed, 53, event])
 
 
-def _before(base: Base, rest: Base, event: int, rng: np.random.Generator) -> _Event:
-    """One avalanche as the base law has it that was fitted to the rest."""
-    return _event(base, *_plain(rest, rng), event, rng)
-
-
-def _plain(base: Base, rng: np.random.Generator) -> tuple[Extension, Draws]:
+def _plain(base: Base, rng: np.random.Generator) -> LeftOut:
     """The base law, and draws by the base's events."""
-    plain = extended(base.problem, base.law, base.directions)
-    own = np.tile(base.strengths, (_DRAWS, 1))
-    return plain, _draws(base, plain, base.fit, base.strengths, own, rng)
+    law = extended(base.problem, base.law, base.directions)
+    own = np.tile(base.strengths, (N_DRAWS, 1))
+    return LeftOut(law, _draws(base, law, base.fit, base.strengths, own, rng))
 
 
-def with_profile(base: Base, profile: Profile, rng: np.random.Generator) -> tuple[Extension, Draws]:
+def with_profile(base: Base, profile: Profile, rng: np.random.Generator) -> LeftOut:
     """The law with a profile fitted to the base's events, each knot a strength; draws by those events.
 
     Parameters
@@ -154,11 +130,11 @@ def with_profile(base: Base, profile: Profile, rng: np.random.Generator) -> tupl
     rng : numpy.random.Generator
     """
     wide = knot_by_knot(base, profile.kind, profile.knots_m)
-    own = np.tile(base.strengths, (_DRAWS, 1))
-    values = rng.multivariate_normal(profile.mean, profile.covariance, _DRAWS)
+    own = np.tile(base.strengths, (N_DRAWS, 1))
+    values = rng.multivariate_normal(profile.mean, profile.covariance, N_DRAWS)
     directions, middle = _added_terms(base, profile)
     narrow = extended(base.problem, base.law, directions)
-    return wide, _draws(base, narrow, profile.fit, middle, np.column_stack([own, values]), rng)
+    return LeftOut(wide, _draws(base, narrow, profile.fit, middle, np.column_stack([own, values]), rng))
 
 
 def _added_terms(base: Base, profile: Profile) -> tuple[tuple[Direction, ...], FloatArray]:
@@ -173,7 +149,7 @@ def _without(base: Base, event: int) -> Base:
     rows, start = base.rows.take(others), (base.population, base.fit.points[others])
     extension = extended(base.problem, base.law, base.directions)
     given = base.strengths[None, :]
-    fit = refit(extension, rows, given, start, Rounds(_BUDGET, USUAL))[0]
+    fit = refit(extension, rows, given, start)[0]
     return replace(base, rows=rows, fit=fit)
 
 
@@ -190,29 +166,21 @@ def _draws(
     population = fit.found.population(n)
     likelihood = EventLikelihood(extension, base.rows, middle)
     modes = event_modes(likelihood, fit.points, population)
-    nodes = event_nodes(likelihood, population, modes, _BUDGET, base.population).nodes
+    nodes = event_nodes(likelihood, population, modes, USUAL, base.population).nodes
     found = evidence(nodes, base.log_scale, fit.found.psi)
     drawn = population_at(importance_draws(nodes, base.log_scale, found, len(strengths), rng), n)
     return Draws(drawn.mean, np.linalg.cholesky(drawn.covariance), strengths)
 
 
-def _event(base: Base, extension: Extension, draws: Draws, event: int, rng: np.random.Generator) -> _Event:
-    """Log score of an avalanche, and predictions of its readings."""
-    seed = int(rng.integers(2**31))
-    rows = base.rows.take(np.flatnonzero(base.rows.event == event))
-    densities = log_densities(extension, rows, *draws, seed)[:, 0]
-    means, factors, strengths = (np.resize(part, (_FRONTS, *part.shape[1:])) for part in draws)
-    predicted = predict_event(extension, event, means, factors, strengths, rng)
-    # NumPy's, not scipy's: see `comparison` on threads.
-    score = float(np.logaddexp.reduce(densities)) - math.log(len(densities))
-    return _Event(score, predicted, LeftOut(extension, draws))
-
-
-def _held_out(base: Base, parts: Sequence[_Event]) -> HeldOut:
+def _held_out(base: Base, others: Sequence[LeftOut], seed: int) -> HeldOut:
     """All avalanches, each as the others have it: refitted, nothing reweighted."""
-    readings = base.problem.readings
-    found = Predicted(*(np.array(values) for values in zip(*(part.predicted for part in parts), strict=True)))
-    scores = np.array([part.log_score for part in parts])
-    covered = found.covered(readings.values, readings.observed)
-    ids, others = tuple(base.problem.campaign.event_ids), tuple(part.others for part in parts)
-    return HeldOut(scores, np.zeros(len(scores)), ids, (), found.where(readings.observed), covered, others)
+
+    def score(event: int) -> float:
+        extension, draws = others[event]
+        rows = base.rows.take(np.flatnonzero(base.rows.event == event))
+        densities = log_densities(extension, rows, draws, seed)
+        # NumPy's, not scipy's: see `comparison` on threads.
+        return float(np.logaddexp.reduce(densities[:, 0])) - math.log(len(densities))
+
+    scores = np.array(side_by_side(score, range(len(others))))
+    return HeldOut.of(scores, others, seed, refitted=tuple(base.problem.campaign.event_ids))

@@ -14,28 +14,19 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from skred.campaign import Campaign
-from skred.diagnosis.augment.components import new_rows
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.discrepancy.profile import Kind, Profile, entering, spline_basis
-from skred.diagnosis.evidence.conditional_map import (
-    EventLikelihood,
-    Population,
-    Rows,
-    campaign_rows,
-    event_modes,
-    log_joint,
-)
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows, campaign_rows
 from skred.diagnosis.evidence.covariates import Standard, standard_of
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of
-from skred.diagnosis.evidence.predictive import Predicted, predict_event
+from skred.diagnosis.predict.draws import N_DRAWS, Draws, LeftOut, draws_of, modes_near, posterior_of
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.tabulated.tables import exact_nodes
 from skred.errors import InputError
 from skred.inference.calibrate import Calibration
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical.event_density import integrated_log_density
-from skred.inference.hierarchical.population import population_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.hierarchical.releases import terrain_with_releases
 from skred.physics.law import Law
@@ -46,22 +37,13 @@ from skred.physics.mechanisms.spec import Direction, Setting, Shape
 from skred.physics.terrain import build_terrain
 
 FloatArray = NDArray[np.float64]
-N_DRAWS = 200
-"""Draws that a predictor keeps: few enough to be written beside an answer."""
 NODES = Budget(32, 32, 0, 1.5, 1.8)
 """Quadrature points of an event for each draw; their errors average out over the draws. None are adapted:
 where those go depends on the others' weights, and few of them are too low in the mean
 (``studies.thresholds.unseen_nodes``)."""
-_SHARED = 16
-"""As many times the nodes where all draws share them."""
-_AT_ONCE = 20
-"""Draws whose nodes are held in memory together."""
-_TRIED, _TRIED_WIDER = 64, 1.6
-"""Points of the population among which each event's mode is looked for, and how much wider they lie."""
-_FRONTS = 1200
-"""Fronts that a prediction is made of."""
-_FARTHEST = 100.0
-"""How many standard deviations a covariate may be from the average that a predictor knows."""
+FARTHEST = 50.0
+"""Size of what stands in an exponent, logarithms of coefficients and covariates in standard deviations, from
+which on a predictor is of another path or damaged."""
 
 
 @dataclass(frozen=True)
@@ -148,9 +130,9 @@ class Predictor:
     profile: ProfileTerm | None = None
 
     @property
-    def n_draws(self) -> int:
-        """Number of draws."""
-        return len(self.means)
+    def draws(self) -> Draws:
+        """Of the population, and of what is added."""
+        return Draws(self.means, self.factors, self.strengths)
 
 
 def predictor_of(calibration: Calibration, n_draws: int = N_DRAWS) -> Predictor:
@@ -168,22 +150,19 @@ def predictor_of(calibration: Calibration, n_draws: int = N_DRAWS) -> Predictor:
     ValueError
         If something is in the law with a fixed strength.
     """
-    problem, law = calibration.problem, calibration.law
+    problem = calibration.problem
     assert isinstance(problem, HierarchicalProblem)
-    posterior = calibration.tree["posterior"].to_dataset()
-    names = [parameter.name for parameter in problem.parameters(law)]
-    samples = {name: posterior[name].transpose("chain", "draw").values.ravel() for name in names}
-    chosen = np.linspace(0, len(samples[names[0]]) - 1, n_draws).round().astype(int)
-    samples = {name: values[chosen] for name, values in samples.items()}
-    means, factors = population_of(law, samples)
-    terms, strengths = tuple[Term, ...](), np.empty((len(means), 0))
+    draws = draws_of(calibration, posterior_of(calibration), np.random.default_rng([37]))
+    draws = draws.take(np.linspace(0, len(draws.means) - 1, n_draws).round().astype(int))
+    terms = tuple[Term, ...]()
     if isinstance(problem, AugmentedProblem):
         if problem.base.directions:
             raise ValueError("a predictor cannot hold what is added with a fixed strength")
         terms = tuple(_term(problem, one.mechanism.id, one.shape) for one in problem.added)
-        strengths = new_rows(problem.added, samples, np.random.default_rng([37]), 1)[:, 0]
-    smoothing, place_sd = problem.terrain.smoothing_m, problem.place_sd_m
-    return Predictor(law.id, problem.error_model.id, place_sd, smoothing, means, factors, terms, strengths)
+    return Predictor(
+        calibration.law.id, problem.error_model.id, problem.place_sd_m, problem.terrain.smoothing_m,
+        draws.means, draws.factors, terms, draws.strengths,
+    )  # fmt: skip
 
 
 def _term(problem: HierarchicalProblem, mechanism: str, shape: Shape) -> Term:
@@ -204,8 +183,7 @@ def log_scores(predictor: Predictor, campaign: Campaign, seed: int = 0) -> Float
     """
     extension = extension_of(predictor, campaign)
     try:
-        draws = predictor.means, predictor.factors, predictor.strengths
-        densities = log_densities(extension, campaign_rows(extension), *draws, seed)
+        densities = log_densities(extension, campaign_rows(extension), predictor.draws, seed)
     except np.linalg.LinAlgError as error:
         raise InputError("the predictor's draws are no populations: it is damaged") from error
     scores: FloatArray = logsumexp(densities, axis=0) - np.log(len(densities))
@@ -215,29 +193,16 @@ def log_scores(predictor: Predictor, campaign: Campaign, seed: int = 0) -> Float
     return scores
 
 
-def predictions(predictor: Predictor, campaign: Campaign, seed: int = 0) -> Predicted:
-    """Mean and 5 and 95 % quantiles of each reading, (n_events, n_sensors) each; seen or not.
+def unseen(predictor: Predictor, campaign: Campaign, seed: int = 0) -> HeldOut:
+    """Scores and predictions of a campaign's events, as of events left out; nothing was reweighted.
 
     Raises
     ------
     InputError
         If the predictor is of another path.
     """
-    extension, rng = extension_of(predictor, campaign), np.random.default_rng([seed, 33])
-    n_events = campaign.n_events
-    drawn = np.resize(np.arange(predictor.n_draws), _FRONTS)
-    draws = predictor.means[drawn], predictor.factors[drawn], predictor.strengths[drawn]
-    parts = [predict_event(extension, event, *draws, rng) for event in range(n_events)]
-    return Predicted(*(np.array(values) for values in zip(*parts, strict=True)))
-
-
-def unseen(predictor: Predictor, campaign: Campaign, seed: int = 0) -> HeldOut:
-    """Scores and predictions of a campaign's events, as of events left out; nothing was reweighted."""
-    problem, found = problem_of(predictor, campaign), predictions(predictor, campaign, seed)
-    seen = problem.observed
-    covered = found.covered(problem.readings.values, seen)
-    scores = log_scores(predictor, campaign, seed)
-    return HeldOut(scores, np.zeros(len(scores)), (), (), found.where(seen), covered)
+    said = LeftOut(extension_of(predictor, campaign), predictor.draws)
+    return HeldOut.of(log_scores(predictor, campaign, seed), [said] * campaign.n_events, seed)
 
 
 def problem_of(predictor: Predictor, campaign: Campaign) -> HierarchicalProblem:
@@ -281,7 +246,7 @@ def _direction(term: Term, problem: HierarchicalProblem, law: Law) -> Direction:
     covariates: Mapping[str, FloatArray] = {}
     if shape.covariate is not None and term.standard is not None:
         values = term.standard.standardised(campaign.events, shape.covariate)
-        if np.abs(values).max(initial=0.0) > _FARTHEST:
+        if np.abs(values).max(initial=0.0) > FARTHEST:
             raise InputError(f"{campaign.name}: {shape.covariate!r} is far off what the predictor knows")
         covariates = {shape.covariate: values}
     setting = replace(setting_of(problem, law), covariates=covariates)
@@ -292,64 +257,30 @@ def _direction(term: Term, problem: HierarchicalProblem, law: Law) -> Direction:
 
 
 def log_densities(
-    extension: Extension,
-    rows: Rows,
-    means: FloatArray,
-    factors: FloatArray,
-    strengths: FloatArray,
-    seed: int,
-    budget: Budget = NODES,
+    extension: Extension, rows: Rows, draws: Draws, seed: int, budget: Budget = NODES
 ) -> FloatArray:
     """Log density of each row's event for each draw, its own strengths integrated out, (n_draws, n_rows).
 
     Parameters
     ----------
-    means, factors : (n_draws, n_base) and (n_draws, n_base, n_base) arrays
-        Of populations.
-    strengths : (n_draws, n_directions) array
-        Of what is added.
+    draws : Draws
+        Of populations, and of the strengths of what is added.
     seed : int
     budget : Budget
         Quadrature points of an event for each draw.
     """
-    covariances = np.einsum("nij,nkj->nik", factors, factors)
-    typical = Population(means.mean(axis=0)[None], covariances.mean(axis=0)[None])
-    rng = np.random.default_rng([seed, 35])
-    start = _points(EventLikelihood(extension, rows, strengths.mean(axis=0)), typical, rng)
-    n_events = len(rows.event)
-    result = np.empty((len(means), n_events))
-    if (strengths == strengths[0]).all():
-        # Readings are then as likely at a node whichever draw it is: one set of many nodes serves all.
-        shared = EventLikelihood(extension, rows, strengths[0])
-        nodes = exact_nodes(shared, typical, start[None], budget.times(_SHARED), typical)
-        for k, mean in enumerate(means):
-            result[k] = integrated_log_density(np.tile(mean, (n_events, 1)), factors[k], *nodes)
-        return result
-    for first in range(0, len(means), _AT_ONCE):
-        part = slice(first, first + _AT_ONCE)
-        population = Population(means[part], covariances[part])
-        starts = np.tile(start, (len(population.mean), 1, 1))
-        shifts = rng.random((starts.shape[0] * n_events, starts.shape[2]))
-        likelihood = EventLikelihood(extension, rows, strengths[0]).in_groups(strengths[part])
-        nodes = exact_nodes(likelihood, population, starts, budget, typical, shifts)
-        for k in range(len(population.mean)):
-            of_draw = nodes.first[k * n_events : (k + 1) * n_events + 1]
-            mean = np.tile(population.mean[k], (n_events, 1))
-            result[first + k] = integrated_log_density(
-                mean, factors[first + k], of_draw, nodes.points, nodes.log_weights
-            )
+    typical, rng = draws.typical, np.random.default_rng([seed, 35])
+    population, n = Population(draws.means, draws.covariances), len(draws.means)
+    likelihood = EventLikelihood(extension, rows, draws.strengths.mean(axis=0))
+    start = modes_near(likelihood, typical, draws.so_many(N_DRAWS).points(1, rng)).points
+    result = np.empty((n, len(start)))
+    for event, near in enumerate(start):
+        of_event = likelihood.take(np.array([event])).in_groups(draws.strengths)
+        shifts = rng.random((n, len(near)))
+        nodes = exact_nodes(of_event, population, np.tile(near, (n, 1, 1)), budget, typical, shifts)
+        for k, mean in enumerate(draws.means):
+            first = nodes.first[k : k + 2]
+            result[k, event] = integrated_log_density(
+                mean[None], draws.factors[k], first, nodes.points, nodes.log_weights
+            )[0]
     return result
-
-
-def _points(likelihood: EventLikelihood, population: Population, rng: np.random.Generator) -> FloatArray:
-    """Each event's most probable point, (n_events, n_base + 1): climbed to from the best of many."""
-    n_events, n = len(likelihood.rows.event), population.mean.shape[1]
-    tried = np.zeros((_TRIED, n + 1))
-    tried[1:] = rng.standard_normal((_TRIED - 1, n + 1))
-    tried[:, :n] = tried[:, :n] @ (_TRIED_WIDER * np.linalg.cholesky(population.covariance[0])).T
-    tried[:, :n] += population.mean[0]
-    many = likelihood.take(np.repeat(np.arange(n_events), _TRIED))
-    heights = log_joint(many, np.tile(tried, (n_events, 1)), population).reshape(n_events, _TRIED)
-    start = tried[heights.argmax(axis=1)]
-    found: FloatArray = event_modes(likelihood, start, population, n_steps=20).points
-    return found

@@ -9,15 +9,10 @@ import numpy as np
 from skred.diagnosis.augment.added_strength import AddedStrength
 from skred.diagnosis.augment.coefficient import augmented_of, multiples_of_events, some_draws
 from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.words import percent
+from skred.diagnosis.words import MOST_NAMED, TOLD_FROM, percent
 from skred.inference.between_events import BetweenEvents
 from skred.inference.calibrate import Calibration
 from skred.inference.influence_words import enumerated
-
-_OUT_OF_QUESTION = 0.005
-"""Probability below which a way is not told: it would be rounded to less than 1 %."""
-_MOST_NAMED = 8
-"""Avalanches that a sentence names at most."""
 
 
 def ways_document(candidate: Candidate) -> dict[str, float]:
@@ -59,13 +54,13 @@ def _events(calibration: Calibration, added: AddedStrength) -> list[dict[str, An
     ]
 
 
-def _in_which_ways(ways: dict[str, float]) -> str:
-    """By degree, or in that some have none: both with their probabilities, unless one is out of question."""
+def _in_which_ways(ways: dict[str, float], added: str) -> str:
+    """By degree, or in that some have none: both with their probabilities, unless one is improbable."""
     said = {BetweenEvents.SPREAD: "by degree", BetweenEvents.SOME: "some have none of it"}
-    likely = {kind: words for kind, words in said.items() if ways[kind] >= _OUT_OF_QUESTION}
+    likely = {kind: words for kind, words in said.items() if kind == added or ways[kind] >= TOLD_FROM}
     if len(likely) == 1:
         return next(iter(likely.values()))
-    return ", or ".join(f"{words} ({percent(ways[kind])})" for kind, words in said.items())
+    return ", or ".join(f"{words} ({percent(ways[kind])})" for kind, words in likely.items())
 
 
 def between_sentence(strength: dict[str, Any]) -> str:
@@ -78,7 +73,7 @@ def between_sentence(strength: dict[str, Any]) -> str:
         return (
             f"Avalanches probably differ in it ({percent(likely)}); no law in which they do was calibrated."
         )
-    differs = f"Avalanches differ in it with a probability of {percent(likely)}: {_in_which_ways(ways)}."
+    differs = f"Avalanches differ in it with a probability of {percent(likely)}: {_in_which_ways(ways, way)}."
     if way == BetweenEvents.SPREAD:
         spread = strength["spread"]
         factor = float(np.exp(spread["mean"]))
@@ -88,5 +83,5 @@ def between_sentence(strength: dict[str, Any]) -> str:
         )
     share = strength["share"]
     having = [one["event"] for one in strength["events"] if one["probability"] > 0.5]
-    who = f": more probably than not {enumerated(having)}" if 0 < len(having) <= _MOST_NAMED else ""
+    who = f": more probably than not {enumerated(having)}" if 0 < len(having) <= MOST_NAMED else ""
     return f"{differs} If some have none, a share of {share['mean']:.2f} ± {share['sd']:.2f} has it{who}."

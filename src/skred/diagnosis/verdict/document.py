@@ -10,7 +10,7 @@ import numpy as np
 from skred.diagnosis.augment.coefficient import augmented_of
 from skred.diagnosis.augment.step import Left
 from skred.diagnosis.compare.location import Location
-from skred.diagnosis.detect.detectability import Detectability, Identifiability
+from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER
 from skred.diagnosis.influence.influence import Influence
 from skred.diagnosis.outcome import (
@@ -30,15 +30,13 @@ from skred.diagnosis.verdict.mechanisms import (
     candidate_documents,
     place_of,
     strength_document,
+    work_documents,
 )
 from skred.diagnosis.verdict.next_sensor import detection_sensor, next_sensor
 from skred.diagnosis.verdict.statement import statement
 from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.mechanisms.stretches import equation_of
-
-_NO_LIMIT = 20.0
-"""Prior scales from which on a detection limit is none: no strength that could be is so large."""
 
 
 def verdict(found: Outcome) -> dict[str, Any]:
@@ -139,15 +137,10 @@ def _detection_limits(table: Identifiability) -> dict[str, Any]:
         row.mechanism.id: {
             "parameter": row.mechanism.strength.name,
             "unit": row.mechanism.strength.unit,
-            "value": row.limit if row.limit < _NO_LIMIT * _scale(row) else None,
+            "value": row.as_dict()["limit"],
         }
         for row in table.rows
     }
-
-
-def _scale(row: Detectability) -> float:
-    assert row.mechanism.added is not None
-    return row.mechanism.added.scale
 
 
 def _diagnostics(
@@ -218,7 +211,7 @@ def _more(found: Outcome) -> dict[str, Any]:
         }
         | _of_finding(found.finding)
         | {
-            "identifiability": [_detectability(row) for row in found.table.rows],
+            "identifiability": [row.as_dict() for row in found.table.rows],
             "power": found.table.power,
             "detection_sensor": detection_sensor(found.table),
         }
@@ -268,28 +261,9 @@ def _influence(found: Influence | None) -> dict[str, Any] | None:
     }
 
 
-def _detectability(row: Detectability) -> dict[str, Any]:
-    """What the recordings can tell of one mechanism."""
-    assert row.mechanism.added is not None
-    return {
-        "id": row.mechanism.id,
-        "kept": row.kept,
-        "limit": row.limit,
-        "best_limit": row.best_limit,
-        "best_stretch_m": row.limit_m,
-        "relevant": row.mechanism.added.relevant,
-        "unit": row.mechanism.strength.unit,
-        "power": row.power,
-        "alike": list(row.alike),
-    }
-
-
 def _missing_work(location: Location) -> dict[str, Any]:
     """Specific work that is missing between neighbouring sensors."""
     return {
         "missing_work_of": "fast front" if location.opposed else "typical front",
-        "missing_work": [
-            {"s_from_m": a, "s_to_m": b, "mean": mean, "sd": sd, "unit": "J kg-1"}
-            for a, b, mean, sd in location.work.tolist()
-        ],
+        "missing_work": work_documents(location),
     }

@@ -191,29 +191,21 @@ def _shapes(comparison: Comparison) -> xr.Dataset:
             ends = [math.nan if end is None else end for end in (shape.s_from_m, shape.s_to_m)]
             what = shape.sensor or "", shape.covariate or "", is_opposed(shape), curve is best
             rows.append((name, *ends, *what, float(np.exp(weight)), curve.log_bayes_factor))
-    columns = list(zip(*rows, strict=True)) if rows else [()] * 9
-    names = (
-        "mechanism",
-        "s_from",
-        "s_to",
-        "sensor",
-        "covariate",
-        "opposed",
-        "best",
-        "prior",
-        "log_bayes_factor",
-    )
-    units = {
-        "s_from": {"units": "m"},
-        "s_to": {"units": "m"},
-        "prior": {"units": "1"},
-        "log_bayes_factor": _NATS,
+    columns: dict[str, tuple[type, dict[str, str]]] = {
+        "mechanism": (str, {}),
+        "s_from": (float, {"units": "m"}),
+        "s_to": (float, {"units": "m"}),
+        "sensor": (str, {}),
+        "covariate": (str, {}),
+        "opposed": (bool, {}),
+        "best": (bool, {}),
+        "prior": (float, {"units": "1"}),
+        "log_bayes_factor": (float, _NATS),
     }
-    kinds = (str, float, float, str, str, bool, bool, float, float)
     return xr.Dataset(
         {
-            name: ("shape", np.array(column, dtype=kind), units.get(name, {}))
-            for name, column, kind in zip(names, columns, kinds, strict=True)
+            name: ("shape", np.array([row[k] for row in rows], dtype=kind), units)
+            for k, (name, (kind, units)) in enumerate(columns.items())
         }
     )
 

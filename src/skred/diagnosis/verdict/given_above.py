@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from skred.diagnosis.words import MOST_NAMED, counted, error_text
 from skred.inference.influence_words import enumerated
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.units import unit_text
 
-_MOST_NAMED = 5
-"""Sensors that are told of one by one; of more, all speeds together."""
 CLEAR, UNCLEAR, NOTHING_GAINED, WORSE = "better", "no clear gain", "nothing gained", "worse"
 """What may have been gained at a sensor."""
-_DECIMALS = {"m": 0}
-"""Of errors by their unit; one for speeds."""
 
 
 def given_above(document: dict[str, Any]) -> str:
@@ -66,7 +63,7 @@ def _rows(document: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
     sensors = document["sensors"]
     speeds = [row for row in sensors if row["quantity"] != "runout"]
     rows = [(_name(row), row["unit"], row) for row in sensors]
-    if len(speeds) <= _MOST_NAMED:
+    if len(speeds) <= MOST_NAMED:
         return rows
     pooled = (f"the speeds at {len(speeds)} sensors", "m s-1", document["speeds"])
     return [pooled, *(row for row, one in zip(rows, sensors, strict=True) if one["quantity"] == "runout")]
@@ -82,12 +79,12 @@ def _change(scores: dict[str, Any], unit: str) -> str:
     error = "" if doubled is None else f" ± {n * doubled:.1f}"
     return (
         f"error {_errors(scores, unit)}, log score {_signed(n * scores['log_score_diff'])}{error},"
-        f" {n} {'reading' if n == 1 else 'readings'}"
+        f" {counted(n, 'reading')}"
     )
 
 
 def _errors(scores: dict[str, Any], unit: str) -> str:
-    before, after = (f"{scores[f'rmse_{when}']:.{_DECIMALS.get(unit, 1)}f}" for when in ("before", "after"))
+    before, after = (error_text(scores[f"rmse_{when}"], unit) for when in ("before", "after"))
     return (
         f"{before} {unit_text(unit)} as before"
         if before == after

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from skred.diagnosis.words import error_text
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
+from skred.units import unit_text
 
-_ERRORS = (("rmse_velocity", "speeds", 1, "m/s"), ("rmse_runout", "runouts", 0, "m"))
-"""Keys of ``held_out``, what they are errors of, decimals, unit."""
+_ERRORS = (("rmse_velocity", "speeds", "m s-1"), ("rmse_runout", "runouts", "m"))
+"""Keys of ``held_out``, what they are errors of, unit."""
 
 
 def improvement(document: dict[str, Any]) -> str:
@@ -35,15 +37,16 @@ def improvement(document: dict[str, Any]) -> str:
 def _changes(held: dict[str, Any]) -> tuple[list[str], list[str]]:
     """Errors that fall or stay as they are, and errors that grow, as they are written."""
     better, worse = list[str](), list[str]()
-    for key, what, decimals, unit in _ERRORS:
+    for key, what, unit in _ERRORS:
         values = [held[f"{key}_{when}"] for when in ("before", "after")]
         if None in values:
             continue
-        before, after = (f"{value:.{decimals}f}" for value in values)
+        before, after = (error_text(value, unit) for value in values)
+        shown = unit_text(unit)
         if before == after:
-            better.append(f"the error of {what} stays at {before} {unit}")
+            better.append(f"the error of {what} stays at {before} {shown}")
         elif values[1] < values[0]:
-            better.append(f"the error of {what} falls from {before} to {after} {unit}")
+            better.append(f"the error of {what} falls from {before} to {after} {shown}")
         else:
-            worse.append(f"the error of {what} grows from {before} to {after} {unit}")
+            worse.append(f"the error of {what} grows from {before} to {after} {shown}")
     return better, worse

@@ -11,6 +11,7 @@ from typing import Any
 from skred.diagnosis.augment.coefficient import augmented_of, strength_of
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison
+from skred.diagnosis.compare.location import Location
 from skred.diagnosis.evidence.covariates import standard_of
 from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.verdict.between import between_document, ways_document
@@ -58,7 +59,7 @@ def added_document(found: Diagnosis, number: int) -> dict[str, Any]:
         "location": place_of(step.candidate),
         "equation": equation_of(mechanism, shape),
         "covariate": shape.covariate,
-        "standard": _standard(found, shape.covariate),
+        "standard": standard_of_covariate(found, shape.covariate),
         "sensor": shape.sensor,
         "constants": dict(shape.constants),
         "tied_with": list(step.tied),
@@ -72,7 +73,15 @@ def kind_of(mechanism: Mechanism) -> dict[str, str]:
     return {"group": str(mechanism.group), "bound_to": str(mechanism.added.bound_to)}
 
 
-def _standard(found: Diagnosis, covariate: str | None) -> dict[str, Any] | None:
+def work_documents(location: Location) -> list[dict[str, Any]]:
+    """Specific work that is missing between neighbouring sensors."""
+    return [
+        {"s_from_m": first, "s_to_m": last, "mean": mean, "sd": sd, "unit": "J kg-1"}
+        for first, last, mean, sd in location.work.tolist()
+    ]
+
+
+def standard_of_covariate(found: Diagnosis, covariate: str | None) -> dict[str, Any] | None:
     """By what a covariate is standardised before its strength multiplies it."""
     standard = None if covariate is None else standard_of(found.problem.campaign.events, covariate)
     return None if standard is None else standard.as_dict()

@@ -9,12 +9,9 @@ import numpy as np
 
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.detect.detectability import Identifiability, with_sensors
+from skred.diagnosis.detect.detectability import Identifiability, places_of_a_sensor, with_sensors
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.outcome import Diagnosis
-
-_PLACES = 16
-"""Places tried: close enough to each other for what a reading there says to change little between them."""
 
 
 def next_sensor(found: Diagnosis) -> dict[str, Any] | None:
@@ -53,18 +50,17 @@ def _splitting(found: Diagnosis, first: Candidate, second: Candidate) -> float:
 
     Each with the events' modes and the strength that fit the recordings best under it.
     """
-    low, high = found.steps[0].comparison.under_each[0].base.setting.recorded_m
-    release = float(found.problem.releases.mean.max()) + 20.0
-    places = np.linspace(max(release, low - 0.5 * (high - low)), high, _PLACES)
+    recorded = found.steps[0].comparison.under_each[0].base.setting.recorded_m
+    places = places_of_a_sensor(found.problem, recorded)
     problem = with_sensors(found.problem, places)
-    columns = np.arange(_PLACES) + found.problem.campaign.n_sensors
+    columns = np.arange(len(places)) + found.problem.campaign.n_sensors
     speeds = []
     for candidate in (first, second):
         curve = candidate.best
         at = int(np.argmax(curve.log_evidence))
         direction = curve.direction
         if direction.log_readings is not None:
-            padded = np.concatenate([direction.log_readings, np.zeros(_PLACES)])
+            padded = np.concatenate([direction.log_readings, np.zeros(len(places))])
             direction = replace(direction, log_readings=padded)
         extension = extended(problem, found.law, [direction])
         points = curve.fits[at].points

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,11 +37,11 @@ def _with_profile(found: Diagnosis, law: ProfileLaw) -> tuple[Predictor, Predict
     problem = found.problem
     term = ProfileTerm.of(law.profile, found.comparison.leading(UNLISTED).base.setting)
     common = found.law.id, law.error_model, problem.place_sd_m, problem.terrain.smoothing_m
-    before, after = law.draws_before, law.draws_after
-    return (
-        Predictor(*common, before.means, before.factors, (), before.strengths),
-        Predictor(*common, after.means, after.factors, (), after.strengths, term),
+    before, after = (
+        Predictor(*common, means, factors, (), strengths)
+        for means, factors, strengths in (law.draws_before, law.draws_after)
     )
+    return before, replace(after, profile=term)
 
 
 def predictors(found: Outcome) -> dict[str, Any] | None:

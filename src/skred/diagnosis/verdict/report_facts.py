@@ -19,7 +19,6 @@ from skred.diagnosis.check.limits import LIMIT, NOTHING_AT_MOST
 from skred.diagnosis.compare.comparison import ERROR_SHARES, Comparison
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.discrepancy.profile import AMPLITUDES, KINDS, LENGTHS_M, NEAR_M
-from skred.diagnosis.evidence.covariates import standard_of
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.outcome import (
     Diagnosis,
@@ -30,7 +29,8 @@ from skred.diagnosis.outcome import (
     ProfileAdded,
 )
 from skred.diagnosis.predict.held_out import K_LIMIT, HeldOut
-from skred.diagnosis.verdict.mechanisms import candidate_documents
+from skred.diagnosis.verdict.mechanisms import candidate_documents, standard_of_covariate, work_documents
+from skred.documents import FORMAT
 from skred.inference.calibrate import Calibration
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
@@ -40,9 +40,6 @@ from skred.physics.law import Law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Mechanism, Shape
 from skred.physics.mechanisms.stretches import is_opposed
-
-FORMAT = 1
-"""Of the key ``report`` and of ``diagnosis.nc``; another one cannot be read by this version."""
 
 
 def report_facts(found: Outcome) -> dict[str, Any]:
@@ -292,10 +289,7 @@ def _force(location: Location) -> dict[str, Any]:
         "resolution_m": location.resolution_m,
         "nil_at_typical_speed": location.opposed,
         "largest": float(np.abs(location.mean).max(initial=0.0)),
-        "work": [
-            {"s_from_m": first, "s_to_m": last, "mean": mean, "sd": sd, "unit": "J kg-1"}
-            for first, last, mean, sd in location.work.tolist()
-        ],
+        "work": work_documents(location),
     }
 
 
@@ -356,16 +350,14 @@ def _added(found: Diagnosis, number: int) -> dict[str, Any]:
     """Of a mechanism added: its parameter in the augmented law, and how a covariate enters."""
     step = found.steps[number]
     shape = step.candidate.best.shape
-    standard = None
-    if shape.covariate is not None:
-        standard = standard_of(found.problem.campaign.events, shape.covariate)
+    standard = standard_of_covariate(found, shape.covariate)
     return {
         "id": step.candidate.mechanism.id,
         "parameter": augmented_of(found.steps[-1].calibration).added[number].name,
         "symbol": step.candidate.mechanism.strength.symbol,
         "unit": step.candidate.mechanism.strength.unit,
         "shape": _shape(shape),
-        "by_logarithm": standard is not None and standard.logarithm,
+        "by_logarithm": standard is not None and standard["logarithm"],
     }
 
 

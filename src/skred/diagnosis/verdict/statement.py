@@ -15,14 +15,10 @@ from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdd
 from skred.diagnosis.verdict.between import between_sentence
 from skred.diagnosis.verdict.hangs_on import carried, hangs_on
 from skred.diagnosis.verdict.improvement import improvement
-from skred.diagnosis.words import percent, plus_minus
+from skred.diagnosis.words import TOLD_FROM, percent, plus_minus
 from skred.inference.influence_words import enumerated
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.stretches import U_1, U_2
-
-_TOLD_FROM = 0.05
-"""Probability from which another candidate than those named is told of: below it, its name misleads more
-than it informs."""
 
 
 def statement(found: Outcome, document: dict[str, Any]) -> str:
@@ -129,7 +125,7 @@ def _not_excluded(document: dict[str, Any]) -> str:
     told = {NOTHING, UNLISTED, document["mechanism"], *document["indistinguishable"]}
     others = {name: share for name, share in document["probability"].items() if name not in told}
     name = max(others, key=lambda one: others[one], default="")
-    if not name or others[name] < _TOLD_FROM:
+    if not name or others[name] < TOLD_FROM:
         return ""
     return f"Not excluded: {_title(name)} ({percent(others[name])})."
 
@@ -181,7 +177,7 @@ def _split(step: Step, document: dict[str, Any]) -> str:
 
 def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     probability = document["probability"]
-    doubt = 1.0 - probability[NOTHING] - probability[UNLISTED] >= _TOLD_FROM
+    doubt = 1.0 - probability[NOTHING] - probability[UNLISTED] >= TOLD_FROM
     return [
         f"Something is missing{_where(document['location'])} that {'most probably ' if doubt else ''}no"
         f" listed mechanism accounts for (a force not in the list: {percent(probability[UNLISTED])}; nothing:"
