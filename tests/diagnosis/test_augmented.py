@@ -29,7 +29,7 @@ from skred.diagnosis.evidence.conditional_map import (
 )
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
-from skred.diagnosis.tabulated.coefficient_grid import finer, locate
+from skred.diagnosis.tabulated.coefficient_grid import locate
 from skred.diagnosis.tabulated.tables import highest
 from skred.diagnosis.tabulated.tabulated_op import TabulatedLogDensity, tabulated_log_density
 from skred.inference.calibrate import calibrate
@@ -175,8 +175,8 @@ def test_finer_tables_cover_what_chains_visited(problem: AugmentedProblem) -> No
     assert_allclose(again.log_likelihood(law, samples), problem.log_likelihood(law, samples), atol=0.02)
 
 
-def test_finest_tables_are_at_half_the_steps_between_strengths(problem: AugmentedProblem) -> None:
-    """The second time that tables are too rough, and no more than that: little error between two is left.
+def test_finer_tables_are_at_half_the_steps_between_strengths(problem: AugmentedProblem) -> None:
+    """Once, and no more than that: little error between two is left.
 
     In a narrow population beside the posterior's, whose likelihood bends most with the strength.
     """
@@ -186,12 +186,10 @@ def test_finest_tables_are_at_half_the_steps_between_strengths(problem: Augmente
     samples = {"dry_friction": np.full(2, 0.3 * np.exp(0.2)), "dry_friction_spread": np.full(2, 0.02)}
     samples["turbulent_drag"] = strengths
     chains = {name: (("chain", "draw"), np.tile(values, (4, 1))) for name, values in samples.items()}
-    covered = problem.finer(law, xr.Dataset(chains))
-    assert covered is not None and covered.tables.grid.size == grid.size
-    finest = covered.finer(law, xr.Dataset(chains))
-    assert finest is not None and np.all(finest.tables.grid.steps == 0.5 * grid.steps)
-    assert finest.finer(law, xr.Dataset(chains)) is None
-    before, after = (np.abs(one.integration_errors(law, samples)).sum() for one in (covered, finest))
+    finer = problem.finer(law, xr.Dataset(chains))
+    assert finer is not None and np.all(finer.tables.grid.steps == 0.5 * grid.steps)
+    assert finer.finer(law, xr.Dataset(chains)) is None
+    before, after = (np.abs(one.integration_errors(law, samples)).sum() for one in (problem, finer))
     assert before > 0.2 and after < 0.1 * before
 
 
@@ -291,9 +289,9 @@ def test_two_mechanisms(base: Base, drag: Curve) -> None:
     rng = np.random.default_rng(1)
     added = tables.mean + rng.uniform(-1.0, 1.0, (4, 2)) @ tables.located.factor.T
     added[:, 0] = np.maximum(added[:, 0], both.range[0][0])
-    population = (np.full((4, 1), np.log(0.3)), np.full((4, 1, 1), 0.25))
-    same = added[:, None], np.zeros((4, 1))
-    assert np.abs(both.errors_at(*population, *same, np.arange(n_events))).max() < 0.1
+    samples = {"dry_friction": np.full(4, 0.3), "dry_friction_spread": np.full(4, 0.25)}
+    samples |= {one.name: added[:, k] for k, one in enumerate(both.added)}
+    assert np.abs(both.integration_errors(base.law, samples)).max() < 0.1
     inputs = [pt.as_tensor_variable(value) for value in (means, factor, *given, *arrays)]
     for mode in ("NUMBA", "FAST_COMPILE"):
         value = pytensor.function([], TabulatedLogDensity()(*inputs), mode=mode)()
@@ -325,17 +323,12 @@ def test_what_cannot_be_is_refused(base: Base, drag: Curve, problem: AugmentedPr
 
 
 def test_finer_tables_hold_the_old_ones(base: Base, drag: Curve) -> None:
-    """Half the steps, the same range; fits at old strengths stay what they were but for the sums' noise."""
-    extension = extended(base.problem, base.law, (drag.direction,))
-    old = locate(base, extension, [drag])
-    new = finer(base, extension, old)
+    """Half the steps, the same range, and the populations of the nearest."""
+    old = locate(base, extended(base.problem, base.law, (drag.direction,)), [drag])
+    new = old.finer
     assert_allclose(new.grid.points[::2], old.grid.points, rtol=1e-12)
-    assert len(new.grid.points) == 2 * len(old.grid.points) - 1
-    before = [fit.found.log_evidence for fit in old.fits]
-    after = [fit.found.log_evidence for fit in new.fits]
-    assert_allclose(after[::2], before, atol=0.1)
-    between = 0.5 * (np.array(before[1:]) + before[:-1])
-    assert_allclose(after[1::2], between, atol=0.5)
+    assert len(new.grid.points) == len(new.fits) == 2 * len(old.grid.points) - 1
+    assert all(one is other for one, other in zip(new.fits[::2], old.fits, strict=True))
 
 
 def test_a_table_in_the_lower_mode_is_lifted_by_its_neighbours() -> None:

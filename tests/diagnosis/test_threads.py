@@ -11,9 +11,10 @@ from diagnosis_cases import sparse_base
 from skred.diagnosis.check.bootstrap_test import linear_test, odds_test
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import curve_near
+from skred.diagnosis.evidence.event_quadrature import FINE
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.tabulated.coefficient_grid import locate
-from skred.diagnosis.tabulated.tables import BUDGETS, build_tables
+from skred.diagnosis.tabulated.tables import build_tables
 from skred.parallel.threads import in_parts, side_by_side, threads
 from skred.physics.mechanisms import mechanisms
 
@@ -69,7 +70,7 @@ def test_tables_are_the_same_in_threads(monkeypatch: pytest.MonkeyPatch) -> None
     found = []
     for said in ("1", "3"):
         monkeypatch.setenv("OMP_NUM_THREADS", said)
-        found.append(build_tables(base, extension, locate(base, extension, [near]), BUDGETS[0]))
+        found.append(build_tables(base, extension, locate(base, extension, [near]), FINE))
     one, two = found
     np.testing.assert_array_equal(one.grid.points, two.grid.points)
     np.testing.assert_array_equal(one.modes, two.modes)

@@ -22,9 +22,8 @@ from skred.diagnosis.augment.components import components_of, symbolic_component
 from skred.diagnosis.augment.truncated_normal import truncated_normal
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
-from skred.diagnosis.evidence.event_quadrature import Budget
+from skred.diagnosis.evidence.event_quadrature import FINE
 from skred.diagnosis.evidence.extension import Extension
-from skred.diagnosis.tabulated.coefficient_grid import finer
 from skred.diagnosis.tabulated.tables import Tables, build_tables, exact_nodes
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.hierarchical.event_density import integrated_log_density
@@ -45,20 +44,14 @@ for 22 events.
 A claim of a mechanism rests on several nats; where fronts stop on a stretch that is added, an event's
 likelihood bends sharply with the strength, and more quadrature points do not help.
 """
-_EXACT = Budget(512, 256, 1024, 1.5, 1.8)
+_EXACT = FINE.times(2)
 """Quadrature points of what the tables are compared with: so many that their own error counts for little."""
-_EXACT_RUNS = 352
-"""Events times draws up to which there are so many points; where there are fewer, more."""
 _EXACT_DRAWS = 16
-"""Draws compared, evenly over the posterior."""
-_LEAST_EXACT_DRAWS = 4
-"""Of them where avalanches may differ in what is added, and each draw takes as many integrals."""
-CHECKED_EVENTS = 24
+"""Draws compared, evenly over the posterior; by the root of what an avalanche may have fewer."""
+_CHECKED_EVENTS = 24
 """Events of larger campaigns that integration errors are looked for in, drawn at random."""
 _START_WIDER = 1.5
 """How much wider than the posterior chains start, as r-hat asks for."""
-_INSIDE = 0.02
-"""How far inside the range of a strength chains start, as a share of it: at its end steps shrink."""
 
 
 def as_diagnosed(problem: HierarchicalProblem) -> HierarchicalProblem:
@@ -81,17 +74,14 @@ class AugmentedProblem(HierarchicalProblem):
     added : tuple of AddedStrength
         One or two.
     tables : Tables
-    visited : Population, optional
-        Populations that chains went to with rougher tables, and that these cover.
     refined : bool
-        Whether there are tables at half the steps between strengths, because those were too rough.
+        Whether the first tables were too rough, and these are finer.
     """
 
     integration_limit: float = CLAIM_LIMIT
     base: Base
     added: tuple[AddedStrength, ...]
     tables: Tables = field(repr=False)
-    visited: Population | None = None
     refined: bool = False
 
     def __post_init__(self) -> None:
@@ -197,9 +187,10 @@ class AugmentedProblem(HierarchicalProblem):
         """
         rng, n = np.random.default_rng([seed, 6]), len(next(iter(prior.values())))
         located, (low, high) = self.tables.located, self.range
-        margin = _INSIDE * (high - low)
         reach = _START_WIDER * rng.standard_normal((n, len(self.added))) @ located.factor.T
-        added = np.clip(located.mean + reach, low + margin, high - margin)
+        # What is beyond an end is folded back: at the end itself steps shrink.
+        share = (located.mean + reach - low) / (high - low)
+        added = low + (high - low) * np.abs(share - 2.0 * np.round(0.5 * share))
         psi = located.populations_near(added, rng, _START_WIDER)
         own = law.parameter_rows(np.exp(psi[:, : len(law.mechanisms)]))
         rest = population_samples(law, psi[:, len(law.mechanisms) :])
@@ -221,52 +212,34 @@ class AugmentedProblem(HierarchicalProblem):
     def integration_errors(self, law: Law, samples: Mapping[str, Any], seed: int = 0) -> FloatArray:
         """Differences of event log densities to exact ones, (n, n_checked_events), of at most 16 draws.
 
-        Exact: nodes at the very strengths of the draw, 1792 or more, around its own population.
-        Of at most 24 events, drawn at random from larger campaigns; positive where the tables are larger.
+        Exact: nodes at the very strengths of the draw, 1792, around its own population. Of at most 24 events,
+        drawn at random from larger campaigns; positive where the tables are larger.
         """
         n = len(next(iter(samples.values())))
-        each = max(_EXACT_DRAWS // self.n_components, _LEAST_EXACT_DRAWS)
+        # Where avalanches may differ in what is added, each draw takes as many integrals.
+        each = math.ceil(_EXACT_DRAWS / math.sqrt(self.n_components))
         draws = np.linspace(0, n - 1, min(n, each)).astype(int)
         samples = {name: np.ravel(values)[draws] for name, values in samples.items()}
         rng = np.random.default_rng([seed, 5])
-        chosen = np.sort(rng.permutation(self.campaign.n_events)[:CHECKED_EVENTS])
-        return self.errors_at(*population_of(law, samples), *components_of(self.added, samples), chosen)
-
-    def errors_at(
-        self,
-        means: FloatArray,
-        factors: FloatArray,
-        own: FloatArray,
-        log_shares: FloatArray,
-        chosen: NDArray[np.int64],
-        runs: int = _EXACT_RUNS,
-    ) -> FloatArray:
-        """As `integration_errors`, of chosen events at some populations and components of added strengths.
-
-        Where there are fewer of them than `runs`, with more nodes each.
-        """
-        base, (n, n_components, n_added) = self.base, own.shape
-        added, every = own.reshape(-1, n_added), np.repeat(np.arange(n), n_components)
-        means_each, factors_each = means[every], factors[every]
-        population = Population(means_each, np.einsum("nij,nkj->nik", factors_each, factors_each))
+        chosen = np.sort(rng.permutation(self.campaign.n_events)[:_CHECKED_EVENTS])
+        base, (means, factors) = self.base, population_of(law, samples)
+        own, log_shares = components_of(self.added, samples)
+        added, every = own.reshape(-1, own.shape[2]), np.repeat(np.arange(len(own)), own.shape[1])
+        means, factors = means[every], factors[every]
+        population = Population(means, np.einsum("nij,nkj->nik", factors, factors))
         rows = Rows(chosen, np.zeros_like(chosen), base.rows.readings.take(chosen), base.rows.errors)
         start = self.tables.modes[self.tables.grid.nearest(added)][:, chosen]
         given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
-        more = 2 ** int(np.clip(np.log2(runs / (len(added) * len(chosen))), 0, 3))
-        budget = _EXACT.times(more)
         likelihood = EventLikelihood(self.extension, rows, base.strengths).in_groups(given)
-        nodes = exact_nodes(likelihood, population, start, budget, base.population)
+        nodes = exact_nodes(likelihood, population, start, _EXACT, base.population)
         exact = np.empty((len(added), len(chosen)))
         for k in range(len(added)):
             first = nodes.first[k * len(chosen) : (k + 1) * len(chosen) + 1]
-            of_event = np.tile(means_each[k], (len(chosen), 1))
-            exact[k] = integrated_log_density(
-                of_event, factors_each[k], first, nodes.points, nodes.log_weights
-            )
-        parts = exact.reshape(n, n_components, -1) + log_shares[:, :, None]
+            of_event = np.tile(means[k], (len(chosen), 1))
+            exact[k] = integrated_log_density(of_event, factors[k], first, nodes.points, nodes.log_weights)
+        parts = exact.reshape(*log_shares.shape, -1) + log_shares[:, :, None]
         together: FloatArray = np.logaddexp.reduce(parts, axis=1)
-        tabulated = np.logaddexp.reduce(self._parts(means, factors, own, log_shares), axis=1)
-        return tabulated[:, chosen] - together
+        return self.log_likelihood(law, samples)[:, chosen] - together
 
     def speeds(
         self,
@@ -288,20 +261,11 @@ class AugmentedProblem(HierarchicalProblem):
     def finer(self, law: Law, posterior: xr.Dataset) -> AugmentedProblem | None:
         """The same with finer tables; None where there are such already.
 
-        First those that also cover the populations that chains went to: far from all that the tables cover a
-        few nodes stand for all, and may promise a mode that is none. What is wrong then is wrong between the
-        tables' strengths.
+        They also cover the populations that chains went to: far from all that the tables cover a few nodes
+        stand for all, and may promise a mode that is none.
         """
-        old = self.tables
         if self.refined:
             return None
-        if old.located.held:  # all cover one population already, and strengths lie close
-            tables = build_tables(self.base, self.extension, old.located, old.budget.times(2))
-            return replace(self, tables=tables, refined=True)
-        if self.visited is not None:
-            located = finer(self.base, self.extension, old.located)
-            tables = build_tables(self.base, self.extension, located, old.budget, self.visited)
-            return replace(self, tables=tables, refined=True)
         samples = {
             str(name): posterior[name].transpose("chain", "draw").values for name in posterior.data_vars
         }
@@ -309,10 +273,11 @@ class AugmentedProblem(HierarchicalProblem):
         chains = [{name: values[k] for name, values in samples.items()} for k in range(n_chains)]
         moments = [moments_of(*population_of(law, chain)) for chain in chains]
         visited = Population(*(np.array(values) for values in zip(*moments, strict=True)))
+        old = self.tables
         wide = old.budget.over_population * 2 ** math.ceil(math.log2(2 + n_chains))
-        budget = old.budget._replace(over_population=wide, adapted=2 * old.budget.adapted)
-        tables = build_tables(self.base, self.extension, old.located, budget, visited)
-        return replace(self, tables=tables, visited=visited)
+        budget = old.budget.times(2)._replace(over_population=wide)
+        tables = build_tables(self.base, self.extension, old.located.finer, budget, visited)
+        return replace(self, tables=tables, refined=True)
 
     def surfaces(self, mechanisms: Sequence[Mechanism]) -> Surfaces:
         """Not there: surfaces would be those of the base law alone.

@@ -17,7 +17,7 @@ from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import FINE, Budget
 from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.diagnosis.tabulated.between_evidence import BetweenTarget, Way, between_evidence, search, way_of
-from skred.diagnosis.tabulated.wide_tables import wide_tables
+from skred.diagnosis.tabulated.tables import wide_tables
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism
 

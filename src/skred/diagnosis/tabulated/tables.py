@@ -8,19 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, event_modes, log_joint
 from skred.diagnosis.evidence.event_quadrature import Budget, Spread, event_nodes
-from skred.diagnosis.evidence.extension import Extension
-from skred.diagnosis.tabulated.coefficient_grid import Grid, Located
+from skred.diagnosis.evidence.extension import Extension, extended
+from skred.diagnosis.evidence.marginal import Evidence
+from skred.diagnosis.tabulated.coefficient_grid import Grid, Located, from_nothing
 from skred.inference.hierarchical.surface import Nodes
 from skred.parallel.threads import in_parts, side_by_side
 
 FloatArray = NDArray[np.float64]
-_LEAST = Budget(128, 128, 256, 1.5, 1.8)
-"""Of the first tables, tried before others of twice the cost."""
-BUDGETS = _LEAST, _LEAST.times(2)
-"""Of the tables: each where the one before is not good enough."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +93,12 @@ def build_tables(
     spreads, modes = zip(*side_by_side(spread, in_parts(len(start))), strict=True)
     nodes, points = Spread.joined(spreads), np.concatenate(modes).reshape(n_tables, n_events, n + 1)
     return Tables(located, nodes.nodes, nodes.points[:, :, n].ravel(), points, budget)
+
+
+def wide_tables(base: Base, curve: Curve, found: Evidence, budget: Budget, mean: float, sd: float) -> Tables:
+    """Tables of one mechanism in which avalanches differ; parameters as `from_nothing` has them."""
+    extension = extended(base.problem, base.law, (*base.directions, curve.direction))
+    return build_tables(base, extension, from_nothing(curve, found, mean, sd), budget)
 
 
 def highest(likelihood: EventLikelihood, points: FloatArray, population: Population) -> FloatArray:

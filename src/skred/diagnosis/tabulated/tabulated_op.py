@@ -18,8 +18,6 @@ from skred.inference.array_op import ArrayOp
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.parallel.compile_cache import cache_key, compiled, inner
 
-LEAST_TABLES = 4
-"""Along each axis: what a cubic polynomial goes through."""
 _WALL = 12.0
 """Nats that all events lose a step outside the tables: chains turn back, and yet find in from anywhere."""
 _OVERSHOOT = 0.5
