@@ -290,7 +290,8 @@ def test_what_is_only_promised_counts_no_more_than_what_was_computed(base: Base)
     """A slope at a kink promises hundreds of nats elsewhere: enough to climb there, not to claim them."""
     own, at = KINDS[0], knots(base.setting)
     flat, priors = around_nothing(base, own), priors_of(own, at)
-    seen = ExploredPriors(flat.fit.found.log_evidence, at, priors)
+    covers = {prior: prior.cover(at) for prior in priors}
+    seen = ExploredPriors(flat.fit.found.log_evidence, priors, covers)
     climbed = next(one for one in priors if one.centre_m is not None)
     # Settled under its own prior, which holds its rough values down: to others that is a steep slope.
     values = 0.05 * own.amplitude * np.sin(2.0 * np.arange(len(at)))

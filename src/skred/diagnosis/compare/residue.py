@@ -7,6 +7,7 @@ that something beside a mechanism is in no list, it is that pair.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
@@ -15,9 +16,10 @@ from functools import partial
 import numpy as np
 
 from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.discrepancy.climb import start_from
 from skred.diagnosis.discrepancy.fit import fit_profile
-from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_evidence_of
-from skred.diagnosis.evidence.coefficient import Base, fit_base
+from skred.diagnosis.discrepancy.profile import KINDS, Profile, knots, log_evidence_of
+from skred.diagnosis.evidence.coefficient import Base
 from skred.physics.mechanisms.spec import Group
 
 
@@ -36,12 +38,18 @@ def with_residues(
 
 
 def _residue(base: Base, candidate: Candidate) -> float:
-    """Log Bayes factor of a force not in the list beside a mechanism, as strong as it is most probably."""
-    best = candidate.best
+    """Log Bayes factor of a force not in the list beside a mechanism of its best shape, against it alone.
+
+    Both are fitted together: beside such a force a mechanism is as strong as it is, and not as strong as it
+    has to be for both.
+    """
+    best, added = candidate.best, candidate.mechanism.added
+    assert added is not None
     top = int(np.argmax(best.log_evidence))
-    fit, strengths = best.fits[top], np.append(base.strengths, best.strengths[top])
-    population = fit.found.population(len(base.law.mechanisms))
-    added = fit_base(
-        base.problem, base.law, population, fit.points, (*base.directions, best.direction), strengths
+    wide = replace(
+        base, directions=(*base.directions, best.direction), strengths=np.append(base.strengths, 0.0)
     )
-    return log_evidence_of([fit_profile(added, kind) for kind in KINDS])
+    scale, start = added.scale_of(best.shape), start_from(base, best.fits[top])
+    values = np.append(best.strengths[top], np.zeros(len(knots(base.setting))))
+    both = log_evidence_of([fit_profile(wide, kind, (values, start), free=[scale]) for kind in KINDS])
+    return both + (0.0 if added.either_sign else math.log(2.0)) - best.log_bayes_factor

@@ -35,8 +35,10 @@ def expanded_at(
 
     Parameters
     ----------
-    at, values : (n_knots,) arrays
-        Places of the knots [m], and the profile there in the kind's unit.
+    at : (n_knots,) array
+        Places of the knots [m].
+    values : (n_free + n_knots,) array
+        Strengths of the base's last directions, if some are free too, then the profile in the kind's unit.
     start : (Population, points)
         Where the refit begins.
     """
@@ -52,7 +54,7 @@ def climb(base: Base, kind: Kind, at: FloatArray, start: Expansion, cover: Float
         Places of the knots [m].
     start : Expansion
         Around the values to begin from.
-    cover : (n_knots, n_knots) array
+    cover : (n_free + n_knots,) * 2 array
         Covariance of the values under the prior.
     """
     maximum = start
@@ -86,17 +88,24 @@ def _fit_at(
     base: Base, kind: Kind, at: FloatArray, values: FloatArray, start: tuple[Population, FloatArray]
 ) -> Fit:
     """Population and events with the profile in."""
-    direction = combined(base.setting, kind, at, values)
+    held, free = _held(base, at, values), len(values) - len(at)
+    direction = combined(base.setting, kind, at, values[free:])
     extension = extended(base.problem, base.law, [*base.directions, direction])
-    strengths = np.append(base.strengths, 1.0)[None, :]
+    strengths = np.concatenate([held, values[:free], [1.0]])[None, :]
     return refit(extension, base.rows, strengths, start, Rounds(least=1))[0]
+
+
+def _held(base: Base, at: FloatArray, values: FloatArray) -> FloatArray:
+    """Strengths of the base's directions that are not free."""
+    return base.strengths[: len(base.strengths) - (len(values) - len(at))]
 
 
 def _around(base: Base, kind: Kind, at: FloatArray, values: FloatArray, fit: Fit) -> Expansion:
     """With efficient score and information of the knots' values at what they are."""
     wide = knot_by_knot(base, kind, at)
     population, points = start_from(base, fit)
-    around = look_around(EventLikelihood(wide, base.rows, np.concatenate([base.strengths, values])), points)
+    held = _held(base, at, values)
+    around = look_around(EventLikelihood(wide, base.rows, np.concatenate([held, values])), points)
     found = efficient_scores(around, base.rows, population, mean_prior(base.law))
-    n_before = len(base.directions)
+    n_before = len(held)
     return Expansion(values, fit, found.score[0, n_before:], found.information[0, n_before:, n_before:])

@@ -89,18 +89,16 @@ class ExploredPriors:
     ----------
     height : float
         Log evidence of no force.
-    at : (n_knots,) array
-        Places of the knots [m].
-    priors : dict
+    shares : dict
         All priors, and the log of each one's probability.
+    covers : dict
+        Covariance of the values under each.
     """
 
-    def __init__(self, height: float, at: FloatArray, priors: dict[Prior, float]) -> None:
-        self.height = height
-        self.shares = priors
-        self.covers = {prior: prior.cover(at) for prior in priors}
+    def __init__(self, height: float, shares: dict[Prior, float], covers: dict[Prior, FloatArray]) -> None:
+        self.height, self.shares, self.covers = height, shares, covers
         self.maxima: dict[Prior, Expansion] = {}
-        self.approximations: dict[Prior, dict[Prior, Laplace]] = {prior: {} for prior in priors}
+        self.approximations: dict[Prior, dict[Prior, Laplace]] = {prior: {} for prior in shares}
 
     def add(self, climbed: Prior, maximum: Expansion) -> None:
         """A maximum under a prior."""

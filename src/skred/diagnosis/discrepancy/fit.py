@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
 
 from skred.diagnosis.discrepancy.climb import climb, expanded_at, start_from
@@ -41,7 +42,13 @@ _PRIORS_AGAIN = 4
 """The same where a fit to all avalanches is at hand: those close to its prior, and those that lead then."""
 
 
-def fit_profile(base: Base, kind: Kind, near: Start | None = None, again: Prior | None = None) -> Profile:
+def fit_profile(
+    base: Base,
+    kind: Kind,
+    near: Start | None = None,
+    again: Prior | None = None,
+    free: Sequence[float] = (),
+) -> Profile:
     """Fit the profile by Gauss-Newton steps around the events' modes; evidence by quadrature at the maximum.
 
     One prior is tried after the other, as long as those left could matter. The evidence under the others
@@ -55,15 +62,20 @@ def fit_profile(base: Base, kind: Kind, near: Start | None = None, again: Prior 
     again : Prior, optional
         Under which to climb first: `near` is what was found for it by all of some avalanches, of which the
         base has a part. Fewer priors are climbed under then, and from one start each.
+    free : sequence of float, optional
+        Scales of the normal priors of strengths of the base's last directions: these are fitted too, and the
+        evidence is that of both against neither.
     """
     at = knots(base.setting)
     # Nothing like everything else, so that what is left of integration errors is the same there.
-    none = np.zeros(len(at))
+    none = np.zeros(len(free) + len(at))
     starts = [expanded_at(base, kind, at, none, (base.population, base.fit.points))]
     height = starts[0].fit.found.log_evidence
     if near is not None:
         starts.append(expanded_at(base, kind, at, *near))
-    explored = ExploredPriors(height, at, priors_of(kind, at))
+    shares = priors_of(kind, at)
+    covers = {prior: block_diag(np.diag(np.square(free)), prior.cover(at)) for prior in shares}
+    explored = ExploredPriors(height, shares, covers)
     if again is None:
         waiting, maximum_under, most = _first(kind, starts[-1], explored), _maximum_under, _PRIORS_TRIED
     else:
@@ -71,14 +83,14 @@ def fit_profile(base: Base, kind: Kind, near: Start | None = None, again: Prior 
     while waiting and len(explored.maxima) < most:
         prior = waiting.pop()
         begin = [*starts, *explored.maxima.values()]
-        explored.add(prior, maximum_under(base, kind, at, begin, prior.cover(at)))
+        explored.add(prior, maximum_under(base, kind, at, begin, covers[prior]))
         waiting = waiting or explored.open
     prior = max(explored.maxima, key=explored.factor)
     maximum = explored.maxima[prior]
-    cover = np.linalg.inv(maximum.information + np.linalg.inv(prior.cover(at)))
+    cover = np.linalg.inv(maximum.information + np.linalg.inv(covers[prior]))
+    cover, values = 0.5 * (cover + cover.T)[len(free) :, len(free) :], maximum.values[len(free) :]
     gain = maximum.fit.found.log_evidence - height
-    factor, cover = explored.log_factor, 0.5 * (cover + cover.T)
-    return Profile(kind, prior, at, maximum.values, cover, factor, gain, maximum.fit, explored.modes)
+    return Profile(kind, prior, at, values, cover, explored.log_factor, gain, maximum.fit, explored.modes)
 
 
 def mode_at(base: Base, profile: Profile, values: FloatArray) -> Mode:
