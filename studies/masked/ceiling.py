@@ -24,9 +24,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.commit import commit
-from skred.diagnosis.check.limits import LIMIT
 from skred.diagnosis.detect.score_test import PlacedMechanism, ScoreTest
 from skred.diagnosis.evidence.linear_mixed_model import Scores
+from skred.diagnosis.limits import LIMIT
 from skred.physics.mechanisms.spec import Group
 from skred.physics.mechanisms.stretches import is_opposed
 from skred.simulator.masked import MASKED

@@ -18,7 +18,7 @@ from typing import Any
 import cyclopts
 
 from benchmarks.commit import commit
-from skred.diagnosis.check.limits import LIMIT
+from skred.diagnosis.limits import LIMIT
 from skred.prove.plan import NULLS
 from skred.simulator.draw import draw_trial
 from studies.files import RESULTS, read, write

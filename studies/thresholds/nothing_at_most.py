@@ -13,8 +13,8 @@ from typing import Any
 
 import cyclopts
 
-from skred.diagnosis.check.limits import NOTHING_AT_MOST
 from skred.diagnosis.evidence.prior_odds import NOTHING, SHARES
+from skred.diagnosis.limits import NOTHING_AT_MOST
 from skred.prove.scoring.alarms import AT
 from skred.prove.scoring.answers import Pair
 from skred.prove.scoring.intervals import share

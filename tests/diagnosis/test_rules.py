@@ -10,8 +10,8 @@ import pytest
 
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import Decision, decide, smallest_set
-from skred.diagnosis.check.limits import LIMIT
 from skred.diagnosis.evidence.prior_odds import POWER, prior_odds, probabilities, stated
+from skred.diagnosis.limits import LIMIT
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group
 

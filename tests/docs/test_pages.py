@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from skred.diagnosis.check.decision import TIED_NATS
-from skred.diagnosis.check.limits import HELD, LIMIT, NOTHING_AT_MOST
 from skred.diagnosis.compare.candidate import FORM
 from skred.diagnosis.evidence.prior_odds import POWER, SHARES
+from skred.diagnosis.limits import HELD, LIMIT, NOTHING_AT_MOST
 from skred.diagnosis.verdict.document import verdict
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
 from skred.output import plain

@@ -81,7 +81,8 @@ class Grid:
         points = np.exp(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes)))
         fronts, which = problem.fronts(load_law(law_id).mechanisms), np.full(len(points), event)
         total = np.full(len(points), -np.inf)
-        for place, share in releases(problem.campaign.events[event], problem.terrain.length_m, n_releases):
+        ends = float(problem.terrain.edge_s_m[0]), problem.terrain.length_m
+        for place, share in releases(problem.campaign.events[event], ends, n_releases):
             runs = simulate(points, np.full(len(points), place), fronts.path, fronts.law, fronts.sensors)
             log_l = log_likelihoods(which, runs, fronts.readings, fronts.errors)
             total = np.logaddexp(total, np.log(share) + log_l)
@@ -102,12 +103,12 @@ class Grid:
         return np.asarray(self.box[:, :1] + reach * self.cell[:, None])
 
 
-def releases(event: Event, length_m: float, n: int) -> list[tuple[float, float]]:
-    """Places and their probabilities: midpoints of a normal distribution cut off where the track ends."""
+def releases(event: Event, ends_m: tuple[float, float], n: int) -> list[tuple[float, float]]:
+    """Places and their probabilities: midpoints of a normal distribution cut off where the terrain ends."""
     if not event.release_sd_m:
         return [(event.release_s_m, 1.0)]
     mean, sd = event.release_s_m, event.release_sd_m
-    edges = np.linspace(max(0.0, mean - 5 * sd), min(length_m, mean + 5 * sd), n + 1)
+    edges = np.linspace(max(ends_m[0], mean - 5 * sd), min(ends_m[1], mean + 5 * sd), n + 1)
     shares = np.diff(norm.cdf(edges, mean, sd))
     return list(zip(0.5 * (edges[1:] + edges[:-1]), shares / shares.sum(), strict=True))
 

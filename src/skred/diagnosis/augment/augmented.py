@@ -13,8 +13,8 @@ from skred.diagnosis.augment.problem import (
 from skred.diagnosis.compare.between import ways_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import FINE
-from skred.diagnosis.tabulated.coefficient_grid import TABLES, locate
-from skred.diagnosis.tabulated.tables import Tables, build_tables, wide_tables
+from skred.diagnosis.tabulated.coefficient_grid import TABLES, from_nothing, locate
+from skred.diagnosis.tabulated.tables import Tables, build_tables
 from skred.inference.between_events import BetweenEvents
 
 
@@ -58,7 +58,9 @@ def augmented_problem(
 def _differing(base: Base, curve: Curve, way: BetweenEvents) -> AugmentedProblem:
     """With one mechanism in which avalanches differ: tables around where that way has populations."""
     found, added = ways_of(base, curve)[way], added_strengths([curve], [way])
-    return _with_tables(base, added, wide_tables(base, curve, found.populations, FINE, *found.strength))
+    # Half the steps of a comparison's: what is left of errors there is between the strengths.
+    located = from_nothing(curve, found.populations, *found.strength).finer
+    return _with_tables(base, added, build_tables(base, extension_with(base, added), located, FINE))
 
 
 def _with_tables(base: Base, added: tuple[AddedStrength, ...], tables: Tables) -> AugmentedProblem:

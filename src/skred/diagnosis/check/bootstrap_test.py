@@ -21,11 +21,11 @@ from numpy.typing import NDArray
 
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
 from skred.diagnosis.check.by_fronts import log_odds_by_fronts
-from skred.diagnosis.check.limits import LIMIT, NOTHING_AT_MOST
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
 from skred.diagnosis.evidence.linear_mixed_model import Scores, fit_population
+from skred.diagnosis.limits import LIMIT, NOTHING_AT_MOST
 from skred.parallel.threads import side_by_side, threads
 
 FloatArray = NDArray[np.float64]

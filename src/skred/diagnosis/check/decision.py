@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from skred.diagnosis.check.limits import HELD, LIMIT, NOTHING_AT_MOST
 from skred.diagnosis.evidence.prior_odds import NOTHING, SHARES, UNLISTED, same_term
+from skred.diagnosis.limits import HELD, LIMIT, NOTHING_AT_MOST
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.check.limits import HELD
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
 from skred.diagnosis.discrepancy.profile import Kind, Profile, most_probable, spline_basis
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.prior_odds import UNLISTED
+from skred.diagnosis.limits import HELD
 from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.stretches import is_opposed
 

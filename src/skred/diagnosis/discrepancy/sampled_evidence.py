@@ -21,7 +21,7 @@ from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, weighted_d
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.refit import Rounds, refit
-from skred.diagnosis.evidence.tolerance import ENOUGH
+from skred.diagnosis.evidence.tolerance import STANDARD_ERROR
 
 FloatArray = NDArray[np.float64]
 _AT_ONCE = 32
@@ -37,7 +37,7 @@ def sampled(
     least: float = -math.inf,
     seed: int = 0,
     n: int = _DRAWS,
-    enough: float = ENOUGH,
+    enough: float = STANDARD_ERROR,
 ) -> Profile:
     """A profile with its log Bayes factor over all priors by importance sampling of its values.
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln
 
-from skred.diagnosis.evidence.tolerance import ENOUGH, MOST_ROUNDS
+from skred.diagnosis.evidence.tolerance import MOST_ROUNDS, STANDARD_ERROR
 
 FloatArray = NDArray[np.float64]
 DRAWS = 200
@@ -171,7 +171,7 @@ def weighted_draws(
     proposal: Mixture,
     rng: np.random.Generator,
     n: int = DRAWS,
-    enough: float = ENOUGH,
+    enough: float = STANDARD_ERROR,
     least: float = -math.inf,
     mode_near: Callable[[FloatArray], Mode] | None = None,
 ) -> Weighted:

@@ -22,7 +22,7 @@ from skred.diagnosis.evidence.population_target import (
     log_targets,
     slopes,
 )
-from skred.diagnosis.evidence.tolerance import ENOUGH
+from skred.diagnosis.evidence.tolerance import STANDARD_ERROR
 from skred.inference.hierarchical.surface import Nodes
 
 FloatArray = NDArray[np.float64]
@@ -132,7 +132,7 @@ def importance_evidence(
     nodes: Nodes, log_scale: FloatArray, found: Evidence, seed: int
 ) -> tuple[float, float]:
     """Evidence by importance sampling from the Laplace approximation on, and its standard error in nats."""
-    weighted = _weighted(nodes, log_scale, found, np.random.default_rng([seed, 11]), DRAWS, ENOUGH)
+    weighted = _weighted(nodes, log_scale, found, np.random.default_rng([seed, 11]), DRAWS, STANDARD_ERROR)
     return weighted.log_integral + log_correlation_constant(len(log_scale)), weighted.error
 
 

@@ -1,6 +1,6 @@
 """One tolerance for all that is compared: how well evidence is known, what decides nothing, what counts."""
 
-ENOUGH = 0.1
+STANDARD_ERROR = 0.1
 """Standard error of a log integral, in nats, at which there are enough draws."""
 DECIDES_NOTHING = 1.0
 """Nats that decide nothing between two answers: what is closer than that counts as equally good."""

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.check.limits import LIMIT
 from skred.diagnosis.compare.between import TABLES, gains_of
 from skred.diagnosis.compare.candidate import Candidate, log_gain
 from skred.diagnosis.compare.comparison import Comparison
@@ -29,6 +28,7 @@ from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.evidence.refit import Fit
 from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
+from skred.diagnosis.limits import LIMIT
 from skred.parallel.threads import side_by_side
 
 FloatArray = NDArray[np.float64]

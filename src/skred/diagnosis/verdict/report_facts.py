@@ -15,11 +15,11 @@ from skred.campaign import Campaign, Status
 from skred.diagnosis.augment.coefficient import augmented_of
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import TIED_NATS, decide
-from skred.diagnosis.check.limits import LIMIT, NOTHING_AT_MOST
 from skred.diagnosis.compare.comparison import ERROR_SHARES, Comparison
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.discrepancy.profile import AMPLITUDES, KINDS, LENGTHS_M, NEAR_M
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
+from skred.diagnosis.limits import LIMIT, NOTHING_AT_MOST
 from skred.diagnosis.outcome import (
     Diagnosis,
     MechanismsAdded,

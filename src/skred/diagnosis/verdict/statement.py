@@ -8,9 +8,9 @@ from typing import Any
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import Decision
-from skred.diagnosis.check.limits import NOTHING_AT_MOST
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.evidence.prior_odds import NOTHING, SHARES, UNLISTED
+from skred.diagnosis.limits import NOTHING_AT_MOST
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
 from skred.diagnosis.verdict.between import between_sentence
 from skred.diagnosis.verdict.hangs_on import carried, hangs_on
