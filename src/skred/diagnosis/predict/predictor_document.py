@@ -115,10 +115,10 @@ def _profile(entry: Mapping[str, Any]) -> ProfileTerm:
 
 
 def _places(document: Mapping[str, Any], key: str, most: int) -> FloatArray:
-    """Increasing places on the track [m], two or more."""
+    """Increasing places [m], two or more; below 0 where terrain goes on above the track's first point."""
     places = _column(document, key, most)
-    if len(places) < 2 or places[0] < 0.0 or np.any(np.diff(places) <= 0.0):
-        raise InputError(f"predictor: {key}: expected two or more increasing places on the track")
+    if len(places) < 2 or np.any(np.diff(places) <= 0.0):
+        raise InputError(f"predictor: {key}: expected two or more increasing places")
     return places
 
 
