@@ -10,7 +10,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
 
 from skred.diagnosis.discrepancy.climb import climb, expanded_at, start_from
@@ -74,7 +73,7 @@ def fit_profile(
     if near is not None:
         starts.append(expanded_at(base, kind, at, *near))
     shares = priors_of(kind, at)
-    covers = {prior: block_diag(np.diag(np.square(free)), prior.cover(at)) for prior in shares}
+    covers = {prior: _with_free(free, prior.cover(at)) for prior in shares}
     explored = ExploredPriors(height, shares, covers)
     if again is None:
         waiting, maximum_under, most = _first(kind, starts[-1], explored), _maximum_under, _PRIORS_TRIED
@@ -91,6 +90,14 @@ def fit_profile(
     cover, values = 0.5 * (cover + cover.T)[len(free) :, len(free) :], maximum.values[len(free) :]
     gain = maximum.fit.found.log_evidence - height
     return Profile(kind, prior, at, values, cover, explored.log_factor, gain, maximum.fit, explored.modes)
+
+
+def _with_free(scales: Sequence[float], cover: FloatArray) -> FloatArray:
+    """Covariance of strengths that are free and of a profile's values; not scipy's, see `comparison`."""
+    n = len(scales)
+    found = np.zeros((n + len(cover),) * 2)
+    found[:n, :n], found[n:, n:] = np.diag(np.square(scales)), cover
+    return found
 
 
 def mode_at(base: Base, profile: Profile, values: FloatArray) -> Mode:
