@@ -36,15 +36,21 @@ def may_differ(mechanism: Mechanism) -> bool:
 
 
 def with_ways(base: Base, candidates: Mapping[str, Candidate], pool: Executor) -> dict[str, Candidate]:
-    """Candidates, the most probable ones with what they gain where avalanches differ in their strength."""
-    found = dict(candidates)
-    differ = [one for one in candidates.values() if may_differ(one.mechanism)]
-    least = max(max((one.alone for one in differ), default=0.0) - COUNTS, 0.0)
-    leading = [one for one in differ if one.alone > least]
-    gains = pool.map(partial(gains_of, base), [one.best for one in leading])
-    for one, gained in zip(leading, gains, strict=True):
-        found[one.mechanism.id] = replace(one, ways=gained)
-    return found
+    """Candidates that have evidence with what they gain where avalanches differ in their strength.
+
+    Those that may count then by finer tables. One that is far behind with a strength in common may gain more
+    by this than what leads does.
+    """
+    looked = [one for one in candidates.values() if may_differ(one.mechanism) and one.alone > 0.0]
+
+    def gained(some: Sequence[Candidate], budgets: Sequence[Budget]) -> list[Candidate]:
+        gains = pool.map(partial(gains_of, base, budgets=budgets), [one.best for one in some])
+        return [replace(one, ways=ways) for one, ways in zip(some, gains, strict=True)]
+
+    looked = gained(looked, TABLES[:1])
+    least = max((one.log_bayes_factor for one in looked), default=0.0) - COUNTS
+    found = [*looked, *gained([one for one in looked if one.log_bayes_factor > least], TABLES)]
+    return {**candidates, **{one.mechanism.id: one for one in found}}
 
 
 def gains_of(base: Base, curve: Curve, budgets: Sequence[Budget] = TABLES) -> dict[BetweenEvents, float]:
