@@ -84,8 +84,8 @@ The *newest batch* is {newest}, the last that was sealed. Intervals in brackets 
 what the linearised model expects of a perfect method in the blind run. Criteria leave compensated effects
 out; these have a table of their own.
 """
-_EARLIER = f"""The same campaigns, by the code of commit 7d03b1a as well, side by side on one machine. That
-version had no global starts, took avalanches to have every added strength in common, named a
+_EARLIER = f"""The campaigns of batch {{}}, by the code of commit 7d03b1a as well, side by side on one
+machine. That version had no global starts, took avalanches to have every added strength in common, named a
 term that two mechanisms share by one of them, and compared no mechanism with a force beside
 it. *p* is that of a sign test of trials that one version has right and the other has not. Rows
 on effects take those with a signal-to-noise of {STRONG:g} and more, and open ones but for the
@@ -133,9 +133,9 @@ def page(figures: Sequence[str], run: Found) -> str:
     parts += [f"![{name.replace('_', ' ')}](figures/proof-{name}.png)\n" for name in figures]
     parts += ["Open and compensated effects of the blind run:\n", _open_and_compensated(run)]
     parts += ["What was hidden in the blind run:\n", _by_hidden(run["trials"])]
-    if EARLIER in answers_of(newest):
-        trials, answers = gathered([newest])
-        parts += ["## The newest batch by an earlier version\n", _EARLIER, beside(trials, answers)]
+    for batch in [one for one in every if EARLIER in answers_of(one)][-1:]:
+        trials, answers = gathered([batch])
+        parts += ["## A batch by an earlier version\n", _EARLIER.format(batch.name), beside(trials, answers)]
     parts += ["## Every batch\n", _ORDER.format(strong=STRONG), _by_batch(every, lines)]
     parts += ["## The full record\n", _FULL.format(command=COMMAND, kept=KEPT)]
     return "\n".join(parts)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-MOST_BYTES = 3 * 2**20
+MOST_BYTES = 7 * 2**19
 START = 'if __name__ == "__main__":'
 ASK_EACH = """
 import contextlib, io, json, runpy, sys
