@@ -131,15 +131,6 @@ class Curve:
         """The fits by strength."""
         return dict(zip(self.strengths.tolist(), self.fits, strict=True))
 
-    def joined(self, other: Curve) -> Curve:
-        """With another curve's strengths, of the same mechanism, shape and budget."""
-        strengths, numbers = np.unique(np.concatenate([self.strengths, other.strengths]), return_index=True)
-        heights = np.concatenate([self.log_evidence, other.log_evidence])[numbers]
-        fits = [*self.fits, *other.fits]
-        return replace(
-            self, strengths=strengths, log_evidence=heights, fits=tuple(fits[number] for number in numbers)
-        )
-
     def fine(self, scale: float | None = None) -> tuple[FloatArray, FloatArray]:
         """Strengths on a fine grid, and the log posterior density there, not normalised."""
         added = self.mechanism.added

@@ -55,15 +55,12 @@ class Start(NamedTuple):
     ----------
     strength, sd : float
         In the coefficient's unit.
-    height : float
-        Log posterior density there, the events' strengths integrated, relative to no coefficient.
     fit : Fit
         Population and events there; its evidence is not known.
     """
 
     strength: float
     sd: float
-    height: float
     fit: Fit
 
 
@@ -192,7 +189,6 @@ def global_starts(
     climb = _Climb(extension, rows, held, scale, either_sign)
     population = Population(*(np.repeat(part, n_groups, axis=0) for part in begin[0]))
     state = climb.at(starts, population, np.tile(begin[1], (n_groups, 1)), _CLIMB)
-    nil = float(state.height[starts == 0.0][0])
     for _ in range(_ROUNDS):
         before, state = state, climb.moved(state)
         if (state.height <= before.height + ARRIVED).all():
@@ -203,12 +199,7 @@ def global_starts(
     for k in np.argsort(-state.height):
         population = Population(*(part[k : k + 1] for part in state.population))
         points = state.modes.points[k * n_events : (k + 1) * n_events]
-        one = Start(
-            float(state.strengths[k]),
-            float(sd[k]),
-            float(state.height[k]) - nil,
-            Fit(unfitted(population), points),
-        )
+        one = Start(float(state.strengths[k]), float(sd[k]), Fit(unfitted(population), points))
         if all(abs(one.strength - other.strength) > _SAME * other.sd for other in found):
             found.append(one)
     return found
