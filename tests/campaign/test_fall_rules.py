@@ -53,11 +53,16 @@ def test_speeds_in_km_h_are_told_once(tmp_path):
 @pytest.mark.parametrize("status", ["observed", "at_least"])
 def test_one_speed_above_a_free_fall(status, texts, folder_with):
     sd = np.hypot(0.1 * LIMIT, 1.0)
-    read_campaign(folder_with({"recordings.csv": upper(texts, LIMIT + 4 * sd, status)}))
-    [problem] = problems_of(folder_with({"recordings.csv": upper(texts, LIMIT + 5 * sd, status)}))
+    exact = {"events.csv": texts["events.csv"].replace("first,0,5", "first,0,")}
+
+    def with_speed(*given, **more):
+        return folder_with({**exact, "recordings.csv": upper(texts, *given, **more)})
+
+    read_campaign(with_speed(LIMIT + 4 * sd, status))
+    [problem] = problems_of(with_speed(LIMIT + 5 * sd, status))
     assert "reaches sensor 'upper' with 39.6 m/s; are" in problem.message
-    read_campaign(folder_with({"recordings.csv": upper(texts, LIMIT + 5 * sd, "at_most")}))
-    read_campaign(folder_with({"recordings.csv": upper(texts, LIMIT + 5 * sd, status, sd=6)}))
+    read_campaign(with_speed(LIMIT + 5 * sd, "at_most"))
+    read_campaign(with_speed(LIMIT + 5 * sd, status, sd=6))
 
 
 def test_a_span_falls_to_its_lowest_point(texts, folder_with):
@@ -79,3 +84,12 @@ def test_a_noted_release_is_not_trusted(texts, folder_with):
     """That it is noted too far down is a fault that a diagnosis finds; it is not refused here."""
     events = texts["events.csv"].replace("first,0,5", "first,95,")
     read_campaign(folder_with({"events.csv": events}))
+
+
+def test_an_uncertain_release_may_be_above_the_track(texts, folder_with):
+    """Its first slope goes on there; an exact one begins on the track."""
+    too_fast = {"recordings.csv": upper(texts, LIMIT + 5 * np.hypot(0.1 * LIMIT, 1.0))}
+    exact = {**too_fast, "events.csv": texts["events.csv"].replace("first,0,5", "first,0,")}
+    wide = {**too_fast, "events.csv": texts["events.csv"].replace("first,0,5", "first,0,20")}
+    assert problems_of(folder_with(exact))
+    read_campaign(folder_with(wide))

@@ -133,14 +133,18 @@ class _Drop:
         """Speed of a free fall there, m/s.
 
         From rest it may begin anywhere above: a release may not be where it was noted, which is what a
-        diagnosis is to find. A speed at the release is known there and nowhere else.
+        diagnosis is to find. A speed at the release is known there and nowhere else. Where the track begins
+        near an uncertain release, its first slope goes on above.
         """
         start = release.number_or_none("release_speed_m_s") or 0.0
+        release_m = release.number("release_s_m") - release_reach(release)
         highest_m = self._highest_m
         if start > 0:
-            release_m = release.number("release_s_m") - release_reach(release)
             highest_m = self._between(release_m, self._end_m).max()
             start += LARGEST_SDS * (release.number_or_none("release_speed_sd_m_s") or 0.0)
+        if release_m < 0.0:
+            (first_m, second_m), (top_m, next_m) = self.track.s_m[:2], self.track.z_m[:2]
+            highest_m = max(highest_m, top_m - release_m * (top_m - next_m) / (second_m - first_m))
         return sqrt(start**2 + 2.0 * GRAVITY * max(float(highest_m - self._lowest_m), 0.0))
 
     def _between(self, from_m: float, to_m: float) -> np.ndarray:

@@ -78,7 +78,7 @@ class Terrain:
     def continued_up(self, first_m: float) -> Terrain:
         """With its first slope going on above its first point, to a negative place [m] or just beyond."""
         cell = float(self.edge_s_m[1] - self.edge_s_m[0])
-        n = max(int(np.ceil((float(self.edge_s_m[0]) - first_m) / cell)), 0)
+        n = max(int(np.ceil((float(self.edge_s_m[0]) - first_m) / cell - 1e-9)), 0)
         above = float(self.edge_s_m[0]) - cell * np.arange(n, 0, -1)
         return Terrain(
             np.concatenate([above, self.edge_s_m]),

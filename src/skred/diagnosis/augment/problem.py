@@ -276,7 +276,9 @@ class AugmentedProblem(HierarchicalProblem):
         old = self.tables
         wide = old.budget.over_population * 2 ** math.ceil(math.log2(2 + n_chains))
         budget = old.budget.times(2)._replace(over_population=wide)
-        tables = build_tables(self.base, self.extension, old.located.finer, budget, visited)
+        # Of two strengths, half the steps are four times the tables.
+        located = old.located.finer if len(self.added) == 1 else old.located
+        tables = build_tables(self.base, self.extension, located, budget, visited)
         return replace(self, tables=tables, refined=True)
 
     def surfaces(self, mechanisms: Sequence[Mechanism]) -> Surfaces:

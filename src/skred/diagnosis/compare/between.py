@@ -12,6 +12,8 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import FINE, Budget
@@ -44,13 +46,21 @@ def with_ways(base: Base, candidates: Mapping[str, Candidate], pool: Executor) -
     looked = [one for one in candidates.values() if may_differ(one.mechanism) and one.alone > 0.0]
 
     def gained(some: Sequence[Candidate], budgets: Sequence[Budget]) -> list[Candidate]:
-        gains = pool.map(partial(gains_of, base, budgets=budgets), [one.best for one in some])
+        gains = pool.map(partial(_gains_or_none, base, budgets=budgets), [one.best for one in some])
         return [replace(one, ways=ways) for one, ways in zip(some, gains, strict=True)]
 
     looked = gained(looked, TABLES[:1])
     least = max((one.log_bayes_factor for one in looked), default=0.0) - COUNTS
     found = [*looked, *gained([one for one in looked if one.log_bayes_factor > least], TABLES)]
     return {**candidates, **{one.mechanism.id: one for one in found}}
+
+
+def _gains_or_none(base: Base, curve: Curve, budgets: Sequence[Budget]) -> dict[BetweenEvents, float] | None:
+    """What each way has more; None where some way has no density that draws find."""
+    try:
+        return gains_of(base, curve, budgets)
+    except np.linalg.LinAlgError:
+        return None
 
 
 def gains_of(base: Base, curve: Curve, budgets: Sequence[Budget] = TABLES) -> dict[BetweenEvents, float]:

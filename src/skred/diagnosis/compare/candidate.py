@@ -66,8 +66,8 @@ class Candidate:
     log_weights : (n_curves,) array
         Prior weight of each shape; they sum to 1.
     correction : float
-        What many more nodes, and importance sampling over the population, change along the best curve, in
-        nats; 0 where not looked at.
+        What many more quadrature points, and importance sampling over the population, change along the best
+        curve, in nats; 0 where not looked at.
     error : float or None
         Standard error of the log Bayes factor by importance sampling, in nats; None where not looked at.
     residue : float or None

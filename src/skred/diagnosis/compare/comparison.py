@@ -231,7 +231,7 @@ def worth_comparing(curves: Sequence[Curve], behind: float) -> list[Curve]:
     """
     heights = np.array([one.log_bayes_factor for one in curves])
     may_have = heights + np.maximum(heights, 0.0) + COUNTS - behind
-    best = max(float(heights.max()), 0.0)
+    best = float(heights.max(initial=0.0))
     names = {one.mechanism.id for one, most in zip(curves, may_have, strict=True) if most > best}
     return [one for one in curves if one.mechanism.id in names]
 

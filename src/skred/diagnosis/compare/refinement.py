@@ -28,7 +28,7 @@ _HOLDS_MUCH = 0.2
 """Share of its mechanism's evidence from which a shape is parted: four at most."""
 _MORE = 2.0
 """As many times its nats a mechanism may have once it is parted: 1.6 times were seen, of drag between the dam
-and the sensor above it at Ryggfonn. One that does not come up to the best even so is not parted."""
+and the sensor above it at Ryggfonn. One that cannot count beside the best even so is not parted."""
 _LEVELS = 4
 """How many times a shape is parted: the last steps are an eighth of the first, some metres."""
 _SMALLER = 0.5
@@ -108,7 +108,7 @@ def leading(parts: Sequence[Part]) -> list[int]:
     height = {
         name: float(np.logaddexp.reduce([one.log_factor for one in own])) for name, own in _by_id(parts)
     }
-    least = max(max(height.values()) - COUNTS, 0.0)
+    least = max(max(height.values(), default=0.0) - COUNTS, 0.0)
     return [
         k
         for k, one in enumerate(parts)

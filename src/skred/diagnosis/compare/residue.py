@@ -1,13 +1,12 @@
 """A named effect and a residue: a listed mechanism with a force that is in no list beside it.
 
 A force of any shape takes a second, small effect along with the first, and then wins over the mechanism that
-explains nearly everything. So a mechanism is also compared together with such a force: with the probability
-that something beside a mechanism is in no list, it is that pair.
+explains nearly everything. So a mechanism is also compared together with such a force; that this is there as
+well has even odds then.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
@@ -17,7 +16,7 @@ import numpy as np
 
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.discrepancy.climb import start_from
-from skred.diagnosis.discrepancy.fit import fit_profile
+from skred.diagnosis.discrepancy.fit import Free, fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Profile, knots, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base
 from skred.physics.mechanisms.spec import Group
@@ -26,7 +25,7 @@ from skred.physics.mechanisms.spec import Group
 def with_residues(
     base: Base, candidates: Mapping[str, Candidate], profiles: Sequence[Profile], pool: Executor
 ) -> dict[str, Candidate]:
-    """Candidates, where a force not in the list has more evidence the best mechanisms with it beside them."""
+    """Candidates, those that a force in no list has up to twice the evidence of with it beside them."""
     found, force = dict(candidates), log_evidence_of(profiles)
     physics = [one for one in candidates.values() if one.mechanism.group is Group.PHYSICS]
     looked = [one for one in physics if 0.5 * force < one.log_bayes_factor < force]
@@ -49,7 +48,8 @@ def _residue(base: Base, candidate: Candidate) -> float:
     wide = replace(
         base, directions=(*base.directions, best.direction), strengths=np.append(base.strengths, 0.0)
     )
-    scale, start = added.scale_of(best.shape), start_from(base, best.fits[top])
     values = np.append(best.strengths[top], np.zeros(len(knots(base.setting))))
-    both = log_evidence_of([fit_profile(wide, kind, (values, start), free=[scale]) for kind in KINDS])
-    return both + (0.0 if added.either_sign else math.log(2.0)) - best.log_bayes_factor
+    near = values, start_from(base, best.fits[top])
+    prior = Free(added.scale_of(best.shape), added.either_sign)
+    both = log_evidence_of([fit_profile(wide, kind, near, free=[prior]) for kind in KINDS])
+    return both - best.log_bayes_factor

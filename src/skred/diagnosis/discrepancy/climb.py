@@ -54,7 +54,7 @@ def climb(base: Base, kind: Kind, at: FloatArray, start: Expansion, cover: Float
         Places of the knots [m].
     start : Expansion
         Around the values to begin from.
-    cover : (n_free + n_knots,) * 2 array
+    cover : (n_free + n_knots, n_free + n_knots) array
         Covariance of the values under the prior.
     """
     maximum = start

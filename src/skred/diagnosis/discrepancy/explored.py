@@ -26,13 +26,13 @@ class Expansion:
 
     Attributes
     ----------
-    values : (n_knots,) array
-        Around which.
+    values : (n,) array
+        Around which: strengths that are free beside the profile, if there are any, then it at its knots.
     fit : Fit
         Population and events with these values in.
-    score : (n_knots,) array
+    score : (n,) array
         Slope of the log likelihood there, what is known of population and events taken out.
-    information : (n_knots, n_knots) array
+    information : (n, n) array
         Its negative curvature.
     """
 
@@ -53,8 +53,8 @@ class Laplace(NamedTuple):
         What the prior takes off at those values.
     occam_penalty : float
         What it takes off for the room that it gives to all others.
-    values : (n_knots,) array
-    covariance : (n_knots, n_knots) array
+    values : (n,) array
+    covariance : (n, n) array
         Of the values, by prior and recordings together.
     """
 
@@ -169,7 +169,7 @@ def laplace(maximum: Expansion, height: float, cover: FloatArray) -> Laplace:
         Around a maximum, which may be under another prior.
     height : float
         Log evidence of no force.
-    cover : (n_knots, n_knots) array
+    cover : (n, n) array
         Covariance of the values under the prior.
     """
     precision = np.linalg.inv(cover)

@@ -6,7 +6,9 @@ other; from there on by the Laplace approximation.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,12 +43,19 @@ _PRIORS_AGAIN = 4
 """The same where a fit to all avalanches is at hand: those close to its prior, and those that lead then."""
 
 
+class Free(NamedTuple):
+    """Prior of a strength that is fitted beside a force: its scale, and whether it may be negative."""
+
+    scale: float
+    either_sign: bool
+
+
 def fit_profile(
     base: Base,
     kind: Kind,
     near: Start | None = None,
     again: Prior | None = None,
-    free: Sequence[float] = (),
+    free: Sequence[Free] = (),
 ) -> Profile:
     """Fit the profile by Gauss-Newton steps around the events' modes; evidence by quadrature at the maximum.
 
@@ -61,9 +70,9 @@ def fit_profile(
     again : Prior, optional
         Under which to climb first: `near` is what was found for it by all of some avalanches, of which the
         base has a part. Fewer priors are climbed under then, and from one start each.
-    free : sequence of float, optional
-        Scales of the normal priors of strengths of the base's last directions: these are fitted too, and the
-        evidence is that of both against neither.
+    free : sequence of Free, optional
+        Priors of strengths of the base's last directions, if these are to be fitted too: the evidence is that
+        of both against neither then.
     """
     at = knots(base.setting)
     # Nothing like everything else, so that what is left of integration errors is the same there.
@@ -73,7 +82,7 @@ def fit_profile(
     if near is not None:
         starts.append(expanded_at(base, kind, at, *near))
     shares = priors_of(kind, at)
-    covers = {prior: _with_free(free, prior.cover(at)) for prior in shares}
+    covers = {prior: _with_free([one.scale for one in free], prior.cover(at)) for prior in shares}
     explored = ExploredPriors(height, shares, covers)
     if again is None:
         waiting, maximum_under, most = _first(kind, starts[-1], explored), _maximum_under, _PRIORS_TRIED
@@ -87,9 +96,13 @@ def fit_profile(
     prior = max(explored.maxima, key=explored.factor)
     maximum = explored.maxima[prior]
     cover = np.linalg.inv(maximum.information + np.linalg.inv(covers[prior]))
+    factor = explored.log_factor
+    for value, variance, one in zip(maximum.values, np.diag(cover), free, strict=False):
+        if not one.either_sign:  # a half-normal prior is twice the normal one, above nil alone
+            factor += math.log(max(math.erfc(-value / math.sqrt(2.0 * variance)), 1e-300))
     cover, values = 0.5 * (cover + cover.T)[len(free) :, len(free) :], maximum.values[len(free) :]
-    gain = maximum.fit.found.log_evidence - height
-    return Profile(kind, prior, at, values, cover, explored.log_factor, gain, maximum.fit, explored.modes)
+    gain, modes = maximum.fit.found.log_evidence - height, () if free else explored.modes
+    return Profile(kind, prior, at, values, cover, factor, gain, maximum.fit, modes)
 
 
 def _with_free(scales: Sequence[float], cover: FloatArray) -> FloatArray:

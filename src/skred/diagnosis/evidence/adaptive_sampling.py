@@ -108,11 +108,10 @@ class Mixture(NamedTuple):
             covariances[k] += trust * (away.T @ (weights[:, None] * away) - self.covariances[k])
         return Mixture(np.log(0.5 * np.exp(self.log_weights) + 0.5 * total), means, covariances)
 
-    def joined_by(self, mode: Mode) -> Mixture:
-        """With one mode more, and as many draws on it as the others have on average."""
-        log_share = -math.log(1 + len(self.means))
+    def joined_by(self, mode: Mode, share: float) -> Mixture:
+        """With one mode more, and a share of the draws on it."""
         return Mixture(
-            np.append(self.log_weights + math.log1p(-math.exp(log_share)), log_share),
+            np.append(self.log_weights + math.log1p(-share), math.log(share)),
             np.vstack([self.means, mode.mean]),
             np.concatenate([self.covariances, mode.covariance[None]]),
         )
@@ -212,7 +211,10 @@ def weighted_draws(
         if mode_near is not None and shares.max() > _ODD:
             # Where fronts stop there are more modes than climbs find: so do Raftery and Bao, 2010,
             # doi 10.1111/j.1541-0420.2010.01399.x.
-            following, first = following.joined_by(mode_near(draws[np.argmax(shares)])), len(turns)
+            # It gets what the draw that showed it has of all weight, and no less of the next draws.
+            share = min(float(shares.max()), 0.5)
+            following = following.joined_by(mode_near(draws[np.argmax(shares)]), share)
+            first = len(turns)
         proposals.append(following)
 
 

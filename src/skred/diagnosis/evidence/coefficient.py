@@ -36,8 +36,9 @@ from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
 
 FloatArray = NDArray[np.float64]
-_NEAR = (-3.5, -2.0, -1.0, 0.0, 1.0, 2.0, 3.5)
-"""Strengths around what was found before, in its standard deviations: to two thousandths of the density."""
+_NEAR = (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0)
+"""Strengths around what was found before, in its standard deviations: a normal posterior has fallen by eight
+nats at the ends, more than `COUNTS`."""
 _SMALLEST = 1e-3
 """Strength, and standard deviation of one, below which nothing is told apart, in scales of the prior."""
 _BETWEEN = 60

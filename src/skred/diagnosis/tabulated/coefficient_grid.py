@@ -143,15 +143,20 @@ def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located
         mean, factor = _moments(grid, density)
         at = np.stack(np.unravel_index(np.flatnonzero(counts), grid.size), axis=1)
         inside = (points[counts] > low + slack) & (points[counts] < high - slack)
-        goes_on = np.any(((at == 0) | (at == grid.size - 1)) & inside)
+        below, above = (((at == edge) & inside).any(axis=0) for edge in (0, grid.size - 1))
         # The first grid is of what each curve says alone.
-        if look > 0 and not goes_on:
+        if look > 0 and not (below | above).any():
             break
         white = np.linalg.solve(factor, (points[counts] - mean).T).T
+        first, last = white.min(axis=0), white.max(axis=0)
         step = np.abs(np.linalg.solve(factor, grid.steps)).max(axis=1)
-        before, reach = grid, (white.min(axis=0) - step, white.max(axis=0) + step)
-        grid = _grid(mean, factor, reach, (low, high))
+        # Where the posterior goes on beyond an end, half as far again; else one step beyond what counts.
+        farther = np.maximum(0.5 * (last - first), step)
+        reach = first - np.where(below, farther, step), last + np.where(above, farther, step)
+        before, grid = grid, _grid(mean, factor, reach, (low, high))
         near = [fits[k] for k in before.nearest(grid.points)]
+    else:
+        fits = _fitted(base, extension, grid.points, near)
     return Located(grid, fits, mean, factor)
 
 
