@@ -46,7 +46,7 @@ def with_ways(base: Base, candidates: Mapping[str, Candidate], pool: Executor) -
     looked = [one for one in candidates.values() if may_differ(one.mechanism) and one.alone > 0.0]
 
     def gained(some: Sequence[Candidate], budgets: Sequence[Budget]) -> list[Candidate]:
-        gains = pool.map(partial(_gains_or_none, base, budgets=budgets), [one.best for one in some])
+        gains = pool.map(partial(gains_or_none, base, budgets=budgets), [one.best for one in some])
         return [replace(one, ways=ways) for one, ways in zip(some, gains, strict=True)]
 
     looked = gained(looked, TABLES[:1])
@@ -55,7 +55,7 @@ def with_ways(base: Base, candidates: Mapping[str, Candidate], pool: Executor) -
     return {**candidates, **{one.mechanism.id: one for one in found}}
 
 
-def _gains_or_none(base: Base, curve: Curve, budgets: Sequence[Budget]) -> dict[BetweenEvents, float] | None:
+def gains_or_none(base: Base, curve: Curve, budgets: Sequence[Budget]) -> dict[BetweenEvents, float] | None:
     """What each way has more; None where some way has no density that draws find."""
     try:
         return gains_of(base, curve, budgets)

@@ -31,16 +31,16 @@ def with_residues(
     looked = [one for one in physics if 0.5 * force < one.log_bayes_factor < force]
     for one, residue in zip(looked, pool.map(partial(_residue, base), looked), strict=True):
         # What a mechanism leaves is no residue if it is more than what it explains.
-        if residue < one.log_bayes_factor:
+        if residue is not None and residue < one.log_bayes_factor:
             found[one.mechanism.id] = replace(one, residue=residue)
     return found
 
 
-def _residue(base: Base, candidate: Candidate) -> float:
+def _residue(base: Base, candidate: Candidate) -> float | None:
     """Log Bayes factor of a force not in the list beside a mechanism of its best shape, against it alone.
 
     Both are fitted together: beside such a force a mechanism is as strong as it is, and not as strong as it
-    has to be for both.
+    has to be for both. None where a step leads to what no front can do, as a drag far below nil.
     """
     best, added = candidate.best, candidate.mechanism.added
     assert added is not None
@@ -51,5 +51,8 @@ def _residue(base: Base, candidate: Candidate) -> float:
     values = np.append(best.strengths[top], np.zeros(len(knots(base.setting))))
     near = values, start_from(base, best.fits[top])
     prior = Free(added.scale_of(best.shape), added.either_sign)
-    both = log_evidence_of([fit_profile(wide, kind, near, free=[prior]) for kind in KINDS])
+    try:
+        both = log_evidence_of([fit_profile(wide, kind, near, free=[prior]) for kind in KINDS])
+    except np.linalg.LinAlgError:
+        return None
     return both - best.log_bayes_factor

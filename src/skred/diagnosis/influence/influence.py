@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.compare.between import TABLES, gains_of
+from skred.diagnosis.compare.between import TABLES, gains_or_none
 from skred.diagnosis.compare.candidate import Candidate, log_gain
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.discrepancy.fit import fit_profile
@@ -197,7 +197,7 @@ def _of_mechanism(candidate: Candidate) -> Again:
         if candidate.ways is None:
             return in_common
         best = max(found, key=lambda one: one[0])[1]
-        return in_common + log_gain(None, gains_of(rest, best, TABLES[:1]))
+        return in_common + log_gain(None, gains_or_none(rest, best, TABLES[:1]))
 
     return again
 
