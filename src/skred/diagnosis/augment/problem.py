@@ -262,7 +262,7 @@ class AugmentedProblem(HierarchicalProblem):
         """The same with finer tables; None where there are such already.
 
         They also cover the populations that chains went to: far from all that the tables cover a few nodes
-        stand for all, and may promise a mode that is none.
+        stand for all, and may show a mode that is none.
         """
         if self.refined:
             return None
