@@ -124,6 +124,12 @@ def test_only_mechanisms_that_may_come_up_to_the_best_are_parted() -> None:
     assert leading(screened_parts(strong)) == [0, 1]
     assert leading(screened_parts([made("segment_drag", 0.0, -1.0)])) == []
     assert leading(screened_parts([made("segment_drag", 0.0, 4.0), made("obstacle", 0.0, -1.0)])) == [0]
+    # Nor what cannot come up to the best under another error model.
+    assert leading(screened_parts(strong), best=150.0) == [0]
+    # Smaller steps gain less: with 71 of 91 nats it is not parted any more.
+    parted = [one._replace(level=1) for one in screened_parts(strong)]
+    assert leading(parted) == [0, 1]
+    assert leading([one._replace(level=2) for one in parted]) == [0]
 
 
 def test_parting_ends(base: Base) -> None:

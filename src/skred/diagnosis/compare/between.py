@@ -37,11 +37,18 @@ def may_differ(mechanism: Mechanism) -> bool:
     )
 
 
-def with_ways(base: Base, candidates: Mapping[str, Candidate], pool: Executor) -> dict[str, Candidate]:
+def with_ways(
+    base: Base, candidates: Mapping[str, Candidate], pool: Executor, best: float = -math.inf
+) -> dict[str, Candidate]:
     """Candidates that have evidence with what they gain where avalanches differ in their strength.
 
     Those that may count then by finer tables. One that is far behind with a strength in common may gain more
     by this than what leads does.
+
+    Parameters
+    ----------
+    best : float
+        The most that a candidate has under another error model, in nats above nothing under this one.
     """
     looked = [one for one in candidates.values() if may_differ(one.mechanism) and one.alone > 0.0]
 
@@ -50,7 +57,7 @@ def with_ways(base: Base, candidates: Mapping[str, Candidate], pool: Executor) -
         return [replace(one, ways=ways) for one, ways in zip(some, gains, strict=True)]
 
     looked = gained(looked, TABLES[:1])
-    least = max((one.log_bayes_factor for one in looked), default=0.0) - COUNTS
+    least = max([best, *(one.log_bayes_factor for one in looked)]) - COUNTS
     found = [*looked, *gained([one for one in looked if one.log_bayes_factor > least], TABLES)]
     return {**candidates, **{one.mechanism.id: one for one in found}}
 

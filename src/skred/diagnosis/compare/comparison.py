@@ -211,11 +211,11 @@ def _under_errors(
         base.with_nothing(budget)
     with worker_pool() as pool:
         curves = screened(base, pool, tell, before)
-        candidates = refine(base.setting, curves, partial(curve_near, base), pool)
+        candidates = refine(base.setting, curves, partial(curve_near, base), pool, best)
         profiles = list(pool.map(partial(free_force, base, candidates=candidates), KINDS))
-        candidates, profiles = recomputed(base, candidates, profiles, pool, best)
-        candidates = with_ways(base, candidates, pool)
+        candidates = with_ways(base, candidates, pool, best)
         candidates = with_residues(base, candidates, profiles, pool)
+        candidates, profiles = recomputed(base, candidates, profiles, pool, best)
     return ComparisonUnderErrors(error_model, base, candidates, profiles, curves)
 
 

@@ -26,9 +26,10 @@ from skred.physics.mechanisms.stretches import shares
 Near = Callable[[Curve, Shape], Curve]
 _HOLDS_MUCH = 0.2
 """Share of its mechanism's evidence from which a shape is parted: four at most."""
-_MORE = 2.0
-"""As many times its nats a mechanism may have once it is parted: 1.6 times were seen, of drag between the dam
-and the sensor above it at Ryggfonn. One that cannot count beside the best even so is not parted."""
+_MORE = 1.0
+"""Share of its nats that a mechanism may gain by being parted: 0.6 were seen, of drag between the dam and the
+sensor above it at Ryggfonn. What it may gain falls with the square of the steps. One that cannot count beside
+the best even so is not parted."""
 _LEVELS = 4
 """How many times a shape is parted: the last steps are an eighth of the first, some metres."""
 _SMALLER = 0.5
@@ -66,7 +67,11 @@ class Part(NamedTuple):
 
 
 def refine(
-    setting: Setting, curves: Sequence[Curve], near: Near, pool: ThreadPoolExecutor
+    setting: Setting,
+    curves: Sequence[Curve],
+    near: Near,
+    pool: ThreadPoolExecutor,
+    best: float = -math.inf,
 ) -> dict[str, Candidate]:
     """Candidates whose leading shapes are computed anew and parted; the others as they were screened.
 
@@ -79,9 +84,11 @@ def refine(
     near : callable
         Computes the curve at a shape near that of another curve.
     pool : ThreadPoolExecutor
+    best : float
+        The most that a candidate has under another error model, in nats above nothing under this one.
     """
     parts = screened_parts(curves)
-    while todo := leading(parts):
+    while todo := leading(parts, best):
         jobs = [(k, shape) for k in todo for shape in _finer(setting, parts, k)]
         computed = pool.map(near, [parts[k].curve for k, _ in jobs], [shape for _, shape in jobs])
         others = defaultdict[int, list[Curve]](list)
@@ -103,17 +110,17 @@ def screened_parts(curves: Sequence[Curve]) -> list[Part]:
     return parts
 
 
-def leading(parts: Sequence[Part]) -> list[int]:
+def leading(parts: Sequence[Part], best: float = -math.inf) -> list[int]:
     """Numbers of those to part: where their mechanism has evidence and may come up to the best one."""
     height = {
         name: float(np.logaddexp.reduce([one.log_factor for one in own])) for name, own in _by_id(parts)
     }
-    least = max(max(height.values(), default=0.0) - COUNTS, 0.0)
+    least = max(max(best, *height.values()) - COUNTS, 0.0)
     return [
         k
         for k, one in enumerate(parts)
         if one.level < _LEVELS
-        and _MORE * (own := height[one.curve.mechanism.id]) > least
+        and (1.0 + _MORE * _SMALLER ** (2 * one.level)) * (own := height[one.curve.mechanism.id]) > least
         and one.log_factor > own + math.log(_HOLDS_MUCH)
     ]
 

@@ -11,13 +11,11 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
-
-import numpy as np
+from itertools import batched
 
 from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.discrepancy.climb import start_from
-from skred.diagnosis.discrepancy.fit import Free, fit_profile
-from skred.diagnosis.discrepancy.profile import KINDS, Profile, knots, log_evidence_of
+from skred.diagnosis.discrepancy.beside import Beside, fit_beside, with_strength
+from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base
 from skred.physics.mechanisms.spec import Group
 
@@ -29,30 +27,14 @@ def with_residues(
     found, force = dict(candidates), log_evidence_of(profiles)
     physics = [one for one in candidates.values() if one.mechanism.group is Group.PHYSICS]
     looked = [one for one in physics if 0.5 * force < one.log_bayes_factor < force]
-    for one, residue in zip(looked, pool.map(partial(_residue, base), looked), strict=True):
+    jobs = [(one.best, kind) for one in looked for kind in KINDS]
+    fits = pool.map(partial(fit_beside, base), *zip(*jobs, strict=True)) if jobs else iter(())
+    for one, of_each in zip(looked, batched(fits, len(KINDS)), strict=True):
+        fitted = tuple(profile for profile in of_each if profile is not None)
+        if len(fitted) < len(KINDS):
+            continue
+        beside = Beside(with_strength(base, one.best), one.best.log_bayes_factor, fitted)
         # What a mechanism leaves is no residue if it is more than what it explains.
-        if residue is not None and residue < one.log_bayes_factor:
-            found[one.mechanism.id] = replace(one, residue=residue)
+        if beside.log_bayes_factor < one.log_bayes_factor:
+            found[one.mechanism.id] = replace(one, beside=beside)
     return found
-
-
-def _residue(base: Base, candidate: Candidate) -> float | None:
-    """Log Bayes factor of a force not in the list beside a mechanism of its best shape, against it alone.
-
-    Both are fitted together: beside such a force a mechanism is as strong as it is, and not as strong as it
-    has to be for both. None where a step leads to what no front can do, as a drag far below nil.
-    """
-    best, added = candidate.best, candidate.mechanism.added
-    assert added is not None
-    top = int(np.argmax(best.log_evidence))
-    wide = replace(
-        base, directions=(*base.directions, best.direction), strengths=np.append(base.strengths, 0.0)
-    )
-    values = np.append(best.strengths[top], np.zeros(len(knots(base.setting))))
-    near = values, start_from(base, best.fits[top])
-    prior = Free(added.scale_of(best.shape), added.either_sign)
-    try:
-        both = log_evidence_of([fit_profile(wide, kind, near, free=[prior]) for kind in KINDS])
-    except np.linalg.LinAlgError:
-        return None
-    return both - best.log_bayes_factor

@@ -157,7 +157,9 @@ class Weighted(NamedTuple):
 
     @property
     def error(self) -> float:
-        """Standard error of the log integral, in nats."""
+        """Standard error of the log integral, in nats; infinite where no draw has any density."""
+        if self.log_weights.max() == -np.inf:
+            return math.inf
         return float(self.shares.std() * math.sqrt(len(self.log_weights)))
 
     def resampled(self, n: int, rng: np.random.Generator) -> FloatArray:
