@@ -38,6 +38,7 @@ from skred.diagnosis.evidence.tolerance import ARRIVED, STEP_SHARES
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 STARTS = (0.0, 0.3, 1.2)
 """Where climbs begin, in scales of the prior: nil, and either side of its median (0.67)."""
 _ROUNDS = 15
@@ -65,12 +66,36 @@ class Start(NamedTuple):
 
 
 class _State(NamedTuple):
-    """Where all climbs are, one group each."""
+    """Where climbs are, one group each."""
 
     strengths: FloatArray
     population: Population
     modes: Modes
     height: FloatArray
+
+    def rows_of(self, groups: IntArray) -> IntArray:
+        """Numbers of the groups' rows."""
+        n = len(self.modes.points) // len(self.strengths)
+        return (n * groups[:, None] + np.arange(n)).ravel()
+
+    def take(self, groups: IntArray) -> _State:
+        """Some of the groups."""
+        rows = self.rows_of(groups)
+        return _State(
+            self.strengths[groups],
+            Population(*(part[groups] for part in self.population)),
+            Modes(*(part[rows] for part in self.modes)),
+            self.height[groups],
+        )
+
+    def put(self, groups: IntArray, there: _State) -> None:
+        """Some of the groups at where they are now."""
+        rows = self.rows_of(groups)
+        self.strengths[groups], self.height[groups] = there.strengths, there.height
+        for whole, part in zip(self.population, there.population, strict=True):
+            whole[groups] = part
+        for whole, part in zip(self.modes, there.modes, strict=True):
+            whole[rows] = part
 
 
 class _Climb:
@@ -115,21 +140,21 @@ class _Climb:
         step = joint_step(state.modes, rows, population, self.prior, state.strengths, self.precision)
         if not self.either_sign:
             step = step.held(np.flatnonzero(state.strengths + step.strength < 0.0), -state.strengths)
-        share, open_ = np.ones(n_groups), np.ones(n_groups, dtype=bool)
-        for part in STEP_SHARES:
-            share[open_] = part
+        after, open_ = state.take(np.arange(n_groups)), np.arange(n_groups)
+        for share in STEP_SHARES:
+            points = state.modes.points + step.of_points(share, rows)
             there = self.at(
-                state.strengths + share * step.strength,
-                Population(state.population.mean + share[:, None] * step.mean, population.covariance),
-                state.modes.points + step.of_points(share, rows),
+                (state.strengths + share * step.strength)[open_],
+                Population((state.population.mean + share * step.mean)[open_], population.covariance[open_]),
+                points[state.rows_of(open_)],
                 _CLIMB,
             )
-            gained = open_ & (there.height >= state.height - 1e-9)
-            state = _chosen(there, state, gained)
-            open_ &= ~gained
-            if not open_.any():
+            gained = there.height >= state.height[open_] - 1e-9
+            after.put(open_[gained], there.take(np.flatnonzero(gained)))
+            open_ = open_[~gained]
+            if not len(open_):
                 break
-        return state
+        return after
 
     def _with_spreads(self, state: _State, rows: Rows) -> Population:
         """The populations with the covariances that the events ask for."""
@@ -137,21 +162,6 @@ class _Climb:
         cover = np.linalg.inv(state.modes.information + state.population.precision[rows.group])
         deviation = deviations(state.modes.points, rows, state.population)
         return Population(mean, most_probable_covariance(rows, deviation[:, :n], cover[:, :n, :n]))
-
-
-def _chosen(one: _State, other: _State, taken: NDArray[np.bool_]) -> _State:
-    """One state's groups where they are taken, else the other's."""
-    rows = np.repeat(taken, len(one.modes.points) // len(taken))
-
-    def pick(a: FloatArray, b: FloatArray, chosen: NDArray[np.bool_]) -> FloatArray:
-        return np.where(chosen.reshape(-1, *(1,) * (a.ndim - 1)), a, b)
-
-    return _State(
-        pick(one.strengths, other.strengths, taken),
-        Population(*(pick(a, b, taken) for a, b in zip(one.population, other.population, strict=True))),
-        Modes(*(pick(a, b, rows) for a, b in zip(one.modes, other.modes, strict=True))),
-        pick(one.height, other.height, taken),
-    )
 
 
 def first_strengths(scale: float, either_sign: bool) -> FloatArray:
@@ -189,9 +199,13 @@ def global_starts(
     climb = _Climb(extension, rows, held, scale, either_sign)
     population = Population(*(np.repeat(part, n_groups, axis=0) for part in begin[0]))
     state = climb.at(starts, population, np.tile(begin[1], (n_groups, 1)), _CLIMB)
+    climbing = np.arange(n_groups)
     for _ in range(_ROUNDS):
-        before, state = state, climb.moved(state)
-        if (state.height <= before.height + ARRIVED).all():
+        before = state.take(climbing)
+        after = climb.moved(before)
+        state.put(climbing, after)
+        climbing = climbing[after.height > before.height + ARRIVED]
+        if not len(climbing):
             break
     all_rows = rows.repeated(n_groups)
     sd = joint_step(state.modes, all_rows, state.population, climb.prior, state.strengths, climb.precision).sd

@@ -167,12 +167,12 @@ class JointStep(NamedTuple):
         changed[groups] = strength[groups]
         return self._replace(mean=mean, strength=changed)
 
-    def of_points(self, share: FloatArray, rows: Rows) -> FloatArray:
-        """What the events' points move by, (n_rows, n_base + 1), with a share of the step of each group."""
+    def of_points(self, share: float, rows: Rows) -> FloatArray:
+        """What the events' points move by, (n_rows, n_base + 1), with a share of the step."""
         both = np.column_stack([self.mean, self.strength])[rows.group]
         whole = self.along + np.einsum("rij,rj->ri", self.by_both, both)
         size = np.maximum(np.abs(whole).max(axis=1, keepdims=True) / LARGEST_STEP, 1.0)
-        moved: FloatArray = share[rows.group, None] * whole / size
+        moved: FloatArray = share * whole / size
         return moved
 
 
