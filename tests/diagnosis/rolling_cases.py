@@ -20,21 +20,58 @@ WAVE_M = 400.0
 
 
 def speed(s: float, release: float, friction: float, drag: float, waves: float = 0.0) -> float:
-    """Front speed [m/s]: dv/ds = 2 g (sin(phi) - friction cos(phi)) - 2 drag v on ramp and level ground.
+    """Front speed [m/s]: dv/ds = 2 g (sin(phi) - friction cos(phi)) - 2 drag v on ramp and level ground."""
+    end = G_M_S2 * (np.sin(STEEP) - friction * np.cos(STEEP)) / drag
+    v = end * (1.0 - np.exp(-2.0 * drag * (RAMP_M - release)))
+    return after_waves(v, s - RAMP_M, friction, drag, waves)
 
-    Level ground that has waves adds -2 waves sin(2 pi x / 400 m), x from its beginning.
+
+def after_waves(v: float, x: float, friction: float, drag: float, waves: float) -> float:
+    """Front speed [m/s] at x on level ground that begins with v = U^2.
+
+    Waves add -2 waves sin(2 pi x / 400 m).
     """
-
-    def after(v: float, length: float, force: float) -> float:
-        end = force / drag
-        return end + (v - end) * np.exp(-2.0 * drag * length)
-
-    v = after(0.0, RAMP_M - release, G_M_S2 * (np.sin(STEEP) - friction * np.cos(STEEP)))
-    x, decay, turn = s - RAMP_M, 2.0 * drag, 2.0 * np.pi / WAVE_M
+    end, decay, turn = -G_M_S2 * friction / drag, 2.0 * drag, 2.0 * np.pi / WAVE_M
     by_waves = (decay * np.sin(turn * x) - turn * np.cos(turn * x) + turn * np.exp(-decay * x)) * (
         -2.0 * waves / (decay**2 + turn**2)
     )
-    return float(np.sqrt(max(after(v, x, -G_M_S2 * friction) + by_waves, 0.0)))
+    return float(np.sqrt(max(end + (v - end) * np.exp(-decay * x) + by_waves, 0.0)))
+
+
+def entering(drag: float, waves: float, n_events: int = 14, seed: int = 2) -> Campaign:
+    """The same bodies on level ground alone, their speed stated where it begins."""
+    rng = np.random.default_rng(seed)
+    entry = 26.0 + 0.5 * rng.standard_normal(n_events)
+    frictions = 0.006 * np.exp(0.1 * rng.standard_normal(n_events))
+    places = np.arange(50.0, 801.0, 75.0)
+    values = np.array(
+        [
+            [after_waves(v0**2, x, mu, drag, waves) for x in places]
+            for v0, mu in zip(entry, frictions, strict=True)
+        ]
+    )
+    values += 0.1 * rng.standard_normal(values.shape)
+    stated = entry + 0.1 * rng.standard_normal(n_events)
+    along = np.arange(0.0, LEVEL_M + 1.0, 10.0)
+    return Campaign(
+        name="entering",
+        description="bodies rolling out from a speed that is stated",
+        source="closed form",
+        origin="simulated",
+        reference_s_m=None,
+        track=Track(along, np.zeros_like(along)),
+        sensors=tuple(
+            Sensor(f"s{k}", "front_velocity", place, place, relative_sd=0.0, absolute_sd=0.1)
+            for k, place in enumerate(places)
+        ),
+        events=tuple(
+            Event(f"run{k:02d}", 0.0, None, {}, release_speed_m_s=v0, release_speed_sd_m_s=0.1)
+            for k, v0 in enumerate(stated)
+        ),
+        values=values,
+        status=np.full(values.shape, int(Status.OBSERVED), dtype=np.int8),
+        stated_sd=np.full(values.shape, np.nan),
+    )
 
 
 def rolling(

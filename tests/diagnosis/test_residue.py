@@ -9,12 +9,12 @@ from functools import partial
 import numpy as np
 import pytest
 from diagnosis_cases import base_of
-from rolling_cases import rolling, speed
+from rolling_cases import entering, rolling, speed
 from scipy.stats import norm
 
 from skred.campaign import Campaign
 from skred.diagnosis.compare.candidate import Candidate, log_gain
-from skred.diagnosis.compare.comparison import free_force
+from skred.diagnosis.compare.comparison import compare, free_force
 from skred.diagnosis.compare.residue import with_residues
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.discrepancy.beside import fit_beside, with_strength
@@ -81,6 +81,16 @@ def test_evidence_of_both_is_that_of_the_force_at_each_strength_of_the_mechanism
     by_strength = np.log(np.trapezoid(np.exp(log_density - 100.0)[::-1], strengths[::-1])) + 100.0
     assert one.log_bayes_factor == pytest.approx(by_strength, abs=3.0)
     assert both.log_bayes_factor < one.log_bayes_factor
+
+
+@pytest.mark.slow
+def test_drag_is_named_first_where_ground_is_not_quite_level_and_entry_speeds_are_stated() -> None:
+    """A force of any shape takes both; drag and such a force beside it win."""
+    comparison = compare(base_of(entering(2.4e-4, waves=0.03), "coulomb"))
+    drag = comparison.leading(DRAG.id).candidates[DRAG.id]
+    assert max(comparison.probability, key=lambda name: comparison.probability[name]) == DRAG.id
+    assert drag.residue is not None and drag.residue > 0.0
+    assert drag.strength().mean == pytest.approx(2.4e-4, abs=2.0 * drag.strength().sd)
 
 
 def test_without_a_second_effect_nothing_is_looked_for() -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import expit
 
 FloatArray = NDArray[np.float64]
 SPREAD_MEDIAN, SPREAD_LOG_SD = 0.4, 0.6
@@ -90,9 +91,8 @@ def from_unbounded(kind: BetweenEvents, coordinate: FloatArray) -> tuple[FloatAr
     if kind is BetweenEvents.SPREAD:
         z = (coordinate - math.log(SPREAD_MEDIAN)) / SPREAD_LOG_SD
         return np.exp(coordinate), -0.5 * z**2 - math.log(SPREAD_LOG_SD) - 0.5 * math.log(2.0 * math.pi)
-    share = 1.0 / (1.0 + np.exp(-coordinate))
     log_density: FloatArray = -np.logaddexp(0.0, coordinate) - np.logaddexp(0.0, -coordinate)
-    return share, log_density
+    return expit(coordinate), log_density
 
 
 def own_multiples(

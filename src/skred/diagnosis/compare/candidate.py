@@ -26,8 +26,8 @@ real forces have otherwise. Set on 28 opened trials, whose true forms differ on 
 _UNLIKELY = 0.1
 """Probability up to which a way in which avalanches may differ is not modelled in place of a likelier one."""
 BESIDE = 0.5
-"""Prior probability that a force in no list acts beside a mechanism, where such a force by itself has more
-evidence than it: then something acts beside it or in its place, and the odds are even."""
+"""Prior probability that a force in no list acts beside a mechanism, where such a force, by itself or beside
+another one, has more evidence than it: then something acts beside it or in its place, at even odds."""
 
 
 def log_gain(residue: float | None, ways: Mapping[BetweenEvents, float] | None = None) -> float:

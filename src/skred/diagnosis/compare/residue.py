@@ -7,7 +7,7 @@ well has even odds then.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
@@ -23,12 +23,30 @@ from skred.physics.mechanisms.spec import Group
 def with_residues(
     base: Base, candidates: Mapping[str, Candidate], profiles: Sequence[Profile], pool: Executor
 ) -> dict[str, Candidate]:
-    """Candidates, those that a force in no list has up to twice the evidence of with it beside them."""
+    """Candidates, with a force beside those that have more than half of what such a force has by itself.
+
+    That is: those that have less than it has by itself, or beside another one.
+    """
     found, force = dict(candidates), log_evidence_of(profiles)
-    physics = [one for one in candidates.values() if one.mechanism.group is Group.PHYSICS]
-    looked = [one for one in physics if 0.5 * force < one.log_bayes_factor < force]
+    best, tried = force, set[str]()
+    while looked := [
+        one
+        for name, one in found.items()
+        if one.mechanism.group is Group.PHYSICS
+        and name not in tried
+        and 0.5 * force < one.log_bayes_factor < best
+    ]:
+        tried |= {one.mechanism.id for one in looked}
+        for one in _looked_at(base, looked, pool):
+            found[one.mechanism.id] = one
+            best = max(best, one.log_bayes_factor)
+    return found
+
+
+def _looked_at(base: Base, looked: Sequence[Candidate], pool: Executor) -> Iterator[Candidate]:
+    """Candidates with a force beside them, where that is less than they are."""
     jobs = [(one.best, kind) for one in looked for kind in KINDS]
-    fits = pool.map(partial(fit_beside, base), *zip(*jobs, strict=True)) if jobs else iter(())
+    fits = pool.map(partial(fit_beside, base), *zip(*jobs, strict=True))
     for one, of_each in zip(looked, batched(fits, len(KINDS)), strict=True):
         fitted = tuple(profile for profile in of_each if profile is not None)
         if len(fitted) < len(KINDS):
@@ -36,5 +54,4 @@ def with_residues(
         beside = Beside(with_strength(base, one.best), one.best.log_bayes_factor, fitted)
         # What a mechanism leaves is no residue if it is more than what it explains.
         if beside.log_bayes_factor < one.log_bayes_factor:
-            found[one.mechanism.id] = replace(one, beside=beside)
-    return found
+            yield replace(one, beside=beside)
