@@ -17,7 +17,7 @@ from skred.diagnosis.compare.candidate import Candidate, log_gain
 from skred.diagnosis.compare.comparison import compare, free_force
 from skred.diagnosis.compare.residue import with_residues
 from skred.diagnosis.compare.screening import curve
-from skred.diagnosis.discrepancy.beside import fit_beside, with_strength
+from skred.diagnosis.discrepancy.beside import Beside, fit_beside, with_strength
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_evidence_of
 from skred.diagnosis.discrepancy.sampled_evidence import sampled
@@ -101,6 +101,17 @@ def test_without_a_second_effect_nothing_is_looked_for() -> None:
         # A mechanism that explains less than half of what the force does is no first effect.
         weak = replace(drag, correction=0.3 * log_evidence_of(profiles) - drag.alone)
         assert with_residues(base, {DRAG.id: weak}, profiles, pool)[DRAG.id].residue is None
+
+
+def test_draws_that_break_down_end_no_diagnosis(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*given: object) -> Profile:
+        raise np.linalg.LinAlgError
+
+    base, drag, profiles = fitted(rolling(2.4e-4, n_events=8))
+    beside = Beside(with_strength(base, drag.best), drag.best.log_bayes_factor, tuple(profiles))
+    monkeypatch.setattr("skred.diagnosis.discrepancy.beside.sampled", broken)
+    with ThreadPoolExecutor(1) as pool:
+        assert beside.sampled(pool, 0.0) is beside
 
 
 def test_what_a_force_beside_adds() -> None:

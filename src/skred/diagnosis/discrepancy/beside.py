@@ -42,7 +42,7 @@ class Beside:
         return log_evidence_of(self.profiles) - self.alone
 
     def sampled(self, pool: Executor, least: float) -> Beside:
-        """By importance sampling, the kinds that count.
+        """By importance sampling, the kinds that count; as it is where draws lead to what no front can do.
 
         Parameters
         ----------
@@ -52,13 +52,14 @@ class Beside:
             Log Bayes factor of both against the mechanism below which it need not be known.
         """
         some = max(one.log_bayes_factor for one in self.profiles) - COUNTS
-        return replace(
-            self,
-            profiles=tuple(
-                sampled(self.base, one, pool, least + self.alone) if one.log_bayes_factor > some else one
-                for one in self.profiles
-            ),
-        )
+        found = list(self.profiles)
+        try:
+            for k, one in enumerate(self.profiles):
+                if one.log_bayes_factor > some:
+                    found[k] = sampled(self.base, one, pool, least + self.alone)
+        except np.linalg.LinAlgError:
+            return self
+        return replace(self, profiles=tuple(found))
 
 
 def with_strength(base: Base, curve: Curve) -> Base:
