@@ -15,9 +15,9 @@ from scipy.stats import norm
 from skred.campaign import Campaign
 from skred.diagnosis.compare.candidate import Candidate, log_gain
 from skred.diagnosis.compare.comparison import compare, free_force
+from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.residue import with_residues
 from skred.diagnosis.compare.screening import curve
-from skred.diagnosis.discrepancy.beside import Beside, fit_beside, with_strength
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_evidence_of
 from skred.diagnosis.discrepancy.sampled_evidence import sampled
@@ -60,27 +60,26 @@ def test_a_force_that_takes_both_effects_is_level_with_the_first_and_a_force_bes
 
 @pytest.mark.slow
 def test_evidence_of_both_is_that_of_the_force_at_each_strength_of_the_mechanism() -> None:
-    """Sampled together, and the force sampled alone beside drags that are held, these summed up.
-
-    Sampling comes closer than the Laplace approximation; 2 nats are left, with a standard error of 0.5.
-    """
-    base, drag, _ = fitted(rolling(2.4e-4, waves=0.05))
-    wide, both = with_strength(base, drag.best), fit_beside(base, drag.best, KINDS[0])
-    assert both is not None and DRAG.added is not None
+    """By Laplace, with what that lacks of the force alone; and by forces sampled beside drags that are held."""
+    base, drag, profiles = fitted(rolling(2.4e-4, waves=0.05))
+    assert DRAG.added is not None
     mean, sd = drag.best.moments
     strengths, known, heights = mean + sd * np.arange(2.0, -17.0, -3.0), drag.best.known, list[float]()
     with ThreadPoolExecutor(2) as pool:
-        one = sampled(wide, both, pool)
+        laplace = with_residues(base, {DRAG.id: drag}, profiles, pool)
+        one = recomputed(base, laplace, profiles, pool)[0][DRAG.id]
         for strength in strengths:
             along = curve_at(base, DRAG, Shape(), np.array([strength]), known=known)
             known = known | along.known
-            held = replace(wide, strengths=np.array([strength]), fit=along.nearest(strength))
-            force = sampled(held, fit_profile(held, KINDS[0]), pool)
-            heights.append(along.log_evidence[-1] + force.log_bayes_factor)
+            near = along.nearest(strength)
+            held = replace(base, directions=(along.direction,), strengths=np.array([strength]), fit=near)
+            forces = [sampled(held, fit_profile(held, kind), pool) for kind in KINDS]
+            heights.append(along.log_evidence[-1] + log_evidence_of(forces))
     log_density = np.array(heights) + norm(scale=DRAG.added.scale).logpdf(strengths) + np.log(2.0)
     by_strength = np.log(np.trapezoid(np.exp(log_density - 100.0)[::-1], strengths[::-1])) + 100.0
-    assert one.log_bayes_factor == pytest.approx(by_strength, abs=3.0)
-    assert both.log_bayes_factor < one.log_bayes_factor
+    before = laplace[DRAG.id].residue
+    assert one.residue is not None and before is not None and before < one.residue
+    assert drag.alone + one.residue == pytest.approx(by_strength, abs=2.5)
 
 
 @pytest.mark.slow
@@ -101,17 +100,6 @@ def test_without_a_second_effect_nothing_is_looked_for() -> None:
         # A mechanism that explains less than half of what the force does is no first effect.
         weak = replace(drag, correction=0.3 * log_evidence_of(profiles) - drag.alone)
         assert with_residues(base, {DRAG.id: weak}, profiles, pool)[DRAG.id].residue is None
-
-
-def test_draws_that_break_down_end_no_diagnosis(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(*given: object) -> Profile:
-        raise np.linalg.LinAlgError
-
-    base, drag, profiles = fitted(rolling(2.4e-4, n_events=8))
-    beside = Beside(with_strength(base, drag.best), drag.best.log_bayes_factor, tuple(profiles))
-    monkeypatch.setattr("skred.diagnosis.discrepancy.beside.sampled", broken)
-    with ThreadPoolExecutor(1) as pool:
-        assert beside.sampled(pool, 0.0) is beside
 
 
 def test_what_a_force_beside_adds() -> None:

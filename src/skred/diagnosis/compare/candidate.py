@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.discrepancy.beside import Beside
 from skred.diagnosis.evidence.coefficient import Curve
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.physics.mechanisms.spec import Group, Mechanism
@@ -71,8 +70,8 @@ class Candidate:
         curve, in nats; 0 where not looked at.
     error : float or None
         Standard error of the log Bayes factor by importance sampling, in nats; None where not looked at.
-    beside : Beside or None
-        With a force not in the list; None where not looked at.
+    residue : float or None
+        Log Bayes factor of a force not in the list beside it; None where not looked at.
     ways : mapping of BetweenEvents to float, or None
         What each way in which avalanches may differ in the strength has more than the strength in common, in
         nats; None where not looked at.
@@ -83,7 +82,7 @@ class Candidate:
     log_weights: FloatArray
     correction: float = 0.0
     error: float | None = None
-    beside: Beside | None = None
+    residue: float | None = None
     ways: Mapping[BetweenEvents, float] | None = None
 
     @property
@@ -95,11 +94,6 @@ class Candidate:
     def alone(self) -> float:
         """Log Bayes factor against nothing, shapes and strength integrated over, no force beside it."""
         return float(np.logaddexp.reduce(self.log_factors)) + self.correction
-
-    @property
-    def residue(self) -> float | None:
-        """Log Bayes factor of a force not in the list beside it; None where not looked at."""
-        return None if self.beside is None else self.beside.log_bayes_factor
 
     @property
     def log_bayes_factor(self) -> float:

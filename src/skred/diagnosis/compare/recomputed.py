@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.discrepancy.profile import Profile
+from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_evidence_of
 from skred.diagnosis.discrepancy.sampled_evidence import sampled
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
 from skred.diagnosis.evidence.event_quadrature import FINE
@@ -27,8 +27,8 @@ def recomputed(
 ) -> tuple[dict[str, Candidate], list[Profile]]:
     """All candidates under one error model, those that lead with re-computed evidence.
 
-    A mechanism's is re-computed along its best curve, a profile's by sampling its values, also beside a
-    mechanism.
+    A mechanism's is re-computed along its best curve, a profile's by sampling its values. What the Laplace
+    approximation of such a force lacks, it lacks beside a mechanism as well.
 
     Parameters
     ----------
@@ -40,23 +40,19 @@ def recomputed(
     # What is less probable than nothing raises no alarm with some nats more.
     least = max(max(best, *height.values(), *force) - COUNTS, 0.0)
     leading = [name for name in height if height[name] > least]
-    worth = [k for k, factor in enumerate(force) if factor > least]
-    besides = {
-        name: one.beside
-        for name, one in candidates.items()
-        if one.beside is not None and one.alone + one.beside.log_bayes_factor > least
-    }
+    beside = any(candidates[name].residue is not None for name in leading)
+    some = max(force) - COUNTS if beside else least
+    worth = [k for k, factor in enumerate(force) if factor > some]
     # Each waits for jobs of the pool, and takes none of its threads for that.
-    with ThreadPoolExecutor(max(len(worth) + len(besides), 1)) as waiting:
-        sampled_of = {k: waiting.submit(sampled, base, profiles[k], pool, least) for k in worth}
-        beside_of = {
-            name: waiting.submit(one.sampled, pool, least - candidates[name].alone)
-            for name, one in besides.items()
-        }
+    with ThreadPoolExecutor(len(KINDS)) as waiting:
+        sampled_of = {k: waiting.submit(sampled, base, profiles[k], pool, some) for k in worth}
         found = _looked_at(base, candidates, leading, pool)
-        factors = {k: one.result() for k, one in sampled_of.items()}
-        found |= {name: replace(found[name], beside=one.result()) for name, one in beside_of.items()}
-    return found, [factors.get(k, one) for k, one in enumerate(profiles)]
+        again = [sampled_of[k].result() if k in worth else one for k, one in enumerate(profiles)]
+    lacked = log_evidence_of(again) - log_evidence_of(profiles) if worth else 0.0
+    for name, one in found.items():
+        if one.residue is not None:
+            found[name] = replace(one, residue=one.residue + lacked)
+    return found, again
 
 
 def _looked_at(

@@ -7,25 +7,29 @@ well has even odds then.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
 from itertools import batched
 
+import numpy as np
+
 from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.discrepancy.beside import Beside, fit_beside, with_strength
-from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_evidence_of
-from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.discrepancy.climb import start_from
+from skred.diagnosis.discrepancy.fit import Free, fit_profile
+from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, knots, log_evidence_of
+from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.physics.mechanisms.spec import Group
 
 
 def with_residues(
     base: Base, candidates: Mapping[str, Candidate], profiles: Sequence[Profile], pool: Executor
 ) -> dict[str, Candidate]:
-    """Candidates, with a force beside those that have more than half of what such a force has by itself.
+    """Candidates, with a residue those that have more than half of what a force in no list has by itself.
 
-    That is: those that have less than it has by itself, or beside another one.
+    That is: those that have less than it has by itself, or beside another one. All are by the Laplace
+    approximation, and so should the profiles be.
     """
     found, force = dict(candidates), log_evidence_of(profiles)
     best, tried = force, set[str]()
@@ -37,21 +41,43 @@ def with_residues(
         and 0.5 * force < one.log_bayes_factor < best
     ]:
         tried |= {one.mechanism.id for one in looked}
-        for one in _looked_at(base, looked, pool):
-            found[one.mechanism.id] = one
-            best = max(best, one.log_bayes_factor)
+        for one, residue in zip(looked, _residues(base, [one.best for one in looked], pool), strict=True):
+            # What a mechanism leaves is no residue if it is more than what it explains.
+            if residue is not None and residue < one.log_bayes_factor:
+                found[one.mechanism.id] = replace(one, residue=residue)
+                best = max(best, found[one.mechanism.id].log_bayes_factor)
     return found
 
 
-def _looked_at(base: Base, looked: Sequence[Candidate], pool: Executor) -> Iterator[Candidate]:
-    """Candidates with a force beside them, where that is less than they are."""
-    jobs = [(one.best, kind) for one in looked for kind in KINDS]
-    fits = pool.map(partial(fit_beside, base), *zip(*jobs, strict=True))
-    for one, of_each in zip(looked, batched(fits, len(KINDS)), strict=True):
-        fitted = tuple(profile for profile in of_each if profile is not None)
-        if len(fitted) < len(KINDS):
-            continue
-        beside = Beside(with_strength(base, one.best), one.best.log_bayes_factor, fitted)
-        # What a mechanism leaves is no residue if it is more than what it explains.
-        if beside.log_bayes_factor < one.log_bayes_factor:
-            yield replace(one, beside=beside)
+def _residues(base: Base, curves: Sequence[Curve], pool: Executor) -> list[float | None]:
+    """Log Bayes factors of a force not in the list beside mechanisms, against these alone.
+
+    None where a step leads to what no front can do, as a drag far below nil.
+    """
+    jobs = [(curve, kind) for curve in curves for kind in KINDS]
+    fits = batched(pool.map(partial(_fit_beside, base), *zip(*jobs, strict=True)), len(KINDS))
+    fitted = [[one for one in profiles if one is not None] for profiles in fits]
+    return [
+        log_evidence_of(profiles) - curve.log_bayes_factor if len(profiles) == len(KINDS) else None
+        for curve, profiles in zip(curves, fitted, strict=True)
+    ]
+
+
+def _fit_beside(base: Base, curve: Curve, kind: Kind) -> Profile | None:
+    """A force of one kind beside a mechanism of a curve's shape, from where that is by itself.
+
+    Both are fitted together: beside such a force a mechanism is as strong as it is, and not as strong as it
+    has to be for both.
+    """
+    added = curve.mechanism.added
+    assert added is not None
+    top = int(np.argmax(curve.log_evidence))
+    directions = (*base.directions, curve.direction)
+    wide = replace(base, directions=directions, strengths=np.append(base.strengths, 0.0))
+    values = np.append(curve.strengths[top], np.zeros(len(knots(base.setting))))
+    near = values, start_from(base, curve.fits[top])
+    prior = Free(added.scale_of(curve.shape), added.either_sign)
+    try:
+        return fit_profile(wide, kind, near, free=[prior])
+    except np.linalg.LinAlgError:
+        return None

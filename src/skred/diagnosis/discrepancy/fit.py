@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,6 @@ from skred.diagnosis.discrepancy.explored import (
 )
 from skred.diagnosis.discrepancy.profile import (
     NEAR_M,
-    Free,
     Kind,
     Prior,
     Profile,
@@ -41,6 +41,13 @@ _PRIORS_TRIED = 12
 """Priors climbed under at most, which bounds the time; climbs end before where those left hold little."""
 _PRIORS_AGAIN = 4
 """The same where a fit to all avalanches is at hand: those close to its prior, and those that lead then."""
+
+
+class Free(NamedTuple):
+    """Prior of a strength that is fitted beside a force: its scale, and whether it may be negative."""
+
+    scale: float
+    either_sign: bool
 
 
 def fit_profile(
@@ -75,7 +82,7 @@ def fit_profile(
     if near is not None:
         starts.append(expanded_at(base, kind, at, *near))
     shares = priors_of(kind, at)
-    covers = {prior: _cover_of(prior, at, free) for prior in shares}
+    covers = {prior: _with_free([one.scale for one in free], prior.cover(at)) for prior in shares}
     explored = ExploredPriors(height, shares, covers)
     if again is None:
         waiting, maximum_under, most = _first(kind, starts[-1], explored), _maximum_under, _PRIORS_TRIED
@@ -89,30 +96,32 @@ def fit_profile(
     prior = max(explored.maxima, key=explored.factor)
     maximum = explored.maxima[prior]
     cover = np.linalg.inv(maximum.information + np.linalg.inv(covers[prior]))
-    beside = zip(free, maximum.values, np.sqrt(np.diag(cover)), strict=False)
-    factor = explored.log_factor + math.fsum(one.log_share(value, sd) for one, value, sd in beside)
+    factor = explored.log_factor
+    for value, variance, one in zip(maximum.values, np.diag(cover), free, strict=False):
+        if not one.either_sign:  # a half-normal prior is twice the normal one, above nil alone
+            factor += math.log(max(math.erfc(-value / math.sqrt(2.0 * variance)), 1e-300))
     cover, values = 0.5 * (cover + cover.T)[len(free) :, len(free) :], maximum.values[len(free) :]
-    gain = maximum.fit.found.log_evidence - height
-    return Profile(kind, prior, at, values, cover, factor, gain, maximum.fit, explored.modes, tuple(free))
+    gain, modes = maximum.fit.found.log_evidence - height, () if free else explored.modes
+    return Profile(kind, prior, at, values, cover, factor, gain, maximum.fit, modes)
 
 
-def _cover_of(prior: Prior, at: FloatArray, free: Sequence[Free]) -> FloatArray:
+def _with_free(scales: Sequence[float], cover: FloatArray) -> FloatArray:
     """Covariance of strengths that are free and of a profile's values; not scipy's, see `comparison`."""
-    n = len(free)
-    found = np.zeros((n + len(at),) * 2)
-    found[:n, :n], found[n:, n:] = np.diag([one.scale**2 for one in free]), prior.cover(at)
+    n = len(scales)
+    found = np.zeros((n + len(cover),) * 2)
+    found[:n, :n], found[n:, n:] = np.diag(np.square(scales)), cover
     return found
 
 
 def mode_at(base: Base, profile: Profile, values: FloatArray) -> Mode:
     """The mode near some values, under the prior that suits them best."""
-    kind, at, forces = profile.kind, profile.knots_m, values[len(profile.free) :]
+    kind, at = profile.kind, profile.knots_m
     shares = priors_of(kind, at)
     prior = max(
         shares,
-        key=lambda one: shares[one] + float(multivariate_normal(cov=one.cover(at)).logpdf(forces)),
+        key=lambda one: shares[one] + float(multivariate_normal(cov=one.cover(at)).logpdf(values)),
     )
-    cover = _cover_of(prior, at, profile.free)
+    cover = prior.cover(at)
     begin = expanded_at(base, kind, at, values, start_from(base, profile.fit))
     maximum = climb(base, kind, at, begin, cover)
     left = np.linalg.inv(maximum.information + np.linalg.inv(cover))

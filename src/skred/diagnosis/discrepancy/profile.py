@@ -15,11 +15,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import log_ndtr
 from scipy.stats import multivariate_normal
 
 from skred.diagnosis.evidence.adaptive_sampling import Mode
@@ -111,23 +109,9 @@ _LEAST_STEP_M = 30.0
 """Distance of the knots at least: below it recordings do not tell one from the next."""
 
 
-class Free(NamedTuple):
-    """Prior of a strength that is fitted beside a force: its scale, and whether it may be negative."""
-
-    scale: float
-    either_sign: bool
-
-    def log_share(self, mean: float, sd: float) -> float:
-        """What is left in evidence if the strength is normal where either sign may be; in nats.
-
-        A half-normal prior is twice the normal one, above nil alone.
-        """
-        return 0.0 if self.either_sign else math.log(2.0) + float(log_ndtr(mean / sd))
-
-
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """A fitted profile of one kind, perhaps with strengths beside it.
+    """A fitted profile of one kind.
 
     Attributes
     ----------
@@ -146,9 +130,7 @@ class Profile:
     fit : Fit
         Population and events with the mean in.
     modes : tuple of Mode
-        Where strengths beside it and values are to be looked for: one for each prior that may count.
-    free : tuple of Free
-        Of the strengths beside it, those of the base's last directions.
+        Where values are to be looked for: one for each prior that may count.
     error : float or None
         Standard error of the log Bayes factor, in nats; None where it is by the Laplace approximation.
     """
@@ -162,7 +144,6 @@ class Profile:
     gain: float
     fit: Fit
     modes: tuple[Mode, ...]
-    free: tuple[Free, ...] = ()
     error: float | None = None
 
 

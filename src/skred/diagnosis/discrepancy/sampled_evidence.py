@@ -14,7 +14,6 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 from skred.diagnosis.discrepancy.fit import mode_at
 from skred.diagnosis.discrepancy.profile import KINDS, Profile, knot_by_knot, log_prior_density
@@ -51,13 +50,9 @@ def sampled(
     least, n, enough
         When to end, as in `weighted_draws`.
     """
-    scales = np.array([one.scale for one in profile.free])
 
     def log_density(values: FloatArray) -> FloatArray:
-        beside, forces = np.split(values, [len(scales)], axis=1)
-        prior = norm(scale=scales).logpdf(beside).sum(axis=1)
-        prior += log_prior_density(profile.kind, profile.knots_m, forces)
-        return gains(base, profile, values, pool) + prior
+        return gains(base, profile, values, pool) + log_prior_density(profile.kind, profile.knots_m, values)
 
     def mode_near(values: FloatArray) -> Mode:
         return pool.submit(mode_at, base, profile, values).result()
@@ -67,15 +62,11 @@ def sampled(
     found = weighted_draws(log_density, proposal, rng, n, enough, least, mode_near)
     if found.log_integral == -math.inf:
         return profile
-    beside = found.draws[:, : len(scales)]
-    mean = found.shares @ beside
-    sd = np.sqrt(found.shares @ (beside - mean) ** 2)
-    above = [one.log_share(*moments) for one, *moments in zip(profile.free, mean, sd, strict=True)]
-    return replace(profile, log_bayes_factor=found.log_integral + math.fsum(above), error=found.error)
+    return replace(profile, log_bayes_factor=found.log_integral, error=found.error)
 
 
 def gains(base: Base, profile: Profile, values: FloatArray, pool: Executor) -> FloatArray:
-    """Gain in log evidence over no force, at values of a profile, (n, n_free + n_knots) to (n,).
+    """Gain in log evidence over no force, at values of a profile, (n, n_knots) to (n,).
 
     It is minus infinity where fronts tell nothing.
     """
@@ -86,11 +77,10 @@ def gains(base: Base, profile: Profile, values: FloatArray, pool: Executor) -> F
 
 
 def _log_evidence(base: Base, profile: Profile, values: FloatArray) -> FloatArray:
-    """At strengths beside the profile and values of it, (n, n_free + n_knots)."""
+    """At values of the profile, (n, n_knots)."""
     extension = knot_by_knot(base, profile.kind, profile.knots_m)
     start = profile.fit.found.population(len(base.law.mechanisms)), profile.fit.points
-    held = base.strengths[: len(base.strengths) - len(profile.free)]
-    given = np.column_stack([np.tile(held, (len(values), 1)), values])
+    given = np.column_stack([np.tile(base.strengths, (len(values), 1)), values])
     # With as many nodes and rounds as the peak and nothing: what is left of integration errors is alike.
     fits = refit(extension, base.rows, given, start, Rounds(USUAL, least=1))
     return np.array([fit.found.log_evidence for fit in fits])
