@@ -60,7 +60,10 @@ def test_a_force_that_takes_both_effects_is_level_with_the_first_and_a_force_bes
 
 @pytest.mark.slow
 def test_evidence_of_both_is_that_of_the_force_at_each_strength_of_the_mechanism() -> None:
-    """By Laplace, with what that lacks of the force alone; and by forces sampled beside drags that are held."""
+    """By Laplace with what that lacks of the force alone, and by forces sampled beside drags that are held.
+
+    The latter are summed up over the drags.
+    """
     base, drag, profiles = fitted(rolling(2.4e-4, waves=0.05))
     assert DRAG.added is not None
     mean, sd = drag.best.moments
