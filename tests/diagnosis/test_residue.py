@@ -105,6 +105,47 @@ def test_without_a_second_effect_nothing_is_looked_for() -> None:
         assert with_residues(base, {DRAG.id: weak}, profiles, pool)[DRAG.id].residue is None
 
 
+def test_a_mechanism_that_is_overtaken_is_looked_at_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ahead of a force by itself it is not; behind another one with such a force beside it is."""
+    base, drag, profiles = fitted(rolling(2.4e-4, n_events=6))
+    force = [replace(one, log_bayes_factor=98.0) for one in profiles]
+    heights = {"turbulent_drag": 104.0, "viscous_drag": 80.0, "constant_retardation": 40.0}
+    candidates = {
+        name: replace(drag, mechanism=mechanisms()[name], correction=height - drag.alone)
+        for name, height in heights.items()
+    }
+    n_looked = list[int]()
+
+    def residues(base: Base, curves: list[object], pool: object) -> list[float | None]:
+        n_looked.append(len(curves))
+        return [29.0] * len(curves)
+
+    monkeypatch.setattr("skred.diagnosis.compare.residue._residues", residues)
+    with ThreadPoolExecutor(1) as pool:
+        found = with_residues(base, candidates, force, pool)
+        assert n_looked == [1, 1]
+        assert [found[name].residue for name in heights] == [29.0, 29.0, None]
+        weak = replace(candidates["viscous_drag"], correction=40.0 - drag.alone)
+        behind = with_residues(base, {**candidates, "viscous_drag": weak}, force, pool)
+    assert behind["turbulent_drag"].residue is None
+
+
+def test_what_laplace_lacks_of_the_force_is_added_beside_a_mechanism(monkeypatch: pytest.MonkeyPatch) -> None:
+    base, drag, profiles = fitted(rolling(2.4e-4, waves=0.05, n_events=6))
+
+    def five_more(base: Base, profile: Profile, *given: object) -> Profile:
+        return replace(profile, log_bayes_factor=profile.log_bayes_factor + 5.0)
+
+    monkeypatch.setattr("skred.diagnosis.compare.recomputed.sampled", five_more)
+    with ThreadPoolExecutor(1) as pool:
+        beside, again = recomputed(base, {DRAG.id: replace(drag, residue=30.0)}, profiles, pool)
+        alone = recomputed(base, {DRAG.id: drag}, profiles, pool)[0]
+    lacked = log_evidence_of(again) - log_evidence_of(profiles)
+    assert 4.9 < lacked <= 5.0
+    assert beside[DRAG.id].residue == pytest.approx(30.0 + lacked)
+    assert alone[DRAG.id].residue is None
+
+
 def test_what_a_force_beside_adds() -> None:
     """With it or without it, at even odds."""
     assert log_gain(-50.0) == pytest.approx(np.log(0.5)) and log_gain(0.0) == pytest.approx(0.0)
