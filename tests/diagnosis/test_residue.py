@@ -116,11 +116,11 @@ def test_a_mechanism_that_is_overtaken_is_looked_at_too(monkeypatch: pytest.Monk
     }
     n_looked = list[int]()
 
-    def residues(base: Base, curves: list[object], pool: object) -> list[float | None]:
+    def beside(base: Base, curves: list[object], pool: object) -> list[float | None]:
         n_looked.append(len(curves))
         return [29.0] * len(curves)
 
-    monkeypatch.setattr("skred.diagnosis.compare.residue._residues", residues)
+    monkeypatch.setattr("skred.diagnosis.compare.residue.residues", beside)
     with ThreadPoolExecutor(1) as pool:
         found = with_residues(base, candidates, force, pool)
         assert n_looked == [1, 1]

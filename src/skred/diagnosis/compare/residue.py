@@ -41,7 +41,7 @@ def with_residues(
         and 0.5 * force < one.log_bayes_factor < best
     ]:
         tried |= {one.mechanism.id for one in looked}
-        for one, residue in zip(looked, _residues(base, [one.best for one in looked], pool), strict=True):
+        for one, residue in zip(looked, residues(base, [one.best for one in looked], pool), strict=True):
             # What a mechanism leaves is no residue if it is more than what it explains.
             if residue is not None and residue < one.log_bayes_factor:
                 found[one.mechanism.id] = replace(one, residue=residue)
@@ -49,7 +49,7 @@ def with_residues(
     return found
 
 
-def _residues(base: Base, curves: Sequence[Curve], pool: Executor) -> list[float | None]:
+def residues(base: Base, curves: Sequence[Curve], pool: Executor) -> list[float | None]:
     """Log Bayes factors of a force not in the list beside mechanisms, against these alone.
 
     None where a step leads to what no front can do, as a drag far below nil.
