@@ -35,7 +35,7 @@ from skred.diagnosis.evidence.event_quadrature import (
     on_a_line,
 )
 from skred.diagnosis.evidence.extension import extended
-from skred.diagnosis.evidence.marginal import coordinates, evidence
+from skred.diagnosis.evidence.marginal import coordinates, evidence, population_at
 from skred.inference.hierarchical.surface import Nodes
 from studies.files import RESULTS, write
 from studies.thresholds.compared_again import base_on
@@ -78,10 +78,7 @@ def integration_of(base: Base, curve: Curve) -> Integration:
     n = len(curve.strengths)
     given = np.column_stack([np.tile(base.strengths, (n, 1)), curve.strengths])
     likelihood = EventLikelihood(extension, base.rows, np.empty(0)).in_groups(given)
-    own = [fit.found.population(len(base.law.mechanisms)) for fit in curve.fits]
-    population = Population(
-        np.concatenate([one.mean for one in own]), np.concatenate([one.covariance for one in own])
-    )
+    population = population_at(np.stack([fit.found.psi for fit in curve.fits]), len(base.law.mechanisms))
     modes = event_modes(likelihood, np.concatenate([fit.points for fit in curve.fits]), population)
     return Integration(likelihood, population, modes, base.population)
 

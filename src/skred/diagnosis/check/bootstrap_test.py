@@ -121,7 +121,7 @@ def linear_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, mos
         Campaigns simulated at most; as many draws at least.
     """
     test = ScoreTest(base.problem, base.law, base.setting, base.directions, base.strengths)
-    statistic = float(_refitted(test, base.rows, (base.population, base.fit.points)).log_odds[0])
+    statistic = float(_refitted(test, base.rows, base.fit.start).log_odds[0])
     simulated = _until_clear(test, draws, seed, statistic, most, lambda refitted, first: refitted.log_odds)
     return BootstrapTest(statistic, simulated)
 

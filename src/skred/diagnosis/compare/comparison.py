@@ -185,13 +185,11 @@ def with_errors(base: Base, error_model: str) -> Base:
         problem = replace(problem, error_model=ERROR_MODELS[error_model])
     extension = extended(problem, base.law, base.directions)
     rows = campaign_rows(extension)
-    start = (base.population, base.fit.points)
-    fit = refit(extension, rows, base.strengths[None, :], start, Rounds(FINE, USUAL, 3))[0]
-    population = fit.found.population(len(base.law.mechanisms))
-    points = better_modes(EventLikelihood(extension, rows, base.strengths), fit.points, population)
+    rounds = Rounds(FINE, USUAL, 3)
+    fit = refit(extension, rows, base.strengths[None, :], base.fit.start, rounds)[0]
+    points = better_modes(EventLikelihood(extension, rows, base.strengths), *fit.start)
     if not np.array_equal(points, fit.points):
-        start = (population, points)
-        fit = refit(extension, rows, base.strengths[None, :], start, Rounds(FINE, USUAL, 3))[0]
+        fit = refit(extension, rows, base.strengths[None, :], (fit.population, points), rounds)[0]
     return replace(base, problem=problem, rows=rows, fit=fit)
 
 

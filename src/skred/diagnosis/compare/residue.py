@@ -16,7 +16,6 @@ from itertools import batched
 import numpy as np
 
 from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.discrepancy.climb import start_from
 from skred.diagnosis.discrepancy.fit import Free, fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, knots, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
@@ -75,7 +74,7 @@ def _fit_beside(base: Base, curve: Curve, kind: Kind) -> Profile | None:
     directions = (*base.directions, curve.direction)
     wide = replace(base, directions=directions, strengths=np.append(base.strengths, 0.0))
     values = np.append(curve.strengths[top], np.zeros(len(knots(base.setting))))
-    near = values, start_from(base, curve.fits[top])
+    near = values, curve.fits[top].start
     prior = Free(added.scale_of(curve.shape), added.either_sign)
     try:
         return fit_profile(wide, kind, near, free=[prior])

@@ -16,7 +16,7 @@ from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
 FloatArray = NDArray[np.float64]
 
 
-def better_modes(likelihood: EventLikelihood, points: FloatArray, population: Population) -> FloatArray:
+def better_modes(likelihood: EventLikelihood, population: Population, points: FloatArray) -> FloatArray:
     """Each event's mode, or a higher one that a climb from the node with most of its integral leads to.
 
     Parameters

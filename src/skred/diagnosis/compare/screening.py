@@ -46,10 +46,8 @@ def _starts(base: Base, mechanism: Mechanism, shape: Shape) -> list[Start]:
     assert added is not None
     direction = direction_of(mechanism, base.setting, shape)
     extension = extended(base.problem, base.law, (*base.directions, direction))
-    begin = base.population, base.fit.points
-    return global_starts(
-        extension, base.rows, base.strengths, begin, added.scale_of(shape), added.either_sign
-    )
+    scale = added.scale_of(shape)
+    return global_starts(extension, base.rows, base.strengths, base.fit.start, scale, added.either_sign)
 
 
 def screened(

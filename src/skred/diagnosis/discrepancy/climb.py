@@ -23,11 +23,6 @@ from skred.diagnosis.evidence.tolerance import ARRIVED, MOST_ROUNDS, STEP_SHARES
 FloatArray = NDArray[np.float64]
 
 
-def start_from(base: Base, fit: Fit) -> tuple[Population, FloatArray]:
-    """Population and events' points of a fit, where a refit begins."""
-    return fit.found.population(len(base.law.mechanisms)), fit.points
-
-
 def expanded_at(
     base: Base, kind: Kind, at: FloatArray, values: FloatArray, start: tuple[Population, FloatArray]
 ) -> Expansion:
@@ -67,7 +62,7 @@ def climb(base: Base, kind: Kind, at: FloatArray, start: Expansion, cover: Float
             if share * (2.0 - share) * expected < ARRIVED:
                 return _arrived(maximum, precision)
             values = maximum.values + share * step
-            fit = _fit_at(base, kind, at, values, start_from(base, maximum.fit))
+            fit = _fit_at(base, kind, at, values, maximum.fit.start)
             gained = fit.found.log_evidence - prior_penalty(values, precision) - height
             if gained > 0.0:
                 break
@@ -103,7 +98,7 @@ def _held(base: Base, at: FloatArray, values: FloatArray) -> FloatArray:
 def _around(base: Base, kind: Kind, at: FloatArray, values: FloatArray, fit: Fit) -> Expansion:
     """With efficient score and information of the knots' values at what they are."""
     wide = knot_by_knot(base, kind, at)
-    population, points = start_from(base, fit)
+    population, points = fit.start
     held = _held(base, at, values)
     around = look_around(EventLikelihood(wide, base.rows, np.concatenate([held, values])), points)
     found = efficient_scores(around, base.rows, population, mean_prior(base.law))

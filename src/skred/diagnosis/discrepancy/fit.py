@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 
-from skred.diagnosis.discrepancy.climb import climb, expanded_at, start_from
+from skred.diagnosis.discrepancy.climb import climb, expanded_at
 from skred.diagnosis.discrepancy.explored import (
     Expansion,
     ExploredPriors,
@@ -77,7 +77,7 @@ def fit_profile(
     at = knots(base.setting)
     # Nothing like everything else, so that what is left of integration errors is the same there.
     none = np.zeros(len(free) + len(at))
-    starts = [expanded_at(base, kind, at, none, (base.population, base.fit.points))]
+    starts = [expanded_at(base, kind, at, none, base.fit.start)]
     height = starts[0].fit.found.log_evidence
     if near is not None:
         starts.append(expanded_at(base, kind, at, *near))
@@ -122,7 +122,7 @@ def mode_at(base: Base, profile: Profile, values: FloatArray) -> Mode:
         key=lambda one: shares[one] + float(multivariate_normal(cov=one.cover(at)).logpdf(values)),
     )
     cover = prior.cover(at)
-    begin = expanded_at(base, kind, at, values, start_from(base, profile.fit))
+    begin = expanded_at(base, kind, at, values, profile.fit.start)
     maximum = climb(base, kind, at, begin, cover)
     left = np.linalg.inv(maximum.information + np.linalg.inv(cover))
     return Mode(maximum.values, 0.5 * (left + left.T))
@@ -179,4 +179,4 @@ def as_profile(base: Base, kind: Kind, near: Curve) -> Start:
     profile = near.direction.profiles[near.direction.columns.index(kind.column)]
     cells = spline_basis(base.setting.terrain, at) * np.diff(edge)
     values = near.strengths[best] * (cells @ profile) / np.maximum(cells.sum(axis=1), 1e-9)
-    return values, start_from(base, near.fits[best])
+    return values, near.fits[best].start

@@ -26,7 +26,7 @@ from skred.diagnosis.evidence.conditional_map import (
 from skred.diagnosis.evidence.event_quadrature import FIRST, USUAL, Budget
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of, typical_speed
 from skred.diagnosis.evidence.linear_mixed_model import mean_prior
-from skred.diagnosis.evidence.marginal import coordinates, evidence, prior_log_scale
+from skred.diagnosis.evidence.marginal import coordinates, evidence, population_at, prior_log_scale
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 from skred.diagnosis.evidence.tolerance import COUNTS, MOST_ROUNDS
 from skred.inference.hierarchical.problem import HierarchicalProblem
@@ -80,7 +80,7 @@ class Base:
     @property
     def population(self) -> Population:
         """The most probable population."""
-        return self.fit.found.population(len(self.law.mechanisms))
+        return self.fit.population
 
     def plain(self) -> Base:
         """The base law without what was added before."""
@@ -268,8 +268,7 @@ def _refit_from(
     given = base.strengths[None, :]
     if len(strengths):
         given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
-    start = (base.population, base.fit.points)
-    return refit(extension, base.rows, given, start, rounds, fits)
+    return refit(extension, base.rows, given, base.fit.start, rounds, fits)
 
 
 def fit_base(
@@ -295,7 +294,7 @@ def fit_base(
     else:
         log_scale = prior_log_scale(mean_prior(law))
         found = evidence(problem.surfaces(law.mechanisms).nodes, log_scale, coordinates(population), 30)
-        exact = found.population(len(law.mechanisms))
+        exact = population_at(found.psi[None], len(law.mechanisms))
         starts = (points, _best_nodes(problem.surfaces(law.mechanisms).nodes, exact))
         likelihood = EventLikelihood(extension, rows, given)
         tried = [event_modes(likelihood, start, exact, n_steps=20).points for start in starts]

@@ -85,10 +85,6 @@ class Evidence(NamedTuple):
     covariance: FloatArray
     error: float = 0.0
 
-    def population(self, n: int) -> Population:
-        """The most probable population."""
-        return population_at(self.psi[None], n)
-
 
 def population_at(psi: FloatArray, n: int) -> Population:
     """Populations of `n` strengths at coordinates, (n_groups, n_coordinates)."""

@@ -18,6 +18,7 @@ from skred.diagnosis.evidence.marginal import (
     coordinates,
     evidence,
     importance_evidence,
+    population_at,
     prior_log_scale,
 )
 from skred.diagnosis.evidence.tolerance import MOST_ROUNDS
@@ -43,6 +44,16 @@ class Fit(NamedTuple):
 
     found: Evidence
     points: FloatArray
+
+    @property
+    def population(self) -> Population:
+        """The most probable population."""
+        return population_at(self.found.psi[None], self.points.shape[1] - 1)
+
+    @property
+    def start(self) -> tuple[Population, FloatArray]:
+        """Population and events' points, where another refit can begin."""
+        return self.population, self.points
 
 
 class Rounds(NamedTuple):
@@ -98,8 +109,7 @@ def refit(
         at_once, moved = max(MOST_NODES // (n_events * spent.total), 1), list[int]()
         for some in map(list, batched(active, at_once)):
             likelihood = EventLikelihood(extension, rows, np.empty(0)).in_groups(strengths[some])
-            parts = [state[k].found.population(n) for k in some]
-            population = Population(*(np.concatenate([part[a] for part in parts]) for a in range(2)))
+            population = population_at(np.stack([state[k].found.psi for k in some]), n)
             points = np.concatenate([state[k].points for k in some])
             modes = event_modes(likelihood, points, population, n_steps=6)
             nodes = event_nodes(likelihood, population, modes, spent, start[0]).nodes

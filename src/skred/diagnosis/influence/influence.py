@@ -206,8 +206,7 @@ def _of_profile(profile: Profile) -> Again:
     """The log Bayes factor of a profile by a part of the recordings."""
 
     def again(base: Base, part: _Part) -> float:
-        population = profile.fit.found.population(len(base.law.mechanisms))
-        near = profile.mean, (population, part.fit(profile.fit).points)
+        near = profile.mean, part.fit(profile.fit).start
         return fit_profile(part.base(base), profile.kind, near, profile.prior).log_bayes_factor
 
     return again

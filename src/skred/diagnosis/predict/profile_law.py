@@ -97,8 +97,7 @@ def _left_out(base: Base, profile: Profile, event: int, seed: int) -> tuple[Left
     rest, rng = _without(base, event), _rng(seed, event)
     before = _plain(rest, rng)
     others = np.flatnonzero(base.rows.event != event)
-    population = profile.fit.found.population(len(base.law.mechanisms))
-    near = profile.mean, (population, profile.fit.points[others])
+    near = profile.mean, (profile.fit.population, profile.fit.points[others])
     return before, with_profile(rest, fit_profile(rest, profile.kind, near, profile.prior), rng)
 
 
@@ -163,7 +162,7 @@ def _draws(
 ) -> Draws:
     """Populations by the base's events at the middle strengths, as many as there are draws of strengths."""
     n = len(base.law.mechanisms)
-    population = fit.found.population(n)
+    population = fit.population
     likelihood = EventLikelihood(extension, base.rows, middle)
     modes = event_modes(likelihood, fit.points, population)
     nodes = event_nodes(likelihood, population, modes, USUAL, base.population).nodes

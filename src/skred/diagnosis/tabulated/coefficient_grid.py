@@ -184,10 +184,9 @@ def from_nothing(curve: Curve, found: Evidence, mean: float, sd: float) -> Locat
 def _fitted(base: Base, extension: Extension, added: FloatArray, near: Sequence[Fit]) -> list[Fit]:
     """Fits at strengths of what is added, (n, n_added), begun at others; these where nothing is found."""
     given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
-    start = (base.population, base.fit.points)
 
     def fitted(part: slice) -> list[Fit]:
-        return refit(extension, base.rows, given[part], start, Rounds(least=1), near[part])
+        return refit(extension, base.rows, given[part], base.fit.start, Rounds(least=1), near[part])
 
     fits = [fit for found in side_by_side(fitted, in_parts(len(added))) for fit in found]
     return [

@@ -12,7 +12,7 @@ from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, event_modes, log_joint
 from skred.diagnosis.evidence.event_quadrature import Budget, Spread, event_nodes
 from skred.diagnosis.evidence.extension import Extension, extended
-from skred.diagnosis.evidence.marginal import Evidence
+from skred.diagnosis.evidence.marginal import Evidence, population_at
 from skred.diagnosis.tabulated.coefficient_grid import Grid, Located, from_nothing
 from skred.inference.hierarchical.surface import Nodes
 from skred.parallel.threads import in_parts, side_by_side
@@ -72,10 +72,7 @@ def build_tables(
     n, n_tables, n_events = len(base.law.mechanisms), len(fits), len(base.rows.event)
     given = np.column_stack([np.tile(base.strengths, (n_tables, 1)), grid.points])
     likelihood = EventLikelihood(extension, base.rows, base.strengths).in_groups(given)
-    found = [fit.found.population(n) for fit in fits]
-    population = Population(
-        np.concatenate([one.mean for one in found]), np.concatenate([one.covariance for one in found])
-    )
+    population = population_at(np.stack([fit.found.psi for fit in fits]), n)
     start = highest(likelihood, np.stack([fit.points for fit in fits]), population)
     # Populations of the posterior differ in mean and in spread.
     covariances = np.stack([fit.found.covariance for fit in fits])
