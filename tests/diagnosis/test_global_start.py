@@ -11,10 +11,16 @@ from rolling_cases import rolling
 
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import Base
-from skred.diagnosis.evidence.conditional_map import LARGEST_STEP, EventLikelihood, Population, look_around
+from skred.diagnosis.evidence.conditional_map import (
+    LARGEST_STEP,
+    EventLikelihood,
+    Population,
+    deviations,
+    look_around,
+)
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.global_start import global_starts
-from skred.diagnosis.evidence.linear_mixed_model import deviations, joint_step, mean_prior
+from skred.diagnosis.evidence.linear_mixed_model import joint_step, mean_prior
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Shape

@@ -89,7 +89,11 @@ class Population(NamedTuple):
     @property
     def groups(self) -> list[Population]:
         """Each group by itself."""
-        return [Population(self.mean[k : k + 1], self.covariance[k : k + 1]) for k in range(len(self.mean))]
+        return [self.take(slice(k, k + 1)) for k in range(len(self.mean))]
+
+    def take(self, groups: IntArray | slice) -> Population:
+        """Some of the groups."""
+        return Population(self.mean[groups], self.covariance[groups])
 
     def with_more(self, more: Population) -> Population:
         """These groups and others."""
@@ -121,6 +125,11 @@ class Modes(NamedTuple):
     slope: FloatArray
     curvature: FloatArray
     shared: FloatArray
+
+    def put(self, rows: IntArray, there: Modes) -> None:
+        """Some of the rows at where they are now."""
+        for whole, part in zip(self, there, strict=True):
+            whole[rows] = part
 
     @property
     def information(self) -> FloatArray:
@@ -195,13 +204,18 @@ def look_around(likelihood: EventLikelihood, points: FloatArray) -> Modes:
     return Modes(points, points, predictions, by_points, by_strengths, slope, curvature, shared)
 
 
+def deviations(points: FloatArray, rows: Rows, population: Population) -> FloatArray:
+    """Deviation of points from their population's mean, the release's last."""
+    deviation = points.copy()
+    deviation[:, :-1] -= population.mean[rows.group]
+    return deviation
+
+
 def log_joint(likelihood: EventLikelihood, points: FloatArray, population: Population) -> FloatArray:
     """Log likelihood of each row plus the exponent of its population's density, (n_rows,)."""
-    group = likelihood.rows.group
-    deviation = points.copy()
-    deviation[:, :-1] -= population.mean[group]
+    deviation = deviations(points, likelihood.rows, population)
     return likelihood.at(points) - 0.5 * np.einsum(
-        "ri,rij,rj->r", deviation, population.precision[group], deviation
+        "ri,rij,rj->r", deviation, population.precision[likelihood.rows.group], deviation
     )
 
 
@@ -223,9 +237,7 @@ def event_modes(
     if len(lost):
         points, gained = _aside(likelihood.take(lost), found.points[lost], population)
         moved = lost[gained]
-        again = _climbed(likelihood.take(moved), points[gained], population, n_steps)
-        for whole, part in zip(found, again, strict=True):
-            whole[moved] = part
+        found.put(moved, _climbed(likelihood.take(moved), points[gained], population, n_steps))
     return found
 
 
@@ -234,12 +246,12 @@ def _climbed(likelihood: EventLikelihood, start: FloatArray, population: Populat
     points, precision = start.copy(), population.precision
     best = log_joint(likelihood, points, population)
     damping = np.full(len(points), _STARTING_DAMPING)
-    active, found = np.arange(len(points)), list[FloatArray]()
+    active = np.arange(len(points))
+    found: Modes | None = None
     for _ in range(n_steps):
         part = likelihood.take(active)
         around = look_around(part, points[active])
-        deviation = points[active].copy()
-        deviation[:, :-1] -= population.mean[part.rows.group]
+        deviation = deviations(points[active], part.rows, population)
         prior = precision[part.rows.group]
         gradient = np.einsum("ri,rij->rj", around.slope, around.by_points)
         gradient -= np.einsum("rij,rj->ri", prior, deviation)
@@ -255,12 +267,16 @@ def _climbed(likelihood: EventLikelihood, start: FloatArray, population: Populat
         points[active[better]] += step[better]
         best[active[better]] = new[better]
         damping[active] = np.where(better, 0.2 * damping[active], np.maximum(20.0 * damping[active], 0.1))
-        _store(found, active, around)
+        if found is None:
+            found = Modes(*(values.copy() for values in around))
+        else:
+            found.put(active, around)
         active = active[~better | (gained > ARRIVED)]
         if len(active) == 0:
             break
+    assert found is not None
     # Tangents are those before each row's last, small step; the points are after it.
-    return Modes(points, *found[1:])
+    return found._replace(points=points)
 
 
 def _lost(rows: Rows, predictions: FloatArray) -> IntArray:
@@ -288,17 +304,6 @@ def _aside(
     gained = heights.max(axis=1) > before + DECIDES_NOTHING
     best = around.reshape(n_rows, n_places, -1)[np.arange(n_rows), heights.argmax(axis=1)]
     return np.where(gained[:, None], best, points), gained
-
-
-def _store(found: list[FloatArray], active: IntArray, around: Modes) -> None:
-    """Keep what was found at the active rows."""
-    for k, values in enumerate(around):
-        if len(found) <= k:
-            found.append(np.empty((0, *values.shape[1:])))
-        if len(found[k]) == 0:
-            found[k] = values.copy()
-        else:
-            found[k][active] = values
 
 
 def campaign_rows(extension: Extension) -> Rows:

@@ -21,6 +21,7 @@ from skred.diagnosis.evidence.conditional_map import (
     Modes,
     Population,
     Rows,
+    deviations,
     event_modes,
     log_joint,
     look_around,
@@ -28,7 +29,6 @@ from skred.diagnosis.evidence.conditional_map import (
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.linear_mixed_model import (
     MeanPrior,
-    deviations,
     joint_step,
     mean_prior,
     most_probable_covariance,
@@ -83,19 +83,17 @@ class _State(NamedTuple):
         rows = self.rows_of(groups)
         return _State(
             self.strengths[groups],
-            Population(*(part[groups] for part in self.population)),
+            self.population.take(groups),
             Modes(*(part[rows] for part in self.modes)),
             self.height[groups],
         )
 
     def put(self, groups: IntArray, there: _State) -> None:
         """Some of the groups at where they are now."""
-        rows = self.rows_of(groups)
         self.strengths[groups], self.height[groups] = there.strengths, there.height
         for whole, part in zip(self.population, there.population, strict=True):
             whole[groups] = part
-        for whole, part in zip(self.modes, there.modes, strict=True):
-            whole[rows] = part
+        self.modes.put(self.rows_of(groups), there.modes)
 
 
 class _Climb:
@@ -211,7 +209,7 @@ def global_starts(
     sd = joint_step(state.modes, all_rows, state.population, climb.prior, state.strengths, climb.precision).sd
     found: list[Start] = []
     for k in np.argsort(-state.height):
-        population = Population(*(part[k : k + 1] for part in state.population))
+        population = state.population.take(slice(k, k + 1))
         points = state.modes.points[k * n_events : (k + 1) * n_events]
         one = Start(float(state.strengths[k]), float(sd[k]), Fit(unfitted(population), points))
         if all(abs(one.strength - other.strength) > _SAME * other.sd for other in found):

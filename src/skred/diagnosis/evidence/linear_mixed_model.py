@@ -21,6 +21,7 @@ from skred.diagnosis.evidence.conditional_map import (
     Modes,
     Population,
     Rows,
+    deviations,
     event_modes,
 )
 from skred.inference.hierarchical.rough_population import (
@@ -92,13 +93,6 @@ def _products(rows: Rows, first: FloatArray, second: FloatArray) -> FloatArray:
     one, other = (part.reshape(rows.n_groups, -1, part.shape[2]) for part in (first, second))
     result: FloatArray = one.transpose(0, 2, 1) @ other
     return result
-
-
-def deviations(points: FloatArray, rows: Rows, population: Population) -> FloatArray:
-    """Deviation of points from their population's mean, the release's last."""
-    deviation = points.copy()
-    deviation[:, :-1] -= population.mean[rows.group]
-    return deviation
 
 
 def efficient_scores(modes: Modes, rows: Rows, population: Population, prior: MeanPrior) -> Scores:
