@@ -89,8 +89,8 @@ def evidences(rule: str, budget: Budget, one: Integration, log_scale: Any) -> tu
     spread = RULES[rule](one.likelihood, one.population, one.modes, budget, one.reference)
     seconds = time.process_time() - started
     found = [
-        evidence(nodes_of(spread.nodes, rows, k), log_scale, coordinates(one.population, k)).log_evidence
-        for k in range(rows.n_groups)
+        evidence(nodes_of(spread.nodes, rows, k), log_scale, coordinates(population)).log_evidence
+        for k, population in enumerate(one.population.groups)
     ]
     return np.array(found), spread.points.shape[1], seconds
 

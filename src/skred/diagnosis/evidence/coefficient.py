@@ -25,8 +25,8 @@ from skred.diagnosis.evidence.conditional_map import (
 )
 from skred.diagnosis.evidence.event_quadrature import FIRST, USUAL, Budget
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of, typical_speed
-from skred.diagnosis.evidence.linear_mixed_model import mean_prior
-from skred.diagnosis.evidence.marginal import coordinates, evidence, population_at, prior_log_scale
+from skred.diagnosis.evidence.linear_mixed_model import median_log_scale
+from skred.diagnosis.evidence.marginal import coordinates, evidence, population_at
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 from skred.diagnosis.evidence.tolerance import COUNTS, MOST_ROUNDS
 from skred.inference.hierarchical.problem import HierarchicalProblem
@@ -75,7 +75,7 @@ class Base:
     @property
     def log_scale(self) -> FloatArray:
         """Logarithm of the scales of the medians' priors."""
-        return prior_log_scale(mean_prior(self.law))
+        return median_log_scale(self.law)
 
     @property
     def population(self) -> Population:
@@ -292,10 +292,10 @@ def fit_base(
     if directions:
         fit = refit(extension, rows, given[None, :], (population, points), Rounds(least=4))[0]
     else:
-        log_scale = prior_log_scale(mean_prior(law))
-        found = evidence(problem.surfaces(law.mechanisms).nodes, log_scale, coordinates(population), 30)
+        nodes = problem.surfaces(law.mechanisms).nodes
+        found = evidence(nodes, median_log_scale(law), coordinates(population), 30)
         exact = population_at(found.psi[None], len(law.mechanisms))
-        starts = (points, _best_nodes(problem.surfaces(law.mechanisms).nodes, exact))
+        starts = (points, _best_nodes(nodes, exact))
         likelihood = EventLikelihood(extension, rows, given)
         tried = [event_modes(likelihood, start, exact, n_steps=20).points for start in starts]
         heights = [log_joint(likelihood, one, exact) for one in tried]

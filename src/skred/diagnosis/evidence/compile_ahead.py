@@ -28,6 +28,6 @@ def compile_ahead(readings: EventReadings, error_model: ErrorModel) -> None:
     points = np.random.default_rng(0).normal(0.0, 0.3, (2, n_events * _NODES))
     nodes = Nodes(_NODES * np.arange(n_events + 1), points, np.zeros(points.shape[1]))
     found = evidence(nodes, np.zeros(2), np.zeros(5), n_steps=1)
-    importance_evidence(nodes, np.zeros(2), found, seed=0)
+    importance_evidence(nodes, np.zeros(2), found)
     reading_slopes(events, predictions, readings, errors)
     draw_nodes(np.zeros((1, 2)), np.eye(2)[None], np.full((1, n_events), 0.5), *nodes)

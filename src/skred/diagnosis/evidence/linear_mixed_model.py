@@ -51,6 +51,12 @@ def mean_prior(law: Law) -> MeanPrior:
     return MeanPrior(np.log(scales) + MEDIAN_LOG_MEAN, np.full(len(scales), MEDIAN_LOG_SD))
 
 
+def median_log_scale(law: Law) -> FloatArray:
+    """Logarithm of the scales of the medians' half-normal priors, as `mean_prior` stands for them."""
+    result: FloatArray = mean_prior(law).mean - MEDIAN_LOG_MEAN
+    return result
+
+
 class Scores(NamedTuple):
     """Efficient scores and information about the strengths added, by group.
 
@@ -284,6 +290,8 @@ def fit_population(
 def most_probable_covariance(rows: Rows, deviation: FloatArray, cover: FloatArray) -> FloatArray:
     """Covariance of each group's population, (n_groups, n, n), that its events ask for.
 
+    Most probable spreads under their log-normal prior, mild correlation.
+
     Parameters
     ----------
     deviation : (n_rows, n) array
@@ -292,12 +300,7 @@ def most_probable_covariance(rows: Rows, deviation: FloatArray, cover: FloatArra
         What is left open of them.
     """
     moment = _by_group(rows, np.einsum("ri,rj->rij", deviation, deviation) + cover)
-    return _most_probable_covariance(moment, len(rows.event) // rows.n_groups)
-
-
-def _most_probable_covariance(moment: FloatArray, n_events: int) -> FloatArray:
-    """Covariance of each group: most probable spreads under their log-normal prior, mild correlation."""
-    squares = _diagonal(moment)
+    squares, n_events = _diagonal(moment), len(rows.event) // rows.n_groups
     log_spread = 0.5 * np.log(squares / n_events + 1e-12)
     for _ in range(12):
         ratio = squares * np.exp(-2.0 * log_spread)
@@ -310,8 +313,7 @@ def _most_probable_covariance(moment: FloatArray, n_events: int) -> FloatArray:
     return result
 
 
-def starting_population(law: Law, n_groups: int = 1) -> Population:
-    """A wide population at the prior's median strengths."""
-    n = len(law.mechanisms)
-    mean = np.tile(mean_prior(law).mean, (n_groups, 1))
-    return Population(mean, np.tile(STARTING_SPREAD**2 * np.eye(n), (n_groups, 1, 1)))
+def starting_population(law: Law) -> Population:
+    """A wide population at the prior's median strengths, of one group."""
+    mean = mean_prior(law).mean
+    return Population(mean[None], STARTING_SPREAD**2 * np.eye(len(mean))[None])

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from skred.diagnosis.evidence.adaptive_sampling import DRAWS, Mixture, Mode, Weighted, weighted_draws
 from skred.diagnosis.evidence.conditional_map import Population
-from skred.diagnosis.evidence.linear_mixed_model import MeanPrior
 from skred.diagnosis.evidence.population_target import (
     MOST_CORRELATED,
     NARROWEST,
@@ -92,9 +91,9 @@ def population_at(psi: FloatArray, n: int) -> Population:
     return Population(psi[:, :n].copy(), np.einsum("gij,gkj->gik", factors, factors))
 
 
-def coordinates(population: Population, group: int = 0) -> FloatArray:
-    """A group's population in the coordinates of `population_target`."""
-    covariance = population.covariance[group]
+def coordinates(population: Population) -> FloatArray:
+    """A population, of one group, in the coordinates of `population_target`."""
+    covariance = population.covariance[0]
     n = len(covariance)
     spread = np.sqrt(np.diag(covariance))
     factor = np.linalg.cholesky(covariance)
@@ -103,7 +102,7 @@ def coordinates(population: Population, group: int = 0) -> FloatArray:
         for i in range(j + 1, n):
             left = math.sqrt(max(covariance[i, i] - float(np.sum(factor[i, :j] ** 2)), 1e-12))
             partial.append(math.atanh(float(np.clip(factor[i, j] / left, -MOST_CORRELATED, MOST_CORRELATED))))
-    return np.concatenate([population.mean[group], np.log(spread), partial])
+    return np.concatenate([population.mean[0], np.log(spread), partial])
 
 
 def evidence(nodes: Nodes, log_scale: FloatArray, start: FloatArray, n_steps: int = 12) -> Evidence:
@@ -124,12 +123,11 @@ def evidence(nodes: Nodes, log_scale: FloatArray, start: FloatArray, n_steps: in
     return Evidence(laplace + log_correlation_constant(n), psi, covariance)
 
 
-def importance_evidence(
-    nodes: Nodes, log_scale: FloatArray, found: Evidence, seed: int
-) -> tuple[float, float]:
-    """Evidence by importance sampling from the Laplace approximation on, and its standard error in nats."""
+def importance_evidence(nodes: Nodes, log_scale: FloatArray, found: Evidence, seed: int = 0) -> Evidence:
+    """What was found, with evidence by importance sampling from the Laplace approximation on."""
     weighted = _weighted(nodes, log_scale, found, np.random.default_rng([seed, 11]), DRAWS, STANDARD_ERROR)
-    return weighted.log_integral + log_correlation_constant(len(log_scale)), weighted.error
+    log_evidence = weighted.log_integral + log_correlation_constant(len(log_scale))
+    return found._replace(log_evidence=log_evidence, error=weighted.error)
 
 
 def importance_draws(
@@ -154,11 +152,3 @@ def _weighted(
 
     proposal = Mixture.on([Mode(found.psi, found.covariance)])
     return weighted_draws(log_density, proposal, rng, n_draws, enough)
-
-
-def prior_log_scale(prior: MeanPrior) -> FloatArray:
-    """Logarithm of the half-normal scales that a prior of the mean stands for."""
-    from skred.diagnosis.evidence.linear_mixed_model import MEDIAN_LOG_MEAN
-
-    result: FloatArray = prior.mean - MEDIAN_LOG_MEAN
-    return result

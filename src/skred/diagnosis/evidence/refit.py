@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows, event_modes
 from skred.diagnosis.evidence.event_quadrature import USUAL, Budget, event_nodes
 from skred.diagnosis.evidence.extension import Extension
-from skred.diagnosis.evidence.linear_mixed_model import mean_prior
+from skred.diagnosis.evidence.linear_mixed_model import median_log_scale
 from skred.diagnosis.evidence.marginal import (
     Evidence,
     coordinates,
     evidence,
     importance_evidence,
     population_at,
-    prior_log_scale,
 )
 from skred.diagnosis.evidence.tolerance import MOST_ROUNDS
 from skred.inference.hierarchical.surface import Nodes
@@ -101,7 +100,7 @@ def refit(
         Where to begin instead, one for each group.
     """
     n_groups, n_events, n = len(strengths), len(rows.event), start[0].mean.shape[1]
-    log_scale = prior_log_scale(mean_prior(extension.law))
+    log_scale = median_log_scale(extension.law)
     state = list(fits) if fits is not None else [Fit(unfitted(start[0]), start[1])] * n_groups
     active = list(range(n_groups))
     for number in range(MOST_ROUNDS):
@@ -120,18 +119,12 @@ def refit(
                 if number + 1 < rounds.least or _moved(before, found.psi, n):
                     moved.append(k)
                 if rounds.sampled and (k not in moved or number + 1 == MOST_ROUNDS):
-                    found = _by_sampling(part, log_scale, found)
+                    found = importance_evidence(part, log_scale, found)
                 state[k] = Fit(found, own)
         active = moved
         if not active:
             break
     return state
-
-
-def _by_sampling(nodes: Nodes, log_scale: FloatArray, found: Evidence) -> Evidence:
-    """With evidence by importance sampling."""
-    sampled, error = importance_evidence(nodes, log_scale, found, seed=0)
-    return found._replace(log_evidence=sampled, error=error)
 
 
 def unfitted(population: Population) -> Evidence:
