@@ -18,8 +18,7 @@ def alpha_beta_entry(problem: Problem) -> dict[str, Any]:
     """
     campaign, terrain = problem.campaign, problem.terrain
     runouts = [j for j, sensor in enumerate(campaign.sensors) if sensor.is_runout]
-    middle = 0.5 * (terrain.edge_s_m[1:] + terrain.edge_s_m[:-1])
-    slope = np.interp(campaign.track.s_m, middle, terrain.slope_rad)
+    slope = np.interp(campaign.track.s_m, terrain.middle_s_m, terrain.slope_rad)
     try:
         model = alpha_beta(campaign.track.x_m, campaign.track.z_m, slope)
     except ValueError as error:

@@ -71,6 +71,12 @@ class Terrain:
         return float(self.edge_s_m[-1])
 
     @property
+    def middle_s_m(self) -> FloatArray:
+        """Arc length at the middles of the cells [m], (n_cells,)."""
+        middle: FloatArray = 0.5 * (self.edge_s_m[1:] + self.edge_s_m[:-1])
+        return middle
+
+    @property
     def slope_rad(self) -> FloatArray:
         """Slope angle phi per cell [rad], downhill positive."""
         return np.arctan2(self.sin_slope, self.cos_slope)

@@ -63,16 +63,14 @@ def with_ways(
 
 
 def gains_or_none(base: Base, curve: Curve, budgets: Sequence[Budget]) -> dict[BetweenEvents, float] | None:
-    """What each way has more; None where some way has no density that draws find."""
+    """What each way has more than the strength in common, in nats; parameters as `ways_of` has them.
+
+    None where some way has no density that draws find.
+    """
     try:
-        return gains_of(base, curve, budgets)
+        ways = ways_of(base, curve, budgets)
     except np.linalg.LinAlgError:
         return None
-
-
-def gains_of(base: Base, curve: Curve, budgets: Sequence[Budget] = TABLES) -> dict[BetweenEvents, float]:
-    """What each way has more than the strength in common, in nats; parameters as `ways_of` has them."""
-    ways = ways_of(base, curve, budgets)
     common = ways[BetweenEvents.COMMON].log_evidence
     return {kind: way.log_evidence - common for kind, way in ways.items()}
 

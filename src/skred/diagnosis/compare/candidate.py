@@ -20,8 +20,6 @@ FORM = 0.3
 """Relative standard deviation of a physical strength for the form of its term: edges, exponents, supply that
 real forces have otherwise. Set on 28 opened trials, whose true forms differ on purpose: 90 % intervals held
 16 of the true strengths without it, 24 with it."""
-
-
 _UNLIKELY = 0.1
 """Probability up to which a way in which avalanches may differ is not modelled in place of a likelier one."""
 BESIDE = 0.5
@@ -149,7 +147,7 @@ class Candidate:
             Of the strength at the best shape.
         """
         best = self.best
-        same = [k for k, one in enumerate(self.curves) if _is_same_quantity(one, best)]
+        same = [k for k, one in enumerate(self.curves) if _quantity(one) == _quantity(best)]
         weights = self.shape_weights[same] / self.shape_weights[same].sum()
         apart = np.array([self.curves[k].moments[0] - best.moments[0] for k in same])
         moved = float(weights @ apart)
@@ -160,8 +158,7 @@ class Candidate:
 
     def stretch(self) -> tuple[float, float] | None:
         """Where it acts: medians of both ends over the place's posterior [m], None where it is not local."""
-        ends = self.ends(0.5)
-        return None if ends is None else (ends[0], ends[1])
+        return self.ends(0.5)
 
     def ends(self, share: float) -> tuple[float, float] | None:
         """Quantiles of both ends over the place's posterior [m], None where it is not local."""
@@ -173,14 +170,10 @@ class Candidate:
         return _weighted_quantile(first, weights, share), _weighted_quantile(last, weights, share)
 
 
-def _is_same_quantity(one: Curve, other: Curve) -> bool:
-    """Whether strengths of two shapes are the same quantity."""
-
-    def meaning(curve: Curve) -> tuple[str | None, str | None, bool, float | None]:
-        shape = curve.shape
-        return shape.sensor, shape.covariate, is_opposed(shape), curve.direction.weakening_speed
-
-    return meaning(one) == meaning(other)
+def _quantity(curve: Curve) -> tuple[str | None, str | None, bool, float | None]:
+    """What a shape's strength is: the same quantity where this is the same."""
+    shape = curve.shape
+    return shape.sensor, shape.covariate, is_opposed(shape), curve.direction.weakening_speed
 
 
 def _weighted_quantile(values: FloatArray, weights: FloatArray, share: float) -> float:

@@ -110,12 +110,8 @@ class Comparison:
         """Log Bayes factors from those under each error model."""
         parts: dict[str, list[float]] = {}
         for under_errors, found in zip(self.under_each, factors, strict=True):
-            prior = (
-                math.log(ERROR_SHARES[under_errors.error_model])
-                + self.base_evidence[under_errors.error_model]
-            )
             for name, factor in found.items():
-                parts.setdefault(name, []).append(prior + factor)
+                parts.setdefault(name, []).append(self._height(under_errors.error_model) + factor)
         nothing = float(np.logaddexp.reduce(parts[NOTHING]))
         return {name: float(np.logaddexp.reduce(values)) - nothing for name, values in parts.items()}
 
@@ -133,17 +129,12 @@ class Comparison:
 
     def leading(self, name: str) -> ComparisonUnderErrors:
         """The comparison under the error model that an id has most of its evidence under."""
+        having = [one for one in self.under_each if name in one.log_factors]
+        return max(having, key=lambda one: self._height(one.error_model) + one.log_factors[name])
 
-        def height(under_errors: ComparisonUnderErrors) -> float:
-            return (
-                math.log(ERROR_SHARES[under_errors.error_model])
-                + self.base_evidence[under_errors.error_model]
-                + under_errors.log_factors[name]
-            )
-
-        return max(
-            (under_errors for under_errors in self.under_each if name in under_errors.log_factors), key=height
-        )
+    def _height(self, error_model: str) -> float:
+        """Log of an error model's prior probability and of the base law's evidence under it."""
+        return math.log(ERROR_SHARES[error_model]) + self.base_evidence[error_model]
 
 
 def compare(base: Base, tell: Tell = lambda done, of: None) -> Comparison:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
 from skred.diagnosis.discrepancy.profile import Kind, Profile, most_probable, spline_basis
+from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.limits import HELD
@@ -63,19 +64,15 @@ def locate(under_errors: ComparisonUnderErrors, opposed: bool | None = None) -> 
     alike = [one for one in under_errors.profiles if opposed in (None, one.kind.opposed)]
     profile = most_probable(alike)
     base = under_errors.base
-    terrain = base.setting.terrain
-    edge = np.asarray(terrain.edge_s_m)
     speeds = extended(base.problem, base.law, base.directions).speeds(base.fit.points, base.strengths)
     squares = 0.5 * (speeds[:, 1:] ** 2 + speeds[:, :-1] ** 2)
     here = squares > 0.0
-    factor = _per_unit(profile.kind, squares, here)
-    basis = spline_basis(terrain, profile.knots_m) * factor
-    inside = np.flatnonzero(spline_basis(terrain, profile.knots_m).sum(axis=0) > 0.0)
+    unit = spline_basis(base.setting.terrain, profile.knots_m)
+    basis = unit * _per_unit(profile.kind, squares, here)
+    inside = np.flatnonzero(unit.sum(axis=0) > 0.0)
     mean, sd, band = _band(profile, basis[:, inside])
-    work = _work(base.problem.sensor_places, profile, basis, np.diff(edge), edge)
-    middle = 0.5 * (edge[1:] + edge[:-1])
     return Location(
-        s_m=middle[inside],
+        s_m=base.setting.terrain.middle_s_m[inside],
         mean=mean,
         low=mean - band * sd,
         high=mean + band * sd,
@@ -83,7 +80,7 @@ def locate(under_errors: ComparisonUnderErrors, opposed: bool | None = None) -> 
         resolution_m=_resolution(profile),
         opposed=profile.kind.opposed,
         stretch_m=_stretch(profile),
-        work=work,
+        work=_work(base, profile, basis),
         log_bayes_factor=profile.log_bayes_factor,
     )
 
@@ -141,19 +138,14 @@ def _stretch(profile: Profile) -> tuple[float, float]:
     return float(profile.knots_m[first]) - half, float(profile.knots_m[last]) + half
 
 
-def _work(
-    places: list[tuple[float, float] | None],
-    profile: Profile,
-    basis: FloatArray,
-    lengths: FloatArray,
-    edge: FloatArray,
-) -> FloatArray:
+def _work(base: Base, profile: Profile, basis: FloatArray) -> FloatArray:
     """Missing specific work between neighbouring sensors, and its standard deviation."""
+    places, terrain = base.problem.sensor_places, base.setting.terrain
     ends = sorted({0.5 * (place[0] + place[1]) for place in places if place is not None})
     if not ends:
         return np.empty((0, 4))
     ends = [*ends, float(profile.knots_m[-1])] if profile.knots_m[-1] > ends[-1] + 1.0 else ends
-    middle = 0.5 * (edge[1:] + edge[:-1])
+    lengths, middle = np.diff(terrain.edge_s_m), terrain.middle_s_m
     rows = []
     for first, last in zip(ends[:-1], ends[1:], strict=True):
         weights = basis @ (lengths * ((middle >= first) & (middle < last)))

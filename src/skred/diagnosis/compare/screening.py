@@ -12,7 +12,7 @@ from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
 from skred.diagnosis.evidence.event_quadrature import SCREENING
 from skred.diagnosis.evidence.extension import extended
-from skred.diagnosis.evidence.global_start import Start, first_strengths, global_starts
+from skred.diagnosis.evidence.global_start import first_strengths, global_starts
 from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Mechanism, Shape
@@ -31,23 +31,16 @@ def curve(base: Base, mechanism: Mechanism, shape: Shape) -> Curve:
     added = mechanism.added
     assert added is not None
     scale = added.scale_of(shape)
-    starts = _starts(base, mechanism, shape)
+    extension = extended(
+        base.problem, base.law, (*base.directions, direction_of(mechanism, base.setting, shape))
+    )
+    starts = global_starts(extension, base.rows, base.strengths, base.fit.start, scale, added.either_sign)
     begin = {0.0: base.fit} | {one.strength: one.fit for one in starts if one.strength != 0.0}
     about = np.array([one.strength + one.sd * by for one in starts for by in _ABOUT])
     strengths = np.append(first_strengths(scale, added.either_sign), about)
     if not added.either_sign:
         strengths = strengths[strengths > 0.0]
     return curve_at(base, mechanism, shape, np.unique(strengths), SCREENING, begin=begin)
-
-
-def _starts(base: Base, mechanism: Mechanism, shape: Shape) -> list[Start]:
-    """Global starts."""
-    added = mechanism.added
-    assert added is not None
-    direction = direction_of(mechanism, base.setting, shape)
-    extension = extended(base.problem, base.law, (*base.directions, direction))
-    scale = added.scale_of(shape)
-    return global_starts(extension, base.rows, base.strengths, base.fit.start, scale, added.either_sign)
 
 
 def screened(

@@ -178,7 +178,7 @@ def knots(setting: Setting) -> FloatArray:
 
 def spline_basis(terrain: Terrain, at: FloatArray) -> FloatArray:
     """Piecewise linear basis, (n_knots, n_cells): 1 at its own knot, 0 at all others and outside."""
-    middle = 0.5 * (terrain.edge_s_m[1:] + terrain.edge_s_m[:-1])
+    middle = terrain.middle_s_m
     inside = (middle >= at[0]) & (middle <= at[-1])
     rows = [np.interp(middle, at, unit) * inside for unit in np.eye(len(at))]
     return np.array(rows)
