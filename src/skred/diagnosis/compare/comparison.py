@@ -23,13 +23,18 @@ from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import refine
 from skred.diagnosis.compare.residue import with_residues
-from skred.diagnosis.compare.restarts import better_modes
 from skred.diagnosis.compare.screening import Tell, screened
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, alike, log_evidence_of, most_probable
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
-from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
-from skred.diagnosis.evidence.event_quadrature import FINE, SCREENING, USUAL
+from skred.diagnosis.evidence.conditional_map import (
+    EventLikelihood,
+    Population,
+    campaign_rows,
+    event_modes,
+    log_joint,
+)
+from skred.diagnosis.evidence.event_quadrature import FINE, SCREENING, USUAL, event_nodes
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds, stated
 from skred.diagnosis.evidence.refit import Rounds, refit
@@ -178,10 +183,39 @@ def with_errors(base: Base, error_model: str) -> Base:
     rows = campaign_rows(extension)
     rounds = Rounds(FINE, USUAL, 3)
     fit = refit(extension, rows, base.strengths[None, :], base.fit.start, rounds)[0]
-    points = better_modes(EventLikelihood(extension, rows, base.strengths), *fit.start)
+    points = _better_modes(EventLikelihood(extension, rows, base.strengths), *fit.start)
     if not np.array_equal(points, fit.points):
         fit = refit(extension, rows, base.strengths[None, :], (fit.population, points), rounds)[0]
     return replace(base, problem=problem, rows=rows, fit=fit)
+
+
+def _better_modes(likelihood: EventLikelihood, population: Population, points: FloatArray) -> FloatArray:
+    """Each event's mode, or a higher one that a climb from the node with most of its integral leads to.
+
+    Where a gate stands just above the stops, a front that stops a little too early is at a mode of its own,
+    and no step away from it gains anything; points spread over the whole population lie beyond.
+
+    Parameters
+    ----------
+    points : (n_rows, n_base + 1) array
+        Where climbs ended.
+
+    Returns
+    -------
+    (n_rows, n_base + 1) array
+        The same points but for rows with a higher mode.
+    """
+    modes = event_modes(likelihood, points, population)
+    spread = event_nodes(likelihood, population, modes, FINE)
+    n_rows, _, n = spread.points.shape
+    away = spread.points - np.append(population.mean[0], 0.0)
+    precision = population.precision[0][: n - 1, : n - 1]
+    log_prior = -0.5 * np.einsum("rki,ij,rkj->rk", away[:, :, :-1], precision, away[:, :, :-1])
+    best = (spread.log_weights + log_prior).argmax(axis=1)
+    start = spread.points[np.arange(n_rows), best]
+    again = event_modes(likelihood, start, population).points
+    heights = [log_joint(likelihood, one, population) for one in (points, again)]
+    return np.where((heights[1] > heights[0] + DECIDES_NOTHING)[:, None], again, points)
 
 
 def _under_errors(

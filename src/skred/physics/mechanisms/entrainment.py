@@ -38,8 +38,7 @@ def _direction(setting: Setting, shape: Shape) -> Direction:
     growth = dict(shape.constants).get(GROWTH)
     if growth is None:
         return along_a_stretch(Column.QUADRATIC)(setting, shape)
-    edge = setting.terrain.edge_s_m
-    mass = np.interp(0.5 * (edge[1:] + edge[:-1]), ends_of(shape), (1.0, growth))
+    mass = np.interp(setting.terrain.middle_s_m, ends_of(shape), (1.0, growth))
     return Direction((Column.QUADRATIC,), (on_a_stretch(setting.terrain, *ends_of(shape)) / mass)[None, :])
 
 

@@ -94,10 +94,8 @@ def _relief(setting: Setting, shape: Shape) -> FloatArray:
     """U^2 at which the relief equals the drag, in each cell: linear between the stretch's ends."""
     first, last = ends_of(shape)
     constants = dict(shape.constants)
-    edge = setting.terrain.edge_s_m
-    middle = 0.5 * (edge[1:] + edge[:-1])
     squares = np.array([constants[U_1], constants[U_2]]) ** 2
-    return np.interp(middle, [first, last], squares)
+    return np.interp(setting.terrain.middle_s_m, [first, last], squares)
 
 
 def stretches(setting: Setting) -> tuple[Shape, ...]:
