@@ -68,15 +68,12 @@ def _fit_beside(base: Base, curve: Curve, kind: Kind) -> Profile | None:
     Both are fitted together: beside such a force a mechanism is as strong as it is, and not as strong as it
     has to be for both.
     """
-    added = curve.mechanism.added
-    assert added is not None
     top = int(np.argmax(curve.log_evidence))
     directions = (*base.directions, curve.direction)
     wide = replace(base, directions=directions, strengths=np.append(base.strengths, 0.0))
     values = np.append(curve.strengths[top], np.zeros(len(knots(base.setting))))
     near = values, curve.fits[top].start
-    prior = Free(added.scale_of(curve.shape), added.either_sign)
     try:
-        return fit_profile(wide, kind, near, free=[prior])
+        return fit_profile(wide, kind, near, free=[Free(curve.scale, curve.added.either_sign)])
     except np.linalg.LinAlgError:
         return None

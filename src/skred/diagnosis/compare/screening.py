@@ -14,7 +14,7 @@ from skred.diagnosis.evidence.event_quadrature import SCREENING
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.global_start import first_strengths, global_starts
 from skred.diagnosis.evidence.tolerance import COUNTS
-from skred.physics.mechanisms.placed import direction_of
+from skred.physics.mechanisms.placed import added_of, direction_of
 from skred.physics.mechanisms.spec import Mechanism, Shape
 
 Tell = Callable[[int, int], None]
@@ -28,8 +28,7 @@ def curve(base: Base, mechanism: Mechanism, shape: Shape) -> Curve:
     Many recordings tell strengths far below the prior's scale, or far beyond what a refit from the base law
     reaches; strengths over the prior alone would miss where the evidence is.
     """
-    added = mechanism.added
-    assert added is not None
+    added = added_of(mechanism)
     scale = added.scale_of(shape)
     extension = extended(
         base.problem, base.law, (*base.directions, direction_of(mechanism, base.setting, shape))

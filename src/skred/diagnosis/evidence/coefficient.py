@@ -24,7 +24,7 @@ from skred.diagnosis.evidence.conditional_map import (
     log_joint,
 )
 from skred.diagnosis.evidence.event_quadrature import FIRST, USUAL, Budget
-from skred.diagnosis.evidence.extension import Extension, extended, setting_of, typical_speed
+from skred.diagnosis.evidence.extension import extended, setting_of, typical_speed
 from skred.diagnosis.evidence.linear_mixed_model import median_log_scale
 from skred.diagnosis.evidence.marginal import coordinates, evidence, population_at
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
@@ -32,8 +32,8 @@ from skred.diagnosis.evidence.tolerance import COUNTS, MOST_ROUNDS
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.hierarchical.surface import Nodes
 from skred.physics.law import Law
-from skred.physics.mechanisms.placed import direction_of
-from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
+from skred.physics.mechanisms.placed import added_of, direction_of
+from skred.physics.mechanisms.spec import Added, Direction, Mechanism, Setting, Shape
 
 FloatArray = NDArray[np.float64]
 _NEAR = (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0)
@@ -94,8 +94,9 @@ class Base:
         """
         if (budget, sampled) not in self._nothing:
             extension = extended(self.problem, self.law, self.directions)
-            rounds = Rounds(budget, FIRST, sampled=sampled)
-            self._nothing[budget, sampled] = _refit_from(self, extension, np.empty(0), rounds)[0]
+            given, rounds = self.strengths[None, :], Rounds(budget, FIRST, sampled=sampled)
+            (fit,) = refit(extension, self.rows, given, self.fit.start, rounds)
+            self._nothing[budget, sampled] = fit
         return self._nothing[budget, sampled]
 
 
@@ -123,6 +124,16 @@ class Curve:
     log_evidence: FloatArray
     fits: tuple[Fit, ...]
 
+    @property
+    def added(self) -> Added:
+        """How the mechanism is added."""
+        return added_of(self.mechanism)
+
+    @property
+    def scale(self) -> float:
+        """Scale of the strength's prior."""
+        return self.added.scale_of(self.shape)
+
     def nearest(self, strength: float) -> Fit:
         """The fit at the strength closest to one."""
         return _closest(self.known, strength)
@@ -134,9 +145,7 @@ class Curve:
 
     def fine(self, scale: float | None = None) -> tuple[FloatArray, FloatArray]:
         """Strengths on a fine grid, and the log posterior density there, not normalised."""
-        added = self.mechanism.added
-        assert added is not None
-        scale = added.scale_of(self.shape) if scale is None else scale
+        scale = self.scale if scale is None else scale
         # As many between each two that were computed: these lie close where the curve is narrow.
         parts = np.linspace(self.strengths[:-1], self.strengths[1:], _BETWEEN, endpoint=False, axis=1)
         strengths = np.append(parts.ravel(), self.strengths[-1])
@@ -144,7 +153,7 @@ class Curve:
         heights = np.maximum(self.log_evidence, floor)
         spline = Akima1DInterpolator(self.strengths, heights, method="makima")
         log_prior = -0.5 * (strengths / scale) ** 2 - 0.5 * math.log(2.0 * math.pi * scale**2)
-        if not added.either_sign:
+        if not self.added.either_sign:
             log_prior = log_prior + math.log(2.0)
         return strengths, spline(strengths) + log_prior
 
@@ -187,8 +196,7 @@ def curve_near(base: Base, near: Curve, shape: Shape) -> Curve:
     near : Curve
         Of the same mechanism and nearly the same shape.
     """
-    assert near.mechanism.added is not None
-    least = _SMALLEST * near.mechanism.added.scale_of(shape)
+    least = _SMALLEST * near.added.scale_of(shape)
     for _ in range(MOST_ROUNDS):
         before = near.moments
         near = curve_at(base, near.mechanism, shape, _strengths_near(near), USUAL, near.known)
@@ -202,14 +210,12 @@ def curve_near(base: Base, near: Curve, shape: Shape) -> Curve:
 
 def _strengths_near(near: Curve) -> FloatArray:
     """Strengths around the mean of a curve, without 0."""
-    added = near.mechanism.added
-    assert added is not None
     mean, sd = near.moments
-    sd = max(sd, _SMALLEST * added.scale_of(near.shape)) * (2.0 if near.is_cut else 1.0)
+    sd = max(sd, _SMALLEST * near.scale) * (2.0 if near.is_cut else 1.0)
     strengths = mean + sd * np.array(_NEAR)
     if abs(mean) > 2.0 * abs(_NEAR[0]) * sd:  # nothing between 0 and there otherwise
         strengths = np.append(strengths, 0.5 * (mean - math.copysign(abs(_NEAR[0]) * sd, mean)))
-    return strengths if added.either_sign else strengths[strengths > 0.05 * sd]
+    return strengths if near.added.either_sign else strengths[strengths > 0.05 * sd]
 
 
 def curve_at(
@@ -235,15 +241,14 @@ def curve_at(
     sampled : bool
         Whether the evidence is computed by importance sampling; else by Laplace's formula.
     """
-    added = mechanism.added
-    assert added is not None
     direction = direction_of(mechanism, base.setting, shape)
     extension = extended(base.problem, base.law, (*base.directions, direction))
-    strengths = np.sort(strengths[np.abs(strengths) > _SMALLEST * added.scale_of(shape)])
+    strengths = np.sort(strengths[np.abs(strengths) > _SMALLEST * added_of(mechanism).scale_of(shape)])
     fits = known or begin
     near = None if fits is None else [_closest(fits, strength) for strength in strengths]
     rounds = Rounds(budget, FIRST, sampled=sampled) if known is None else Rounds(budget, None, 1, sampled)
-    found = _refit_from(base, extension, strengths, rounds, near) if len(strengths) else []
+    given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
+    found = refit(extension, base.rows, given, base.fit.start, rounds, near)
     place = int(np.searchsorted(strengths, 0.0))
     found.insert(place, base.with_nothing(budget, sampled=sampled))
     strengths = np.insert(strengths, place, 0.0)
@@ -255,20 +260,6 @@ def curve_at(
 def _closest(fits: Mapping[float, Fit], strength: float) -> Fit:
     """The fit at the strength closest to one."""
     return fits[min(fits, key=lambda one: abs(one - strength))]
-
-
-def _refit_from(
-    base: Base,
-    extension: Extension,
-    strengths: FloatArray,
-    rounds: Rounds,
-    fits: list[Fit] | None = None,
-) -> list[Fit]:
-    """Fits at strengths of the extension's last direction, or without it; begun at fits or at the base's."""
-    given = base.strengths[None, :]
-    if len(strengths):
-        given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
-    return refit(extension, base.rows, given, base.fit.start, rounds, fits)
 
 
 def fit_base(

@@ -76,15 +76,12 @@ class Rounds(NamedTuple):
     sampled: bool = False
 
 
-USUAL_ROUNDS = Rounds()
-
-
 def refit(
     extension: Extension,
     rows: Rows,
     strengths: FloatArray,
     start: tuple[Population, FloatArray],
-    rounds: Rounds = USUAL_ROUNDS,
+    rounds: Rounds,
     fits: Sequence[Fit] | None = None,
 ) -> list[Fit]:
     """Refit population and events at some strengths, one group of rows each.

@@ -25,7 +25,7 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, event_mode
 from skred.diagnosis.evidence.event_quadrature import USUAL, event_nodes
 from skred.diagnosis.evidence.extension import Extension, extended
 from skred.diagnosis.evidence.marginal import evidence, importance_draws, population_at
-from skred.diagnosis.evidence.refit import Fit, refit
+from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 from skred.diagnosis.predict.draws import N_DRAWS, Draws, LeftOut
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.predict.unseen import log_densities
@@ -148,7 +148,7 @@ def _without(base: Base, event: int) -> Base:
     rows, start = base.rows.take(others), (base.population, base.fit.points[others])
     extension = extended(base.problem, base.law, base.directions)
     given = base.strengths[None, :]
-    fit = refit(extension, rows, given, start)[0]
+    fit = refit(extension, rows, given, start, Rounds())[0]
     return replace(base, rows=rows, fit=fit)
 
 

@@ -30,7 +30,7 @@ def shapes_of(mechanism: Mechanism, setting: Setting) -> tuple[Shape, ...]:
     InputError
         If a mechanism of another package fails, or its shapes are not what it says that it is bound to.
     """
-    added = _added(mechanism)
+    added = added_of(mechanism)
     if not set(added.needs) <= set(setting.covariates):
         return ()
     with _named(mechanism):
@@ -42,7 +42,7 @@ def shapes_of(mechanism: Mechanism, setting: Setting) -> tuple[Shape, ...]:
 
 def parts_of(mechanism: Mechanism, setting: Setting, shape: Shape, steps: float) -> tuple[Shape, ...]:
     """Finer shapes around one; raises as `shapes_of`."""
-    added = _added(mechanism)
+    added = added_of(mechanism)
     with _named(mechanism):
         parts = tuple(added.split(setting, shape, steps))
         for part in parts:
@@ -53,12 +53,19 @@ def parts_of(mechanism: Mechanism, setting: Setting, shape: Shape, steps: float)
 def direction_of(mechanism: Mechanism, setting: Setting, shape: Shape) -> Direction:
     """What one unit of the mechanism changes on a campaign; raises as `shapes_of`."""
     with _named(mechanism):
-        direction = _added(mechanism).direction(setting, shape)
+        direction = added_of(mechanism).direction(setting, shape)
         _check_direction(direction, setting)
     return direction
 
 
-def _added(mechanism: Mechanism) -> Added:
+def added_of(mechanism: Mechanism) -> Added:
+    """How a mechanism that can be added to a law is added.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be.
+    """
     if mechanism.added is None:
         raise ValueError(f"{mechanism.id} cannot be added to a law")
     return mechanism.added
