@@ -12,7 +12,6 @@ from rolling_cases import rolling
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import (
-    LARGEST_STEP,
     EventLikelihood,
     Population,
     deviations,
@@ -92,7 +91,7 @@ def test_a_joint_step_solves_the_linear_model(base: Base) -> None:
     assert step.strength[0] == pytest.approx(whole[n], rel=1e-6)
     assert step.sd[0] == pytest.approx(np.sqrt(np.linalg.inv(hessian)[n, n]), rel=1e-6)
     moved = step.of_points(1.0, base.rows).ravel()
-    small = np.abs(whole[n + 1 :]).reshape(n_events, size).max(axis=1) < LARGEST_STEP
+    small = np.abs(whole[n + 1 :]).reshape(n_events, size).max(axis=1) < 1.0
     assert moved.reshape(n_events, size)[small] == pytest.approx(
         whole[n + 1 :].reshape(n_events, size)[small], rel=1e-5, abs=1e-9
     )

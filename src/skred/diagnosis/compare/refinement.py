@@ -26,10 +26,6 @@ from skred.physics.mechanisms.stretches import shares
 Near = Callable[[Curve, Shape], Curve]
 _HOLDS_MUCH = 0.2
 """Share of its mechanism's evidence from which a shape is parted: four at most."""
-_MORE = 1.0
-"""Share of its nats that a mechanism may gain by being parted: 0.6 were seen, of drag between the dam and the
-sensor above it at Ryggfonn. What it may gain falls with the square of the steps. One that cannot count beside
-the best even so is not parted."""
 _LEVELS = 4
 """How many times a shape is parted: the last steps are an eighth of the first, some metres."""
 _SMALLER = 0.5
@@ -111,7 +107,12 @@ def screened_parts(curves: Sequence[Curve]) -> list[Part]:
 
 
 def leading(parts: Sequence[Part], best: float = -math.inf) -> list[int]:
-    """Numbers of those to part: where their mechanism has evidence and may come up to the best one."""
+    """Numbers of those to part: where their mechanism has evidence and may come up to the best one.
+
+    By being parted for the first time a mechanism may gain as many nats as it has: 0.6 of that was seen, of
+    drag between the dam and the sensor above it at Ryggfonn. What it may gain falls with the square of the
+    steps.
+    """
     height = {
         name: float(np.logaddexp.reduce([one.log_factor for one in own])) for name, own in _by_id(parts)
     }
@@ -120,7 +121,7 @@ def leading(parts: Sequence[Part], best: float = -math.inf) -> list[int]:
         k
         for k, one in enumerate(parts)
         if one.level < _LEVELS
-        and (1.0 + _MORE * _SMALLER ** (2 * one.level)) * (own := height[one.curve.mechanism.id]) > least
+        and (1.0 + _SMALLER ** (2 * one.level)) * (own := height[one.curve.mechanism.id]) > least
         and one.log_factor > own + math.log(_HOLDS_MUCH)
     ]
 

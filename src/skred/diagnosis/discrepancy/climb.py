@@ -55,9 +55,10 @@ def climb(base: Base, kind: Kind, at: FloatArray, start: Expansion, cover: Float
     maximum = start
     precision = np.linalg.inv(cover)
     for _ in range(MOST_ROUNDS):
-        step = np.linalg.solve(maximum.information + precision, maximum.score - precision @ maximum.values)
+        slope = maximum.score - precision @ maximum.values
+        step = np.linalg.solve(maximum.information + precision, slope)
         height = maximum.fit.found.log_evidence - prior_penalty(maximum.values, precision)
-        expected = 0.5 * float(step @ (maximum.score - precision @ maximum.values))
+        expected = 0.5 * float(step @ slope)
         for share in STEP_SHARES:
             if share * (2.0 - share) * expected < ARRIVED:
                 return _arrived(maximum, precision)

@@ -26,8 +26,6 @@ from skred.diagnosis.evidence.tolerance import STANDARD_ERROR
 FloatArray = NDArray[np.float64]
 _AT_ONCE = 32
 """Draws fitted together."""
-_DRAWS = 2 * _AT_ONCE
-"""Of a turn: two lots, one for each of two cores."""
 
 
 def sampled(
@@ -36,7 +34,7 @@ def sampled(
     pool: Executor,
     least: float = -math.inf,
     seed: int = 0,
-    n: int = _DRAWS,
+    n: int = 2 * _AT_ONCE,
     enough: float = STANDARD_ERROR,
 ) -> Profile:
     """A profile with its log Bayes factor over all priors by importance sampling of its values.
@@ -47,7 +45,9 @@ def sampled(
     ----------
     pool : Executor
         For the fits, some draws at once. This itself must not be a job of the pool: it waits for those.
-    least, n, enough
+    n : int
+        Draws of a turn: two lots, one for each of two cores.
+    least, enough : float
         When to end, as in `weighted_draws`.
     """
 

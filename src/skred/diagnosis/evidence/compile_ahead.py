@@ -11,9 +11,6 @@ from skred.inference.hierarchical.event_density import draw_nodes
 from skred.inference.hierarchical.surface import Nodes
 from skred.inference.reading_density import assess
 
-_NODES = 8
-"""Of each event: enough for a sum."""
-
 
 def compile_ahead(readings: EventReadings, error_model: ErrorModel) -> None:
     """Call the compiled functions of a diagnosis once, on numbers made up, so that they are on disk.
@@ -25,8 +22,9 @@ def compile_ahead(readings: EventReadings, error_model: ErrorModel) -> None:
     events, errors = np.arange(n_events), error_model.errors
     predictions = np.ones((n_events, n_sensors + 1))
     assess(events, np.repeat(predictions[:, None], 4, axis=1), readings, errors, np.zeros((n_events, 5)))
-    points = np.random.default_rng(0).normal(0.0, 0.3, (2, n_events * _NODES))
-    nodes = Nodes(_NODES * np.arange(n_events + 1), points, np.zeros(points.shape[1]))
+    n_nodes = 8  # of each event: enough for a sum
+    points = np.random.default_rng(0).normal(0.0, 0.3, (2, n_events * n_nodes))
+    nodes = Nodes(n_nodes * np.arange(n_events + 1), points, np.zeros(points.shape[1]))
     found = evidence(nodes, np.zeros(2), np.zeros(5), n_steps=1)
     importance_evidence(nodes, np.zeros(2), found)
     reading_slopes(events, predictions, readings, errors)

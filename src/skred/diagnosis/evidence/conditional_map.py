@@ -17,8 +17,6 @@ from skred.inference.reading_density import log_likelihoods
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
-LARGEST_STEP = 1.0
-"""Largest change of a log strength in one step: tangents say nothing of a front three times as strong."""
 _STARTING_DAMPING = 1e-3
 """Of the Levenberg-Marquardt steps, relative to the diagonal: nearly none."""
 _LOST = 20.0
@@ -259,8 +257,8 @@ def _climbed(likelihood: EventLikelihood, start: FloatArray, population: Populat
         diagonal = np.einsum("rii->ri", damped)
         diagonal *= 1.0 + damping[active][:, None]
         step = np.linalg.solve(damped, gradient[:, :, None])[:, :, 0]
-        size = np.abs(step).max(axis=1)
-        step *= np.minimum(1.0, LARGEST_STEP / np.maximum(size, 1e-12))[:, None]
+        # By a factor e at most: tangents say nothing of a front three times as strong.
+        step *= (1.0 / np.maximum(np.abs(step).max(axis=1), 1.0))[:, None]
         new = log_joint(part, points[active] + step, population)
         gained = new - best[active]
         better = gained >= -1e-9

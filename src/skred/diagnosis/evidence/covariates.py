@@ -19,8 +19,6 @@ from skred.campaign import Event
 FloatArray = NDArray[np.float64]
 _LEAST_KNOWN = 4
 """Events whose covariate is known, below which it is left out."""
-_WIDE = 10.0
-"""Largest over smallest from which a logarithm is considered."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +74,7 @@ def standard_of(events: Sequence[Event], name: str) -> Standard | None:
 
 def _wide(values: FloatArray) -> bool:
     """Whether positive numbers spread over an order of magnitude, and less lopsided by their logarithms."""
-    if values.min() <= 0.0 or values.max() < _WIDE * values.min():
+    if values.min() <= 0.0 or values.max() < 10.0 * values.min():
         return False
     return abs(float(skew(np.log(values)))) < abs(float(skew(values)))
 

@@ -43,8 +43,6 @@ STARTS = (0.0, 0.3, 1.2)
 """Where climbs begin, in scales of the prior: nil, and either side of its median (0.67)."""
 _ROUNDS = 15
 """Steps at most. Where fronts stop a climb could go to and fro."""
-_SAME = 1.0
-"""Standard deviations apart below which two climbs have come to the same maximum."""
 _CLIMB = 4
 """Steps of the events' modes after each step of the others."""
 
@@ -212,6 +210,7 @@ def global_starts(
         population = state.population.take(slice(k, k + 1))
         points = state.modes.points[k * n_events : (k + 1) * n_events]
         one = Start(float(state.strengths[k]), float(sd[k]), Fit(unfitted(population), points))
-        if all(abs(one.strength - other.strength) > _SAME * other.sd for other in found):
+        # Less than a standard deviation apart two climbs have come to the same maximum.
+        if all(abs(one.strength - other.strength) > other.sd for other in found):
             found.append(one)
     return found

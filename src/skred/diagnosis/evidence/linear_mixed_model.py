@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.evidence.conditional_map import (
-    LARGEST_STEP,
     EventLikelihood,
     Modes,
     Population,
@@ -168,10 +167,13 @@ class JointStep(NamedTuple):
         return self._replace(mean=mean, strength=changed)
 
     def of_points(self, share: float, rows: Rows) -> FloatArray:
-        """What the events' points move by, (n_rows, n_base + 1), with a share of the step."""
+        """What the events' points move by, (n_rows, n_base + 1), with a share of the step.
+
+        None by more than 1, a factor e, with the whole step: tangents say nothing of what is farther.
+        """
         both = np.column_stack([self.mean, self.strength])[rows.group]
         whole = self.along + np.einsum("rij,rj->ri", self.by_both, both)
-        size = np.maximum(np.abs(whole).max(axis=1, keepdims=True) / LARGEST_STEP, 1.0)
+        size = np.maximum(np.abs(whole).max(axis=1, keepdims=True), 1.0)
         moved: FloatArray = share * whole / size
         return moved
 
