@@ -122,8 +122,7 @@ class Candidate:
     def shape_weights(self) -> FloatArray:
         """Posterior probability of each shape."""
         factors = self.log_factors
-        weights: FloatArray = np.exp(factors - np.logaddexp.reduce(factors))
-        return weights
+        return np.exp(factors - np.logaddexp.reduce(factors))
 
     @property
     def best(self) -> Curve:

@@ -102,8 +102,7 @@ def _per_unit(kind: Kind, squares: FloatArray, here: NDArray[np.bool_]) -> Float
         return np.ones_like(typical)
     if not kind.opposed:
         return typical
-    spread: FloatArray = np.sqrt(np.sum((squares - typical) ** 2 * here, axis=0) / fronts)
-    return spread
+    return np.sqrt(np.sum((squares - typical) ** 2 * here, axis=0) / fronts)
 
 
 def _band(profile: Profile, basis: FloatArray) -> tuple[FloatArray, FloatArray, float]:

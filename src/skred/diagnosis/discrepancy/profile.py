@@ -84,8 +84,7 @@ class Prior:
         if self.centre_m is not None:
             near = np.exp(-0.5 * ((at - self.centre_m) / NEAR_M) ** 2)
             alike *= near[:, None] * near[None, :]
-        found: FloatArray = self.amplitude**2 * (alike + 1e-6 * np.eye(len(at)))
-        return found
+        return self.amplitude**2 * (alike + 1e-6 * np.eye(len(at)))
 
 
 KINDS = (

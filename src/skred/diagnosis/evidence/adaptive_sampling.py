@@ -67,8 +67,7 @@ class Mixture(NamedTuple):
     def _factors(self) -> FloatArray:
         variances = np.einsum("kii->ki", self.covariances)
         regular = self.covariances + 1e-10 * variances[:, :, None] * np.eye(self.means.shape[1])
-        result: FloatArray = np.linalg.cholesky(regular)
-        return result
+        return np.linalg.cholesky(regular)
 
     def drawn(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Draws, (n, size); of each mode as many as its weight says."""
@@ -225,5 +224,4 @@ def _shares(log_weights: FloatArray) -> FloatArray:
     if log_weights.max() == -np.inf:
         raise np.linalg.LinAlgError("nothing is found where a density was thought to be")
     weights = np.exp(log_weights - log_weights.max())
-    result: FloatArray = weights / weights.sum()
-    return result
+    return weights / weights.sum()

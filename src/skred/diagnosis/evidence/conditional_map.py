@@ -132,8 +132,7 @@ class Modes(NamedTuple):
     @property
     def information(self) -> FloatArray:
         """Of the readings about the points, (n_rows, n_base + 1, n_base + 1)."""
-        result: FloatArray = self.by_points.transpose(0, 2, 1) @ self.weighed(self.by_points)
-        return result
+        return self.by_points.transpose(0, 2, 1) @ self.weighed(self.by_points)
 
     def weighed(self, changes: FloatArray) -> FloatArray:
         """Changes of the predictions, (n_rows, n_columns, n), times the readings' information."""
@@ -164,8 +163,7 @@ class EventLikelihood:
     def given(self) -> FloatArray:
         """Strengths of each row, (n_rows, n_directions)."""
         shape = len(self.rows.event), len(self.extension.directions)
-        found: FloatArray = np.broadcast_to(self.strengths, shape)
-        return found
+        return np.broadcast_to(self.strengths, shape)
 
     def take(self, chosen: IntArray) -> EventLikelihood:
         """Some of the rows, perhaps repeated."""
@@ -183,10 +181,7 @@ class EventLikelihood:
     def at(self, points: FloatArray) -> FloatArray:
         """Log likelihood of each row at its point, (n_rows, n_base + 1) to (n_rows,)."""
         predictions = self.extension.predict(self.rows.event, points, self.strengths)
-        found: FloatArray = log_likelihoods(
-            np.arange(len(points)), predictions, self.rows.readings, self.rows.errors
-        )
-        return found
+        return log_likelihoods(np.arange(len(points)), predictions, self.rows.readings, self.rows.errors)
 
 
 def look_around(likelihood: EventLikelihood, points: FloatArray) -> Modes:

@@ -125,16 +125,14 @@ class _Part(NamedTuple):
         """Points from normal numbers, both (n_rows, size, n_axes)."""
         # Around each centre a run of the quasi-random sequence: every sixteenth number would fill a sliver.
         at = np.arange(self.size) * self.centres.shape[1] // self.size
-        points: FloatArray = self.centres[:, at] + numbers @ self.factor.transpose(0, 2, 1)
-        return points
+        return self.centres[:, at] + numbers @ self.factor.transpose(0, 2, 1)
 
     def log_density(self, points: FloatArray) -> FloatArray:
         """At points of the rows, (n_rows, k, n_axes) to (n_rows, k)."""
         whiten = np.linalg.inv(self.factor)
         log_scale = np.log(np.einsum("rii->ri", whiten)).sum(axis=1) - points.shape[2] * _LOG_SQRT_2PI
         white = points @ whiten.transpose(0, 2, 1), self.centres @ whiten.transpose(0, 2, 1)
-        result: FloatArray = _log_mixture(*white) + log_scale[:, None]
-        return result
+        return _log_mixture(*white) + log_scale[:, None]
 
 
 @compiled()
@@ -169,8 +167,7 @@ def _normal_numbers(n_events: int, n: int, n_axes: int, seed: int) -> FloatArray
         qmc.Sobol(n_axes, scramble=True, rng=np.random.default_rng([seed, event])).random(n)
         for event in range(n_events)
     ]
-    numbers: FloatArray = ndtri(np.clip(np.array(uniforms), 1e-12, 1.0 - 1e-12))
-    return numbers
+    return ndtri(np.clip(np.array(uniforms), 1e-12, 1.0 - 1e-12))
 
 
 def event_nodes(
@@ -293,8 +290,7 @@ def _covered(population: Population, reference: Population | None) -> list[Popul
 def _cover(rows: Rows, population: Population, modes: Modes, axes: int) -> FloatArray:
     """Covariance of the linear model about each row's mode, (n_rows, axes, axes)."""
     cover = np.linalg.inv(modes.information + population.precision[rows.group])[:, :axes, :axes]
-    result: FloatArray = 0.5 * (cover + cover.transpose(0, 2, 1))
-    return result
+    return 0.5 * (cover + cover.transpose(0, 2, 1))
 
 
 def _log_likelihoods(likelihood: EventLikelihood, points: FloatArray) -> FloatArray:
@@ -342,8 +338,7 @@ def _rotated(numbers: FloatArray, shifts: FloatArray | None) -> FloatArray:
     if shifts is None:
         return numbers
     quantiles = (ndtr(numbers) + shifts[:, None, : numbers.shape[2]]) % 1.0
-    rotated: FloatArray = ndtri(np.clip(quantiles, 1e-12, 1.0 - 1e-12))
-    return rotated
+    return ndtri(np.clip(quantiles, 1e-12, 1.0 - 1e-12))
 
 
 def _over(population: Population, rows: Rows, axes: int, wider: float) -> tuple[FloatArray, FloatArray]:

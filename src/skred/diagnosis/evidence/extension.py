@@ -116,12 +116,11 @@ class Extension:
             raise InputError(
                 f"friction that falls with speed has the scales {sorted(speeds)} m/s: a law can have one"
             )
-        contributions: Contributions = make_contributions(
+        return make_contributions(
             np.concatenate(columns).astype(np.int64),
             np.ascontiguousarray(np.concatenate(profiles)),
             float(speeds.pop() if speeds else WEAKENING_SPEED_M_S),
         )
-        return contributions
 
     @cached_property
     def _owner(self) -> IntArray:
@@ -179,8 +178,7 @@ class Extension:
         """Front speed of each event at the cells' edges [m/s], (n_events, n_cells + 1), at one point each."""
         given = np.broadcast_to(strengths, (len(points), len(self.directions)))
         rows, releases, begin, _ = self._inputs(np.arange(len(points)), points, given)
-        found: FloatArray = front_speeds(rows, releases, self.problem.path, self.contributions, begin)
-        return found
+        return front_speeds(rows, releases, self.problem.path, self.contributions, begin)
 
     def tangents(
         self, events: IntArray, points: FloatArray, strengths: FloatArray
@@ -227,8 +225,7 @@ class Extension:
 def typical_speed(speeds: FloatArray) -> FloatArray:
     """Root of the mean square over the fronts that come by, 0 where none does, (n_edges,)."""
     fronts = np.maximum((speeds > 0.0).sum(axis=0), 1)
-    typical: FloatArray = np.sqrt((speeds**2).sum(axis=0) / fronts)
-    return typical
+    return np.sqrt((speeds**2).sum(axis=0) / fronts)
 
 
 def extended(problem: HierarchicalProblem, law: Law, directions: Sequence[Direction] = ()) -> Extension:

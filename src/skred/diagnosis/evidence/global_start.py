@@ -125,8 +125,7 @@ class _Climb:
         height = integrals.reshape(len(strengths), -1).sum(axis=1)
         height -= 0.5 * (((spreads - math.log(SPREAD_MEDIAN)) / SPREAD_LOG_SD) ** 2).sum(axis=1)
         height -= 0.5 * (((population.mean - self.prior.mean) / self.prior.sd) ** 2).sum(axis=1)
-        found: FloatArray = np.nan_to_num(height - 0.5 * self.precision * strengths**2, nan=-np.inf)
-        return found
+        return np.nan_to_num(height - 0.5 * self.precision * strengths**2, nan=-np.inf)
 
     def moved(self, state: _State) -> _State:
         """One step of each climb, or a part of it, as far as it gains."""

@@ -52,8 +52,7 @@ def mean_prior(law: Law) -> MeanPrior:
 
 def median_log_scale(law: Law) -> FloatArray:
     """Logarithm of the scales of the medians' half-normal priors, as `mean_prior` stands for them."""
-    result: FloatArray = mean_prior(law).mean - MEDIAN_LOG_MEAN
-    return result
+    return mean_prior(law).mean - MEDIAN_LOG_MEAN
 
 
 class Scores(NamedTuple):
@@ -89,15 +88,13 @@ def _diagonal(matrices: FloatArray) -> FloatArray:
 
 def _by_group(rows: Rows, values: FloatArray) -> FloatArray:
     """Sum over the rows of each group; groups have equally many rows, one after the other."""
-    result: FloatArray = values.reshape(rows.n_groups, -1, *values.shape[1:]).sum(axis=1)
-    return result
+    return values.reshape(rows.n_groups, -1, *values.shape[1:]).sum(axis=1)
 
 
 def _products(rows: Rows, first: FloatArray, second: FloatArray) -> FloatArray:
     """Products of two matrices (n_rows, k, n) over k, summed over each group's rows, (n_groups, n, n)."""
     one, other = (part.reshape(rows.n_groups, -1, part.shape[2]) for part in (first, second))
-    result: FloatArray = one.transpose(0, 2, 1) @ other
-    return result
+    return one.transpose(0, 2, 1) @ other
 
 
 def efficient_scores(modes: Modes, rows: Rows, population: Population, prior: MeanPrior) -> Scores:
@@ -174,8 +171,7 @@ class JointStep(NamedTuple):
         both = np.column_stack([self.mean, self.strength])[rows.group]
         whole = self.along + np.einsum("rij,rj->ri", self.by_both, both)
         size = np.maximum(np.abs(whole).max(axis=1, keepdims=True), 1.0)
-        moved: FloatArray = share * whole / size
-        return moved
+        return share * whole / size
 
 
 def joint_step(
@@ -311,8 +307,7 @@ def most_probable_covariance(rows: Rows, deviation: FloatArray, cover: FloatArra
     regular = moment + PRIOR_EVENTS * SPREAD_MEDIAN**2 * np.eye(moment.shape[1])
     scale = np.sqrt(_diagonal(regular))
     spread = np.exp(log_spread)
-    result: FloatArray = regular * (spread / scale)[:, :, None] * (spread / scale)[:, None, :]
-    return result
+    return regular * (spread / scale)[:, :, None] * (spread / scale)[:, None, :]
 
 
 def starting_population(law: Law) -> Population:
