@@ -58,7 +58,6 @@ class Candidate:
 
     Attributes
     ----------
-    mechanism : Mechanism
     curves : tuple of Curve
         One for each shape.
     log_weights : (n_curves,) array

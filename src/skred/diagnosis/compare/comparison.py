@@ -54,10 +54,6 @@ class ComparisonUnderErrors:
 
     Attributes
     ----------
-    error_model : str
-    base : Base
-    candidates : mapping of str to Candidate
-    profiles : list of Profile
     screened : list of Curve
         One for each candidate of the mechanisms compared; that under another error model where it cannot
         count.
@@ -95,7 +91,6 @@ class Comparison:
 
     Attributes
     ----------
-    under_each : tuple of ComparisonUnderErrors
     odds : mapping
         Prior probability of each id.
     base_evidence : mapping

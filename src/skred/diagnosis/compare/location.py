@@ -44,7 +44,6 @@ class Location:
         Where it stands out most.
     work : (n_stretches, 4) array
         From [m], to [m], missing specific work [J/kg] and its standard deviation, between sensors.
-    log_bayes_factor : float
     """
 
     s_m: FloatArray

@@ -39,7 +39,6 @@ class Part(NamedTuple):
 
     Attributes
     ----------
-    curve : Curve
     log_weight : float
         Prior probability among its mechanism's shapes.
     level : int
@@ -79,7 +78,6 @@ def refine(
         Of all shapes, screened.
     near : callable
         Computes the curve at a shape near that of another curve.
-    pool : ThreadPoolExecutor
     best : float
         The most that a candidate has under another error model, in nats above nothing under this one.
     """

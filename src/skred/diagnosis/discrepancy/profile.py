@@ -42,9 +42,8 @@ class Kind:
         CONSTANT or QUADRATIC.
     opposed : bool
         Whether it is nil at the typical speed.
-    unit : str
     amplitude : float
-        Typical standard deviation of the profile; `PRIORS` are relative to it.
+        Typical standard deviation of the profile; `AMPLITUDES` are relative to it.
     share : float
         Prior probability among the kinds.
     equation : str
@@ -114,7 +113,6 @@ class Profile:
 
     Attributes
     ----------
-    kind : Kind
     prior : Prior
         The most probable one, under which it is fitted.
     knots_m : (n,) array

@@ -53,11 +53,6 @@ class Base:
 
     Attributes
     ----------
-    problem : HierarchicalProblem
-    law : Law
-    setting : Setting
-    rows : Rows
-    fit : Fit
     directions : tuple of Direction
         Already in, with `strengths`.
     strengths : (n_directions,) array
@@ -106,9 +101,6 @@ class Curve:
 
     Attributes
     ----------
-    mechanism : Mechanism
-    shape : Shape
-    direction : Direction
     strengths : (n,) array
         In the strength's unit, increasing, 0 among them.
     log_evidence : (n,) array

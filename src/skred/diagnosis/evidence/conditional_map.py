@@ -39,7 +39,6 @@ class Rows(NamedTuple):
         Which replicate it belongs to.
     readings : EventReadings
         With one row each.
-    errors : Errors
     """
 
     event: IntArray
@@ -150,7 +149,6 @@ class EventLikelihood:
     ----------
     extension : Extension
         A law with mechanisms added.
-    rows : Rows
     strengths : (n_directions,) or (n_rows, n_directions) array
         Of what is added.
     """

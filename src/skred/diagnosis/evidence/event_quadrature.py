@@ -182,7 +182,6 @@ def event_nodes(
 
     Parameters
     ----------
-    likelihood : EventLikelihood
     population : Population
         Roughly where the events' strengths are.
     modes : Modes

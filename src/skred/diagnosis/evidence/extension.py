@@ -80,8 +80,6 @@ class Extension:
 
     Attributes
     ----------
-    problem : HierarchicalProblem
-    law : Law
     directions : tuple of Direction
         One for each added mechanism.
     """

@@ -177,7 +177,6 @@ def global_starts(
 
     Parameters
     ----------
-    extension : Extension
     rows : Rows
         The campaign's rows.
     held : (n_directions - 1,) array

@@ -36,7 +36,6 @@ class Fit(NamedTuple):
 
     Attributes
     ----------
-    found : Evidence
     points : (n_events, n_base + 1) array
         The events' modes.
     """
