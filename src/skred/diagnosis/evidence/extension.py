@@ -125,35 +125,26 @@ class Extension:
         """Which added mechanism each added column belongs to."""
         return np.repeat(np.arange(len(self.directions)), [len(d.columns) for d in self.directions])
 
-    def _log_strength_shift(self, events: IntArray, strengths: FloatArray) -> FloatArray:
-        shift = np.zeros(len(events))
-        for k, direction in enumerate(self.directions):
-            if direction.log_strengths is not None:
-                shift += strengths[:, k] * direction.log_strengths[events]
-        return shift
-
-    def _own(self, events: IntArray) -> FloatArray:
-        """Multiples of each added strength that events have, (n, n_directions)."""
-        own = np.ones((len(events), len(self.directions)))
-        for k, direction in enumerate(self.directions):
-            if direction.own is not None:
-                own[:, k] = direction.own[events]
-        return own
-
     def _inputs(
         self, events: IntArray, points: FloatArray, strengths: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Strengths of all columns, releases and the speeds there, and factors of the readings."""
-        logs = points[:, : self.n_base].copy()
-        logs[:, 0] += self._log_strength_shift(events, strengths)
-        rows = np.column_stack([np.exp(logs), (strengths * self._own(events))[:, self._owner]])
         releases = self.problem.releases
         place = releases.mean[events] + releases.sd[events] * points[:, -1]
-        log_factor = np.zeros((len(events), len(self.problem.sensors)))
+        # By the mechanisms added: of the first strength, of the readings, and what each event has of each.
+        log_shift, log_factor = np.zeros(len(events)), np.zeros((len(events), len(self.problem.sensors)))
+        own = np.ones((len(events), len(self.directions)))
         for k, direction in enumerate(self.directions):
             place = place + strengths[:, k] * direction.release
+            if direction.own is not None:
+                own[:, k] = direction.own[events]
+            if direction.log_strengths is not None:
+                log_shift += strengths[:, k] * direction.log_strengths[events]
             if direction.log_readings is not None:
                 log_factor[:, :-1] += np.outer(strengths[:, k], direction.log_readings)
+        logs = points[:, : self.n_base].copy()
+        logs[:, 0] += log_shift
+        rows = np.column_stack([np.exp(logs), (strengths * own)[:, self._owner]])
         place = np.clip(place, releases.first, releases.length)
         return rows, place, releases.speeds(events, points[:, -1]), np.exp(log_factor)
 

@@ -16,14 +16,13 @@ from skred.inference.hierarchical.population import LKJ_SHAPE
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 from skred.parallel.compile_cache import compiled, inner
 
-_LOG_MEDIAN, _LOG_SD, _SHAPE = math.log(SPREAD_MEDIAN), SPREAD_LOG_SD, LKJ_SHAPE
-_LOG_2PI = math.log(2.0 * math.pi)
-_HALF_LOG_2PI = 0.5 * _LOG_2PI
+_LOG_MEDIAN = math.log(SPREAD_MEDIAN)
+_HALF_LOG_2PI = 0.5 * math.log(2.0 * math.pi)
 _NEGLIGIBLE = -25.0
 """Log share of an event's integral below which a node does not count for slopes."""
 _STEP = 2e-3
 """Of the differences that a curvature is taken from, in the population's coordinates."""
-NARROWEST = _LOG_MEDIAN - 6.0 * _LOG_SD
+NARROWEST = _LOG_MEDIAN - 6.0 * SPREAD_LOG_SD
 """Least log of a spread, six standard deviations of its prior below the median: 0.0036. Narrower populations
 are between the nodes, whose sums then promise what is not there, tens of nats."""
 MOST_CORRELATED = 0.99
@@ -62,12 +61,12 @@ def log_prior(psi, n, log_scale):  # type: ignore[no-untyped-def]
         # Half-normal median, in the logarithm.
         z = psi[i] - log_scale[i]
         total += 0.5 * math.log(2.0 / math.pi) - 0.5 * math.exp(2.0 * z) + z
-        z = (psi[n + i] - _LOG_MEDIAN) / _LOG_SD
-        total += -0.5 * z * z - math.log(_LOG_SD) - 0.5 * _LOG_2PI
+        z = (psi[n + i] - _LOG_MEDIAN) / SPREAD_LOG_SD
+        total += -0.5 * z * z - math.log(SPREAD_LOG_SD) - _HALF_LOG_2PI
     position = 2 * n
     for j in range(n):
         for _ in range(j + 1, n):
-            shape = _SHAPE + 0.5 * (n - 2 - j)
+            shape = LKJ_SHAPE + 0.5 * (n - 2 - j)
             r = math.tanh(psi[position])
             total += shape * math.log(max(1.0 - r * r, 1e-300))
             position += 1

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows, event_modes
-from skred.diagnosis.evidence.event_quadrature import USUAL, Budget, event_nodes
+from skred.diagnosis.evidence.event_quadrature import USUAL, Budget, Spread, event_nodes
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.linear_mixed_model import median_log_scale
 from skred.diagnosis.evidence.marginal import (
@@ -21,7 +21,6 @@ from skred.diagnosis.evidence.marginal import (
     population_at,
 )
 from skred.diagnosis.evidence.tolerance import MOST_ROUNDS
-from skred.inference.hierarchical.surface import Nodes
 
 FloatArray = NDArray[np.float64]
 MOST_NODES = 200_000
@@ -107,15 +106,15 @@ def refit(
             population = population_at(np.stack([state[k].found.psi for k in some]), n)
             points = np.concatenate([state[k].points for k in some])
             modes = event_modes(likelihood, points, population, n_steps=6)
-            nodes = event_nodes(likelihood, population, modes, spent, start[0]).nodes
-            own_points = modes.points.reshape(len(some), n_events, -1)
-            for k, part, own in zip(some, _split(nodes, len(some), n_events), own_points, strict=True):
-                before = state[k].found.psi
-                found = evidence(part, log_scale, before)
+            spread = event_nodes(likelihood, population, modes, spent, start[0])
+            of_each = (np.split(values, len(some)) for values in (*spread, modes.points))
+            for k, nodes_at, log_weights, own in zip(some, *of_each, strict=True):
+                nodes, before = Spread(nodes_at, log_weights).nodes, state[k].found.psi
+                found = evidence(nodes, log_scale, before)
                 if number + 1 < rounds.least or _moved(before, found.psi, n):
                     moved.append(k)
                 if rounds.sampled and (k not in moved or number + 1 == MOST_ROUNDS):
-                    found = importance_evidence(part, log_scale, found)
+                    found = importance_evidence(nodes, log_scale, found)
                 state[k] = Fit(found, own)
         active = moved
         if not active:
@@ -134,14 +133,3 @@ def _moved(before: FloatArray, after: FloatArray, n: int) -> bool:
     mean = np.abs(after[:n] - before[:n]) / np.exp(before[n : 2 * n])
     spread = np.abs(after[n : 2 * n] - before[n : 2 * n])
     return bool(max(mean.max(), spread.max()) > _FAR)
-
-
-def _split(nodes: Nodes, n_groups: int, n_events: int) -> list[Nodes]:
-    """Nodes of each group."""
-    parts = []
-    for k in range(n_groups):
-        first = nodes.first[k * n_events : (k + 1) * n_events + 1]
-        inside = slice(first[0], first[-1])
-        points = np.ascontiguousarray(nodes.points[:, inside])
-        parts.append(Nodes(first - first[0], points, nodes.log_weights[inside]))
-    return parts
