@@ -35,7 +35,6 @@ from skred.diagnosis.evidence.conditional_map import (
     log_joint,
 )
 from skred.diagnosis.evidence.event_quadrature import FINE, SCREENING, USUAL, event_nodes
-from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds, stated
 from skred.diagnosis.evidence.refit import Rounds, refit
 from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING
@@ -171,17 +170,16 @@ def compare(base: Base, tell: Tell = lambda done, of: None) -> Comparison:
 
 def with_errors(base: Base, error_model: str) -> Base:
     """The base law refitted under an error model, with quadrature points around its own fit."""
-    problem = base.problem
-    if problem.error_model.id != error_model:
-        problem = replace(problem, error_model=ERROR_MODELS[error_model])
-    extension = extended(problem, base.law, base.directions)
+    if base.problem.error_model.id != error_model:
+        base = replace(base, problem=replace(base.problem, error_model=ERROR_MODELS[error_model]))
+    extension = base.extended()
     rows = campaign_rows(extension)
     rounds = Rounds(FINE, USUAL, 3)
     fit = refit(extension, rows, base.strengths[None, :], base.fit.start, rounds)[0]
     points = _better_modes(EventLikelihood(extension, rows, base.strengths), *fit.start)
     if not np.array_equal(points, fit.points):
         fit = refit(extension, rows, base.strengths[None, :], (fit.population, points), rounds)[0]
-    return replace(base, problem=problem, rows=rows, fit=fit)
+    return replace(base, rows=rows, fit=fit)
 
 
 def _better_modes(likelihood: EventLikelihood, population: Population, points: FloatArray) -> FloatArray:

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
 from skred.diagnosis.discrepancy.profile import Kind, Profile, most_probable, spline_basis
 from skred.diagnosis.evidence.coefficient import Base
-from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.limits import HELD
 from skred.physics.kernel.columns import Column
@@ -63,7 +62,7 @@ def locate(under_errors: ComparisonUnderErrors, opposed: bool | None = None) -> 
     alike = [one for one in under_errors.profiles if opposed in (None, one.kind.opposed)]
     profile = most_probable(alike)
     base = under_errors.base
-    speeds = extended(base.problem, base.law, base.directions).speeds(base.fit.points, base.strengths)
+    speeds = base.extended().speeds(base.fit.points, base.strengths)
     squares = 0.5 * (speeds[:, 1:] ** 2 + speeds[:, :-1] ** 2)
     here = squares > 0.0
     unit = spline_basis(base.setting.terrain, profile.knots_m)

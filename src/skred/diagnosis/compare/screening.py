@@ -11,7 +11,6 @@ import numpy as np
 from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
 from skred.diagnosis.evidence.event_quadrature import SCREENING
-from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.global_start import first_strengths, global_starts
 from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms.placed import added_of, direction_of
@@ -30,9 +29,7 @@ def curve(base: Base, mechanism: Mechanism, shape: Shape) -> Curve:
     """
     added = added_of(mechanism)
     scale = added.scale_of(shape)
-    extension = extended(
-        base.problem, base.law, (*base.directions, direction_of(mechanism, base.setting, shape))
-    )
+    extension = base.extended(direction_of(mechanism, base.setting, shape))
     starts = global_starts(extension, base.rows, base.strengths, base.fit.start, scale, added.either_sign)
     begin = {0.0: base.fit} | {one.strength: one.fit for one in starts if one.strength != 0.0}
     about = np.array([one.strength + one.sd * by for one in starts for by in _ABOUT])

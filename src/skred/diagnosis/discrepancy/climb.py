@@ -15,7 +15,6 @@ from skred.diagnosis.discrepancy.explored import Expansion, prior_penalty
 from skred.diagnosis.discrepancy.profile import Kind, combined, knot_by_knot
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, look_around
-from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import efficient_scores, mean_prior
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 from skred.diagnosis.evidence.tolerance import ARRIVED, MOST_ROUNDS, STEP_SHARES
@@ -85,8 +84,7 @@ def _fit_at(
 ) -> Fit:
     """Population and events with the profile in."""
     held, free = _held(base, at, values), len(values) - len(at)
-    direction = combined(base.setting, kind, at, values[free:])
-    extension = extended(base.problem, base.law, [*base.directions, direction])
+    extension = base.extended(combined(base.setting, kind, at, values[free:]))
     strengths = np.concatenate([held, values[:free], [1.0]])[None, :]
     return refit(extension, base.rows, strengths, start, Rounds(least=1))[0]
 

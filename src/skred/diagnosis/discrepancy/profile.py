@@ -22,7 +22,7 @@ from scipy.stats import multivariate_normal
 
 from skred.diagnosis.evidence.adaptive_sampling import Mode
 from skred.diagnosis.evidence.coefficient import Base, Curve
-from skred.diagnosis.evidence.extension import Extension, extended
+from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.refit import Fit
 from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import Direction, Setting
@@ -184,7 +184,7 @@ def spline_basis(terrain: Terrain, at: FloatArray) -> FloatArray:
 def knot_by_knot(base: Base, kind: Kind, at: FloatArray) -> Extension:
     """The base law with the profile's value at each knot as a strength."""
     added = [entering(base.setting, kind, row) for row in spline_basis(base.setting.terrain, at)]
-    return extended(base.problem, base.law, [*base.directions, *added])
+    return base.extended(*added)
 
 
 def combined(setting: Setting, kind: Kind, at: FloatArray, values: FloatArray) -> Direction:

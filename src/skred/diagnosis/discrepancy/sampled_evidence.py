@@ -79,7 +79,6 @@ def gains(base: Base, profile: Profile, values: FloatArray, pool: Executor) -> F
 def _log_evidence(base: Base, profile: Profile, values: FloatArray) -> FloatArray:
     """At values of the profile, (n, n_knots)."""
     extension = knot_by_knot(base, profile.kind, profile.knots_m)
-    given = np.column_stack([np.tile(base.strengths, (len(values), 1)), values])
     # With as many nodes and rounds as the peak and nothing: what is left of integration errors is alike.
-    fits = refit(extension, base.rows, given, profile.fit.start, Rounds(USUAL, least=1))
+    fits = refit(extension, base.rows, base.given(values), profile.fit.start, Rounds(USUAL, least=1))
     return np.array([fit.found.log_evidence for fit in fits])

@@ -24,7 +24,7 @@ from skred.diagnosis.evidence.conditional_map import (
     log_joint,
 )
 from skred.diagnosis.evidence.event_quadrature import FIRST, USUAL, Budget
-from skred.diagnosis.evidence.extension import extended, setting_of, typical_speed
+from skred.diagnosis.evidence.extension import Extension, extended, setting_of, typical_speed
 from skred.diagnosis.evidence.linear_mixed_model import median_log_scale
 from skred.diagnosis.evidence.marginal import coordinates, evidence, population_at
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
@@ -81,6 +81,14 @@ class Base:
         """The base law without what was added before."""
         return replace(self, directions=(), strengths=np.empty(0))
 
+    def extended(self, *more: Direction) -> Extension:
+        """The law with what is in already, and with more."""
+        return extended(self.problem, self.law, (*self.directions, *more))
+
+    def given(self, added: FloatArray) -> FloatArray:
+        """Strengths of what is in already before some of what is added, (n, n_added) to (n, n_directions)."""
+        return np.column_stack([np.tile(self.strengths, (len(added), 1)), added])
+
     def with_nothing(self, budget: Budget, *, sampled: bool = False) -> Fit:
         """Refitted with nothing added, as `curve_at` does with something: the same for all mechanisms.
 
@@ -88,10 +96,9 @@ class Base:
         everything has nats that are not there.
         """
         if (budget, sampled) not in self._nothing:
-            extension = extended(self.problem, self.law, self.directions)
             given, rounds = self.strengths[None, :], Rounds(budget, FIRST, sampled=sampled)
-            (fit,) = refit(extension, self.rows, given, self.fit.start, rounds)
-            self._nothing[budget, sampled] = fit
+            fits = refit(self.extended(), self.rows, given, self.fit.start, rounds)
+            self._nothing[budget, sampled] = fits[0]
         return self._nothing[budget, sampled]
 
 
@@ -234,13 +241,12 @@ def curve_at(
         Whether the evidence is computed by importance sampling; else by Laplace's formula.
     """
     direction = direction_of(mechanism, base.setting, shape)
-    extension = extended(base.problem, base.law, (*base.directions, direction))
     strengths = np.sort(strengths[np.abs(strengths) > _SMALLEST * added_of(mechanism).scale_of(shape)])
     fits = known or begin
     near = None if fits is None else [_closest(fits, strength) for strength in strengths]
     rounds = Rounds(budget, FIRST, sampled=sampled) if known is None else Rounds(budget, None, 1, sampled)
-    given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
-    found = refit(extension, base.rows, given, base.fit.start, rounds, near)
+    given = base.given(strengths)
+    found = refit(base.extended(direction), base.rows, given, base.fit.start, rounds, near)
     place = int(np.searchsorted(strengths, 0.0))
     found.insert(place, base.with_nothing(budget, sampled=sampled))
     strengths = np.insert(strengths, place, 0.0)
