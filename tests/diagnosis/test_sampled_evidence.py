@@ -20,7 +20,7 @@ from skred.diagnosis.discrepancy.profile import (
     Profile,
     combined,
     knots,
-    log_prior_density,
+    log_prior_densities,
     priors_of,
 )
 from skred.diagnosis.discrepancy.sampled_evidence import gains, sampled
@@ -171,7 +171,8 @@ def test_all_priors_count_by_their_shares(base: Base) -> None:
     best = modes[int(np.argmax(heights))][0]
 
     def log_density(values: FloatArray) -> FloatArray:
-        return likelihood.gain(values) + log_prior_density(kind, at, values)
+        densities = log_prior_densities(kind, at, values)
+        return likelihood.gain(values) + np.logaddexp.reduce(list(densities.values()), axis=0)
 
     found = [
         log_integral(log_density, near, lambda values: best, np.random.default_rng(seed)) for seed in range(8)

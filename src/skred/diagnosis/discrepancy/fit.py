@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import multivariate_normal
 
 from skred.diagnosis.discrepancy.climb import climb, expanded_at
 from skred.diagnosis.discrepancy.explored import (
@@ -27,6 +26,7 @@ from skred.diagnosis.discrepancy.profile import (
     Prior,
     Profile,
     knots,
+    log_prior_densities,
     priors_of,
     spline_basis,
 )
@@ -116,12 +116,8 @@ def _with_free(scales: Sequence[float], cover: FloatArray) -> FloatArray:
 def mode_at(base: Base, profile: Profile, values: FloatArray) -> Mode:
     """The mode near some values, under the prior that suits them best."""
     kind, at = profile.kind, profile.knots_m
-    shares = priors_of(kind, at)
-    prior = max(
-        shares,
-        key=lambda one: shares[one] + float(multivariate_normal(cov=one.cover(at)).logpdf(values)),
-    )
-    cover = prior.cover(at)
+    densities = log_prior_densities(kind, at, values)
+    cover = max(densities, key=lambda prior: densities[prior][0]).cover(at)
     begin = expanded_at(base, kind, at, values, profile.fit.start)
     maximum = climb(base, kind, at, begin, cover)
     left = np.linalg.inv(maximum.information + np.linalg.inv(cover))

@@ -157,13 +157,12 @@ def priors_of(kind: Kind, at: FloatArray) -> dict[Prior, float]:
     return {one: -math.log(2.0 * len(group)) for group in (everywhere, local) for one in group}
 
 
-def log_prior_density(kind: Kind, at: FloatArray, values: FloatArray) -> FloatArray:
-    """Of a profile's values at its knots, (n, n_knots) to (n,), over all priors of its kind."""
-    densities = [
-        share + multivariate_normal(cov=prior.cover(at)).logpdf(values).reshape(-1)
+def log_prior_densities(kind: Kind, at: FloatArray, values: FloatArray) -> dict[Prior, FloatArray]:
+    """Of a profile's values at its knots, (n, n_knots) to (n,), by each prior of its kind and its share."""
+    return {
+        prior: share + multivariate_normal(cov=prior.cover(at)).logpdf(values).reshape(-1)
         for prior, share in priors_of(kind, at).items()
-    ]
-    return np.asarray(np.logaddexp.reduce(densities, axis=0))
+    }
 
 
 def knots(setting: Setting) -> FloatArray:

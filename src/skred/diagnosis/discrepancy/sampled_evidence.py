@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.discrepancy.fit import mode_at
-from skred.diagnosis.discrepancy.profile import KINDS, Profile, knot_by_knot, log_prior_density
+from skred.diagnosis.discrepancy.profile import KINDS, Profile, knot_by_knot, log_prior_densities
 from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, weighted_draws
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.event_quadrature import USUAL
@@ -52,7 +52,8 @@ def sampled(
     """
 
     def log_density(values: FloatArray) -> FloatArray:
-        return gains(base, profile, values, pool) + log_prior_density(profile.kind, profile.knots_m, values)
+        densities = log_prior_densities(profile.kind, profile.knots_m, values)
+        return gains(base, profile, values, pool) + np.logaddexp.reduce(list(densities.values()), axis=0)
 
     def mode_near(values: FloatArray) -> Mode:
         return pool.submit(mode_at, base, profile, values).result()
