@@ -16,7 +16,7 @@ from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, combined, knots
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.extension import extended, setting_of
-from skred.diagnosis.outcome import Diagnosis, ProfileAdded
+from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.predict.held_out import held_out
 from skred.diagnosis.predict.predictor_document import as_dict, from_dict
 from skred.diagnosis.predict.profile_law import ProfileLaw, profile_law
@@ -69,7 +69,7 @@ def diagnosed(hidden: Base, added: ProfileLaw) -> Diagnosis:
     nothing: Any = None
     return Diagnosis(
         hidden.problem, hidden.law, nothing, nothing, nothing, nothing, comparison, nothing, nothing,
-        ProfileAdded(added), added.before,
+        added, added.before, added.after,
     )  # fmt: skip
 
 

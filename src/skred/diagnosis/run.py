@@ -12,7 +12,8 @@ import xarray as xr
 
 from skred.diagnosis.diagnose import diagnose
 from skred.diagnosis.effort import Effort
-from skred.diagnosis.outcome import NotDiagnosed, Outcome, ProfileAdded
+from skred.diagnosis.outcome import NotDiagnosed, Outcome
+from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.repeated import folds_of, open_locked, outer_folds, set_aside
 from skred.diagnosis.verdict.document import verdict
 from skred.diagnosis.verdict.draws import augmented_draws, profile_draws
@@ -102,6 +103,6 @@ def _draws_of(found: Outcome) -> dict[str, xr.DataTree]:
         if found.reference is not found.calibration:
             trees["base_same_errors.nc"] = found.reference.tree
         trees["augmented.nc"] = augmented_draws(found)
-    if not isinstance(found, NotDiagnosed) and isinstance(found.finding, ProfileAdded):
-        trees["profile.nc"] = profile_draws(found, found.finding.law)
+    if not isinstance(found, NotDiagnosed) and isinstance(found.finding, ProfileLaw):
+        trees["profile.nc"] = profile_draws(found, found.finding)
     return trees

@@ -13,15 +13,7 @@ from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER
 from skred.diagnosis.influence.influence import Influence
-from skred.diagnosis.outcome import (
-    Diagnosis,
-    Finding,
-    MechanismsAdded,
-    NotDiagnosed,
-    NothingAdded,
-    Outcome,
-    ProfileAdded,
-)
+from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.predict.held_out import HeldOut, errors, paired
 from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.conditional import conditional_document
@@ -209,7 +201,7 @@ def _more(found: Outcome) -> dict[str, Any]:
             "influence": _influence(found.influence),
             "conditional": conditional_document(found),
         }
-        | _of_finding(found.finding)
+        | _with_what_was_added(found)
         | {
             "identifiability": [row.as_dict() for row in found.table.rows],
             "power": found.table.power,
@@ -219,24 +211,22 @@ def _more(found: Outcome) -> dict[str, Any]:
     )
 
 
-def _of_finding(finding: Finding) -> dict[str, Any]:
+def _with_what_was_added(found: Diagnosis) -> dict[str, Any]:
     """Under which errors something was added, and what the check says of the law with it."""
-    match finding:
-        case MechanismsAdded():
-            problem = augmented_of(finding.last.calibration)
-            return {
-                "error_model": problem.error_model.id,
-                "p_value_augmented": finding.last.check.p_value,
-                "refitted_events": list(finding.after.refitted),
-            }
-        case ProfileAdded(law):
-            return {
-                "error_model": law.error_model,
-                "p_value_augmented": law.check.p_value,
-                "profile": _profile(law),
-            }
-        case NothingAdded():
-            return {}
+    if isinstance(found.finding, ProfileLaw):
+        return {
+            "error_model": found.finding.error_model,
+            "p_value_augmented": found.finding.check.p_value,
+            "profile": _profile(found.finding),
+        }
+    if found.after is None:
+        return {}
+    last = found.steps[-1]
+    return {
+        "error_model": augmented_of(last.calibration).error_model.id,
+        "p_value_augmented": last.check.p_value,
+        "refitted_events": list(found.after.refitted),
+    }
 
 
 def _influence(found: Influence | None) -> dict[str, Any] | None:

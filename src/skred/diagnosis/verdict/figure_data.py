@@ -17,7 +17,7 @@ from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.evidence.coefficient import Curve
-from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, NothingAdded, Outcome
+from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.verdict.conditional import conditional_dataset
 from skred.diagnosis.verdict.mechanisms import candidates_of
 from skred.diagnosis.verdict.report_facts import checks_of, comparisons_of
@@ -107,8 +107,8 @@ def _force(location: Location) -> xr.Dataset:
 
 def _held_out(found: Diagnosis) -> xr.Dataset:
     held = {"before": found.before}
-    if not isinstance(found.finding, NothingAdded):
-        held["after"] = found.finding.after
+    if found.after is not None:
+        held["after"] = found.after
     of_reading, of_event = ("when", "event", "sensor"), ("when", "event")
     each = held.values()
     return xr.Dataset(

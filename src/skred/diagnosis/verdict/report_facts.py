@@ -20,15 +20,9 @@ from skred.diagnosis.compare.location import Location
 from skred.diagnosis.discrepancy.profile import AMPLITUDES, KINDS, LENGTHS_M, NEAR_M
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.limits import LIMIT, NOTHING_AT_MOST
-from skred.diagnosis.outcome import (
-    Diagnosis,
-    MechanismsAdded,
-    NotDiagnosed,
-    NothingAdded,
-    Outcome,
-    ProfileAdded,
-)
+from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.predict.held_out import K_LIMIT, HeldOut
+from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.mechanisms import candidate_documents, standard_of_covariate, work_documents
 from skred.documents import FORMAT
 from skred.inference.calibrate import Calibration
@@ -208,8 +202,7 @@ def _calibrations(found: Outcome) -> list[dict[str, Any]]:
         entries.append(_calibration([], same_errors, found.before) | {"errors": errors})
     names = [step.candidate.mechanism.id for step in found.steps]
     for number, step in enumerate(found.steps, start=1):
-        finding, last = found.finding, number == len(found.steps)
-        held = finding.after if isinstance(finding, MechanismsAdded) and last else None
+        held = found.after if number == len(found.steps) else None
         entries.append(_calibration(names[:number], step.calibration, held))
     return entries
 
@@ -277,8 +270,8 @@ def checks_of(found: Diagnosis) -> list[tuple[tuple[str, ...], BootstrapTest]]:
     names = tuple(step.candidate.mechanism.id for step in found.steps)
     checks: list[tuple[tuple[str, ...], BootstrapTest]] = [((), found.check)]
     checks += [(names[: number + 1], step.check) for number, step in enumerate(found.steps)]
-    if isinstance(found.finding, ProfileAdded):
-        checks.append(((UNLISTED,), found.finding.law.check))
+    if isinstance(found.finding, ProfileLaw):
+        checks.append(((UNLISTED,), found.finding.check))
     return checks
 
 
@@ -364,7 +357,7 @@ def _added(found: Diagnosis, number: int) -> dict[str, Any]:
 def _log_score(found: Diagnosis) -> dict[str, Any]:
     """Sums over the avalanches left out, and of how many the prediction became better."""
     before = found.before.pointwise
-    after = None if isinstance(found.finding, NothingAdded) else found.finding.after.pointwise
+    after = None if found.after is None else found.after.pointwise
     return {
         "before": float(before.sum()),
         "after": None if after is None else float(after.sum()),
