@@ -173,7 +173,7 @@ def test_seeds_are_fixed_and_few_draws_are_told(ryggfonn: HierarchicalProblem) -
 
 
 def found_of(pair: BeforeAfter, problem: HierarchicalProblem, *carried_by: str) -> Diagnosis:
-    nothing: Any = (None,) * 10
+    nothing: Any = (None,) * 9
     events = tuple(problem.campaign.event_ids)
     hangs_on = Influence("drag", 9.0, 4.0, events, np.full(len(events), 8.0), carried_by, None, None, ())
     return Diagnosis(problem, load_law("pcm"), *nothing, hangs_on, pair)

@@ -68,7 +68,7 @@ def diagnosed(hidden: Base, added: ProfileLaw) -> Diagnosis:
     comparison = Comparison((under_errors,), {}, {"robust": 0.0})
     nothing: Any = None
     return Diagnosis(
-        hidden.problem, hidden.law, nothing, nothing, nothing, nothing, comparison, nothing, nothing,
+        hidden.problem, hidden.law, nothing, nothing, nothing, comparison, nothing, nothing,
         added, added.before, added.after,
     )  # fmt: skip
 

@@ -202,7 +202,7 @@ def diagnosis(kind: str, text: str = "") -> Outcome:
         finding = profile_law(problem, clean)
         after = finding.after
     return Diagnosis(
-        problem, LAW, calibration(problem), SimpleNamespace(), table,
+        problem, LAW, calibration(problem), table,
         BootstrapTest(30.0 if alarm else 0.3, clean), comparison, Decision(verdict_, names),
         location(), finding, held(problem, 0.0), after, hangs_on(verdict_, names, problem),
         None if finding is None else BeforeAfter(

@@ -15,7 +15,6 @@ from skred.diagnosis.clock import Clock, Tell
 from skred.diagnosis.compare.comparison import compare
 from skred.diagnosis.compare.location import location_of
 from skred.diagnosis.detect.detectability import identify
-from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.detect.too_little import too_little
 from skred.diagnosis.effort import Effort, Run
 from skred.diagnosis.evidence.coefficient import fit_base
@@ -70,10 +69,9 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
         return NotDiagnosed(problem, law, why, calibration, seconds=clock.seconds)
     draws = population_draws(calibration, effort.replicas, run.seed)
     base = fit_base(problem, law, typical(draws))
-    score_test = ScoreTest(problem, law, base.setting)
 
     clock.stage("identify", "what these recordings can tell")
-    table = identify(score_test, base.rows, base.fit.points, base.population)
+    table = identify(base)
 
     clock.stage("comparison", "what could be missing: every candidate refitted")
     comparison = compare(base, clock.progress)
@@ -105,8 +103,8 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
         given = BeforeAfter.of(before, after, run.seed)
     clock.end()
     return Diagnosis(
-        problem, law, calibration, score_test, table, check, comparison, decision, location, finding, before,
-        after, hangs_on, given, clock.seconds,
+        problem, law, calibration, table, check, comparison, decision, location, finding, before, after,
+        hangs_on, given, clock.seconds,
     )  # fmt: skip
 
 

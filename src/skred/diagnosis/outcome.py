@@ -10,7 +10,6 @@ from skred.diagnosis.check.decision import Decision, alarmed
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Identifiability
-from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.influence.influence import Influence
 from skred.diagnosis.predict.conditional import BeforeAfter
 from skred.diagnosis.predict.held_out import HeldOut
@@ -69,7 +68,6 @@ class Diagnosis:
         What was asked about.
     calibration : Calibration
         Of the base law.
-    score_test : ScoreTest
     table : Identifiability
     check : BootstrapTest
     comparison : Comparison
@@ -93,7 +91,6 @@ class Diagnosis:
     problem: HierarchicalProblem
     law: Law
     calibration: Calibration
-    score_test: ScoreTest
     table: Identifiability
     check: BootstrapTest
     comparison: Comparison

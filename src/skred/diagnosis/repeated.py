@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from skred.campaign import Campaign
 from skred.campaign.parts import of_events, without_silent_sensors
+from skred.diagnosis.clock import Tell
 from skred.diagnosis.detect.too_little import too_little
 from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
@@ -27,7 +28,6 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.paired import sum_se
 
 FloatArray = NDArray[np.float64]
-Tell = Callable[[str], None]
 _WHEN = ("before", "after")
 _ERRORS = ("rmse_velocity", "rmse_runout", "coverage_90")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 import xarray as xr
 
+from skred.diagnosis.clock import Tell
 from skred.diagnosis.diagnose import diagnose
 from skred.diagnosis.effort import Effort
 from skred.diagnosis.outcome import NotDiagnosed, Outcome
@@ -26,7 +26,6 @@ from skred.output import write_json
 from skred.parallel.processes import meanwhile
 from skred.physics.law import Law
 
-Tell = Callable[[str], None]
 DRAWS = ("base.nc", "base_same_errors.nc", "augmented.nc", "profile.nc")
 """Of the base law, of it under the errors of what was added, of the law with that, and of the law with a
 force that is in no list."""

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from skred.diagnosis.detect.detectability import Detectability, Identifiability
-from skred.diagnosis.detect.detectability import identify as look
-from skred.diagnosis.detect.score_test import ScoreTest
+from skred.diagnosis.clock import Tell
+from skred.diagnosis.detect.detectability import Detectability, Identifiability, identify
 from skred.diagnosis.detect.too_little import too_little
 from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
@@ -21,7 +19,6 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.output import write_json
 from skred.physics.law import Law
 
-Tell = Callable[[str], None]
 FILE = "identify.json"
 
 
@@ -50,7 +47,7 @@ def identify_to(
         tell(f"{law.id}: fitting the population of avalanches")
         base = base_of(problem, law)
         tell("what these recordings can tell")
-        table = identifiability(base)
+        table = identify(base)
     document = identify_document(problem, law, table, reason)
     write_json(folder / FILE, document)
     return document
@@ -65,12 +62,6 @@ def base_of(problem: HierarchicalProblem, law: Law) -> Base:
     likelihood = EventLikelihood(extension, rows, np.empty(0))
     start = fit_population(likelihood, mean_prior(law), (population, points))
     return fit_base(problem, law, *start)
-
-
-def identifiability(base: Base) -> Identifiability:
-    """What the recordings can tell around a fitted law."""
-    score_test = ScoreTest(base.problem, base.law, base.setting)
-    return look(score_test, base.rows, base.fit.points, base.population)
 
 
 def identify_document(
