@@ -17,18 +17,14 @@ from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.predict.held_out import HeldOut, errors, paired
 from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.conditional import conditional_document
-from skred.diagnosis.verdict.mechanisms import (
-    added_document,
-    candidate_documents,
-    place_of,
-    strength_document,
-    work_documents,
-)
+from skred.diagnosis.verdict.mechanisms import added_document, candidate_documents, work_documents
 from skred.diagnosis.verdict.next_sensor import detection_sensor, next_sensor
 from skred.diagnosis.verdict.statement import statement
 from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.problem import HierarchicalProblem
-from skred.physics.mechanisms.stretches import equation_of
+
+_OF_THE_NAMED = ("location", "strength", "covariate", "sensor", "equation")
+"""Keys of a mechanism that the verdict has of the one that it names."""
 
 
 def verdict(found: Outcome) -> dict[str, Any]:
@@ -39,8 +35,8 @@ def verdict(found: Outcome) -> dict[str, Any]:
     return document | _more(found)
 
 
-def _told_nothing(found: NotDiagnosed) -> dict[str, Any]:
-    """Every key of the format, where no diagnosis was possible."""
+def _told_nothing(found: Outcome) -> dict[str, Any]:
+    """Every key of the format, as where no diagnosis was possible."""
     return {
         "format": 1,
         "campaign": found.problem.campaign.name,
@@ -50,7 +46,7 @@ def _told_nothing(found: NotDiagnosed) -> dict[str, Any]:
         "mechanisms": [],
         "probability": {},
         "indistinguishable": [],
-        **dict.fromkeys(("location", "strength", "covariate", "sensor", "equation")),
+        **dict.fromkeys(_OF_THE_NAMED),
         "evidence": dict.fromkeys(("elpd_diff", "elpd_se", "log_bayes_factor", "p_value")),
         "held_out": _held_out(None, None, found.problem),
         "detection_limits": {},
@@ -62,23 +58,10 @@ def _told_nothing(found: NotDiagnosed) -> dict[str, Any]:
 
 def _told(found: Diagnosis) -> dict[str, Any]:
     """Every key of the format."""
-    candidate = found.steps[0].candidate if found.steps else None
-    shape = candidate.best.shape if candidate is not None else None
-    names = found.decision.names if found.steps else ()
-    return {
-        "format": 1,
-        "campaign": found.problem.campaign.name,
-        "base_model": found.law.id,
-        "verdict": found.decision.verdict,
-        "mechanism": names[0] if names else None,
+    document = _told_nothing(found) | {
         "mechanisms": [added_document(found, number) for number in range(len(found.steps))],
         "probability": found.comparison.probability,
         "indistinguishable": list(found.decision.tied),
-        "location": _location(found),
-        "strength": strength_document(found, 0) if found.steps else None,
-        "covariate": shape.covariate if shape is not None else None,
-        "sensor": shape.sensor if shape is not None else None,
-        "equation": equation_of(candidate.mechanism, candidate.best.shape) if candidate is not None else None,
         "evidence": _evidence(found),
         "held_out": _held_out(found.before, found.after, found.problem),
         "detection_limits": _detection_limits(found.table),
@@ -89,16 +72,14 @@ def _told(found: Diagnosis) -> dict[str, Any]:
         ),
         "left": _left(found.left),
     }
-
-
-def _location(found: Diagnosis) -> dict[str, Any] | None:
-    """Where something is missing; None where it is not local, or nothing is."""
-    if found.steps:
-        return place_of(found.steps[0].candidate)
-    if found.decision.verdict != "unexplained":
-        return None
-    first, last = found.location.stretch_m
-    return {"s_from_m": first, "s_to_m": last, "s_from_interval_m": None, "s_to_interval_m": None}
+    if found.decision.verdict == "unexplained":
+        first, last = found.location.stretch_m
+        ends = {"s_from_m": first, "s_to_m": last, "s_from_interval_m": None, "s_to_interval_m": None}
+        document["location"] = ends
+    if document["mechanisms"]:
+        named = document["mechanisms"][0]
+        document |= {"mechanism": named["id"]} | {key: named[key] for key in _OF_THE_NAMED}
+    return document
 
 
 def _evidence(found: Diagnosis) -> dict[str, float | None]:
