@@ -10,6 +10,7 @@ from skred.diagnosis.check.decision import Decision, alarmed
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Identifiability
+from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.influence.influence import Influence
 from skred.diagnosis.predict.conditional import BeforeAfter
 from skred.diagnosis.predict.held_out import HeldOut
@@ -134,6 +135,13 @@ class Diagnosis:
     def steps(self) -> tuple[Step, ...]:
         """The mechanisms added, none or more."""
         return self.finding.steps if isinstance(self.finding, Augmented) else ()
+
+    @property
+    def added(self) -> tuple[str, ...]:
+        """Ids of what was added, in order of discovery."""
+        if isinstance(self.finding, ProfileLaw):
+            return (UNLISTED,)
+        return tuple(step.candidate.mechanism.id for step in self.steps)
 
     @property
     def reference(self) -> Calibration:

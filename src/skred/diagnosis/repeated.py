@@ -17,10 +17,8 @@ from skred.campaign import Campaign
 from skred.campaign.parts import of_events, without_silent_sensors
 from skred.diagnosis.clock import Tell
 from skred.diagnosis.detect.too_little import too_little
-from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.predict.held_out import errors
-from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.predict.unseen import log_scores, problem_of, unseen
 from skred.diagnosis.verdict.predictors import predictors_of
 from skred.errors import InputError
@@ -136,9 +134,7 @@ def _fold(found: Outcome, left_out: Campaign, seed: int) -> tuple[dict[str, Any]
     first = log_scores(before, left_out, seed)
     second = first if after is None else log_scores(after, left_out, seed)
     difference = second - first
-    names = [step.candidate.mechanism.id for step in found.steps] if isinstance(found, Diagnosis) else []
-    if isinstance(found, Diagnosis) and isinstance(found.finding, ProfileLaw):
-        names = [UNLISTED]
+    names = list(found.added) if isinstance(found, Diagnosis) else []
     entry = {
         "events": list(left_out.event_ids),
         "verdict": found.decision.verdict,

@@ -200,10 +200,9 @@ def _calibrations(found: Outcome) -> list[dict[str, Any]]:
     if same_errors is not alone:
         errors = cast(HierarchicalProblem, same_errors.problem).error_model.title
         entries.append(_calibration([], same_errors, found.before) | {"errors": errors})
-    names = [step.candidate.mechanism.id for step in found.steps]
     for number, step in enumerate(found.steps, start=1):
         held = found.after if number == len(found.steps) else None
-        entries.append(_calibration(names[:number], step.calibration, held))
+        entries.append(_calibration(found.added[:number], step.calibration, held))
     return entries
 
 
@@ -267,11 +266,10 @@ def _checks(found: Diagnosis) -> list[dict[str, Any]]:
 
 def checks_of(found: Diagnosis) -> list[tuple[tuple[str, ...], BootstrapTest]]:
     """What was added, and the bootstrap test of the law with it; the base law's first."""
-    names = tuple(step.candidate.mechanism.id for step in found.steps)
     checks: list[tuple[tuple[str, ...], BootstrapTest]] = [((), found.check)]
-    checks += [(names[: number + 1], step.check) for number, step in enumerate(found.steps)]
+    checks += [(found.added[:number], step.check) for number, step in enumerate(found.steps, start=1)]
     if isinstance(found.finding, ProfileLaw):
-        checks.append(((UNLISTED,), found.finding.check))
+        checks.append((found.added, found.finding.check))
     return checks
 
 
