@@ -44,15 +44,7 @@ def effort_of(quick: bool) -> Effort:
 
 @dataclass(frozen=True)
 class Run:
-    """One run of a diagnosis.
-
-    Attributes
-    ----------
-    settings : SamplerSettings
-    effort : Effort
-    clock : Clock
-        Which tells of each stage as it begins.
-    """
+    """One run of a diagnosis, whose clock tells of each stage as it begins."""
 
     settings: SamplerSettings
     effort: Effort

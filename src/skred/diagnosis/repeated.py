@@ -107,15 +107,12 @@ def outer_folds(
 
     Parameters
     ----------
-    problem : HierarchicalProblem
     k : int
         Number of folds.
     seed : int
         Of how avalanches are dealt out, and of the scores.
     diagnose : callable
         Takes the problem of the other avalanches.
-    tell : callable
-        Takes one line for each fold.
     """
     folds = folds_of(problem, k, seed)
     entries, pairs = list[dict[str, Any]](), list[FloatArray]()

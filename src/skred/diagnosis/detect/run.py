@@ -25,21 +25,9 @@ FILE = "identify.json"
 def identify_to(
     problem: HierarchicalProblem, law: Law, folder: Path, tell: Tell = lambda line: None
 ) -> dict[str, Any]:
-    """What the recordings can tell of a law, written to identify.json.
+    """What the recordings can tell of a law, written to identify.json, and the content of that.
 
-    Parameters
-    ----------
-    problem : HierarchicalProblem
-    law : Law
-        That something may be missing from.
-    folder : Path
-    tell : callable
-        Is told of each stage.
-
-    Returns
-    -------
-    dict
-        The content of identify.json; ``reason`` says why it tells nothing, where it does not.
+    Its ``reason`` says why it tells nothing, where it does not.
     """
     reason = too_little(problem)
     table = None

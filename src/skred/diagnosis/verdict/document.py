@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from skred.diagnosis.augment.coefficient import augmented_of
 from skred.diagnosis.augment.step import Left
-from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER
 from skred.diagnosis.influence.influence import Influence
@@ -170,26 +170,24 @@ def _more(found: Outcome) -> dict[str, Any]:
     }
     if isinstance(found, NotDiagnosed):
         return more | {"alarm_by": None, "influence": None, "conditional": None}
-    return (
-        more
-        | {
-            "alarm": found.alarm_by is not None,
-            "alarm_by": found.alarm_by,
-            "log_bayes_factors": found.comparison.log_factors,
-            "calibration": {"version": CALIBRATION_VERSION, "power": POWER, "prior": found.comparison.odds},
-            "error_models": [under_errors.error_model for under_errors in found.comparison.under_each],
-            "candidates": candidate_documents(found, found.comparison),
-            "influence": _influence(found.influence),
-            "conditional": conditional_document(found),
-        }
-        | _with_what_was_added(found)
-        | {
-            "identifiability": [row.as_dict() for row in found.table.rows],
-            "power": found.table.power,
-            "detection_sensor": detection_sensor(found.table),
-        }
-        | (_missing_work(found.location) if found.alarm_by is not None else {})
-    )
+    more |= {
+        "alarm": found.alarm_by is not None,
+        "alarm_by": found.alarm_by,
+        "log_bayes_factors": found.comparison.log_factors,
+        "calibration": {"version": CALIBRATION_VERSION, "power": POWER, "prior": found.comparison.odds},
+        "error_models": [under_errors.error_model for under_errors in found.comparison.under_each],
+        "candidates": candidate_documents(found, found.comparison),
+        "influence": _influence(found.influence),
+        "conditional": conditional_document(found),
+        **_with_what_was_added(found),
+        "identifiability": [row.as_dict() for row in found.table.rows],
+        "power": found.table.power,
+        "detection_sensor": detection_sensor(found.table),
+    }
+    if found.alarm_by is not None:
+        more["missing_work_of"] = "fast front" if found.location.opposed else "typical front"
+        more["missing_work"] = work_documents(found.location)
+    return more
 
 
 def _with_what_was_added(found: Diagnosis) -> dict[str, Any]:
@@ -225,16 +223,5 @@ def _influence(found: Influence | None) -> dict[str, Any] | None:
         "carried_by": list(found.carried_by),
         "without_them": found.without_them,
         "without_a_third": found.without_a_third,
-        "readings": [
-            {"kind": one.kind, "sensor": one.sensor, "n": one.n, "log_bayes_factor": one.log_bayes_factor}
-            for one in found.readings
-        ],
-    }
-
-
-def _missing_work(location: Location) -> dict[str, Any]:
-    """Specific work that is missing between neighbouring sensors."""
-    return {
-        "missing_work_of": "fast front" if location.opposed else "typical front",
-        "missing_work": work_documents(location),
+        "readings": [asdict(one) for one in found.readings],
     }

@@ -37,16 +37,9 @@ from skred.physics.mechanisms.stretches import is_opposed
 
 
 def report_facts(found: Outcome) -> dict[str, Any]:
-    """What the page of a diagnosis quotes beside the verdict.
+    """What the page of a diagnosis quotes beside the verdict, as plain data.
 
-    Parameters
-    ----------
-    found : Diagnosis or NotDiagnosed
-
-    Returns
-    -------
-    dict
-        Plain data. Of what was not diagnosed only the campaign, the law, and what was calibrated.
+    Of what was not diagnosed only the campaign, the law, and what was calibrated.
     """
     facts: dict[str, Any] = {
         "format": FORMAT,
