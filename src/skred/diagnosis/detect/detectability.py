@@ -92,7 +92,7 @@ class Identifiability:
     Attributes
     ----------
     rows : tuple of Detectability
-    sensor_m : float or None
+    sensor_m : float
         Where one more velocity sensor raises the power most.
     power : float
         Mean power over the listed physics.
@@ -101,7 +101,7 @@ class Identifiability:
     """
 
     rows: tuple[Detectability, ...]
-    sensor_m: float | None
+    sensor_m: float
     power: float
     power_with: float
 
@@ -119,8 +119,6 @@ def identify(base: Base) -> Identifiability:
     places, with_each = extra_sensors(score_test, base.fit.points, base.population)
     power = mean_power(table)
     powers = [mean_power(told(score_test, one)) for one in with_each]
-    if not powers:
-        return Identifiability(tuple(table), None, power, power)
     best = int(np.argmax(powers))
     return Identifiability(tuple(table), float(places[best]), power, powers[best])
 

@@ -86,9 +86,7 @@ def _row(told: Detectability) -> dict[str, Any]:
     return told.as_dict() | named
 
 
-def _next_sensor(table: Identifiability) -> dict[str, Any] | None:
-    if table.sensor_m is None:
-        return None
+def _next_sensor(table: Identifiability) -> dict[str, Any]:
     return {
         "quantity": "front_velocity",
         "s_from_m": table.sensor_m,
@@ -114,7 +112,7 @@ def _statement(document: dict[str, Any]) -> list[str]:
     if alike:
         sentences.append(f"Not to be told apart, where each is seen best: {'; '.join(alike)}.")
     sensor = document["next_sensor"]
-    if sensor is not None and sensor["power_with"] > document["power"]:
+    if sensor["power_with"] > document["power"]:
         sentences.append(
             f"One more speed, at s = {sensor['s_from_m']:.0f} m, would raise that to"
             f" {percent(sensor['power_with'])}."

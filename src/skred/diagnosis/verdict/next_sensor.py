@@ -28,7 +28,7 @@ def next_sensor(found: Diagnosis) -> dict[str, Any] | None:
 
 def detection_sensor(table: Identifiability) -> dict[str, Any] | None:
     """The one that raises the power over the listed mechanisms most; None where none does."""
-    if table.sensor_m is None or table.power_with <= table.power:
+    if table.power_with <= table.power:
         return None
     return _sensor(table.sensor_m, [], table.power_with)
 

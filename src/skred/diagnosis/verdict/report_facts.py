@@ -279,17 +279,14 @@ def _force(location: Location) -> dict[str, Any]:
 
 def _comparison(comparison: Comparison, found: Diagnosis, number: int) -> dict[str, Any]:
     """One model comparison, and what was added from it."""
-    step = found.steps[number] if number < len(found.steps) else None
-    listed = mechanisms()
-    named = step.candidate.mechanism if step is not None else None
+    added, tied = None, list[str]()
+    if number < len(found.steps):
+        step = found.steps[number]
+        added, tied = step.candidate.mechanism.id, list(step.tied)
     return {
-        "added": named.id if named is not None else None,
-        "tied_with": list(step.tied) if step is not None else [],
-        "same_term": [
-            name
-            for name in (step.tied if step is not None else ())
-            if name != UNLISTED and named is not None and listed[name].same_term_as == named.id
-        ],
+        "added": added,
+        "tied_with": tied,
+        "same_term": [name for name in tied if name != UNLISTED and mechanisms()[name].same_term_as == added],
         "probability": comparison.probability,
         "prior": comparison.odds,
         "log_bayes_factors": comparison.log_factors,

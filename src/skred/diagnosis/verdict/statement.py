@@ -93,8 +93,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     if document["covariate"]:
         sentences.append("Associated with, not necessarily caused by.")
     if ties:
-        sentences.append(_tied(document))
-        sentences.append(_split(found.steps[0], document))
+        sentences += [_tied(document), _split(found.steps[0], document)]
     sentences.append(_not_excluded(document))
     if len(document["mechanisms"]) > 1:
         second = document["mechanisms"][1]
