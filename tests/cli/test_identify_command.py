@@ -22,12 +22,8 @@ from skred.campaign import Campaign, find_campaign, read_campaign, write_campaig
 from skred.cli.main import app, run
 from skred.cli.options import DIAGNOSING
 from skred.diagnosis.augment.problem import as_diagnosed
-from skred.diagnosis.detect.run import (
-    base_of,
-    identifiability,
-    identify_document,
-    identify_to,
-)
+from skred.diagnosis.detect.detectability import identify
+from skred.diagnosis.detect.run import base_of, identify_document, identify_to
 from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.effort import QUICK_REPLICAS, SAMPLING, Effort
 from skred.inference.calibrate import calibrate
@@ -46,7 +42,7 @@ def first_events(n: int) -> Campaign:
 
 def document_of(campaign: Campaign, law_id: str = "pcm") -> dict[str, Any]:
     problem, law = hierarchical_problem(campaign), load_law(law_id)
-    return identify_document(problem, law, identifiability(base_of(problem, law)))
+    return identify_document(problem, law, identify(base_of(problem, law)))
 
 
 def by_id(document: dict[str, Any]) -> dict[str, dict[str, Any]]:
@@ -63,7 +59,7 @@ def ryggfonn() -> dict[str, Any]:
 def test_a_row_for_whatever_can_be_missing(law_id: str) -> None:
     problem, law = hierarchical_problem(RYGGFONN), load_law(law_id)
     base = base_of(problem, law)
-    document = identify_document(problem, law, identifiability(base))
+    document = identify_document(problem, law, identify(base))
     assert set(by_id(document)) == {candidate.mechanism.id for candidate in placed_mechanisms(base.setting)}
     for row in document["identifiability"]:
         assert 0.0 <= row["kept"] <= 1.0 and 0.0 <= row["power"] <= 1.0

@@ -12,8 +12,8 @@ import xarray as xr
 from diagnosis_cases import gates_campaign, gates_diagnosis
 
 from skred.campaign.parts import of_events
+from skred.diagnosis.augment.step import Augmented
 from skred.diagnosis.effort import Effort
-from skred.diagnosis.outcome import MechanismsAdded
 from skred.diagnosis.run import diagnose_to, write_trees
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
 from skred.inference.sampling import SamplerSettings
@@ -48,7 +48,7 @@ def test_draws_are_in_their_files(
 ) -> None:
     """Of a biased sensor that was found, and the base law calibrated once more for comparison."""
     found = gates_diagnosis(biased=True)
-    assert isinstance(found.finding, MechanismsAdded)
+    assert isinstance(found.finding, Augmented)
     other = replace(found.calibration, tree=found.calibration.tree.copy())
     other.tree.attrs["name"] = "under the same errors"
     added = replace(found, finding=replace(found.finding, reference=other))

@@ -13,8 +13,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skred.campaign import Status
 from skred.diagnosis.augment.reference import Reference
+from skred.diagnosis.augment.step import Augmented
 from skred.diagnosis.evidence.predictive import Predicted
-from skred.diagnosis.outcome import Diagnosis, MechanismsAdded, NothingAdded
+from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.predict.held_out import HeldOut, errors, paired
 from skred.diagnosis.verdict.document import verdict
 from skred.diagnosis.verdict.report_facts import report_facts
@@ -84,7 +85,7 @@ def test_nothing_is_named_where_nothing_is(clean: Diagnosis) -> None:
     assert document["verdict"] in ("nothing_missing", "cannot_tell")
     assert (document["verdict"] == "nothing_missing") == clean.table.can_tell
     assert document["mechanism"] is None and document["mechanisms"] == [] and document["strength"] is None
-    assert document["evidence"]["p_value"] > 0.01 and isinstance(clean.finding, NothingAdded)
+    assert document["evidence"]["p_value"] > 0.01 and clean.finding is None
     assert document["held_out"]["rmse_velocity_after"] is None
 
 
@@ -110,7 +111,7 @@ def test_limits_are_those_of_the_table(clean: Diagnosis) -> None:
         found = verdict(clean)["detection_limits"][row.mechanism.id]
         assert found["unit"] == row.mechanism.strength.unit
         assert found["value"] is None or found["value"] == row.limit
-    assert clean.table.power_with >= clean.table.power and clean.table.sensor_m is not None
+    assert clean.table.power_with >= clean.table.power
 
 
 def test_importance_sampling_agrees_with_refits(clean: Diagnosis) -> None:
@@ -148,7 +149,7 @@ def test_before_and_after_stand_under_one_error_model(biased: Diagnosis, name: s
     assert found.gate.passed and cannot == ""
     assert problem.error_model.id == name
     assert (found is calibration) == (name == "robust")
-    assert isinstance(biased.finding, MechanismsAdded)
+    assert isinstance(biased.finding, Augmented)
     finding = replace(biased.finding, steps=(step,), reference=found)
     diagnosis = replace(biased, finding=finding)
     assert verdict(diagnosis)["error_model"] == name

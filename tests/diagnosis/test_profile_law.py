@@ -16,7 +16,7 @@ from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, combined, knots
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.extension import extended, setting_of
-from skred.diagnosis.outcome import Diagnosis, ProfileAdded
+from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.predict.held_out import held_out
 from skred.diagnosis.predict.predictor_document import as_dict, from_dict
 from skred.diagnosis.predict.profile_law import ProfileLaw, profile_law
@@ -68,8 +68,8 @@ def diagnosed(hidden: Base, added: ProfileLaw) -> Diagnosis:
     comparison = Comparison((under_errors,), {}, {"robust": 0.0})
     nothing: Any = None
     return Diagnosis(
-        hidden.problem, hidden.law, nothing, nothing, nothing, nothing, comparison, nothing, nothing,
-        ProfileAdded(added), added.before,
+        hidden.problem, hidden.law, nothing, nothing, nothing, comparison, nothing, nothing,
+        added, added.before, added.after,
     )  # fmt: skip
 
 

@@ -28,13 +28,14 @@ import json
 from diagnosis_cases import base_of, first_events, trial, with_sensors
 from diagnosis_report_cases import diagnosis
 from skred.diagnosis.compare.comparison import compare
-from skred.diagnosis.detect.run import identify_document, identifiability
+from skred.diagnosis.detect.detectability import identify
+from skred.diagnosis.detect.run import identify_document
 from skred.diagnosis.verdict.document import verdict
 from skred.output import plain
 
 campaign = first_events(trial(1003, "dense", "nothing", "constant").campaign, 6)
 base = base_of(with_sensors(campaign, [12, 18, 24, campaign.n_sensors - 1]), "constant")
-told = identify_document(base.problem, base.law, identifiability(base))
+told = identify_document(base.problem, base.law, identify(base))
 found = verdict(diagnosis("wet_snow"))
 print(json.dumps(plain({"identify": told, "probability": compare(base).probability, "verdict": found})))
 """

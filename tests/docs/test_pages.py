@@ -13,9 +13,10 @@ import pytest
 from skred.diagnosis.check.decision import TIED_NATS
 from skred.diagnosis.compare.candidate import FORM
 from skred.diagnosis.evidence.prior_odds import POWER, SHARES
-from skred.diagnosis.limits import HELD, LIMIT, NOTHING_AT_MOST
+from skred.diagnosis.limits import LIMIT, NOTHING_AT_MOST
 from skred.diagnosis.verdict.document import verdict
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
+from skred.inference.intervals import INTERVAL_PROBABILITY
 from skred.output import plain
 from skred.physics.laws import load_law
 
@@ -114,7 +115,7 @@ def test_every_key_that_is_written_is_explained(kind: str, monkeypatch: pytest.M
 def test_rules_on_the_page_are_the_codes() -> None:
     text = page("reading-a-verdict")
     assert f"p is at most {LIMIT:g} and `nothing` is less probable than {NOTHING_AT_MOST:g}" in text
-    assert f"holds {HELD:.0%}".replace("%", " %") in text
+    assert f"holds {INTERVAL_PROBABILITY:.0%}".replace("%", " %") in text
     assert f"at most {math.exp(TIED_NATS):.1f} times less probable" in text
     assert f"to the power {POWER:g}" in text and f"another {100 * FORM:.0f} % of the mean" in text
     assert all(f" {share:g}" in text for share in SHARES.values())

@@ -69,7 +69,8 @@ from dataclasses import replace
 from diagnosis_cases import base_of, first_events, trial, with_sensors
 from diagnosis_report_cases import diagnosis
 from skred.diagnosis.compare.comparison import compare
-from skred.diagnosis.detect.run import identifiability, identify_document
+from skred.diagnosis.detect.detectability import identify
+from skred.diagnosis.detect.run import identify_document
 from skred.diagnosis.verdict.document import verdict
 from skred.output import plain
 
@@ -79,7 +80,7 @@ wet = [replace(one, covariates={"wetness_percent": float(k % 4)}) for k, one in 
 base = base_of(replace(campaign, events=tuple(wet)), "constant")
 found = compare(base)
 lacking = base_of(campaign, "constant")
-table = identify_document(lacking.problem, lacking.law, identifiability(lacking))
+table = identify_document(lacking.problem, lacking.law, identify(lacking))
 print(json.dumps(plain({
     "probability": found.probability,
     "stretch": found.under_each[0].candidates["ledge"].stretch(),

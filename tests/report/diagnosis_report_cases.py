@@ -11,7 +11,7 @@ import xarray as xr
 from hierarchical_cases import hierarchical_calibration, hierarchical_ryggfonn
 
 from skred.diagnosis.augment.added_strength import AddedStrength
-from skred.diagnosis.augment.step import Step
+from skred.diagnosis.augment.step import Augmented, Step
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import Decision, blamed
 from skred.diagnosis.compare.candidate import Candidate
@@ -25,14 +25,7 @@ from skred.diagnosis.evidence.predictive import Predicted
 from skred.diagnosis.evidence.prior_odds import UNLISTED, prior_odds
 from skred.diagnosis.evidence.refit import Fit
 from skred.diagnosis.influence.influence import Influence, ReadingsLeftOut
-from skred.diagnosis.outcome import (
-    Diagnosis,
-    MechanismsAdded,
-    NotDiagnosed,
-    NothingAdded,
-    Outcome,
-    ProfileAdded,
-)
+from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.predict.conditional import BeforeAfter, Conditional, above
 from skred.diagnosis.predict.draws import Draws
 from skred.diagnosis.predict.held_out import HeldOut
@@ -202,16 +195,17 @@ def diagnosis(kind: str, text: str = "") -> Outcome:
     steps = _steps(problem, comparison, names, clean, second=kind == "two")
     alarm = kind not in ("nothing", "silent")
     table = told(problem, 0.3 if kind == "silent" else 0.8)
-    finding = NothingAdded()
+    finding = after = None
     if steps:
-        finding = MechanismsAdded(steps, calibration(problem), held(problem, 1.1))
+        finding, after = Augmented(steps, calibration(problem)), held(problem, 1.1)
     if kind == "unexplained":
-        finding = ProfileAdded(profile_law(problem, clean))
+        finding = profile_law(problem, clean)
+        after = finding.after
     return Diagnosis(
-        problem, LAW, calibration(problem), SimpleNamespace(), table,
+        problem, LAW, calibration(problem), table,
         BootstrapTest(30.0 if alarm else 0.3, clean), comparison, Decision(verdict_, names),
-        location(), finding, held(problem, 0.0), hangs_on(verdict_, names, problem),
-        None if isinstance(finding, NothingAdded) else BeforeAfter(
+        location(), finding, held(problem, 0.0), after, hangs_on(verdict_, names, problem),
+        None if finding is None else BeforeAfter(
             given_above(problem, 0.0), given_above(problem, 0.4)
         ),
         {"base": 12.3, "comparison": 45.6},

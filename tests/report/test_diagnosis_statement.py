@@ -216,7 +216,7 @@ def test_the_force_profile_added_is_told() -> None:
     """What avalanches left out gain by it, its equation and its numbers; nothing is named."""
     found = diagnosis("unexplained")
     document = verdict(found)
-    law = found.finding.law
+    law = found.finding
     assert document["mechanism"] is None and document["equation"] is None and document["strength"] is None
     assert document["evidence"]["elpd_diff"] == pytest.approx(1.1 * found.problem.campaign.n_events)
     assert "For avalanches left out the log score rises by 24.2" in document["statement"]
@@ -225,7 +225,7 @@ def test_the_force_profile_added_is_told() -> None:
     assert profile["s_m"] == law.profile.knots_m.tolist() and max(profile["mean"]) > 0.45
     assert document["p_value_augmented"] == law.check.p_value
     failed = replace(law, check=BootstrapTest(30.0, law.check.simulated))
-    assert "still fails the check" in verdict(with_finding(found, law=failed))["statement"]
+    assert "still fails the check" in verdict(replace(found, finding=failed))["statement"]
     assert "still fails the check" not in document["statement"]
 
 

@@ -93,7 +93,7 @@ def test_draws_hold_the_interval_of_the_verdict():
 def test_draws_of_a_force_in_no_list_can_be_predicted_with(tmp_path):
     """Written beside an `unexplained` verdict, and read again without the diagnosis."""
     found = diagnosis("unexplained")
-    law = found.finding.law
+    law = found.finding
     n, n_knots = 30, len(law.profile.knots_m)
     rng = np.random.default_rng(2)
     draws = Draws(
@@ -147,8 +147,8 @@ def test_refits_that_did_not_converge_are_told_first():
     assert document["statement"].startswith(
         f"Take this with care: the refit without avalanche {two} did not converge"
     )
-    after = replace(found.finding.after, not_converged=(one,))
-    document = verdict(with_finding(replace(found, before=before), after=after))
+    after = replace(found.after, not_converged=(one,))
+    document = verdict(replace(found, before=before, after=after))
     assert document["refits_not_converged"] == [one, two]
     first = document["statement"].partition(". ")[0]
     assert f"the refits without avalanches {one} and {two} did not converge" in first

@@ -12,10 +12,9 @@ from skred.diagnosis.augment.step import Augmented, NotAugmented
 from skred.diagnosis.check.bootstrap_test import odds_test
 from skred.diagnosis.check.decision import Decision, decide
 from skred.diagnosis.clock import Clock, Tell
-from skred.diagnosis.compare.comparison import Comparison, compare
+from skred.diagnosis.compare.comparison import compare
 from skred.diagnosis.compare.location import location_of
 from skred.diagnosis.detect.detectability import identify
-from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.detect.too_little import too_little
 from skred.diagnosis.effort import Effort, Run
 from skred.diagnosis.evidence.coefficient import fit_base
@@ -23,18 +22,10 @@ from skred.diagnosis.evidence.compile_ahead import compile_ahead
 from skred.diagnosis.evidence.population_draws import population_draws, typical
 from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.influence.influence import influence
-from skred.diagnosis.outcome import (
-    Diagnosis,
-    Finding,
-    MechanismsAdded,
-    NotDiagnosed,
-    NothingAdded,
-    Outcome,
-    ProfileAdded,
-)
+from skred.diagnosis.outcome import Diagnosis, Finding, NotDiagnosed, Outcome
 from skred.diagnosis.predict.conditional import BeforeAfter
 from skred.diagnosis.predict.held_out import HeldOut, held_out
-from skred.diagnosis.predict.profile_law import profile_law
+from skred.diagnosis.predict.profile_law import ProfileLaw, profile_law
 from skred.inference.calibrate import Calibration, calibrate_surely
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.sampling import SamplerSettings
@@ -78,10 +69,9 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
         return NotDiagnosed(problem, law, why, calibration, seconds=clock.seconds)
     draws = population_draws(calibration, effort.replicas, run.seed)
     base = fit_base(problem, law, typical(draws))
-    score_test = ScoreTest(problem, law, base.setting)
 
     clock.stage("identify", "what these recordings can tell")
-    table = identify(score_test, base.rows, base.fit.points, base.population)
+    table = identify(base)
 
     clock.stage("comparison", "what could be missing: every candidate refitted")
     comparison = compare(base, clock.progress)
@@ -91,54 +81,40 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
     decision = decide(comparison.probability, check.p_value, table.can_tell)
     location = location_of(comparison, next(iter(decision.names), None))
 
-    added: Augmented | NotAugmented | None = None
+    finding: Finding = None
     if decision.names:
         adding = Adding(Reference(calibration), run)
-        added = add_mechanisms(base, comparison, decision.names, adding)
-    if isinstance(added, NotAugmented):
+        finding = add_mechanisms(base, comparison, decision.names, adding)
+    if isinstance(finding, NotAugmented):
         decision = Decision("cannot_tell", ())
     if decision.verdict == "unexplained":
-        finding, before = _with_profile(comparison, run)
-    else:
-        finding, before = _predicted(added, calibration, run)
+        clock.stage("profile", "the force profile added: checked again, fitted anew without each avalanche")
+        finding = profile_law(comparison.leading(UNLISTED), effort.replicas, run.seed)
+    before, after = _left_out(finding, calibration, run)
     hangs_on = given = None
-    if not isinstance(finding, NothingAdded):
+    if after is not None:
         assert decision.answer is not None
         clock.stage("influence", "what the answer hangs on: without each avalanche, each kind of reading")
-        gained = _with_the_answer(finding, run).pointwise - before.pointwise
-        hangs_on = influence(comparison, decision.answer, gained)
+        with_the_answer = after
+        if isinstance(finding, Augmented) and len(finding.steps) > 1:  # the first of them is the answer
+            with_the_answer = held_out(finding.steps[0].calibration, run.seed)
+        hangs_on = influence(comparison, decision.answer, with_the_answer.pointwise - before.pointwise)
         clock.stage("conditional", "predicting each reading from those above it")
-        given = BeforeAfter.of(before, finding.after, run.seed)
+        given = BeforeAfter.of(before, after, run.seed)
     clock.end()
     return Diagnosis(
-        problem, law, calibration, score_test, table, check, comparison, decision, location, finding, before,
+        problem, law, calibration, table, check, comparison, decision, location, finding, before, after,
         hangs_on, given, clock.seconds,
     )  # fmt: skip
 
 
-def _with_the_answer(finding: MechanismsAdded | ProfileAdded, run: Run) -> HeldOut:
-    """Avalanches left out as the law with the first that was added predicts them."""
-    if isinstance(finding, MechanismsAdded) and len(finding.steps) > 1:
-        return held_out(finding.steps[0].calibration, run.seed)
-    return finding.after
-
-
-def _with_profile(comparison: Comparison, run: Run) -> tuple[Finding, HeldOut]:
-    """A force in no list, and avalanches left out as the base law predicts them."""
-    run.clock.stage("profile", "the force profile added: checked again, fitted anew without each avalanche")
-    law = profile_law(comparison.leading(UNLISTED), run.effort.replicas, run.seed)
-    return ProfileAdded(law), law.before
-
-
-def _predicted(
-    added: Augmented | NotAugmented | None, calibration: Calibration, run: Run
-) -> tuple[Finding, HeldOut]:
-    """What was found, and avalanches left out as the base law predicts them."""
+def _left_out(finding: Finding, calibration: Calibration, run: Run) -> tuple[HeldOut, HeldOut | None]:
+    """Avalanches left out as the base law predicts them, and as the law with what was added does."""
+    if isinstance(finding, ProfileLaw):
+        return finding.before, finding.after
     run.clock.stage("held out", "predicting avalanches left out")
     exact = run.effort.exact_loo
-    if not isinstance(added, Augmented):
-        nothing = NothingAdded() if added is None else NothingAdded(added.reason, added.left)
-        return nothing, held_out(calibration, run.seed, exact=exact)
-    before = held_out(added.reference, run.seed, exact=exact)
-    after = held_out(added.steps[-1].calibration, run.seed, exact=exact)
-    return MechanismsAdded(added.steps, added.reference, after, added.left), before
+    if not isinstance(finding, Augmented):
+        return held_out(calibration, run.seed, exact=exact), None
+    before = held_out(finding.reference, run.seed, exact=exact)
+    return before, held_out(finding.steps[-1].calibration, run.seed, exact=exact)

@@ -9,12 +9,10 @@ from skred.inference.sampling import SamplerSettings
 
 SAMPLING = SamplerSettings("metropolis", draws=600, tune=1000, chains=4, seed=0)
 """How a diagnosis samples: enough to converge nearly always; with more draws where it did not."""
-QUICK_MECHANISMS = 1
-"""Mechanisms that a quick diagnosis adds at most: a second one takes another comparison, half of the time."""
-QUICK_REPLICAS = 100
-"""The same of a quick diagnosis: nearly the fewest with which a p-value can reach 0.01."""
 REPLICAS = 500
 """Clean campaigns of an augmented law: where 1 % of them are as odd, about five of these are."""
+QUICK_REPLICAS = 100
+"""The same of a quick diagnosis: nearly the fewest with which a p-value can reach 0.01."""
 
 
 @dataclass(frozen=True)
@@ -37,21 +35,16 @@ class Effort:
 
 
 def effort_of(quick: bool) -> Effort:
-    """How much a diagnosis computes for a person who sets nothing, or only asks for a quick one."""
-    return Effort(QUICK_REPLICAS, QUICK_MECHANISMS) if quick else Effort()
+    """How much a diagnosis computes for a person who sets nothing, or only asks for a quick one.
+
+    A quick one adds no second mechanism: that takes another comparison, half of the time.
+    """
+    return Effort(QUICK_REPLICAS, max_mechanisms=1) if quick else Effort()
 
 
 @dataclass(frozen=True)
 class Run:
-    """One run of a diagnosis.
-
-    Attributes
-    ----------
-    settings : SamplerSettings
-    effort : Effort
-    clock : Clock
-        Which tells of each stage as it begins.
-    """
+    """One run of a diagnosis, whose clock tells of each stage as it begins."""
 
     settings: SamplerSettings
     effort: Effort

@@ -4,7 +4,5 @@ from __future__ import annotations
 
 LIMIT = 0.01
 """Share of clean campaigns that may be called wrong: the one limit of an alarm."""
-HELD = 0.9
-"""Share of its group that a credible set holds: that of all intervals."""
 NOTHING_AT_MOST = 0.1
 """Probability of nothing from which on it is in every set that holds as much as a credible one: no claim."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from skred.diagnosis.augment.step import Left, Step
+from skred.diagnosis.augment.step import Augmented, Left, NotAugmented, Step
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import Decision, alarmed
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Identifiability
-from skred.diagnosis.detect.score_test import ScoreTest
+from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.influence.influence import Influence
 from skred.diagnosis.predict.conditional import BeforeAfter
 from skred.diagnosis.predict.held_out import HeldOut
@@ -19,68 +19,8 @@ from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.law import Law
 
-
-@dataclass(frozen=True, eq=False)
-class NothingAdded:
-    """Nothing was added to the law.
-
-    Attributes
-    ----------
-    reason : str
-        Why what the comparison named could not be added; empty where it named nothing.
-    left : Left or None
-        A comparison of an augmented law that was given up.
-    """
-
-    reason: str = ""
-    left: Left | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class MechanismsAdded:
-    """One mechanism was added to the law, or two.
-
-    Attributes
-    ----------
-    steps : tuple of Step
-        In order of discovery.
-    reference : Calibration
-        Of the base law under the error model of the last step.
-    after : HeldOut
-        Avalanches left out, as the law with what was added predicts them.
-    left : Left or None
-        What a last comparison found and was not added; None where there was none.
-    """
-
-    steps: tuple[Step, ...]
-    reference: Calibration
-    after: HeldOut
-    left: Left | None = None
-
-    @property
-    def last(self) -> Step:
-        """The step with the law that everything was added to."""
-        return self.steps[-1]
-
-
-@dataclass(frozen=True, eq=False)
-class ProfileAdded:
-    """A force that is not in the list was added, as a profile along the track.
-
-    Attributes
-    ----------
-    law : ProfileLaw
-    """
-
-    law: ProfileLaw
-
-    @property
-    def after(self) -> HeldOut:
-        """Avalanches left out, as the law with the profile predicts them."""
-        return self.law.after
-
-
-Finding = NothingAdded | MechanismsAdded | ProfileAdded
+Finding = Augmented | NotAugmented | ProfileLaw | None
+"""Mechanisms added, none that could be, a force in no list; None where the comparison named nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +69,6 @@ class Diagnosis:
         What was asked about.
     calibration : Calibration
         Of the base law.
-    score_test : ScoreTest
     table : Identifiability
     check : BootstrapTest
     comparison : Comparison
@@ -137,9 +76,11 @@ class Diagnosis:
         ``cannot_tell`` also where what the comparison named could not be added.
     location : Location
         Where something is missing; where there is no alarm, the force in which nothing stands out.
-    finding : NothingAdded, MechanismsAdded or ProfileAdded
+    finding : Augmented, NotAugmented, ProfileLaw or None
     before : HeldOut
         Avalanches left out, as the base law predicts them, under the error model of what was added.
+    after : HeldOut or None
+        The same, as the law with what was added predicts them; None where nothing was added.
     influence : Influence or None
         What the answer hangs on; None where none is given.
     conditional : BeforeAfter or None
@@ -151,7 +92,6 @@ class Diagnosis:
     problem: HierarchicalProblem
     law: Law
     calibration: Calibration
-    score_test: ScoreTest
     table: Identifiability
     check: BootstrapTest
     comparison: Comparison
@@ -159,6 +99,7 @@ class Diagnosis:
     location: Location
     finding: Finding
     before: HeldOut
+    after: HeldOut | None = None
     influence: Influence | None = None
     conditional: BeforeAfter | None = None
     seconds: dict[str, float] = field(default_factory=dict)
@@ -176,12 +117,7 @@ class Diagnosis:
     @property
     def reason(self) -> str:
         """Why what the comparison named could not be added; empty where there is no such reason."""
-        return self.finding.reason if isinstance(self.finding, NothingAdded) else ""
-
-    @property
-    def after(self) -> HeldOut | None:
-        """Avalanches left out, as the law with what was added predicts them; None where nothing was added."""
-        return None if isinstance(self.finding, NothingAdded) else self.finding.after
+        return self.finding.reason if isinstance(self.finding, NotAugmented) else ""
 
     @property
     def refits_not_converged(self) -> tuple[str, ...]:
@@ -198,17 +134,24 @@ class Diagnosis:
     @property
     def steps(self) -> tuple[Step, ...]:
         """The mechanisms added, none or more."""
-        return self.finding.steps if isinstance(self.finding, MechanismsAdded) else ()
+        return self.finding.steps if isinstance(self.finding, Augmented) else ()
+
+    @property
+    def added(self) -> tuple[str, ...]:
+        """Ids of what was added, in order of discovery."""
+        if isinstance(self.finding, ProfileLaw):
+            return (UNLISTED,)
+        return tuple(step.candidate.mechanism.id for step in self.steps)
 
     @property
     def reference(self) -> Calibration:
         """The base law's calibration that before refers to."""
-        return self.finding.reference if isinstance(self.finding, MechanismsAdded) else self.calibration
+        return self.finding.reference if isinstance(self.finding, Augmented) else self.calibration
 
     @property
     def left(self) -> Left | None:
         """What a last comparison of the augmented law found and was not added."""
-        return None if isinstance(self.finding, ProfileAdded) else self.finding.left
+        return self.finding.left if isinstance(self.finding, Augmented | NotAugmented) else None
 
 
 Outcome = Diagnosis | NotDiagnosed

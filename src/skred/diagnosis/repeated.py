@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from skred.campaign import Campaign
 from skred.campaign.parts import of_events, without_silent_sensors
+from skred.diagnosis.clock import Tell
 from skred.diagnosis.detect.too_little import too_little
-from skred.diagnosis.evidence.prior_odds import UNLISTED
-from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
+from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.predict.held_out import errors
 from skred.diagnosis.predict.unseen import log_scores, problem_of, unseen
 from skred.diagnosis.verdict.predictors import predictors_of
@@ -26,7 +26,6 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.paired import sum_se
 
 FloatArray = NDArray[np.float64]
-Tell = Callable[[str], None]
 _WHEN = ("before", "after")
 _ERRORS = ("rmse_velocity", "rmse_runout", "coverage_90")
 
@@ -108,15 +107,12 @@ def outer_folds(
 
     Parameters
     ----------
-    problem : HierarchicalProblem
     k : int
         Number of folds.
     seed : int
         Of how avalanches are dealt out, and of the scores.
     diagnose : callable
         Takes the problem of the other avalanches.
-    tell : callable
-        Takes one line for each fold.
     """
     folds = folds_of(problem, k, seed)
     entries, pairs = list[dict[str, Any]](), list[FloatArray]()
@@ -135,9 +131,7 @@ def _fold(found: Outcome, left_out: Campaign, seed: int) -> tuple[dict[str, Any]
     first = log_scores(before, left_out, seed)
     second = first if after is None else log_scores(after, left_out, seed)
     difference = second - first
-    names = [step.candidate.mechanism.id for step in found.steps] if isinstance(found, Diagnosis) else []
-    if isinstance(found, Diagnosis) and isinstance(found.finding, ProfileAdded):
-        names = [UNLISTED]
+    names = list(found.added) if isinstance(found, Diagnosis) else []
     entry = {
         "events": list(left_out.event_ids),
         "verdict": found.decision.verdict,

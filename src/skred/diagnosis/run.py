@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -10,9 +9,11 @@ from typing import Any
 
 import xarray as xr
 
+from skred.diagnosis.clock import Tell
 from skred.diagnosis.diagnose import diagnose
 from skred.diagnosis.effort import Effort
-from skred.diagnosis.outcome import NotDiagnosed, Outcome, ProfileAdded
+from skred.diagnosis.outcome import NotDiagnosed, Outcome
+from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.repeated import folds_of, open_locked, outer_folds, set_aside
 from skred.diagnosis.verdict.document import verdict
 from skred.diagnosis.verdict.draws import augmented_draws, profile_draws
@@ -25,7 +26,6 @@ from skred.output import write_json
 from skred.parallel.processes import meanwhile
 from skred.physics.law import Law
 
-Tell = Callable[[str], None]
 DRAWS = ("base.nc", "base_same_errors.nc", "augmented.nc", "profile.nc")
 """Of the base law, of it under the errors of what was added, of the law with that, and of the law with a
 force that is in no list."""
@@ -102,6 +102,6 @@ def _draws_of(found: Outcome) -> dict[str, xr.DataTree]:
         if found.reference is not found.calibration:
             trees["base_same_errors.nc"] = found.reference.tree
         trees["augmented.nc"] = augmented_draws(found)
-    if not isinstance(found, NotDiagnosed) and isinstance(found.finding, ProfileAdded):
-        trees["profile.nc"] = profile_draws(found, found.finding.law)
+    if not isinstance(found, NotDiagnosed) and isinstance(found.finding, ProfileLaw):
+        trees["profile.nc"] = profile_draws(found, found.finding)
     return trees

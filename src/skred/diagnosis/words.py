@@ -12,9 +12,9 @@ def percent(share: float) -> str:
     return "less than 1 %" if share < 0.005 else f"{100.0 * share:.0f} %"
 
 
-def counted(n: int, one: str, many: str = "") -> str:
+def counted(n: int, one: str) -> str:
     """A number and what it counts, in the singular where it is one."""
-    return f"{n} {one if n == 1 else many or one + 's'}"
+    return f"{n} {one if n == 1 else one + 's'}"
 
 
 def plus_minus(mean: float, sd: float, unit: str) -> str:
@@ -26,12 +26,10 @@ def plus_minus(mean: float, sd: float, unit: str) -> str:
 
 
 def error_text(value: float, unit: str) -> str:
-    """An error of speeds or of runouts, as precisely as it counts."""
-    return f"{value:.{_DECIMALS[unit]}f}"
+    """An error of speeds or of runouts: readings are no more precise."""
+    return f"{value:.0f}" if unit == "m" else f"{value:.1f}"
 
 
-_DECIMALS = {"m": 0, "m s-1": 1}
-"""Of errors by their unit: readings are no more precise."""
 TOLD_FROM = 0.05
 """Probability from which what is not the answer is told of: below it, its name misleads more than it
 informs."""

@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 
-INTERVAL_KIND, INTERVAL_PROBABILITY = "equal-tailed", 0.9
+INTERVAL_KIND = "equal-tailed"
+INTERVAL_PROBABILITY = 0.9
+"""Of intervals, bands and credible sets, and of finding a strength at its detection limit."""
 PRACTICAL_DIFFERENCE = 4.0
 """Smaller differences of elpd are called no practical difference."""
 

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from skred.diagnosis.evidence.prior_odds import NOTHING, SHARES, UNLISTED, same_term
-from skred.diagnosis.limits import HELD, LIMIT, NOTHING_AT_MOST
+from skred.diagnosis.limits import LIMIT, NOTHING_AT_MOST
+from skred.inference.intervals import INTERVAL_PROBABILITY
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group
 
@@ -118,6 +119,6 @@ def smallest_set(shares: Mapping[str, float]) -> tuple[str, ...]:
     for name in sorted(shares, key=lambda name: -shares[name]):
         names.append(name)
         held += shares[name]
-        if held >= HELD * total:
+        if held >= INTERVAL_PROBABILITY * total:
             break
     return tuple(names)

@@ -11,7 +11,7 @@ from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
 from skred.diagnosis.discrepancy.profile import Kind, Profile, most_probable, spline_basis
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.prior_odds import UNLISTED
-from skred.diagnosis.limits import HELD
+from skred.inference.intervals import INTERVAL_PROBABILITY
 from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.stretches import is_opposed
 
@@ -109,7 +109,7 @@ def _band(profile: Profile, basis: FloatArray) -> tuple[FloatArray, FloatArray, 
     sd = np.sqrt(np.maximum(np.einsum("kc,kl,lc->c", basis, profile.covariance, basis), 1e-300))
     rng = np.random.default_rng(3)
     draws = rng.multivariate_normal(np.zeros(len(profile.mean)), profile.covariance, _DRAWS) @ basis
-    return mean, sd, float(np.quantile(np.abs(draws / sd).max(axis=1), HELD))
+    return mean, sd, float(np.quantile(np.abs(draws / sd).max(axis=1), INTERVAL_PROBABILITY))
 
 
 def _resolution(profile: Profile) -> float:

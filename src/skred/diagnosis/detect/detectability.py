@@ -17,8 +17,9 @@ from scipy.special import ndtr, ndtri
 
 from skred.campaign import Sensor, Status
 from skred.diagnosis.detect.score_test import ScoreTest
-from skred.diagnosis.evidence.conditional_map import Modes, Population, Rows, campaign_rows
-from skred.diagnosis.evidence.linear_mixed_model import Scores, efficient_scores, without
+from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.evidence.conditional_map import Modes, Population, campaign_rows
+from skred.diagnosis.evidence.linear_mixed_model import Scores, efficient_scores
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import INTERVAL_PROBABILITY
 from skred.physics.mechanisms import mechanisms
@@ -91,7 +92,7 @@ class Identifiability:
     Attributes
     ----------
     rows : tuple of Detectability
-    sensor_m : float or None
+    sensor_m : float
         Where one more velocity sensor raises the power most.
     power : float
         Mean power over the listed physics.
@@ -100,7 +101,7 @@ class Identifiability:
     """
 
     rows: tuple[Detectability, ...]
-    sensor_m: float | None
+    sensor_m: float
     power: float
     power_with: float
 
@@ -110,17 +111,14 @@ class Identifiability:
         return self.power >= 0.5
 
 
-def identify(
-    score_test: ScoreTest, rows: Rows, points: FloatArray, population: Population
-) -> Identifiability:
-    """What the recordings can tell, around the events' modes."""
-    scores = score_test.scores(rows, points, population)
+def identify(base: Base) -> Identifiability:
+    """What the recordings can tell around a fitted law."""
+    score_test = ScoreTest(base.problem, base.law, base.setting)
+    scores = score_test.scores(base.rows, base.fit.points, base.population)
     table = told(score_test, scores)
-    places, with_each = extra_sensors(score_test, points, population)
+    places, with_each = extra_sensors(score_test, base.fit.points, base.population)
     power = mean_power(table)
     powers = [mean_power(told(score_test, one)) for one in with_each]
-    if not powers:
-        return Identifiability(tuple(table), None, power, power)
     best = int(np.argmax(powers))
     return Identifiability(tuple(table), float(places[best]), power, powers[best])
 
@@ -193,21 +191,19 @@ def extra_sensors(
     """Places for one more velocity sensor, and the information with each."""
     places = places_of_a_sensor(score_test.problem, score_test.setting.recorded_m)
     problem = with_sensors(score_test.problem, places)
-    n_new = len(places)
     setting = replace(
         score_test.setting,
         sensors=tuple(problem.campaign.sensor_ids),
-        velocities=(*score_test.setting.velocities, *[False] * n_new),
+        velocities=(*score_test.setting.velocities, *[False] * len(places)),
     )
     wide = replace(score_test, problem=problem, setting=setting)
     rows = campaign_rows(wide.extension)
     around = wide.around(rows, points)
-    columns = np.arange(n_new) + len(score_test.problem.campaign.sensors)
-    found = [
-        efficient_scores(_also_reading(around, problem, int(column)), rows, population, wide.prior)
+    columns = range(score_test.problem.campaign.n_sensors, problem.campaign.n_sensors)
+    return places, [
+        efficient_scores(_also_reading(around, problem, column), rows, population, wide.prior)
         for column in columns
     ]
-    return places, [without(scores, len(score_test.directions)) for scores in found]
 
 
 def _also_reading(modes: Modes, problem: HierarchicalProblem, column: int) -> Modes:

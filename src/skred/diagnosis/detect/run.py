@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from skred.diagnosis.detect.detectability import Detectability, Identifiability
-from skred.diagnosis.detect.detectability import identify as look
-from skred.diagnosis.detect.score_test import ScoreTest
+from skred.diagnosis.clock import Tell
+from skred.diagnosis.detect.detectability import Detectability, Identifiability, identify
 from skred.diagnosis.detect.too_little import too_little
 from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
@@ -21,28 +19,15 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.output import write_json
 from skred.physics.law import Law
 
-Tell = Callable[[str], None]
 FILE = "identify.json"
 
 
 def identify_to(
     problem: HierarchicalProblem, law: Law, folder: Path, tell: Tell = lambda line: None
 ) -> dict[str, Any]:
-    """What the recordings can tell of a law, written to identify.json.
+    """What the recordings can tell of a law, written to identify.json, and the content of that.
 
-    Parameters
-    ----------
-    problem : HierarchicalProblem
-    law : Law
-        That something may be missing from.
-    folder : Path
-    tell : callable
-        Is told of each stage.
-
-    Returns
-    -------
-    dict
-        The content of identify.json; ``reason`` says why it tells nothing, where it does not.
+    Its ``reason`` says why it tells nothing, where it does not.
     """
     reason = too_little(problem)
     table = None
@@ -50,7 +35,7 @@ def identify_to(
         tell(f"{law.id}: fitting the population of avalanches")
         base = base_of(problem, law)
         tell("what these recordings can tell")
-        table = identifiability(base)
+        table = identify(base)
     document = identify_document(problem, law, table, reason)
     write_json(folder / FILE, document)
     return document
@@ -65,12 +50,6 @@ def base_of(problem: HierarchicalProblem, law: Law) -> Base:
     likelihood = EventLikelihood(extension, rows, np.empty(0))
     start = fit_population(likelihood, mean_prior(law), (population, points))
     return fit_base(problem, law, *start)
-
-
-def identifiability(base: Base) -> Identifiability:
-    """What the recordings can tell around a fitted law."""
-    score_test = ScoreTest(base.problem, base.law, base.setting)
-    return look(score_test, base.rows, base.fit.points, base.population)
 
 
 def identify_document(
@@ -107,9 +86,7 @@ def _row(told: Detectability) -> dict[str, Any]:
     return told.as_dict() | named
 
 
-def _next_sensor(table: Identifiability) -> dict[str, Any] | None:
-    if table.sensor_m is None:
-        return None
+def _next_sensor(table: Identifiability) -> dict[str, Any]:
     return {
         "quantity": "front_velocity",
         "s_from_m": table.sensor_m,
@@ -135,7 +112,7 @@ def _statement(document: dict[str, Any]) -> list[str]:
     if alike:
         sentences.append(f"Not to be told apart, where each is seen best: {'; '.join(alike)}.")
     sensor = document["next_sensor"]
-    if sensor is not None and sensor["power_with"] > document["power"]:
+    if sensor["power_with"] > document["power"]:
         sentences.append(
             f"One more speed, at s = {sensor['s_from_m']:.0f} m, would raise that to"
             f" {percent(sensor['power_with'])}."

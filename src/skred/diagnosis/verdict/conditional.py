@@ -28,8 +28,7 @@ def conditional_document(found: Diagnosis) -> dict[str, Any] | None:
     problem, pair = found.problem, found.conditional
     carried_by = [] if found.influence is None else list(found.influence.carried_by)
     carrying = np.isin(problem.campaign.event_ids, carried_by)
-    velocity, n_sensors = problem.readings.is_velocity, problem.campaign.n_sensors
-    groups = [(np.arange(n_sensors) == k) for k in range(n_sensors)]
+    velocity, each = problem.readings.is_velocity, np.eye(problem.campaign.n_sensors, dtype=bool)
     shown = _shown(pair)
     effective = np.minimum(pair.before.effective, pair.after.effective)[shown]
     document: dict[str, Any] = {
@@ -40,7 +39,7 @@ def conditional_document(found: Diagnosis) -> dict[str, Any] | None:
                 "unit": "m" if sensor.is_runout else "m s-1",
                 **_sets(pair, problem, column, carrying),
             }
-            for sensor, column in zip(problem.campaign.sensors, groups, strict=True)
+            for sensor, column in zip(problem.campaign.sensors, each, strict=True)
             if shown[:, column].any()
         ],
         "speeds": _sets(pair, problem, velocity, carrying) if shown[:, velocity].any() else None,

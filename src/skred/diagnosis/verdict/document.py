@@ -3,40 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from skred.diagnosis.augment.coefficient import augmented_of
 from skred.diagnosis.augment.step import Left
-from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER
 from skred.diagnosis.influence.influence import Influence
-from skred.diagnosis.outcome import (
-    Diagnosis,
-    Finding,
-    MechanismsAdded,
-    NotDiagnosed,
-    NothingAdded,
-    Outcome,
-    ProfileAdded,
-)
+from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.predict.held_out import HeldOut, errors, paired
 from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.conditional import conditional_document
-from skred.diagnosis.verdict.mechanisms import (
-    added_document,
-    candidate_documents,
-    place_of,
-    strength_document,
-    work_documents,
-)
+from skred.diagnosis.verdict.mechanisms import added_document, candidate_documents, work_documents
 from skred.diagnosis.verdict.next_sensor import detection_sensor, next_sensor
 from skred.diagnosis.verdict.statement import statement
 from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.problem import HierarchicalProblem
-from skred.physics.mechanisms.stretches import equation_of
+
+_OF_THE_NAMED = ("location", "strength", "covariate", "sensor", "equation")
+"""Keys of a mechanism that the verdict has of the one that it names."""
 
 
 def verdict(found: Outcome) -> dict[str, Any]:
@@ -47,8 +35,8 @@ def verdict(found: Outcome) -> dict[str, Any]:
     return document | _more(found)
 
 
-def _told_nothing(found: NotDiagnosed) -> dict[str, Any]:
-    """Every key of the format, where no diagnosis was possible."""
+def _told_nothing(found: Outcome) -> dict[str, Any]:
+    """Every key of the format, as where no diagnosis was possible."""
     return {
         "format": 1,
         "campaign": found.problem.campaign.name,
@@ -58,7 +46,7 @@ def _told_nothing(found: NotDiagnosed) -> dict[str, Any]:
         "mechanisms": [],
         "probability": {},
         "indistinguishable": [],
-        **dict.fromkeys(("location", "strength", "covariate", "sensor", "equation")),
+        **dict.fromkeys(_OF_THE_NAMED),
         "evidence": dict.fromkeys(("elpd_diff", "elpd_se", "log_bayes_factor", "p_value")),
         "held_out": _held_out(None, None, found.problem),
         "detection_limits": {},
@@ -70,23 +58,10 @@ def _told_nothing(found: NotDiagnosed) -> dict[str, Any]:
 
 def _told(found: Diagnosis) -> dict[str, Any]:
     """Every key of the format."""
-    candidate = found.steps[0].candidate if found.steps else None
-    shape = candidate.best.shape if candidate is not None else None
-    names = found.decision.names if found.steps else ()
-    return {
-        "format": 1,
-        "campaign": found.problem.campaign.name,
-        "base_model": found.law.id,
-        "verdict": found.decision.verdict,
-        "mechanism": names[0] if names else None,
+    document = _told_nothing(found) | {
         "mechanisms": [added_document(found, number) for number in range(len(found.steps))],
         "probability": found.comparison.probability,
         "indistinguishable": list(found.decision.tied),
-        "location": _location(found),
-        "strength": strength_document(found, 0) if found.steps else None,
-        "covariate": shape.covariate if shape is not None else None,
-        "sensor": shape.sensor if shape is not None else None,
-        "equation": equation_of(candidate.mechanism, candidate.best.shape) if candidate is not None else None,
         "evidence": _evidence(found),
         "held_out": _held_out(found.before, found.after, found.problem),
         "detection_limits": _detection_limits(found.table),
@@ -97,16 +72,14 @@ def _told(found: Diagnosis) -> dict[str, Any]:
         ),
         "left": _left(found.left),
     }
-
-
-def _location(found: Diagnosis) -> dict[str, Any] | None:
-    """Where something is missing; None where it is not local, or nothing is."""
-    if found.steps:
-        return place_of(found.steps[0].candidate)
-    if found.decision.verdict != "unexplained":
-        return None
-    first, last = found.location.stretch_m
-    return {"s_from_m": first, "s_to_m": last, "s_from_interval_m": None, "s_to_interval_m": None}
+    if found.decision.verdict == "unexplained":
+        first, last = found.location.stretch_m
+        ends = {"s_from_m": first, "s_to_m": last, "s_from_interval_m": None, "s_to_interval_m": None}
+        document["location"] = ends
+    if document["mechanisms"]:
+        named = document["mechanisms"][0]
+        document |= {"mechanism": named["id"]} | {key: named[key] for key in _OF_THE_NAMED}
+    return document
 
 
 def _evidence(found: Diagnosis) -> dict[str, float | None]:
@@ -197,46 +170,42 @@ def _more(found: Outcome) -> dict[str, Any]:
     }
     if isinstance(found, NotDiagnosed):
         return more | {"alarm_by": None, "influence": None, "conditional": None}
-    return (
-        more
-        | {
-            "alarm": found.alarm_by is not None,
-            "alarm_by": found.alarm_by,
-            "log_bayes_factors": found.comparison.log_factors,
-            "calibration": {"version": CALIBRATION_VERSION, "power": POWER, "prior": found.comparison.odds},
-            "error_models": [under_errors.error_model for under_errors in found.comparison.under_each],
-            "candidates": candidate_documents(found, found.comparison),
-            "influence": _influence(found.influence),
-            "conditional": conditional_document(found),
-        }
-        | _of_finding(found.finding)
-        | {
-            "identifiability": [row.as_dict() for row in found.table.rows],
-            "power": found.table.power,
-            "detection_sensor": detection_sensor(found.table),
-        }
-        | (_missing_work(found.location) if found.alarm_by is not None else {})
-    )
+    more |= {
+        "alarm": found.alarm_by is not None,
+        "alarm_by": found.alarm_by,
+        "log_bayes_factors": found.comparison.log_factors,
+        "calibration": {"version": CALIBRATION_VERSION, "power": POWER, "prior": found.comparison.odds},
+        "error_models": [under_errors.error_model for under_errors in found.comparison.under_each],
+        "candidates": candidate_documents(found, found.comparison),
+        "influence": _influence(found.influence),
+        "conditional": conditional_document(found),
+        **_with_what_was_added(found),
+        "identifiability": [row.as_dict() for row in found.table.rows],
+        "power": found.table.power,
+        "detection_sensor": detection_sensor(found.table),
+    }
+    if found.alarm_by is not None:
+        more["missing_work_of"] = "fast front" if found.location.opposed else "typical front"
+        more["missing_work"] = work_documents(found.location)
+    return more
 
 
-def _of_finding(finding: Finding) -> dict[str, Any]:
+def _with_what_was_added(found: Diagnosis) -> dict[str, Any]:
     """Under which errors something was added, and what the check says of the law with it."""
-    match finding:
-        case MechanismsAdded():
-            problem = augmented_of(finding.last.calibration)
-            return {
-                "error_model": problem.error_model.id,
-                "p_value_augmented": finding.last.check.p_value,
-                "refitted_events": list(finding.after.refitted),
-            }
-        case ProfileAdded(law):
-            return {
-                "error_model": law.error_model,
-                "p_value_augmented": law.check.p_value,
-                "profile": _profile(law),
-            }
-        case NothingAdded():
-            return {}
+    if isinstance(found.finding, ProfileLaw):
+        return {
+            "error_model": found.finding.error_model,
+            "p_value_augmented": found.finding.check.p_value,
+            "profile": _profile(found.finding),
+        }
+    if found.after is None:
+        return {}
+    last = found.steps[-1]
+    return {
+        "error_model": augmented_of(last.calibration).error_model.id,
+        "p_value_augmented": last.check.p_value,
+        "refitted_events": list(found.after.refitted),
+    }
 
 
 def _influence(found: Influence | None) -> dict[str, Any] | None:
@@ -254,16 +223,5 @@ def _influence(found: Influence | None) -> dict[str, Any] | None:
         "carried_by": list(found.carried_by),
         "without_them": found.without_them,
         "without_a_third": found.without_a_third,
-        "readings": [
-            {"kind": one.kind, "sensor": one.sensor, "n": one.n, "log_bayes_factor": one.log_bayes_factor}
-            for one in found.readings
-        ],
-    }
-
-
-def _missing_work(location: Location) -> dict[str, Any]:
-    """Specific work that is missing between neighbouring sensors."""
-    return {
-        "missing_work_of": "fast front" if location.opposed else "typical front",
-        "missing_work": work_documents(location),
+        "readings": [asdict(one) for one in found.readings],
     }

@@ -26,16 +26,10 @@ def augmented_draws(found: Diagnosis) -> xr.DataTree:
     its mean and standard deviation over all places, and quantiles of both ends of the place, (added,) and
     (added, quantile), NaN where it is not local; and what `skred.inference.added_terms` needs to use the law
     again, at the best place.
-
-    Raises
-    ------
-    ValueError
-        If no mechanism was added.
     """
-    if not found.steps:
-        raise ValueError("no mechanism was added")
     calibration = found.steps[-1].calibration
-    names = [one.name for one in augmented_of(calibration).added]
+    added = augmented_of(calibration).added
+    names = [one.name for one in added]
     units = [step.candidate.mechanism.strength.unit for step in found.steps]
     strengths = [strength_of(found.steps, number) for number in range(len(names))]
     quantiles = (INTERVAL[0], 0.5, INTERVAL[1])
@@ -66,7 +60,7 @@ def augmented_draws(found: Diagnosis) -> xr.DataTree:
             one.between,
             one.between_name,
         )
-        for one in augmented_of(calibration).added
+        for one in added
     ]
     groups = {path: node.to_dataset() for path, node in calibration.tree.subtree_with_keys}
     return xr.DataTree.from_dict({**groups, GROUP: group.merge(added_group(terms))})

@@ -17,7 +17,7 @@ from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.evidence.coefficient import Curve
-from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, NothingAdded, Outcome
+from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.verdict.conditional import conditional_dataset
 from skred.diagnosis.verdict.mechanisms import candidates_of
 from skred.diagnosis.verdict.report_facts import checks_of, comparisons_of
@@ -107,8 +107,8 @@ def _force(location: Location) -> xr.Dataset:
 
 def _held_out(found: Diagnosis) -> xr.Dataset:
     held = {"before": found.before}
-    if not isinstance(found.finding, NothingAdded):
-        held["after"] = found.finding.after
+    if found.after is not None:
+        held["after"] = found.after
     of_reading, of_event = ("when", "event", "sensor"), ("when", "event")
     each = held.values()
     return xr.Dataset(
@@ -126,8 +126,8 @@ def _held_out(found: Diagnosis) -> xr.Dataset:
 
 def _curves(comparison: Comparison) -> xr.Dataset:
     """Evidence along the strength of each candidate's most probable shape."""
-    names = candidates_of(comparison)
-    candidates = [comparison.leading(name).candidates[name] for name in names]
+    found = candidates_of(comparison)
+    names, candidates = list(found), list(found.values())
     best = [candidate.best for candidate in candidates]
     fine = [_fine(curve) for curve in best]
     at, on = ("candidate", "strength_point"), ("candidate", "fine_point")
@@ -183,8 +183,7 @@ def _factor_at(candidate: Candidate, relative: float) -> float:
 def _shapes(comparison: Comparison) -> xr.Dataset:
     """Every shape of every candidate: where it acts, and its log Bayes factor for all strengths together."""
     rows: list[tuple[Any, ...]] = []
-    for name in candidates_of(comparison):
-        candidate = comparison.leading(name).candidates[name]
+    for name, candidate in candidates_of(comparison).items():
         best = candidate.best
         for curve, weight in zip(candidate.curves, candidate.log_weights, strict=True):
             shape = curve.shape

@@ -87,9 +87,10 @@ def standard_of_covariate(found: Diagnosis, covariate: str | None) -> dict[str, 
     return None if standard is None else standard.as_dict()
 
 
-def candidates_of(comparison: Comparison) -> list[str]:
-    """Ids of the mechanisms in a comparison, under any error model."""
-    return list(dict.fromkeys(name for one in comparison.under_each for name in one.candidates))
+def candidates_of(comparison: Comparison) -> dict[str, Candidate]:
+    """Every mechanism of a comparison by id, under the error model that it has most of its evidence under."""
+    names = dict.fromkeys(name for one in comparison.under_each for name in one.candidates)
+    return {name: comparison.leading(name).candidates[name] for name in names}
 
 
 def candidate_documents(found: Diagnosis, comparison: Comparison) -> list[dict[str, Any]]:
@@ -99,21 +100,21 @@ def candidate_documents(found: Diagnosis, comparison: Comparison) -> list[dict[s
         for number, step in enumerate(found.steps)
         if step.comparison is comparison
     }
-    rows = [_candidate(comparison, name) for name in candidates_of(comparison)]
+    log_factors = comparison.log_factors
+    rows = [_candidate(one, log_factors[name]) for name, one in candidates_of(comparison).items()]
     for row in rows:
         if row["id"] in added:
             row["strength"] = strength_document(found, added[row["id"]])
     return rows
 
 
-def _candidate(comparison: Comparison, name: str) -> dict[str, Any]:
+def _candidate(candidate: Candidate, log_factor: float) -> dict[str, Any]:
     """One mechanism in a comparison, where and how strong it is if it is there."""
-    candidate = comparison.leading(name).candidates[name]
     strength, shape = candidate.mechanism.strength, candidate.best.shape
     return {
-        "id": name,
+        "id": candidate.mechanism.id,
         **kind_of(candidate.mechanism),
-        "log_bayes_factor": comparison.log_factors[name],
+        "log_bayes_factor": log_factor,
         "strength": {
             "parameter": strength.name,
             "unit": strength.unit,

@@ -12,6 +12,7 @@ from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.detect.detectability import Identifiability, places_of_a_sensor, with_sensors
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.outcome import Diagnosis
+from skred.diagnosis.verdict.mechanisms import candidates_of
 
 
 def next_sensor(found: Diagnosis) -> dict[str, Any] | None:
@@ -27,16 +28,15 @@ def next_sensor(found: Diagnosis) -> dict[str, Any] | None:
 
 def detection_sensor(table: Identifiability) -> dict[str, Any] | None:
     """The one that raises the power over the listed mechanisms most; None where none does."""
-    if table.sensor_m is None or table.power_with <= table.power:
+    if table.power_with <= table.power:
         return None
     return _sensor(table.sensor_m, [], table.power_with)
 
 
 def _rival(step: Step) -> Candidate | None:
     """The first of those tied that a speed could split off: listed, and another term."""
-    known = {name for under_errors in step.comparison.under_each for name in under_errors.candidates}
-    rivals = [step.comparison.leading(name).candidates[name] for name in step.tied if name in known]
-    named = step.candidate.mechanism.id
+    known, named = candidates_of(step.comparison), step.candidate.mechanism.id
+    rivals = [known[name] for name in step.tied if name in known]
     return next((one for one in rivals if one.mechanism.same_term_as != named), None)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from skred.diagnosis.evidence.prior_odds import UNLISTED
-from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
+from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.predict.predictor_document import as_dict
 from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.predict.unseen import Predictor, ProfileTerm, predictor_of
@@ -26,8 +26,8 @@ def predictors_of(found: Outcome) -> tuple[Predictor, Predictor | None]:
         if found.calibration is None:
             raise ValueError(f"nothing was calibrated: {found.reason}")
         return predictor_of(found.calibration), None
-    if isinstance(found.finding, ProfileAdded):
-        return _with_profile(found, found.finding.law)
+    if isinstance(found.finding, ProfileLaw):
+        return _with_profile(found, found.finding)
     after = predictor_of(found.steps[-1].calibration) if found.steps else None
     return predictor_of(found.reference), after
 

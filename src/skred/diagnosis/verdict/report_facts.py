@@ -20,15 +20,9 @@ from skred.diagnosis.compare.location import Location
 from skred.diagnosis.discrepancy.profile import AMPLITUDES, KINDS, LENGTHS_M, NEAR_M
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.limits import LIMIT, NOTHING_AT_MOST
-from skred.diagnosis.outcome import (
-    Diagnosis,
-    MechanismsAdded,
-    NotDiagnosed,
-    NothingAdded,
-    Outcome,
-    ProfileAdded,
-)
+from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.predict.held_out import K_LIMIT, HeldOut
+from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.mechanisms import candidate_documents, standard_of_covariate, work_documents
 from skred.documents import FORMAT
 from skred.inference.calibrate import Calibration
@@ -43,16 +37,9 @@ from skred.physics.mechanisms.stretches import is_opposed
 
 
 def report_facts(found: Outcome) -> dict[str, Any]:
-    """What the page of a diagnosis quotes beside the verdict.
+    """What the page of a diagnosis quotes beside the verdict, as plain data.
 
-    Parameters
-    ----------
-    found : Diagnosis or NotDiagnosed
-
-    Returns
-    -------
-    dict
-        Plain data. Of what was not diagnosed only the campaign, the law, and what was calibrated.
+    Of what was not diagnosed only the campaign, the law, and what was calibrated.
     """
     facts: dict[str, Any] = {
         "format": FORMAT,
@@ -206,11 +193,9 @@ def _calibrations(found: Outcome) -> list[dict[str, Any]]:
     if same_errors is not alone:
         errors = cast(HierarchicalProblem, same_errors.problem).error_model.title
         entries.append(_calibration([], same_errors, found.before) | {"errors": errors})
-    names = [step.candidate.mechanism.id for step in found.steps]
     for number, step in enumerate(found.steps, start=1):
-        finding, last = found.finding, number == len(found.steps)
-        held = finding.after if isinstance(finding, MechanismsAdded) and last else None
-        entries.append(_calibration(names[:number], step.calibration, held))
+        held = found.after if number == len(found.steps) else None
+        entries.append(_calibration(found.added[:number], step.calibration, held))
     return entries
 
 
@@ -274,11 +259,10 @@ def _checks(found: Diagnosis) -> list[dict[str, Any]]:
 
 def checks_of(found: Diagnosis) -> list[tuple[tuple[str, ...], BootstrapTest]]:
     """What was added, and the bootstrap test of the law with it; the base law's first."""
-    names = tuple(step.candidate.mechanism.id for step in found.steps)
     checks: list[tuple[tuple[str, ...], BootstrapTest]] = [((), found.check)]
-    checks += [(names[: number + 1], step.check) for number, step in enumerate(found.steps)]
-    if isinstance(found.finding, ProfileAdded):
-        checks.append(((UNLISTED,), found.finding.law.check))
+    checks += [(found.added[:number], step.check) for number, step in enumerate(found.steps, start=1)]
+    if isinstance(found.finding, ProfileLaw):
+        checks.append((found.added, found.finding.check))
     return checks
 
 
@@ -295,17 +279,14 @@ def _force(location: Location) -> dict[str, Any]:
 
 def _comparison(comparison: Comparison, found: Diagnosis, number: int) -> dict[str, Any]:
     """One model comparison, and what was added from it."""
-    step = found.steps[number] if number < len(found.steps) else None
-    listed = mechanisms()
-    named = step.candidate.mechanism if step is not None else None
+    added, tied = None, list[str]()
+    if number < len(found.steps):
+        step = found.steps[number]
+        added, tied = step.candidate.mechanism.id, list(step.tied)
     return {
-        "added": named.id if named is not None else None,
-        "tied_with": list(step.tied) if step is not None else [],
-        "same_term": [
-            name
-            for name in (step.tied if step is not None else ())
-            if name != UNLISTED and named is not None and listed[name].same_term_as == named.id
-        ],
+        "added": added,
+        "tied_with": tied,
+        "same_term": [name for name in tied if name != UNLISTED and mechanisms()[name].same_term_as == added],
         "probability": comparison.probability,
         "prior": comparison.odds,
         "log_bayes_factors": comparison.log_factors,
@@ -364,7 +345,7 @@ def _added(found: Diagnosis, number: int) -> dict[str, Any]:
 def _log_score(found: Diagnosis) -> dict[str, Any]:
     """Sums over the avalanches left out, and of how many the prediction became better."""
     before = found.before.pointwise
-    after = None if isinstance(found.finding, NothingAdded) else found.finding.after.pointwise
+    after = None if found.after is None else found.after.pointwise
     return {
         "before": float(before.sum()),
         "after": None if after is None else float(after.sum()),

@@ -11,7 +11,8 @@ from skred.diagnosis.check.decision import Decision
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.evidence.prior_odds import NOTHING, SHARES, UNLISTED
 from skred.diagnosis.limits import NOTHING_AT_MOST
-from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome, ProfileAdded
+from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
+from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.between import between_sentence
 from skred.diagnosis.verdict.hangs_on import carried, hangs_on
 from skred.diagnosis.verdict.improvement import improvement
@@ -92,8 +93,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     if document["covariate"]:
         sentences.append("Associated with, not necessarily caused by.")
     if ties:
-        sentences.append(_tied(document))
-        sentences.append(_split(found.steps[0], document))
+        sentences += [_tied(document), _split(found.steps[0], document)]
     sentences.append(_not_excluded(document))
     if len(document["mechanisms"]) > 1:
         second = document["mechanisms"][1]
@@ -187,7 +187,7 @@ def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         _closest(found, document),
         "The force profile is the answer: it says where the force acts and how much work it does.",
         improvement(document),
-        _still_fired(found.finding.law.check) if isinstance(found.finding, ProfileAdded) else "",
+        _still_fired(found.finding.check) if isinstance(found.finding, ProfileLaw) else "",
     ]
 
 
