@@ -61,14 +61,11 @@ class AddedStrength:
         return self.mechanism.added.scale_of(self.shape)
 
 
-def added_strengths(
-    curves: Sequence[Curve], between: Sequence[BetweenEvents] = ()
-) -> tuple[AddedStrength, ...]:
-    """Of some curves, numbered where two have the same name; in common unless given."""
+def added_strengths(curves: Sequence[Curve], way: BetweenEvents) -> tuple[AddedStrength, ...]:
+    """Of some curves, in which avalanches differ alike; numbered where two have the same name."""
     count: Counter[str] = Counter()
     added = []
-    ways = between or [BetweenEvents.COMMON] * len(curves)
-    for curve, way in zip(curves, ways, strict=True):
+    for curve in curves:
         name = curve.mechanism.strength.name
         count[name] += 1
         own = name if count[name] == 1 else f"{name}_{count[name]}"

@@ -59,11 +59,6 @@ def as_diagnosed(problem: HierarchicalProblem) -> HierarchicalProblem:
     return replace(problem, integration_limit=CLAIM_LIMIT, fineness=COARSER)
 
 
-def extension_with(base: Base, added: Sequence[AddedStrength]) -> Extension:
-    """A base law with some mechanisms added."""
-    return Extension(base.problem, base.law, (*base.directions, *(one.direction for one in added)))
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AugmentedProblem(HierarchicalProblem):
     """A campaign, and a base law with mechanisms added; calibrate the base law with it.
@@ -92,7 +87,7 @@ class AugmentedProblem(HierarchicalProblem):
     @property
     def extension(self) -> Extension:
         """The base law with what is added."""
-        return extension_with(self.base, self.added)
+        return self.base.extended(*(one.direction for one in self.added))
 
     @property
     def n_components(self) -> int:
@@ -229,8 +224,7 @@ class AugmentedProblem(HierarchicalProblem):
         population = Population(means, np.einsum("nij,nkj->nik", factors, factors))
         rows = Rows(chosen, np.zeros_like(chosen), base.rows.readings.take(chosen), base.rows.errors)
         start = self.tables.modes[self.tables.grid.nearest(added)][:, chosen]
-        given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
-        likelihood = EventLikelihood(self.extension, rows, base.strengths).in_groups(given)
+        likelihood = EventLikelihood(self.extension, rows, base.strengths).in_groups(base.given(added))
         nodes = exact_nodes(likelihood, population, start, _EXACT, base.population)
         exact = np.empty((len(added), len(chosen)))
         for k in range(len(added)):

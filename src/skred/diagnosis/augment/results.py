@@ -206,9 +206,9 @@ def fronts_of(
         The runout last.
     """
     n, n_events = points.shape[:2]
-    extension, base = problem.extension, problem.base
+    extension = problem.extension
     instruments = _Instruments(extension.problem, extension.law, extension.directions)
-    given = np.column_stack([np.tile(base.strengths, (n * n_events, 1)), own.reshape(n * n_events, -1)])
+    given = problem.base.given(own.reshape(n * n_events, -1))
     avalanches, fronts = instruments.read(
         np.tile(np.arange(n_events), n), points.reshape(n * n_events, -1), given
     )

@@ -86,6 +86,14 @@ class Base:
         """The base law without what was added before."""
         return replace(self, directions=(), strengths=np.empty(0))
 
+    def extended(self, *more: Direction) -> Extension:
+        """The law with what is in already, and with more."""
+        return extended(self.problem, self.law, (*self.directions, *more))
+
+    def given(self, added: FloatArray) -> FloatArray:
+        """Strengths of what is in already before some of what is added, (n, n_added) to (n, n_directions)."""
+        return np.column_stack([np.tile(self.strengths, (len(added), 1)), added])
+
     def with_nothing(self, budget: Budget, *, sampled: bool = False) -> Fit:
         """Refitted with nothing added, as `curve_at` does with something: the same for all mechanisms.
 
@@ -93,7 +101,7 @@ class Base:
         everything has nats that are not there.
         """
         if (budget, sampled) not in self._nothing:
-            extension = extended(self.problem, self.law, self.directions)
+            extension = self.extended()
             rounds = Rounds(budget, FIRST, sampled=sampled)
             self._nothing[budget, sampled] = _refit_from(self, extension, np.empty(0), rounds)[0]
         return self._nothing[budget, sampled]
@@ -238,7 +246,7 @@ def curve_at(
     added = mechanism.added
     assert added is not None
     direction = direction_of(mechanism, base.setting, shape)
-    extension = extended(base.problem, base.law, (*base.directions, direction))
+    extension = base.extended(direction)
     strengths = np.sort(strengths[np.abs(strengths) > _SMALLEST * added.scale_of(shape)])
     fits = known or begin
     near = None if fits is None else [_closest(fits, strength) for strength in strengths]
@@ -265,9 +273,7 @@ def _refit_from(
     fits: list[Fit] | None = None,
 ) -> list[Fit]:
     """Fits at strengths of the extension's last direction, or without it; begun at fits or at the base's."""
-    given = base.strengths[None, :]
-    if len(strengths):
-        given = np.column_stack([np.tile(base.strengths, (len(strengths), 1)), strengths])
+    given = base.given(strengths) if len(strengths) else base.strengths[None, :]
     start = (base.population, base.fit.points)
     return refit(extension, base.rows, given, start, rounds, fits)
 

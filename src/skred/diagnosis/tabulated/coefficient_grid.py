@@ -183,7 +183,7 @@ def from_nothing(curve: Curve, found: Evidence, mean: float, sd: float) -> Locat
 
 def _fitted(base: Base, extension: Extension, added: FloatArray, near: Sequence[Fit]) -> list[Fit]:
     """Fits at strengths of what is added, (n, n_added), begun at others; these where nothing is found."""
-    given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
+    given = base.given(added)
     start = (base.population, base.fit.points)
 
     def fitted(part: slice) -> list[Fit]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, event_modes, log_joint
 from skred.diagnosis.evidence.event_quadrature import Budget, Spread, event_nodes
-from skred.diagnosis.evidence.extension import Extension, extended
+from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.marginal import Evidence
 from skred.diagnosis.tabulated.coefficient_grid import Grid, Located, from_nothing
 from skred.inference.hierarchical.surface import Nodes
@@ -70,8 +70,7 @@ def build_tables(
     """
     grid, fits = located.grid, located.fits
     n, n_tables, n_events = len(base.law.mechanisms), len(fits), len(base.rows.event)
-    given = np.column_stack([np.tile(base.strengths, (n_tables, 1)), grid.points])
-    likelihood = EventLikelihood(extension, base.rows, base.strengths).in_groups(given)
+    likelihood = EventLikelihood(extension, base.rows, base.strengths).in_groups(base.given(grid.points))
     found = [fit.found.population(n) for fit in fits]
     population = Population(
         np.concatenate([one.mean for one in found]), np.concatenate([one.covariance for one in found])
@@ -97,8 +96,7 @@ def build_tables(
 
 def wide_tables(base: Base, curve: Curve, found: Evidence, budget: Budget, mean: float, sd: float) -> Tables:
     """Tables of one mechanism in which avalanches differ; parameters as `from_nothing` has them."""
-    extension = extended(base.problem, base.law, (*base.directions, curve.direction))
-    return build_tables(base, extension, from_nothing(curve, found, mean, sd), budget)
+    return build_tables(base, base.extended(curve.direction), from_nothing(curve, found, mean, sd), budget)
 
 
 def highest(likelihood: EventLikelihood, points: FloatArray, population: Population) -> FloatArray:
