@@ -23,7 +23,7 @@ from skred.inference.hierarchical.results import (
     readings_by_sensor,
     thinned,
 )
-from skred.inference.results import predictive, summary
+from skred.inference.results import draws_by_name, predictive, summary
 from skred.physics.geometry import sensor_table
 from skred.physics.kernel.fronts import simulate
 from skred.physics.law import Law
@@ -44,7 +44,7 @@ def augmented_predictive(
     rng = np.random.default_rng([seed, 1])
     n_events = problem.campaign.n_events
     kept = thinned(posterior, n_events)
-    samples = _samples(problem, law, kept)
+    samples = draws_by_name(problem, law, kept)
     own = recorded_strengths(problem, law, samples, rng)
     points = recorded_points(problem, law, samples, own, rng)
     recorded, fronts = fronts_of(problem, points, own)
@@ -81,12 +81,8 @@ def _added_row(one: AddedStrength) -> dict[str, Any]:
     }
 
 
-def _samples(problem: AugmentedProblem, law: Law, draws: xr.Dataset) -> dict[str, Any]:
-    return {p.name: draws[p.name].values.ravel() for p in problem.parameters(law)}
-
-
 def _predict(problem: AugmentedProblem, law: Law, draws: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
-    samples = _samples(problem, law, draws)
+    samples = draws_by_name(problem, law, draws)
     drawn = new_avalanches(problem, law, samples, rng)
     deviation = _deviations(problem, drawn)
     points = np.concatenate([np.log(drawn.strengths), deviation[..., None]], axis=-1)

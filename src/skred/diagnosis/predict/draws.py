@@ -82,13 +82,6 @@ class LeftOut(NamedTuple):
     draws: Draws
 
 
-def posterior_of(calibration: Calibration) -> Samples:
-    """Draws of a calibration's parameters by name, of all chains one after the other."""
-    posterior = calibration.tree["posterior"].to_dataset()
-    names = [parameter.name for parameter in calibration.problem.parameters(calibration.law)]
-    return {name: posterior[name].transpose("chain", "draw").values.ravel() for name in names}
-
-
 def draws_of(calibration: Calibration, samples: Samples, rng: np.random.Generator) -> Draws:
     """Populations of a calibrated law, and what one avalanche from each has of what is added.
 

@@ -14,8 +14,8 @@ from scipy.special import logsumexp
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.predictive import Predicted
-from skred.diagnosis.predict.draws import N_DRAWS, LeftOut, draws_of, posterior_of, predictions
-from skred.inference.calibrate import Calibration
+from skred.diagnosis.predict.draws import N_DRAWS, LeftOut, draws_of, predictions
+from skred.inference.calibrate import Calibration, posterior_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.leave_one_out import Samples, exact_leave_one_out, samples_of
 

@@ -20,11 +20,11 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population
 from skred.diagnosis.evidence.covariates import Standard, standard_of
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of
-from skred.diagnosis.predict.draws import N_DRAWS, Draws, LeftOut, draws_of, modes_near, posterior_of
+from skred.diagnosis.predict.draws import N_DRAWS, Draws, LeftOut, draws_of, modes_near
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.tabulated.tables import exact_nodes
 from skred.errors import InputError
-from skred.inference.calibrate import Calibration
+from skred.inference.calibrate import Calibration, posterior_of
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.problem import HierarchicalProblem
