@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.augment.components import components_of
+from skred.diagnosis.augment.added_strength import components_of
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.compare.candidate import Strength

@@ -17,9 +17,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from skred.diagnosis.augment.added_strength import AddedStrength
-from skred.diagnosis.augment.components import components_of, symbolic_components_of
-from skred.diagnosis.augment.truncated_normal import truncated_normal
+from skred.diagnosis.augment.added_strength import (
+    AddedStrength,
+    components_of,
+    symbolic_components_of,
+    truncated_normal,
+)
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
 from skred.diagnosis.evidence.event_quadrature import FINE
@@ -99,7 +102,7 @@ class AugmentedProblem(HierarchicalProblem):
     def range(self) -> tuple[FloatArray, FloatArray]:
         """Between which values each added strength is sampled, (n_added,) each: all that counts."""
         grid = self.tables.grid
-        either = [one.mechanism.added is not None and one.mechanism.added.either_sign for one in self.added]
+        either = [one.added.either_sign for one in self.added]
         return np.where(either, grid.least, np.maximum(grid.least, 0.0)), grid.most
 
     def parameters(self, law: Law) -> tuple[Parameter, ...]:
@@ -116,8 +119,7 @@ class AugmentedProblem(HierarchicalProblem):
         self._check(mechanisms)
         tables, n_events = self.tables, self.campaign.n_events
         # As data, so that one compiled model serves many campaigns of as many events.
-        data = tables.arrays
-        held = {name: pm.Data(f"table_{name}", value) for name, value in data.items()}
+        held = {name: pm.Data(f"table_{name}", value) for name, value in tables.arrays.items()}
         for name in ("size", "first"):
             held[name] = pt.cast(held[name], "int64")  # PyMC makes integers int32
         scales = pm.Data("added_scale", np.array([one.scale for one in self.added]))
@@ -146,14 +148,13 @@ class AugmentedProblem(HierarchicalProblem):
     def log_likelihood(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
         """Log density of each event for many parameter vectors: arrays by name to (n, n_events)."""
         self._check(law.mechanisms)
-        parts = self._parts(*population_of(law, samples), *components_of(self.added, samples))
-        together: FloatArray = np.logaddexp.reduce(parts, axis=1)
+        together: FloatArray = np.logaddexp.reduce(self._parts(law, samples), axis=1)
         return together
 
-    def _parts(
-        self, means: FloatArray, factors: FloatArray, own: FloatArray, log_shares: FloatArray
-    ) -> FloatArray:
+    def _parts(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
         """Log of each event's density with a component, times its share, (n, n_components, n_events)."""
+        means, factors = population_of(law, samples)
+        own, log_shares = components_of(self.added, samples)
         n_events, tables = self.campaign.n_events, self.tables.arrays.values()
 
         def densities(draws: slice) -> FloatArray:
@@ -170,7 +171,7 @@ class AugmentedProblem(HierarchicalProblem):
 
     def probability_of_each(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
         """How probable each recorded avalanche has each component, (n, n_events, n_components)."""
-        log_parts = self._parts(*population_of(law, samples), *components_of(self.added, samples))
+        log_parts = self._parts(law, samples)
         parts: FloatArray = np.exp(log_parts - np.logaddexp.reduce(log_parts, axis=1, keepdims=True))
         return np.moveaxis(parts, 1, 2)
 
@@ -186,7 +187,8 @@ class AugmentedProblem(HierarchicalProblem):
         # What is beyond an end is folded back: at the end itself steps shrink.
         share = (located.mean + reach - low) / (high - low)
         added = low + (high - low) * np.abs(share - 2.0 * np.round(0.5 * share))
-        psi = located.populations_near(added, rng, _START_WIDER)
+        near = [located.fits[table].found for table in located.grid.nearest(added)]
+        psi = np.array([rng.multivariate_normal(one.psi, _START_WIDER**2 * one.covariance) for one in near])
         own = law.parameter_rows(np.exp(psi[:, : len(law.mechanisms)]))
         rest = population_samples(law, psi[:, len(law.mechanisms) :])
         # How avalanches differ in it is not known beforehand: all that may be.

@@ -9,8 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from skred.diagnosis.augment.added_strength import AddedStrength
-from skred.diagnosis.augment.components import components_of, new_rows
+from skred.diagnosis.augment.added_strength import AddedStrength, components_of, new_rows
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.extension import Extension
 from skred.inference.hierarchical.event_density import draw_nodes

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.augment.components import new_rows
+from skred.diagnosis.augment.added_strength import new_rows
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.conditional_map import (
     EventLikelihood,

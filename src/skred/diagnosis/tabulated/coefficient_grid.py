@@ -110,18 +110,6 @@ class Located(NamedTuple):
         grid = Grid(self.grid.origin, 0.5 * self.grid.steps, 2 * self.grid.size - 1)
         return self._replace(grid=grid, fits=[self.fits[k] for k in self.grid.nearest(grid.points)])
 
-    def populations_near(self, added: FloatArray, rng: np.random.Generator, wider: float = 1.0) -> FloatArray:
-        """Draw the population's coordinates at each of some added strengths.
-
-        Parameters
-        ----------
-        added : (n, n_added) array
-        wider : float
-            What its standard deviations are multiplied by.
-        """
-        found = [self.fits[table].found for table in self.grid.nearest(added)]
-        return np.array([rng.multivariate_normal(one.psi, wider**2 * one.covariance) for one in found])
-
 
 def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located:
     """Put a grid where curves have the strengths, and move its ends until it covers their posterior."""
