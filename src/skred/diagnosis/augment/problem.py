@@ -31,7 +31,7 @@ from skred.diagnosis.tabulated.tables import Tables, build_tables, exact_nodes
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.population import population_of, population_samples, population_variables
-from skred.inference.hierarchical.problem import COARSER, HierarchicalProblem
+from skred.inference.hierarchical.problem import CHECKED_EVENTS, COARSER, HierarchicalProblem
 from skred.inference.hierarchical.rough_population import moments_of
 from skred.inference.hierarchical.surface import Surfaces
 from skred.parallel.threads import in_parts, side_by_side
@@ -50,8 +50,6 @@ _EXACT = FINE.times(2)
 """Quadrature points of what the tables are compared with: so many that their own error counts for little."""
 _EXACT_DRAWS = 16
 """Draws compared, evenly over the posterior; by the root of what an avalanche may have fewer."""
-_CHECKED_EVENTS = 24
-"""Events of larger campaigns that integration errors are looked for in, drawn at random."""
 _START_WIDER = 1.5
 """How much wider than the posterior chains start, as r-hat asks for."""
 
@@ -217,7 +215,7 @@ class AugmentedProblem(HierarchicalProblem):
         draws = np.linspace(0, n - 1, min(n, each)).astype(int)
         samples = {name: np.ravel(values)[draws] for name, values in samples.items()}
         rng = np.random.default_rng([seed, 5])
-        chosen = np.sort(rng.permutation(self.campaign.n_events)[:_CHECKED_EVENTS])
+        chosen = np.sort(rng.permutation(self.campaign.n_events)[:CHECKED_EVENTS])
         base, (means, factors) = self.base, population_of(law, samples)
         own, log_shares = components_of(self.added, samples)
         added, every = own.reshape(-1, own.shape[2]), np.repeat(np.arange(len(own)), own.shape[1])

@@ -18,7 +18,7 @@ from scipy.optimize import minimize
 
 from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, Weighted, weighted_draws
 from skred.diagnosis.evidence.coefficient import Base, Curve
-from skred.diagnosis.evidence.marginal import Evidence, population_at
+from skred.diagnosis.evidence.marginal import Evidence, curvatures, population_at
 from skred.diagnosis.evidence.population_target import NARROWEST, log_correlation_constant, log_priors
 from skred.diagnosis.tabulated.tables import Tables
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
@@ -33,8 +33,6 @@ _STARTS: dict[BetweenEvents, tuple[tuple[float, float], ...]] = {
 """Where climbs begin: multiples of the strength that all have in common, and the other's coordinate."""
 _DIFFERENCE = 1e-3
 """Step of central differences, in coordinates whose scale is one or so."""
-_LEAST_CURVATURE = 0.05
-"""Of minus the log density along an axis, as for any population here: proposals stay bounded."""
 _SETTLED = 1e-5
 """Share of the log density by which a step must gain: some thousandths or hundredths of a nat."""
 _BAD = -1e10
@@ -181,6 +179,4 @@ def _curvature(target: BetweenTarget, top: FloatArray) -> FloatArray:
     more = heights[2 * n + 1 :].reshape(2, -1).sum(axis=0)
     for (i, j), together in zip(pairs, more, strict=True):
         hessian[i, j] = hessian[j, i] = -(together - 2.0 * middle - sides[i] - sides[j]) / (2.0 * step**2)
-    values, axes = np.linalg.eigh(hessian)
-    covariance: FloatArray = (axes / np.maximum(values, _LEAST_CURVATURE)) @ axes.T
-    return covariance
+    return curvatures(hessian)[1]

@@ -13,6 +13,7 @@ from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.marginal import Evidence
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
+from skred.diagnosis.evidence.tolerance import MOST_ROUNDS
 from skred.parallel.threads import in_parts, side_by_side
 from skred.physics.mechanisms.spec import Added
 
@@ -26,8 +27,6 @@ _REACH = 5.0
 """Standard deviations that a grid reaches from the mean at first."""
 _ENDS_NATS = 8.0
 """How far below the maximum the edge of a grid must be to be the end: four standard deviations."""
-_LOOKS = 6
-"""Grids tried at most, which bounds the time."""
 _FARTHEST = 4.0
 """How many times what all may have in common tables reach where avalanches differ in it."""
 
@@ -120,7 +119,7 @@ def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located
     factor, ends = np.diag(np.clip(sd, 0.01 * scale, scale)), np.full(len(curves), _REACH)
     grid = _grid(mean, factor, (-ends, ends), (low, high))
     near = [curves[-1].nearest(strength) for strength in grid.points[:, -1]]
-    for look in range(_LOOKS):
+    for look in range(MOST_ROUNDS):
         points = grid.points
         fits = _fitted(base, extension, points, near)
         density = np.array([fit.found.log_evidence for fit in fits])
