@@ -11,7 +11,7 @@ front came there.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -109,21 +109,20 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray) -> Influe
     base = under_errors.base
     if answer == UNLISTED:
         again = _of_profile(most_probable(under_errors.profiles))
+        stated = log_evidence_of(under_errors.profiles)
     else:
-        again = _of_mechanism(under_errors.candidates[answer])
+        candidate = under_errors.candidates[answer]
+        again = _of_mechanism(candidate)
+        stated = candidate.alone + log_gain(None, candidate.ways)
     n = len(base.rows.event)
     everything = np.ones(n, dtype=bool)
     kinds = _kinds(base)
     parts = [_Part(everything, chosen) for _, _, chosen in kinds]
     whole, *found = side_by_side(lambda part: again(base, part), [_Part(everything), *parts])
-    # By the same, quicker method on both sides; only the difference is taken from it.
-    stated = log_evidence_of(under_errors.profiles)
-    if answer != UNLISTED:
-        candidate = under_errors.candidates[answer]
-        stated = candidate.alone + log_gain(None, candidate.ways)
     without_each = stated - gained
     needed = math.log((1.0 - LIMIT) / LIMIT * comparison.odds[NOTHING] / comparison.odds[answer])
     order = np.argsort(without_each)
+    # By the same, quicker method on both sides; only the difference is taken from it.
     carried, left = _carried(lambda part: stated + again(base, part) - whole, order, needed)
     ids = base.problem.campaign.event_ids
     return Influence(
@@ -214,7 +213,7 @@ def _of_profile(profile: Profile) -> Again:
 
 
 def _carried(
-    factor: Callable[[_Part], float], order: Sequence[int] | NDArray[np.int64], needed: float
+    factor: Callable[[_Part], float], order: NDArray[np.int64], needed: float
 ) -> tuple[list[int], float | None]:
     """The fewest first avalanches of an order without which an answer has too little; what it has then.
 

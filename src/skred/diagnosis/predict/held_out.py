@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from arviz_stats.base import array_stats
@@ -147,7 +146,7 @@ def _others(
     return tuple(parts)
 
 
-def errors(found: HeldOut, problem: Any) -> dict[str, float | None]:
+def errors(found: HeldOut, problem: HierarchicalProblem) -> dict[str, float | None]:
     """Root mean square error of speeds [m/s] and runouts [m], and coverage of the 90 % intervals."""
     velocity = problem.readings.is_velocity
     difference = np.where(problem.observed, found.predicted.mean - problem.values, np.nan)

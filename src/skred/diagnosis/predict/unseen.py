@@ -144,11 +144,6 @@ def predictor_of(calibration: Calibration, n_draws: int = N_DRAWS) -> Predictor:
         Hierarchical: of a base law, or of one with mechanisms added.
     n_draws : int
         Draws kept, evenly spaced over all of the posterior.
-
-    Raises
-    ------
-    ValueError
-        If something is in the law with a fixed strength.
     """
     problem = calibration.problem
     assert isinstance(problem, HierarchicalProblem)
@@ -156,8 +151,6 @@ def predictor_of(calibration: Calibration, n_draws: int = N_DRAWS) -> Predictor:
     draws = draws.take(np.linspace(0, len(draws.means) - 1, n_draws).round().astype(int))
     terms = tuple[Term, ...]()
     if isinstance(problem, AugmentedProblem):
-        if problem.base.directions:
-            raise ValueError("a predictor cannot hold what is added with a fixed strength")
         terms = tuple(_term(problem, one.mechanism.id, one.shape) for one in problem.added)
     return Predictor(
         calibration.law.id, problem.error_model.id, problem.place_sd_m, problem.terrain.smoothing_m,

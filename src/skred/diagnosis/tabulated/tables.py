@@ -94,9 +94,10 @@ def build_tables(
     return Tables(located, nodes.nodes, nodes.points[:, :, n].ravel(), points, budget)
 
 
-def wide_tables(base: Base, curve: Curve, found: Evidence, budget: Budget, mean: float, sd: float) -> Tables:
-    """Tables of one mechanism in which avalanches differ; parameters as `from_nothing` has them."""
-    return build_tables(base, base.extended(curve.direction), from_nothing(curve, found, mean, sd), budget)
+def wide_tables(base: Base, curve: Curve, found: Evidence, budget: Budget) -> Tables:
+    """Tables of one mechanism in which avalanches differ; populations as `from_nothing` has them."""
+    located = from_nothing(curve, found, *curve.moments)
+    return build_tables(base, base.extended(curve.direction), located, budget)
 
 
 def highest(likelihood: EventLikelihood, points: FloatArray, population: Population) -> FloatArray:
@@ -104,6 +105,10 @@ def highest(likelihood: EventLikelihood, points: FloatArray, population: Populat
 
     Avalanches that stop at a place or pass it have two modes, and a table that is in the lower one of an
     event would stand out between its neighbours.
+
+    Parameters
+    ----------
+    points : (n_tables, n_events, n_base + 1) array
     """
 
     def climbed(start: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -115,18 +120,13 @@ def highest(likelihood: EventLikelihood, points: FloatArray, population: Populat
         tops, heights = zip(*side_by_side(climb, in_parts(len(start))), strict=True)
         return np.concatenate(tops), np.concatenate(heights)
 
-    best, height = climbed(_flat(points))
+    best, height = climbed(points.reshape(-1, points.shape[-1]))
     found = best.reshape(points.shape)
     for side in (1, -1):
-        tried, new = climbed(_flat(np.roll(found, side, axis=0)))
+        tried, new = climbed(np.roll(found, side, axis=0).reshape(best.shape))
         best = np.where((new > height)[:, None], tried, best)
         height = np.maximum(new, height)
     return best
-
-
-def _flat(points: FloatArray) -> FloatArray:
-    """Points of all tables, (n_tables, n_events, n), as rows."""
-    return points.reshape(-1, points.shape[-1])
 
 
 def exact_nodes(
