@@ -84,7 +84,6 @@ def held_out(calibration: Calibration, seed: int, *, exact: bool = False) -> Hel
     ----------
     calibration : Calibration
         Of the base law, or of the augmented one.
-    seed : int
     exact : bool
         Refit without every avalanche instead of only where importance sampling is unreliable.
     """

@@ -258,7 +258,6 @@ def log_densities(
     ----------
     draws : Draws
         Of populations, and of the strengths of what is added.
-    seed : int
     budget : Budget
         Quadrature points of an event for each draw.
     """
