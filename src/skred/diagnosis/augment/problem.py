@@ -34,6 +34,7 @@ from skred.inference.hierarchical.population import population_of, population_sa
 from skred.inference.hierarchical.problem import CHECKED_EVENTS, COARSER, HierarchicalProblem
 from skred.inference.hierarchical.rough_population import moments_of
 from skred.inference.hierarchical.surface import Surfaces
+from skred.inference.results import draws_by_name
 from skred.parallel.threads import in_parts, side_by_side
 from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
@@ -242,11 +243,8 @@ class AugmentedProblem(HierarchicalProblem):
         """
         if self.refined:
             return None
-        samples = {
-            str(name): posterior[name].transpose("chain", "draw").values for name in posterior.data_vars
-        }
         n_chains = posterior.sizes["chain"]
-        chains = [{name: values[k] for name, values in samples.items()} for k in range(n_chains)]
+        chains = [draws_by_name(self, law, posterior.isel(chain=[k])) for k in range(n_chains)]
         moments = [moments_of(*population_of(law, chain)) for chain in chains]
         visited = Population(*(np.array(values) for values in zip(*moments, strict=True)))
         old = self.tables
