@@ -157,10 +157,11 @@ def test_a_base_law_with_the_term_has_the_same_evidence() -> None:
     shape = drag.added.shapes(coulomb.setting)[0]
     found = curve_near(coulomb, curve(coulomb, drag, shape), shape)
     ways = ways_of(coulomb, found)
-    differ = ways[SPREAD].log_evidence - coulomb.fit.found.log_evidence
+    common = ways[COMMON].populations.log_evidence
+    differ = ways[SPREAD].populations.log_evidence - coulomb.fit.found.log_evidence
     assert differ - found.log_bayes_factor > 20.0
     assert abs(differ - (pcm.fit.found.log_evidence - coulomb.fit.found.log_evidence)) < 3.0
-    assert abs(ways[COMMON].log_evidence - coulomb.fit.found.log_evidence - found.log_bayes_factor) < 0.5
+    assert abs(common - coulomb.fit.found.log_evidence - found.log_bayes_factor) < 0.5
 
 
 @pytest.mark.slow

@@ -73,8 +73,8 @@ def gains_or_none(base: Base, curve: Curve, budgets: Sequence[Budget]) -> dict[B
 def gains_of(base: Base, curve: Curve, budgets: Sequence[Budget] = TABLES) -> dict[BetweenEvents, float]:
     """What each way has more than the strength in common, in nats; parameters as `ways_of` has them."""
     ways = ways_of(base, curve, budgets)
-    common = ways[BetweenEvents.COMMON].log_evidence
-    return {kind: way.log_evidence - common for kind, way in ways.items()}
+    common = ways[BetweenEvents.COMMON].populations.log_evidence
+    return {kind: way.populations.log_evidence - common for kind, way in ways.items()}
 
 
 def ways_of(base: Base, curve: Curve, budgets: Sequence[Budget] = TABLES) -> dict[BetweenEvents, Way]:

@@ -44,16 +44,12 @@ class Way(NamedTuple):
 
     Attributes
     ----------
-    log_evidence, error : float
-        In nats; its standard error by importance sampling.
     populations : Evidence
-        Mean and covariance over its posterior.
+        The way's own, with mean and covariance over its posterior.
     strength : (float, float)
         Mean and standard deviation over it.
     """
 
-    log_evidence: float
-    error: float
     populations: Evidence
     strength: tuple[float, float]
 
@@ -143,7 +139,7 @@ def way_of(target: BetweenTarget, found: Weighted) -> Way:
     away = psi - mean
     populations = Evidence(found.log_integral, mean, away.T @ (shares[:, None] * away))
     sd = math.sqrt(float(shares @ (strengths - middle) ** 2))
-    return Way(found.log_integral, found.error, populations, (middle, sd))
+    return Way(populations, (middle, sd))
 
 
 def between_evidence(target: BetweenTarget, proposal: Mixture) -> Way:

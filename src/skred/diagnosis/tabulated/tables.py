@@ -48,11 +48,6 @@ class Tables:
         return self.located.grid
 
     @property
-    def mean(self) -> FloatArray:
-        """Posterior mean of the strengths by the comparison's formula, (n_added,)."""
-        return self.located.mean
-
-    @property
     def arrays(self) -> dict[str, Any]:
         """What the compiled interpolation reads, by name."""
         return {**self.grid._asdict(), **self.nodes._asdict()}
