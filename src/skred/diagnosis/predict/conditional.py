@@ -100,14 +100,19 @@ def conditional(others: Sequence[LeftOut], seed: int) -> Conditional:
     return Conditional(mean, low, high, log_score, crps, n_above, effective)
 
 
+def sensor_ends(problem: HierarchicalProblem) -> FloatArray:
+    """Upper and lower end of each sensor [m], (2, n_sensors); NaN of a runout."""
+    places = [(np.nan, np.nan) if place is None else place for place in problem.sensor_places]
+    return np.array(places, dtype=float).T
+
+
 def above(problem: HierarchicalProblem) -> BoolArray:
     """Which sensors lie wholly above which, (n_sensors, n_sensors): row k has those above k.
 
     A front passes every sensor of speed before it stops: all of them are above the runout.
     """
     velocity = problem.readings.is_velocity
-    ends = [(np.nan, np.nan) if place is None else place for place in problem.sensor_places]
-    first, last = np.array(ends, dtype=float).T
+    first, last = sensor_ends(problem)
     passed = (last[None, :] <= first[:, None]) & (last[None, :] < last[:, None])
     return np.where(velocity[:, None], passed, velocity[None, :]) & velocity[None, :]
 
@@ -138,7 +143,7 @@ def _sets(problem: HierarchicalProblem, event: int) -> tuple[IntArray, BoolArray
 def readings_of(problem: HierarchicalProblem, event: int, sets: BoolArray) -> EventReadings:
     """Some of an avalanche's readings, one row for each set; where it did not come is not among them."""
     readings = problem.readings
-    ends = np.array([np.nan if place is None else place[1] for place in problem.sensor_places])
+    _, ends = sensor_ends(problem)
     moved = sets & readings.is_velocity & (readings.values[event] > 0.0)
     return readings.take(np.full(len(sets), event))._replace(
         observed=sets,
