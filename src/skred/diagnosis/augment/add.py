@@ -23,7 +23,7 @@ The linear model sees little of a second one beside the first. The alarm has the
 """
 
 
-@dataclass
+@dataclass(eq=False)
 class Adding:
     """What is computed to add mechanisms to a law: a calibration, a check, another comparison.
 
