@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +12,9 @@ from scipy.special import logsumexp
 from scipy.stats import beta, halfnorm, lognorm, norm
 
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
+from skred.diagnosis.augment.added_strength import components_of, new_rows
 from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.augment.coefficient import multiples_of_events
-from skred.diagnosis.augment.components import components_of, new_rows
 from skred.diagnosis.compare.between import TABLES, gains_or_none, may_differ, ways_of
 from skred.diagnosis.compare.candidate import BESIDE, log_gain
 from skred.diagnosis.compare.screening import curve
@@ -161,10 +160,11 @@ def test_a_base_law_with_the_term_has_the_same_evidence() -> None:
     shape = drag.added.shapes(coulomb.setting)[0]
     found = curve_near(coulomb, curve(coulomb, drag, shape), shape)
     ways = ways_of(coulomb, found)
-    differ = ways[SPREAD].log_evidence - coulomb.fit.found.log_evidence
+    common = ways[COMMON].populations.log_evidence
+    differ = ways[SPREAD].populations.log_evidence - coulomb.fit.found.log_evidence
     assert differ - found.log_bayes_factor > 20.0
     assert abs(differ - (pcm.fit.found.log_evidence - coulomb.fit.found.log_evidence)) < 3.0
-    assert abs(ways[COMMON].log_evidence - coulomb.fit.found.log_evidence - found.log_bayes_factor) < 0.5
+    assert abs(common - coulomb.fit.found.log_evidence - found.log_bayes_factor) < 0.5
 
 
 @pytest.mark.slow
@@ -246,23 +246,16 @@ def test_only_physics_of_track_and_stretch_may_differ() -> None:
     assert not differ & {"sensor_bias", "release_offset", "covariate_friction"}
 
 
-def test_of_two_both_are_components(few: tuple[Base, Curve]) -> None:
-    """Each pair is a component; what avalanches to come have is drawn for each of them."""
+def test_of_one_each_has_its_own(few: tuple[Base, Curve]) -> None:
+    """What it may have is a component; what avalanches to come have is drawn. In two they cannot differ."""
     base, found = few
-    problem = augmented_problem(base, [found], SOME)
-    (one,) = problem.added
-    other: Any = replace(one, name="other", between=SPREAD)
-    samples = {
-        "segment_friction": np.full(500, 2.0),
-        "segment_friction_share": np.full(500, 0.3),
-        "other": np.full(500, 1.0),
-        "other_spread": np.full(500, 0.4),
-    }
-    own, log_shares = components_of([one, other], samples)
-    assert own.shape == (500, 50, 2)
+    added = augmented_problem(base, [found], SOME).added
+    samples = {"segment_friction": np.full(500, 2.0), "segment_friction_share": np.full(500, 0.3)}
+    own, log_shares = components_of(added, samples)
+    assert own.shape == (500, 2, 1)
     assert_allclose(np.exp(log_shares).sum(axis=1), 1.0)
-    rows = new_rows([one, other], samples, np.random.default_rng(1), 8)
-    assert rows.shape == (500, 8, 2)
+    rows = new_rows(added, samples, np.random.default_rng(1), 8)
+    assert rows.shape == (500, 8, 1)
     assert abs((rows[..., 0] > 0.0).mean() - 0.3) < 0.03
     with pytest.raises(ValueError, match="differ in none"):
         augmented_problem(base, [found, found], SOME)

@@ -65,10 +65,12 @@ def test_detection_limit_by_simulation(base: Base, table: dict[str, Detectabilit
     n_groups, strength = 200, table[name].limit
     means = np.tile(base.population.mean, (n_groups, 1))
     factors = np.tile(np.linalg.cholesky(base.population.covariance), (n_groups, 1, 1))
-    errors, found = ERROR_MODELS["normal"], []
+    normal, found = replace(base.problem, error_model=ERROR_MODELS["normal"]), []
+    simulated = extended(normal, base.law, [chosen.direction])
     for value in (0.0, strength):
         rng = np.random.default_rng(4)
-        rows, points = bootstrap_campaigns(with_it, np.array([value]), means, factors, rng, errors)
+        rows, points = bootstrap_campaigns(simulated, np.array([value]), means, factors, rng)
+        rows = rows._replace(errors=base.problem.error_model.errors)
         start = Population(means.copy(), np.tile(base.population.covariance, (n_groups, 1, 1)))
         population, modes = fit_population(
             EventLikelihood(alone, rows, NONE), mean_prior(base.law), (start, points)

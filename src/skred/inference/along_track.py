@@ -11,7 +11,7 @@ from scipy.special import ndtri
 
 from skred.inference.hierarchical.population import population_of
 from skred.inference.problem import Problem
-from skred.inference.results import chain_and_draw
+from skred.inference.results import chain_and_draw, draws_by_name
 from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
@@ -41,8 +41,7 @@ def with_along_track(tree: xr.DataTree, law: Law, problem: Problem) -> xr.DataTr
     median_strength : the median of each strength across avalanches (chain, draw)
     """
     posterior = tree["posterior"].to_dataset()
-    names = [parameter.name for parameter in problem.parameters(law)]
-    samples = {name: posterior[name].transpose("chain", "draw").values.ravel() for name in names}
+    samples = draws_by_name(problem, law, posterior)
     more = tree.copy()
     if problem.likelihood == "hierarchical":
         more["along_track"] = xr.DataTree(_of_new_avalanches(tree, law, problem, samples))

@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import arviz_stats as az
+import numpy as np
 import pymc as pm
 import xarray as xr
+from numpy.typing import NDArray
 
 import skred.inference.hierarchical.results  # noqa: F401 - registers what it says of readings
 import skred.inference.pooled.results  # noqa: F401 - likewise
@@ -21,11 +23,12 @@ from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY, inter
 from skred.inference.joint_metropolis import JointMetropolis
 from skred.inference.log_prior import with_log_prior
 from skred.inference.problem import Problem
-from skred.inference.results import assemble, save, summary
+from skred.inference.results import assemble, draws_by_name, save, summary
 from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior
 from skred.output import write_json
 from skred.physics.law import Law, Parameter
 
+FloatArray = NDArray[np.float64]
 MORE, LONGER = 4, 2
 """Factor on the number of draws in each further attempt, and the number of such attempts."""
 
@@ -120,6 +123,11 @@ def calibrate_surely(problem: Problem, law: Law, settings: SamplerSettings) -> C
         more = replace(settings, draws=times * settings.draws, tune=times * settings.tune)
         found = calibrate(found.problem, law, more)
     return found
+
+
+def posterior_of(calibration: Calibration) -> dict[str, FloatArray]:
+    """Draws of a calibration's parameters by name, chain after chain."""
+    return draws_by_name(calibration.problem, calibration.law, calibration.tree["posterior"].to_dataset())
 
 
 def write_calibration(calibration: Calibration, folder: Path) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from skred.documents import TREE_FORMAT
 from skred.inference.by_sensor import joint_terms
@@ -23,6 +24,7 @@ from skred.inference.sampling import SamplerSettings
 from skred.output import write_bytes
 from skred.physics.law import Law, Parameter, parameter_of
 
+FloatArray = NDArray[np.float64]
 FORMAT = TREE_FORMAT
 """Of the files with trees; figures are made from no other."""
 _PACKAGES = ("skred", "pymc", "pytensor", "arviz", "numba", "numpy", "scipy", "xarray")
@@ -85,6 +87,12 @@ def assemble(
 def chain_and_draw(dataset: xr.Dataset) -> dict[str, Any]:
     """Coordinates of the draws."""
     return {"chain": dataset["chain"].values, "draw": dataset["draw"].values}
+
+
+def draws_by_name(problem: Problem, law: Law, draws: xr.Dataset) -> dict[str, FloatArray]:
+    """Draws of all parameters of a law on a problem, chain after chain, (n,) each."""
+    names = [parameter.name for parameter in problem.parameters(law)]
+    return {name: draws[name].transpose("chain", "draw").values.ravel() for name in names}
 
 
 def save(tree: xr.DataTree, file: Path) -> None:

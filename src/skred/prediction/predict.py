@@ -22,7 +22,7 @@ from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.population import POPULATION, population_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY
-from skred.inference.results import FORMAT, save
+from skred.inference.results import FORMAT, draws_by_name, save
 from skred.physics.law import Law
 from skred.prediction.at_places import at_places, unrecorded
 from skred.prediction.document import prediction_document, recorded_runouts
@@ -235,10 +235,7 @@ def _populations(
         group = tree[POPULATION].to_dataset()
         chosen = _evenly(group.sizes["draw"], most)
         return (group["mean"].values[chosen], group["factor"].values[chosen]), chosen
-    posterior = tree["posterior"].to_dataset()
-    samples = {
-        p.name: posterior[p.name].transpose("chain", "draw").values.ravel() for p in problem.parameters(law)
-    }
+    samples = draws_by_name(problem, law, tree["posterior"].to_dataset())
     chosen = _evenly(len(next(iter(samples.values()))), most)
     return population_of(law, {name: values[chosen] for name, values in samples.items()}), chosen
 

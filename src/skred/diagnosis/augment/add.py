@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.augment.check_again import Again, check_again
@@ -23,19 +23,19 @@ The linear model sees little of a second one beside the first. The alarm has the
 """
 
 
+@dataclass(eq=False)
 class Adding:
     """What is computed to add mechanisms to a law: a calibration, a check, another comparison.
 
-    Parameters
+    Attributes
     ----------
     reference : Reference
         Asked for the base law under the error model of what is added.
     run : Run
     """
 
-    def __init__(self, reference: Reference, run: Run) -> None:
-        self.reference = reference
-        self.run = run
+    reference: Reference
+    run: Run
 
     def calibrated(self, base: Base, chosen: Sequence[Curve], way: BetweenEvents) -> Calibration:
         """The law with what is chosen added, calibrated; avalanches may differ in it where it is one."""
@@ -59,13 +59,10 @@ def add_mechanisms(
 
     Parameters
     ----------
-    base : Base
-        The fitted base law.
     comparison : Comparison
         That named something.
     names : sequence of str
         What is named, and what is tied with it.
-    adding : Adding
     """
     run, reference = adding.run, adding.reference
     run.clock.stage("augment", f"{base.law.id} + {names[0]}: calibrating the augmented law")

@@ -1,16 +1,30 @@
-"""Mechanisms of one shape that are added to a law, their strengths free."""
+"""Mechanisms of one shape that are added to a law, their strengths free.
+
+Avalanches may differ in one that is added by itself: what they may have of it, and the share that has each.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from skred.diagnosis.evidence.coefficient import Curve
-from skred.inference.between_events import BetweenEvents, symbolic_components, variable
+from skred.inference.between_events import (
+    BetweenEvents,
+    components,
+    own_multiples,
+    symbolic_components,
+    variable,
+)
 from skred.physics.law import Parameter
-from skred.physics.mechanisms.spec import Direction, Mechanism, Shape
+from skred.physics.mechanisms.spec import Added, Direction, Mechanism, Shape
+
+FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,27 +64,102 @@ class AddedStrength:
         ends = self.between.parameter
         return f"{self.name}_{ends}" if ends else ""
 
-    def symbolic(self, strength: Any) -> tuple[Any, Any]:
-        """Strengths that avalanches have and log shares of them, in the current PyMC model: two vectors."""
-        return symbolic_components(self.between, strength, variable(self.between, self.between_name))
+    @property
+    def added(self) -> Added:
+        """How the mechanism joins a law."""
+        assert self.mechanism.added is not None
+        return self.mechanism.added
 
     @property
     def scale(self) -> float:
         """Scale of the prior: half-normal, or normal where either sign may be."""
-        assert self.mechanism.added is not None
-        return self.mechanism.added.scale_of(self.shape)
+        return self.added.scale_of(self.shape)
 
 
-def added_strengths(
-    curves: Sequence[Curve], between: Sequence[BetweenEvents] = ()
-) -> tuple[AddedStrength, ...]:
-    """Of some curves, numbered where two have the same name; in common unless given."""
+def added_strengths(curves: Sequence[Curve], way: BetweenEvents) -> tuple[AddedStrength, ...]:
+    """Of some curves, in which avalanches differ alike; numbered where two have the same name."""
     count: Counter[str] = Counter()
     added = []
-    ways = between or [BetweenEvents.COMMON] * len(curves)
-    for curve, way in zip(curves, ways, strict=True):
+    for curve in curves:
         name = curve.mechanism.strength.name
         count[name] += 1
         own = name if count[name] == 1 else f"{name}_{count[name]}"
         added.append(AddedStrength(own, curve.mechanism, curve.shape, curve.direction, way))
     return tuple(added)
+
+
+def truncated_normal(name: str, scale: Any, low: Any, high: Any) -> Any:
+    """Normal variable around 0 between two values, as PyTensor's numba backend can draw it.
+
+    Half-normal where the lower one is 0: with the support's part that is left out, its density is only
+    higher by a factor.
+    """
+    import pymc as pm
+    import pytensor.tensor as pt
+    from pymc.distributions.transforms import Interval
+
+    root = np.sqrt(2.0)
+
+    def drawn(scale: Any, low: Any, high: Any, size: Any) -> Any:
+        share = pm.Uniform.dist(0.0, 1.0, size=size)
+        first, last = pt.erf(low / scale / root), pt.erf(high / scale / root)
+        inside: Any = pt.clip(scale * root * pt.erfinv(first + share * (last - first)), low, high)
+        return inside
+
+    def logp(value: Any, scale: Any, low: Any, high: Any) -> Any:
+        share = 0.5 * (pt.erf(high / scale / root) - pt.erf(low / scale / root))
+        density = -0.5 * (value / scale) ** 2 - pt.log(scale * share) - 0.5 * np.log(2.0 * np.pi)
+        return pt.switch((value >= low) & (value <= high), density, -np.inf)
+
+    between = Interval(bounds_fn=lambda *_: (low, high))
+    return pm.CustomDist(name, scale, low, high, dist=drawn, logp=logp, default_transform=between)
+
+
+def components_of(
+    added: Sequence[AddedStrength], samples: Mapping[str, Any]
+) -> tuple[FloatArray, FloatArray]:
+    """Added strengths that avalanches may have, (n, n_components, n_added), and log shares that have each.
+
+    Where nothing differs between avalanches, as in two, there is one component.
+
+    Parameters
+    ----------
+    samples : mapping
+        Arrays by name of parameter, n values each.
+    """
+    if len(added) == 1:
+        own, log_shares = components(added[0].between, *_given(added[0], samples))
+        return own[:, :, None], log_shares
+    rows = np.column_stack([_given(one, samples)[0] for one in added])
+    return rows[:, None], np.zeros((len(rows), 1))
+
+
+def symbolic_components_of(added: Sequence[AddedStrength], strengths: Sequence[Any]) -> tuple[Any, Any]:
+    """As `components_of`, of symbolic strengths in the current PyMC model: a matrix and a vector."""
+    import pytensor.tensor as pt
+
+    if len(added) == 1:
+        way, parameter = added[0].between, variable(added[0].between, added[0].between_name)
+        own, log_shares = symbolic_components(way, strengths[0], parameter)
+        return own[:, None], log_shares
+    return pt.stack(list(strengths))[None], pt.zeros(1)
+
+
+def new_rows(
+    added: Sequence[AddedStrength], samples: Mapping[str, Any], rng: np.random.Generator, n_avalanches: int
+) -> FloatArray:
+    """Added strengths of avalanches to come, (n, n_avalanches, n_added): each has its own."""
+    columns = []
+    for one in added:
+        strength, parameter = _given(one, samples)
+        own = own_multiples(one.between, parameter, (len(strength), n_avalanches), rng)
+        columns.append(strength[:, None] * own)
+    return np.stack(columns, axis=2)
+
+
+def _given(one: AddedStrength, samples: Mapping[str, Any]) -> tuple[FloatArray, FloatArray]:
+    """Draws of a strength, and of what says how it differs: of no meaning where it does not."""
+    strength = np.asarray(samples[one.name], dtype=float).ravel()
+    if not one.between_name:
+        return strength, np.zeros_like(strength)
+    return strength, np.asarray(samples[one.between_name], dtype=float).ravel()

@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from skred.diagnosis.augment.coefficient import added_draws, multiples_of_events
+from skred.diagnosis.augment.coefficient import augmented_of, multiples_of_events
 from skred.diagnosis.check.bootstrap_test import BootstrapTest, linear_test, odds_test
 from skred.diagnosis.effort import Run
 from skred.diagnosis.evidence.coefficient import Base, Curve, fit_base
 from skred.diagnosis.evidence.population_draws import population_draws, typical
-from skred.inference.calibrate import Calibration
+from skred.inference.calibrate import Calibration, posterior_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,24 +42,18 @@ def check_again(base: Base, calibration: Calibration, chosen: Sequence[Curve], r
     base : Base
         The law that the last mechanism was added to.
     calibration : Calibration
-        Of the law with all of them.
-    chosen : sequence of Curve
-        What was added.
-    run : Run
+        Of the law with all that were chosen.
     """
     own = multiples_of_events(calibration)
     directions = tuple(one.direction for one in chosen)
     if own is not None:
         directions = tuple(replace(one, own=own[:, k]) for k, one in enumerate(directions))
-    strengths = added_draws(calibration).mean(axis=0)
+    strengths = augmented_of(calibration).added_rows(posterior_of(calibration)).mean(axis=0)
     draws = population_draws(calibration, run.effort.replicas, run.seed + 1)
     again = fit_base(base.problem, base.law, typical(draws), base.fit.points, directions, strengths)
-    setting = replace(again.setting, base=(*base.setting.base, *_global_ids(chosen)))
+    # What acts alike everywhere cannot be missing a second time.
+    everywhere = [one.mechanism.id for one in chosen if one.shape.place_m is None]
+    setting = replace(again.setting, base=(*base.setting.base, *everywhere))
     again = replace(again, setting=setting)
     check = linear_test(again, draws, run.seed + 1, run.effort.replicas)
     return Again(check, again, partial(odds_test, again, draws, run.seed + 1))
-
-
-def _global_ids(chosen: Sequence[Curve]) -> list[str]:
-    """Ids of mechanisms that act alike everywhere: they cannot be missing a second time."""
-    return [one.mechanism.id for one in chosen if one.shape.place_m is None]

@@ -8,11 +8,11 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.augment.components import components_of
+from skred.diagnosis.augment.added_strength import components_of
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.compare.candidate import Strength
-from skred.inference.calibrate import Calibration
+from skred.inference.calibrate import Calibration, posterior_of
 
 FloatArray = NDArray[np.float64]
 _DRAWS = 400
@@ -22,16 +22,6 @@ _DRAWS = 400
 def augmented_of(calibration: Calibration) -> AugmentedProblem:
     """The problem of an augmented law's calibration."""
     return cast(AugmentedProblem, calibration.problem)
-
-
-def added_draws(calibration: Calibration) -> FloatArray:
-    """Draws of the added strengths, chain after chain, (n_draws, n_added); of a base law none."""
-    posterior = calibration.tree["posterior"].to_dataset()
-    problem, sizes = calibration.problem, posterior.sizes
-    if not isinstance(problem, AugmentedProblem):
-        return np.empty((sizes["chain"] * sizes["draw"], 0))
-    columns = [posterior[one.name].transpose("chain", "draw").values.ravel() for one in problem.added]
-    return np.column_stack(columns)
 
 
 def multiples_of_events(calibration: Calibration) -> FloatArray | None:
@@ -52,10 +42,8 @@ def multiples_of_events(calibration: Calibration) -> FloatArray | None:
 
 def some_draws(calibration: Calibration) -> dict[str, FloatArray]:
     """Draws of an augmented law's parameters by name, evenly over all chains."""
-    posterior = calibration.tree["posterior"].to_dataset()
-    names = [p.name for p in calibration.problem.parameters(calibration.law)]
-    values = {name: posterior[name].transpose("chain", "draw").values.ravel() for name in names}
-    n = len(values[names[0]])
+    values = posterior_of(calibration)
+    n = len(next(iter(values.values())))
     chosen = np.linspace(0, n - 1, min(n, _DRAWS)).round().astype(int)
     return {name: draws[chosen] for name, draws in values.items()}
 

@@ -17,9 +17,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from skred.diagnosis.augment.added_strength import AddedStrength
-from skred.diagnosis.augment.components import components_of, symbolic_components_of
-from skred.diagnosis.augment.truncated_normal import truncated_normal
+from skred.diagnosis.augment.added_strength import (
+    AddedStrength,
+    components_of,
+    symbolic_components_of,
+    truncated_normal,
+)
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
 from skred.diagnosis.evidence.event_quadrature import FINE
@@ -28,11 +31,11 @@ from skred.diagnosis.tabulated.tables import Tables, build_tables, exact_nodes
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.population import population_of, population_samples, population_variables
-from skred.inference.hierarchical.problem import COARSER, HierarchicalProblem
+from skred.inference.hierarchical.problem import CHECKED_EVENTS, COARSER, HierarchicalProblem
 from skred.inference.hierarchical.rough_population import moments_of
 from skred.inference.hierarchical.surface import Surfaces
+from skred.inference.results import draws_by_name
 from skred.parallel.threads import in_parts, side_by_side
-from skred.physics.kernel.fronts import front_speeds
 from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
 
@@ -48,8 +51,6 @@ _EXACT = FINE.times(2)
 """Quadrature points of what the tables are compared with: so many that their own error counts for little."""
 _EXACT_DRAWS = 16
 """Draws compared, evenly over the posterior; by the root of what an avalanche may have fewer."""
-_CHECKED_EVENTS = 24
-"""Events of larger campaigns that integration errors are looked for in, drawn at random."""
 _START_WIDER = 1.5
 """How much wider than the posterior chains start, as r-hat asks for."""
 
@@ -57,11 +58,6 @@ _START_WIDER = 1.5
 def as_diagnosed(problem: HierarchicalProblem) -> HierarchicalProblem:
     """How a base law's recordings are integrated: what a claim rests on is computed apart from that."""
     return replace(problem, integration_limit=CLAIM_LIMIT, fineness=COARSER)
-
-
-def extension_with(base: Base, added: Sequence[AddedStrength]) -> Extension:
-    """A base law with some mechanisms added."""
-    return Extension(base.problem, base.law, (*base.directions, *(one.direction for one in added)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -92,7 +88,7 @@ class AugmentedProblem(HierarchicalProblem):
     @property
     def extension(self) -> Extension:
         """The base law with what is added."""
-        return extension_with(self.base, self.added)
+        return self.base.extended(*(one.direction for one in self.added))
 
     @property
     def n_components(self) -> int:
@@ -104,7 +100,7 @@ class AugmentedProblem(HierarchicalProblem):
     def range(self) -> tuple[FloatArray, FloatArray]:
         """Between which values each added strength is sampled, (n_added,) each: all that counts."""
         grid = self.tables.grid
-        either = [one.mechanism.added is not None and one.mechanism.added.either_sign for one in self.added]
+        either = [one.added.either_sign for one in self.added]
         return np.where(either, grid.least, np.maximum(grid.least, 0.0)), grid.most
 
     def parameters(self, law: Law) -> tuple[Parameter, ...]:
@@ -121,8 +117,7 @@ class AugmentedProblem(HierarchicalProblem):
         self._check(mechanisms)
         tables, n_events = self.tables, self.campaign.n_events
         # As data, so that one compiled model serves many campaigns of as many events.
-        data = tables.arrays
-        held = {name: pm.Data(f"table_{name}", value) for name, value in data.items()}
+        held = {name: pm.Data(f"table_{name}", value) for name, value in tables.arrays.items()}
         for name in ("size", "first"):
             held[name] = pt.cast(held[name], "int64")  # PyMC makes integers int32
         scales = pm.Data("added_scale", np.array([one.scale for one in self.added]))
@@ -151,14 +146,13 @@ class AugmentedProblem(HierarchicalProblem):
     def log_likelihood(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
         """Log density of each event for many parameter vectors: arrays by name to (n, n_events)."""
         self._check(law.mechanisms)
-        parts = self._parts(*population_of(law, samples), *components_of(self.added, samples))
-        together: FloatArray = np.logaddexp.reduce(parts, axis=1)
+        together: FloatArray = np.logaddexp.reduce(self._parts(law, samples), axis=1)
         return together
 
-    def _parts(
-        self, means: FloatArray, factors: FloatArray, own: FloatArray, log_shares: FloatArray
-    ) -> FloatArray:
+    def _parts(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
         """Log of each event's density with a component, times its share, (n, n_components, n_events)."""
+        means, factors = population_of(law, samples)
+        own, log_shares = components_of(self.added, samples)
         n_events, tables = self.campaign.n_events, self.tables.arrays.values()
 
         def densities(draws: slice) -> FloatArray:
@@ -175,7 +169,7 @@ class AugmentedProblem(HierarchicalProblem):
 
     def probability_of_each(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
         """How probable each recorded avalanche has each component, (n, n_events, n_components)."""
-        log_parts = self._parts(*population_of(law, samples), *components_of(self.added, samples))
+        log_parts = self._parts(law, samples)
         parts: FloatArray = np.exp(log_parts - np.logaddexp.reduce(log_parts, axis=1, keepdims=True))
         return np.moveaxis(parts, 1, 2)
 
@@ -191,7 +185,8 @@ class AugmentedProblem(HierarchicalProblem):
         # What is beyond an end is folded back: at the end itself steps shrink.
         share = (located.mean + reach - low) / (high - low)
         added = low + (high - low) * np.abs(share - 2.0 * np.round(0.5 * share))
-        psi = located.populations_near(added, rng, _START_WIDER)
+        near = [located.fits[table].found for table in located.grid.nearest(added)]
+        psi = np.array([rng.multivariate_normal(one.psi, _START_WIDER**2 * one.covariance) for one in near])
         own = law.parameter_rows(np.exp(psi[:, : len(law.mechanisms)]))
         rest = population_samples(law, psi[:, len(law.mechanisms) :])
         # How avalanches differ in it is not known beforehand: all that may be.
@@ -221,7 +216,7 @@ class AugmentedProblem(HierarchicalProblem):
         draws = np.linspace(0, n - 1, min(n, each)).astype(int)
         samples = {name: np.ravel(values)[draws] for name, values in samples.items()}
         rng = np.random.default_rng([seed, 5])
-        chosen = np.sort(rng.permutation(self.campaign.n_events)[:_CHECKED_EVENTS])
+        chosen = np.sort(rng.permutation(self.campaign.n_events)[:CHECKED_EVENTS])
         base, (means, factors) = self.base, population_of(law, samples)
         own, log_shares = components_of(self.added, samples)
         added, every = own.reshape(-1, own.shape[2]), np.repeat(np.arange(len(own)), own.shape[1])
@@ -229,8 +224,7 @@ class AugmentedProblem(HierarchicalProblem):
         population = Population(means, np.einsum("nij,nkj->nik", factors, factors))
         rows = Rows(chosen, np.zeros_like(chosen), base.rows.readings.take(chosen), base.rows.errors)
         start = self.tables.modes[self.tables.grid.nearest(added)][:, chosen]
-        given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
-        likelihood = EventLikelihood(self.extension, rows, base.strengths).in_groups(given)
+        likelihood = EventLikelihood(self.extension, rows, base.strengths).in_groups(base.given(added))
         nodes = exact_nodes(likelihood, population, start, _EXACT, base.population)
         exact = np.empty((len(added), len(chosen)))
         for k in range(len(added)):
@@ -241,23 +235,6 @@ class AugmentedProblem(HierarchicalProblem):
         together: FloatArray = np.logaddexp.reduce(parts, axis=1)
         return self.log_likelihood(law, samples)[:, chosen] - together
 
-    def speeds(
-        self,
-        mechanisms: Sequence[Mechanism],
-        strengths: FloatArray,
-        release_s_m: float | FloatArray,
-        release_speed_m_s: float | FloatArray = 0.0,
-    ) -> FloatArray:
-        """Front speed [m/s] at the cell edges, what is added as strong as its posterior mean."""
-        extension = self.extension
-        added = np.concatenate([self.base.strengths, self.tables.mean])
-        columns = np.repeat(added, [len(d.columns) for d in extension.directions])
-        rows = np.column_stack([np.asarray(strengths, float), np.tile(columns, (len(strengths), 1))])
-        releases = np.full(len(rows), release_s_m, dtype=float)  # where fronts start, an offset included
-        law = extension.contributions
-        speeds: FloatArray = front_speeds(rows, releases, self.path, law, release_speed_m_s)
-        return speeds
-
     def finer(self, law: Law, posterior: xr.Dataset) -> AugmentedProblem | None:
         """The same with finer tables; None where there are such already.
 
@@ -266,11 +243,8 @@ class AugmentedProblem(HierarchicalProblem):
         """
         if self.refined:
             return None
-        samples = {
-            str(name): posterior[name].transpose("chain", "draw").values for name in posterior.data_vars
-        }
         n_chains = posterior.sizes["chain"]
-        chains = [{name: values[k] for name, values in samples.items()} for k in range(n_chains)]
+        chains = [draws_by_name(self, law, posterior.isel(chain=[k])) for k in range(n_chains)]
         moments = [moments_of(*population_of(law, chain)) for chain in chains]
         visited = Population(*(np.array(values) for values in zip(*moments, strict=True)))
         old = self.tables

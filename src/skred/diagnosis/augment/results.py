@@ -9,8 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from skred.diagnosis.augment.added_strength import AddedStrength
-from skred.diagnosis.augment.components import components_of, new_rows
+from skred.diagnosis.augment.added_strength import components_of, new_rows
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.extension import Extension
 from skred.inference.hierarchical.event_density import draw_nodes
@@ -19,15 +18,13 @@ from skred.inference.hierarchical.population import population_of
 from skred.inference.hierarchical.results import (
     add_readings,
     avalanche_dataset,
-    hierarchical_summary,
     readings_by_sensor,
     thinned,
 )
-from skred.inference.results import predictive, summary
+from skred.inference.results import draws_by_name, predictive
 from skred.physics.geometry import sensor_table
 from skred.physics.kernel.fronts import simulate
 from skred.physics.law import Law
-from skred.physics.mechanisms.stretches import equation_of
 
 FloatArray = NDArray[np.float64]
 
@@ -44,7 +41,7 @@ def augmented_predictive(
     rng = np.random.default_rng([seed, 1])
     n_events = problem.campaign.n_events
     kept = thinned(posterior, n_events)
-    samples = _samples(problem, law, kept)
+    samples = draws_by_name(problem, law, kept)
     own = recorded_strengths(problem, law, samples, rng)
     points = recorded_points(problem, law, samples, own, rng)
     recorded, fronts = fronts_of(problem, points, own)
@@ -58,35 +55,8 @@ def augmented_predictive(
     }
 
 
-@summary.register
-def augmented_summary(problem: AugmentedProblem, law: Law, tree: xr.DataTree) -> dict[str, Any]:
-    """As of any hierarchical calibration, and what was added."""
-    return {**hierarchical_summary(problem, law, tree), "added": [_added_row(one) for one in problem.added]}
-
-
-def _added_row(one: AddedStrength) -> dict[str, Any]:
-    shape = one.shape
-    return {
-        "id": one.mechanism.id,
-        "title": one.mechanism.title,
-        "parameter": one.name,
-        "between_events": str(one.between),
-        "between_events_parameter": one.between_name or None,
-        "equation": equation_of(one.mechanism, shape),
-        "s_from_m": shape.s_from_m,
-        "s_to_m": shape.s_to_m,
-        "covariate": shape.covariate,
-        "sensor": shape.sensor,
-        "constants": dict(shape.constants),
-    }
-
-
-def _samples(problem: AugmentedProblem, law: Law, draws: xr.Dataset) -> dict[str, Any]:
-    return {p.name: draws[p.name].values.ravel() for p in problem.parameters(law)}
-
-
 def _predict(problem: AugmentedProblem, law: Law, draws: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
-    samples = _samples(problem, law, draws)
+    samples = draws_by_name(problem, law, draws)
     drawn = new_avalanches(problem, law, samples, rng)
     deviation = _deviations(problem, drawn)
     points = np.concatenate([np.log(drawn.strengths), deviation[..., None]], axis=-1)
@@ -206,9 +176,9 @@ def fronts_of(
         The runout last.
     """
     n, n_events = points.shape[:2]
-    extension, base = problem.extension, problem.base
+    extension = problem.extension
     instruments = _Instruments(extension.problem, extension.law, extension.directions)
-    given = np.column_stack([np.tile(base.strengths, (n * n_events, 1)), own.reshape(n * n_events, -1)])
+    given = problem.base.given(own.reshape(n * n_events, -1))
     avalanches, fronts = instruments.read(
         np.tile(np.arange(n_events), n), points.reshape(n * n_events, -1), given
     )

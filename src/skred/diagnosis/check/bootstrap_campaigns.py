@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from skred.campaign import Status
 from skred.diagnosis.evidence.conditional_map import Rows
 from skred.diagnosis.evidence.extension import Extension
-from skred.inference.error_model import ErrorModel, EventReadings
+from skred.inference.error_model import EventReadings
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.kernel.inputs import VELOCITY_TO_STOP
 
@@ -21,7 +21,6 @@ def bootstrap_campaigns(
     means: FloatArray,
     factors: FloatArray,
     rng: np.random.Generator,
-    error_model: ErrorModel | None = None,
 ) -> tuple[Rows, FloatArray]:
     """Simulated recordings, one campaign for each population.
 
@@ -36,8 +35,6 @@ def bootstrap_campaigns(
     means : (n_groups, n_base) array
     factors : (n_groups, n_base, n_base) array
         Cholesky factors of the populations' covariances.
-    error_model : ErrorModel, optional
-        Of the simulated readings; the problem's unless given.
 
     Returns
     -------
@@ -52,7 +49,7 @@ def bootstrap_campaigns(
     logs = means[group] + np.einsum("rij,rj->ri", factors[group], normal)
     points = np.column_stack([logs, rng.standard_normal(len(event))])
     predictions = extension.predict(event, points, strengths)
-    readings = _read(problem, event, predictions, error_model or problem.error_model, rng)
+    readings = _read(problem, event, predictions, rng)
     return Rows(event, group, readings, problem.error_model.errors), points
 
 
@@ -60,7 +57,6 @@ def _read(
     problem: HierarchicalProblem,
     event: NDArray[np.int64],
     predictions: FloatArray,
-    error_model: ErrorModel,
     rng: np.random.Generator,
 ) -> EventReadings:
     """Readings of the fronts, with errors."""
@@ -79,7 +75,7 @@ def _read(
     passed &= np.where(spans[None, :] | ~velocity[None, :], True, predictions[:, :-1] > 0.0)
     observed = recorded & passed
     prediction = predictions[:, :-1]
-    drawn = error_model.draw(prediction, readings.sd(event, prediction), velocity, rng)
+    drawn = problem.error_model.draw(prediction, readings.sd(event, prediction), velocity, rng)
     values = np.where(observed, drawn, 0.0)
     least, most = _sides(np.where(passed, drawn, 0.0), readings.least[event], readings.most[event])
     moved = velocity[None, :] & ((values > 0.0) | (least > 0.0))

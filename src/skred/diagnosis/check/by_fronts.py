@@ -24,7 +24,6 @@ from skred.diagnosis.discrepancy.profile import Kind, Profile
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import Population, Rows
 from skred.diagnosis.evidence.event_quadrature import USUAL
-from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import Scores
 from skred.diagnosis.evidence.refit import Rounds, refit
 
@@ -55,8 +54,7 @@ def log_odds_by_fronts(
     reach : float
         The odds to compare with.
     """
-    extension = extended(base.problem, base.law, base.directions)
-    fit = refit(extension, rows, base.strengths[None, :], start, Rounds(USUAL))[0]
+    fit = refit(base.extended(), rows, base.strengths[None, :], start, Rounds(USUAL))[0]
     simulated = replace(base, rows=rows, fit=fit)
     of_id = {name: drawn(simulated, one, rng) for name, one in score_test.by_id(scores).items()}
     terms = {name: beside + one.log_bayes_factor for name, (one, beside) in of_id.items()}

@@ -71,8 +71,8 @@ def gains_or_none(base: Base, curve: Curve, budgets: Sequence[Budget]) -> dict[B
         ways = ways_of(base, curve, budgets)
     except np.linalg.LinAlgError:
         return None
-    common = ways[BetweenEvents.COMMON].log_evidence
-    return {kind: way.log_evidence - common for kind, way in ways.items()}
+    common = ways[BetweenEvents.COMMON].populations.log_evidence
+    return {kind: way.populations.log_evidence - common for kind, way in ways.items()}
 
 
 def ways_of(base: Base, curve: Curve, budgets: Sequence[Budget] = TABLES) -> dict[BetweenEvents, Way]:
@@ -84,17 +84,16 @@ def ways_of(base: Base, curve: Curve, budgets: Sequence[Budget] = TABLES) -> dic
         Quadrature points of an event in the tables by which modes are looked for, and in those by which
         evidence is computed around the populations that were found; one where they are the same.
     """
-    mean, sd = curve.moments
-    near = curve.nearest(mean).found
-    tables = wide_tables(base, curve, near, budgets[0], mean, sd)
+    near = curve.nearest(curve.moments[0]).found
+    tables = wide_tables(base, curve, near, budgets[0])
     targets = {kind: BetweenTarget(base, curve, tables, kind) for kind in BetweenEvents}
-    found = {kind: search(target, near, mean, seed=0) for kind, target in targets.items()}
+    found = {kind: search(target, near) for kind, target in targets.items()}
     if len(budgets) == 1:
         return {kind: way_of(target, found[kind]) for kind, target in targets.items()}
     best = max(found, key=lambda kind: math.log(PRIOR[kind]) + found[kind].log_integral)
     around = way_of(targets[best], found[best]).populations
-    tables = wide_tables(base, curve, around, budgets[1], mean, sd)
+    tables = wide_tables(base, curve, around, budgets[1])
     return {
-        kind: between_evidence(BetweenTarget(base, curve, tables, kind), one.proposal, seed=0)
+        kind: between_evidence(BetweenTarget(base, curve, tables, kind), one.proposal)
         for kind, one in found.items()
     }

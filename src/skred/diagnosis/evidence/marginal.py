@@ -116,11 +116,19 @@ def evidence(nodes: Nodes, log_scale: FloatArray, start: FloatArray, n_steps: in
     """
     n = len(log_scale)
     psi, best, hessian = _climb(start, n, log_scale, nodes, n_steps)
-    values, axes = np.linalg.eigh(hessian)
-    values = np.maximum(values, 0.05)
-    covariance = (axes / values) @ axes.T
+    values, covariance = curvatures(hessian)
     laplace = best + 0.5 * (len(psi) * _LOG_2PI - float(np.log(values).sum()))
     return Evidence(laplace + log_correlation_constant(n), psi, covariance)
+
+
+def curvatures(hessian: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Curvatures of minus a log density along its own axes, and the covariance that they stand for.
+
+    Along no axis less than what keeps proposals bounded.
+    """
+    values, axes = np.linalg.eigh(hessian)
+    values = np.maximum(values, 0.05)
+    return values, (axes / values) @ axes.T
 
 
 def importance_evidence(nodes: Nodes, log_scale: FloatArray, found: Evidence, seed: int = 0) -> Evidence:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.evidence.conditional_map import Population
-from skred.inference.calibrate import Calibration
+from skred.inference.calibrate import Calibration, posterior_of
 from skred.inference.hierarchical.population import population_of
 
 FloatArray = NDArray[np.float64]
@@ -21,10 +21,7 @@ def population_draws(calibration: Calibration, n: int, seed: int) -> tuple[Float
     factors : (n, n_base, n_base) array
         Lower Cholesky factors of the covariances.
     """
-    posterior = calibration.tree["posterior"].to_dataset()
-    names = [parameter.name for parameter in calibration.problem.parameters(calibration.law)]
-    samples = {name: posterior[name].transpose("chain", "draw").values.ravel() for name in names}
-    means, factors = population_of(calibration.law, samples)
+    means, factors = population_of(calibration.law, posterior_of(calibration))
     chosen = np.random.default_rng([seed, 41]).choice(len(means), size=min(n, len(means)), replace=False)
     return means[chosen], factors[chosen]
 

@@ -9,7 +9,7 @@ COUNTS = 6.0
 probability as stated (`prior_odds.POWER`), or a four hundredth of an integral."""
 MOST_ROUNDS = 6
 """Rounds at most of whatever is done again until it settles, which bounds the time: of a refit, of strengths
-put around what was found, of sampling, of steps of a force."""
+put around what was found, singly or on a grid, of sampling, of steps of a force."""
 ARRIVED = 0.01
 """Nats gained by a step below which a climb has arrived."""
 STEP_SHARES = (1.0, 0.35, 0.12, 0.04)

@@ -11,7 +11,7 @@ front came there.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,12 +23,12 @@ from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of, most_probable
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
-from skred.diagnosis.evidence.conditional_map import Rows
 from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.evidence.refit import Fit
 from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
 from skred.diagnosis.limits import LIMIT
+from skred.diagnosis.predict.conditional import sensor_ends
 from skred.parallel.threads import side_by_side
 
 FloatArray = NDArray[np.float64]
@@ -109,21 +109,20 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray) -> Influe
     base = under_errors.base
     if answer == UNLISTED:
         again = _of_profile(most_probable(under_errors.profiles))
+        stated = log_evidence_of(under_errors.profiles)
     else:
-        again = _of_mechanism(under_errors.candidates[answer])
+        candidate = under_errors.candidates[answer]
+        again = _of_mechanism(candidate)
+        stated = candidate.alone + log_gain(None, candidate.ways)
     n = len(base.rows.event)
     everything = np.ones(n, dtype=bool)
     kinds = _kinds(base)
     parts = [_Part(everything, chosen) for _, _, chosen in kinds]
     whole, *found = side_by_side(lambda part: again(base, part), [_Part(everything), *parts])
-    # By the same, quicker method on both sides; only the difference is taken from it.
-    stated = log_evidence_of(under_errors.profiles)
-    if answer != UNLISTED:
-        candidate = under_errors.candidates[answer]
-        stated = candidate.alone + log_gain(None, candidate.ways)
     without_each = stated - gained
     needed = math.log((1.0 - LIMIT) / LIMIT * comparison.odds[NOTHING] / comparison.odds[answer])
     order = np.argsort(without_each)
+    # By the same, quicker method on both sides; only the difference is taken from it.
     carried, left = _carried(lambda part: stated + again(base, part) - whole, order, needed)
     ids = base.problem.campaign.event_ids
     return Influence(
@@ -157,25 +156,21 @@ class _Part:
     kept: BoolArray
     left_out: BoolArray | None = None
 
-    def rows(self, rows: Rows) -> Rows:
-        """The rows that are kept, without the readings that are not."""
-        if self.left_out is not None:
-            readings = rows.readings
-            left = readings._replace(
-                observed=readings.observed & ~self.left_out,
-                least=np.where(self.left_out, -np.inf, readings.least),
-                most=np.where(self.left_out, np.inf, readings.most),
-            )
-            rows = rows._replace(readings=left)
-        return rows.take(np.flatnonzero(self.kept))
-
     def fit(self, fit: Fit) -> Fit:
         """Where to begin with the avalanches that are kept."""
         return fit._replace(points=fit.points[self.kept])
 
     def base(self, base: Base) -> Base:
         """The base law on what is kept."""
-        return replace(base, rows=self.rows(base.rows), fit=self.fit(base.fit))
+        rows, readings = base.rows, base.rows.readings
+        if self.left_out is not None:
+            left = readings._replace(
+                observed=readings.observed & ~self.left_out,
+                least=np.where(self.left_out, -np.inf, readings.least),
+                most=np.where(self.left_out, np.inf, readings.most),
+            )
+            rows = rows._replace(readings=left)
+        return replace(base, rows=rows.take(np.flatnonzero(self.kept)), fit=self.fit(base.fit))
 
 
 Again = Callable[[Base, _Part], float]
@@ -213,7 +208,7 @@ def _of_profile(profile: Profile) -> Again:
 
 
 def _carried(
-    factor: Callable[[_Part], float], order: Sequence[int] | NDArray[np.int64], needed: float
+    factor: Callable[[_Part], float], order: NDArray[np.int64], needed: float
 ) -> tuple[list[int], float | None]:
     """The fewest first avalanches of an order without which an answer has too little; what it has then.
 
@@ -247,10 +242,8 @@ def _kinds(base: Base) -> list[tuple[str, str | None, BoolArray]]:
     observed = readings.observed
     speeds = observed & readings.is_velocity
     stops, stop_sd = _stops(base)
-    places = np.array(
-        [np.nan if place is None else 0.5 * (place[0] + place[1]) for place in base.problem.sensor_places]
-    )
-    near = speeds & (np.abs(places - stops[:, None]) <= stop_sd[:, None])
+    first, last = sensor_ends(base.problem)
+    near = speeds & (np.abs(0.5 * (first + last) - stops[:, None]) <= stop_sd[:, None])
     kinds: list[tuple[str, str | None, BoolArray]] = [
         ("zeros", None, speeds & (readings.values == 0.0)),
         ("near a stop", None, near),

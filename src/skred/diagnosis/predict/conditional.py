@@ -84,25 +84,6 @@ class BeforeAfter(NamedTuple):
         return cls(conditional(before.others, seed), conditional(after.others, seed))
 
 
-class _Given(NamedTuple):
-    """What is predicted of one avalanche, and from what.
-
-    Attributes
-    ----------
-    sensors : (n,) integer array
-        Whose readings are predicted.
-    sets : (n_sets, n_sensors) boolean array
-        Sets of its readings, the empty one first.
-    above, with_it : (n,) integer arrays
-        Which set lies above each, and which holds it too.
-    """
-
-    sensors: IntArray
-    sets: BoolArray
-    above: IntArray
-    with_it: IntArray
-
-
 def conditional(others: Sequence[LeftOut], seed: int) -> Conditional:
     """Predict each reading of each avalanche from those above it.
 
@@ -119,19 +100,35 @@ def conditional(others: Sequence[LeftOut], seed: int) -> Conditional:
     return Conditional(mean, low, high, log_score, crps, n_above, effective)
 
 
+def sensor_ends(problem: HierarchicalProblem) -> FloatArray:
+    """Upper and lower end of each sensor [m], (2, n_sensors); NaN of a runout."""
+    places = [(np.nan, np.nan) if place is None else place for place in problem.sensor_places]
+    return np.array(places, dtype=float).T
+
+
 def above(problem: HierarchicalProblem) -> BoolArray:
     """Which sensors lie wholly above which, (n_sensors, n_sensors): row k has those above k.
 
     A front passes every sensor of speed before it stops: all of them are above the runout.
     """
     velocity = problem.readings.is_velocity
-    ends = [(np.nan, np.nan) if place is None else place for place in problem.sensor_places]
-    first, last = np.array(ends, dtype=float).T
+    first, last = sensor_ends(problem)
     passed = (last[None, :] <= first[:, None]) & (last[None, :] < last[:, None])
     return np.where(velocity[:, None], passed, velocity[None, :]) & velocity[None, :]
 
 
-def _given(problem: HierarchicalProblem, event: int) -> _Given:
+def _sets(problem: HierarchicalProblem, event: int) -> tuple[IntArray, BoolArray, IntArray, IntArray]:
+    """What is predicted of one avalanche, and from what.
+
+    Returns
+    -------
+    sensors : (n,) integer array
+        Whose readings are predicted.
+    sets : (n_sets, n_sensors) boolean array
+        Sets of its readings, the empty one first.
+    above, with_it : (n,) integer arrays
+        Which set lies above each, and which holds it too.
+    """
     observed = problem.readings.observed[event]
     sensors = np.flatnonzero(observed)
     before = above(problem)[sensors] & observed
@@ -140,13 +137,13 @@ def _given(problem: HierarchicalProblem, event: int) -> _Given:
     nothing = np.zeros((1, len(observed)), dtype=bool)
     sets, place = np.unique(np.vstack([nothing, before, with_it]), axis=0, return_inverse=True)
     place = place.ravel()[1:]
-    return _Given(sensors, sets, place[: len(sensors)], place[len(sensors) :])
+    return sensors, sets, place[: len(sensors)], place[len(sensors) :]
 
 
 def readings_of(problem: HierarchicalProblem, event: int, sets: BoolArray) -> EventReadings:
     """Some of an avalanche's readings, one row for each set; where it did not come is not among them."""
     readings = problem.readings
-    ends = np.array([np.nan if place is None else place[1] for place in problem.sensor_places])
+    _, ends = sensor_ends(problem)
     moved = sets & readings.is_velocity & (readings.values[event] > 0.0)
     return readings.take(np.full(len(sets), event))._replace(
         observed=sets,
@@ -160,13 +157,13 @@ def _event(extension: Extension, draws: Draws, event: int, seed: int) -> FloatAr
     problem = extension.problem
     readings, errors = problem.readings, problem.error_model
     result = np.full((7, len(readings.is_velocity)), np.nan)
-    given = _given(problem, event)
-    if not len(given.sensors):
+    sensors, sets, all_above, all_with_it = _sets(problem, event)
+    if not len(sensors):
         return result
     rows = Rows(
-        np.full(len(given.sets), event),
-        np.zeros(len(given.sets), dtype=np.int64),
-        readings_of(problem, event, given.sets),
+        np.full(len(sets), event),
+        np.zeros(len(sets), dtype=np.int64),
+        readings_of(problem, event, sets),
         errors.errors,
     )
     rng = np.random.default_rng([seed, 61, event])
@@ -179,14 +176,14 @@ def _event(extension: Extension, draws: Draws, event: int, seed: int) -> FloatAr
             found = sample(likelihood, draws, each, missed, rng)
     fronts = found.fronts[:, :-1]
     drawn = errors.draw(fronts, readings.sd(event, fronts), readings.is_velocity, rng)
-    for sensor, before, with_it in zip(given.sensors, given.above, given.with_it, strict=True):
+    for sensor, before, with_it in zip(sensors, all_above, all_with_it, strict=True):
         log_weights = found.log_weights[before]
         weights = _normalised(log_weights + _together(found, rows, before, sensor, drawn, errors))
         value, x = readings.values[event, sensor], drawn[:, sensor]
         effective = [1.0 / np.sum(w**2) for w in (weights, _normalised(found.log_weights[with_it]))]
         score = np.logaddexp.reduce(found.log_weights[with_it]) - np.logaddexp.reduce(log_weights)
         mean, low, high, crps = _summary(x, weights, value)
-        result[:, sensor] = mean, low, high, score, crps, given.sets[before].sum(), min(effective)
+        result[:, sensor] = mean, low, high, score, crps, sets[before].sum(), min(effective)
     return result
 
 

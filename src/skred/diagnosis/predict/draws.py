@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.augment.components import new_rows
+from skred.diagnosis.augment.added_strength import new_rows
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.conditional_map import (
     EventLikelihood,
@@ -80,13 +80,6 @@ class LeftOut(NamedTuple):
 
     extension: Extension
     draws: Draws
-
-
-def posterior_of(calibration: Calibration) -> Samples:
-    """Draws of a calibration's parameters by name, of all chains one after the other."""
-    posterior = calibration.tree["posterior"].to_dataset()
-    names = [parameter.name for parameter in calibration.problem.parameters(calibration.law)]
-    return {name: posterior[name].transpose("chain", "draw").values.ravel() for name in names}
 
 
 def draws_of(calibration: Calibration, samples: Samples, rng: np.random.Generator) -> Draws:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from arviz_stats.base import array_stats
@@ -14,8 +13,8 @@ from scipy.special import logsumexp
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.predictive import Predicted
-from skred.diagnosis.predict.draws import N_DRAWS, LeftOut, draws_of, posterior_of, predictions
-from skred.inference.calibrate import Calibration
+from skred.diagnosis.predict.draws import N_DRAWS, LeftOut, draws_of, predictions
+from skred.inference.calibrate import Calibration, posterior_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.leave_one_out import Samples, exact_leave_one_out, samples_of
 
@@ -85,7 +84,6 @@ def held_out(calibration: Calibration, seed: int, *, exact: bool = False) -> Hel
     ----------
     calibration : Calibration
         Of the base law, or of the augmented one.
-    seed : int
     exact : bool
         Refit without every avalanche instead of only where importance sampling is unreliable.
     """
@@ -147,7 +145,7 @@ def _others(
     return tuple(parts)
 
 
-def errors(found: HeldOut, problem: Any) -> dict[str, float | None]:
+def errors(found: HeldOut, problem: HierarchicalProblem) -> dict[str, float | None]:
     """Root mean square error of speeds [m/s] and runouts [m], and coverage of the 90 % intervals."""
     velocity = problem.readings.is_velocity
     difference = np.where(problem.observed, found.predicted.mean - problem.values, np.nan)

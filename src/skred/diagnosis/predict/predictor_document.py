@@ -89,9 +89,9 @@ def from_dict(document: Any) -> Predictor:
     means = _numbers(known, "means", (n,), FARTHEST)
     factors = _numbers(known, "factors", (n, n), FARTHEST)
     profile = None if known.get("profile") is None else _profile(_mapping(known["profile"], "profile"))
-    n_added = len(terms) + (0 if profile is None else len(profile.knots_m))
-    strengths = _numbers(known, "strengths", (n_added,), LARGEST_NUMBER)
-    _check_draws(means, factors, strengths, [*_scales(terms), *_knot_scales(profile)])
+    scales = _scales(terms, profile)
+    strengths = _numbers(known, "strengths", (len(scales),), LARGEST_NUMBER)
+    _check_draws(means, factors, strengths, scales)
     place = _number(known, "place_sd_m")
     smoothing = _number(known, "smoothing_m", 1000.0)
     if not place > 0.0 or smoothing < 0.0:
@@ -122,21 +122,17 @@ def _places(document: Mapping[str, Any], key: str, most: int) -> FloatArray:
     return places
 
 
-def _scales(terms: Sequence[Term]) -> list[tuple[str, float]]:
-    """Name and prior scale of each term."""
+def _scales(terms: Sequence[Term], profile: ProfileTerm | None) -> list[tuple[str, float]]:
+    """Name and prior scale of each term, then of each knot of a profile."""
     found = []
     for term in terms:
         added = mechanisms()[term.mechanism].added
         assert added is not None
         found.append((term.mechanism, added.scale))
+    if profile is not None:
+        scale = max(AMPLITUDES) * profile.kind.amplitude
+        found += [("the force profile", scale)] * len(profile.knots_m)
     return found
-
-
-def _knot_scales(profile: ProfileTerm | None) -> list[tuple[str, float]]:
-    """Name and prior scale of each knot of a profile."""
-    if profile is None:
-        return []
-    return [("the force profile", max(AMPLITUDES) * profile.kind.amplitude)] * len(profile.knots_m)
 
 
 def _check_draws(

@@ -23,14 +23,12 @@ from skred.diagnosis.discrepancy.profile import Profile, combined, knot_by_knot,
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, event_modes
 from skred.diagnosis.evidence.event_quadrature import USUAL, event_nodes
-from skred.diagnosis.evidence.extension import Extension, extended
 from skred.diagnosis.evidence.marginal import evidence, importance_draws, population_at
-from skred.diagnosis.evidence.refit import Fit, Rounds, refit
+from skred.diagnosis.evidence.refit import Rounds, refit
 from skred.diagnosis.predict.draws import N_DRAWS, Draws, LeftOut
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.predict.unseen import log_densities
 from skred.parallel.threads import side_by_side
-from skred.physics.mechanisms.spec import Direction
 
 FloatArray = NDArray[np.float64]
 
@@ -84,11 +82,8 @@ def profile_law(under_errors: ComparisonUnderErrors, most: int, seed: int) -> Pr
 
 def _check(base: Base, profile: Profile, most: int, seed: int) -> BootstrapTest:
     """The bootstrap test of the law with the profile in."""
-    directions, strengths = _added_terms(base, profile)
-    added = replace(base, directions=directions, strengths=strengths, fit=profile.fit)
-    rng = np.random.default_rng([seed, 51])
-    extension = extended(base.problem, base.law, directions)
-    draws = _draws(base, extension, profile.fit, strengths, np.empty((most, 0)), rng)
+    added = _with_mean(base, profile)
+    draws = _draws(base, added, np.empty((most, 0)), np.random.default_rng([seed, 51]))
     return linear_test(added, (draws.means, draws.factors), seed + 1, most)
 
 
@@ -113,61 +108,44 @@ def _rng(seed: int, event: int) -> np.random.Generator:
 
 def _plain(base: Base, rng: np.random.Generator) -> LeftOut:
     """The base law, and draws by the base's events."""
-    law = extended(base.problem, base.law, base.directions)
     own = np.tile(base.strengths, (N_DRAWS, 1))
-    return LeftOut(law, _draws(base, law, base.fit, base.strengths, own, rng))
+    return LeftOut(base.extended(), _draws(base, base, own, rng))
 
 
 def with_profile(base: Base, profile: Profile, rng: np.random.Generator) -> LeftOut:
     """The law with a profile fitted to the base's events, each knot a strength; draws by those events.
 
-    Parameters
-    ----------
-    base : Base
-    profile : Profile
-        Whose values are drawn by the Laplace approximation.
-    rng : numpy.random.Generator
+    The profile's values are drawn by the Laplace approximation.
     """
     wide = knot_by_knot(base, profile.kind, profile.knots_m)
-    own = np.tile(base.strengths, (N_DRAWS, 1))
     values = rng.multivariate_normal(profile.mean, profile.covariance, N_DRAWS)
-    directions, middle = _added_terms(base, profile)
-    narrow = extended(base.problem, base.law, directions)
-    return LeftOut(wide, _draws(base, narrow, profile.fit, middle, np.column_stack([own, values]), rng))
+    return LeftOut(wide, _draws(base, _with_mean(base, profile), base.given(values), rng))
 
 
-def _added_terms(base: Base, profile: Profile) -> tuple[tuple[Direction, ...], FloatArray]:
-    """What is added with a profile's mean as one direction, and its strengths: quicker than a knot each."""
+def _with_mean(base: Base, profile: Profile) -> Base:
+    """The law with a profile's mean in, as one direction: quicker than a knot each."""
     direction = combined(base.setting, profile.kind, profile.knots_m, profile.mean)
-    return (*base.directions, direction), np.append(base.strengths, 1.0)
+    directions, strengths = (*base.directions, direction), np.append(base.strengths, 1.0)
+    return replace(base, directions=directions, strengths=strengths, fit=profile.fit)
 
 
 def _without(base: Base, event: int) -> Base:
     """The base law fitted to all events but one."""
     others = np.flatnonzero(base.rows.event != event)
     rows, start = base.rows.take(others), (base.population, base.fit.points[others])
-    extension = extended(base.problem, base.law, base.directions)
-    given = base.strengths[None, :]
-    fit = refit(extension, rows, given, start, Rounds())[0]
+    fit = refit(base.extended(), rows, base.strengths[None, :], start, Rounds())[0]
     return replace(base, rows=rows, fit=fit)
 
 
-def _draws(
-    base: Base,
-    extension: Extension,
-    fit: Fit,
-    middle: FloatArray,
-    strengths: FloatArray,
-    rng: np.random.Generator,
-) -> Draws:
-    """Populations by the base's events at the middle strengths, as many as there are draws of strengths."""
-    n = len(base.law.mechanisms)
-    population = fit.population
-    likelihood = EventLikelihood(extension, base.rows, middle)
-    modes = event_modes(likelihood, fit.points, population)
+def _draws(base: Base, fitted: Base, strengths: FloatArray, rng: np.random.Generator) -> Draws:
+    """Populations by the base's events at fitted strengths, as many as there are draws of strengths."""
+    population = fitted.population
+    likelihood = EventLikelihood(fitted.extended(), base.rows, fitted.strengths)
+    modes = event_modes(likelihood, fitted.fit.points, population)
     nodes = event_nodes(likelihood, population, modes, USUAL, base.population).nodes
-    found = evidence(nodes, base.log_scale, fit.found.psi)
-    drawn = population_at(importance_draws(nodes, base.log_scale, found, len(strengths), rng), n)
+    found = evidence(nodes, base.log_scale, fitted.fit.found.psi)
+    psi = importance_draws(nodes, base.log_scale, found, len(strengths), rng)
+    drawn = population_at(psi, len(base.law.mechanisms))
     return Draws(drawn.mean, np.linalg.cholesky(drawn.covariance), strengths)
 
 

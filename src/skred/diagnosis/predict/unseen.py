@@ -20,11 +20,11 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population
 from skred.diagnosis.evidence.covariates import Standard, standard_of
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of
-from skred.diagnosis.predict.draws import N_DRAWS, Draws, LeftOut, draws_of, modes_near, posterior_of
+from skred.diagnosis.predict.draws import N_DRAWS, Draws, LeftOut, draws_of, modes_near
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.tabulated.tables import exact_nodes
 from skred.errors import InputError
-from skred.inference.calibrate import Calibration
+from skred.inference.calibrate import Calibration, posterior_of
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.problem import HierarchicalProblem
@@ -144,11 +144,6 @@ def predictor_of(calibration: Calibration, n_draws: int = N_DRAWS) -> Predictor:
         Hierarchical: of a base law, or of one with mechanisms added.
     n_draws : int
         Draws kept, evenly spaced over all of the posterior.
-
-    Raises
-    ------
-    ValueError
-        If something is in the law with a fixed strength.
     """
     problem = calibration.problem
     assert isinstance(problem, HierarchicalProblem)
@@ -156,8 +151,6 @@ def predictor_of(calibration: Calibration, n_draws: int = N_DRAWS) -> Predictor:
     draws = draws.take(np.linspace(0, len(draws.means) - 1, n_draws).round().astype(int))
     terms = tuple[Term, ...]()
     if isinstance(problem, AugmentedProblem):
-        if problem.base.directions:
-            raise ValueError("a predictor cannot hold what is added with a fixed strength")
         terms = tuple(_term(problem, one.mechanism.id, one.shape) for one in problem.added)
     return Predictor(
         calibration.law.id, problem.error_model.id, problem.place_sd_m, problem.terrain.smoothing_m,
@@ -265,7 +258,6 @@ def log_densities(
     ----------
     draws : Draws
         Of populations, and of the strengths of what is added.
-    seed : int
     budget : Budget
         Quadrature points of an event for each draw.
     """

@@ -18,7 +18,7 @@ from scipy.optimize import minimize
 
 from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, Weighted, weighted_draws
 from skred.diagnosis.evidence.coefficient import Base, Curve
-from skred.diagnosis.evidence.marginal import Evidence, population_at
+from skred.diagnosis.evidence.marginal import Evidence, curvatures, population_at
 from skred.diagnosis.evidence.population_target import NARROWEST, log_correlation_constant, log_priors
 from skred.diagnosis.tabulated.tables import Tables
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
@@ -33,8 +33,6 @@ _STARTS: dict[BetweenEvents, tuple[tuple[float, float], ...]] = {
 """Where climbs begin: multiples of the strength that all have in common, and the other's coordinate."""
 _DIFFERENCE = 1e-3
 """Step of central differences, in coordinates whose scale is one or so."""
-_LEAST_CURVATURE = 0.05
-"""Of minus the log density along an axis, as for any population here: proposals stay bounded."""
 _SETTLED = 1e-5
 """Share of the log density by which a step must gain: some thousandths or hundredths of a nat."""
 _BAD = -1e10
@@ -46,16 +44,12 @@ class Way(NamedTuple):
 
     Attributes
     ----------
-    log_evidence, error : float
-        In nats; its standard error by importance sampling.
     populations : Evidence
-        Mean and covariance over its posterior.
+        The way's own, with mean and covariance over its posterior.
     strength : (float, float)
         Mean and standard deviation over it.
     """
 
-    log_evidence: float
-    error: float
     populations: Evidence
     strength: tuple[float, float]
 
@@ -117,17 +111,15 @@ class BetweenTarget:
         return result
 
 
-def search(target: BetweenTarget, near: Evidence, strength: float, seed: int) -> Weighted:
+def search(target: BetweenTarget, near: Evidence) -> Weighted:
     """Look for the highest mode, and by draws around it how far the posterior reaches.
 
     Parameters
     ----------
     near : Evidence
         Populations around a mode.
-    strength : float
-        What avalanches have in common, roughly.
     """
-    log_size = math.log(abs(strength))
+    log_size = math.log(abs(target.curve.moments[0]))
     most = math.log(0.9 * abs(target.farthest))
     alone = target.kind is BetweenEvents.COMMON
     tops = []
@@ -136,7 +128,7 @@ def search(target: BetweenTarget, near: Evidence, strength: float, seed: int) ->
         tops.append(_climbed(target, np.array(start)))
     top = max(tops, key=lambda x: float(target(x[None])[0]))
     proposal = Mixture.on([Mode(top, _curvature(target, top))])
-    return weighted_draws(target, proposal, np.random.default_rng([seed, 71]))
+    return weighted_draws(target, proposal, np.random.default_rng([0, 71]))
 
 
 def way_of(target: BetweenTarget, found: Weighted) -> Way:
@@ -147,12 +139,12 @@ def way_of(target: BetweenTarget, found: Weighted) -> Way:
     away = psi - mean
     populations = Evidence(found.log_integral, mean, away.T @ (shares[:, None] * away))
     sd = math.sqrt(float(shares @ (strengths - middle) ** 2))
-    return Way(found.log_integral, found.error, populations, (middle, sd))
+    return Way(populations, (middle, sd))
 
 
-def between_evidence(target: BetweenTarget, proposal: Mixture, seed: int) -> Way:
+def between_evidence(target: BetweenTarget, proposal: Mixture) -> Way:
     """One way, from a proposal that may be by other tables."""
-    return way_of(target, weighted_draws(target, proposal, np.random.default_rng([seed, 72])))
+    return way_of(target, weighted_draws(target, proposal, np.random.default_rng([0, 72])))
 
 
 def _climbed(target: BetweenTarget, start: FloatArray) -> FloatArray:
@@ -181,6 +173,4 @@ def _curvature(target: BetweenTarget, top: FloatArray) -> FloatArray:
     more = heights[2 * n + 1 :].reshape(2, -1).sum(axis=0)
     for (i, j), together in zip(pairs, more, strict=True):
         hessian[i, j] = hessian[j, i] = -(together - 2.0 * middle - sides[i] - sides[j]) / (2.0 * step**2)
-    values, axes = np.linalg.eigh(hessian)
-    covariance: FloatArray = (axes / np.maximum(values, _LEAST_CURVATURE)) @ axes.T
-    return covariance
+    return curvatures(hessian)[1]

@@ -13,6 +13,7 @@ from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.marginal import Evidence
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
+from skred.diagnosis.evidence.tolerance import MOST_ROUNDS
 from skred.parallel.threads import in_parts, side_by_side
 from skred.physics.mechanisms.spec import Added
 
@@ -26,8 +27,6 @@ _REACH = 5.0
 """Standard deviations that a grid reaches from the mean at first."""
 _ENDS_NATS = 8.0
 """How far below the maximum the edge of a grid must be to be the end: four standard deviations."""
-_LOOKS = 6
-"""Grids tried at most, which bounds the time."""
 _FARTHEST = 4.0
 """How many times what all may have in common tables reach where avalanches differ in it."""
 
@@ -110,18 +109,6 @@ class Located(NamedTuple):
         grid = Grid(self.grid.origin, 0.5 * self.grid.steps, 2 * self.grid.size - 1)
         return self._replace(grid=grid, fits=[self.fits[k] for k in self.grid.nearest(grid.points)])
 
-    def populations_near(self, added: FloatArray, rng: np.random.Generator, wider: float = 1.0) -> FloatArray:
-        """Draw the population's coordinates at each of some added strengths.
-
-        Parameters
-        ----------
-        added : (n, n_added) array
-        wider : float
-            What its standard deviations are multiplied by.
-        """
-        found = [self.fits[table].found for table in self.grid.nearest(added)]
-        return np.array([rng.multivariate_normal(one.psi, wider**2 * one.covariance) for one in found])
-
 
 def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located:
     """Put a grid where curves have the strengths, and move its ends until it covers their posterior."""
@@ -132,7 +119,7 @@ def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located
     factor, ends = np.diag(np.clip(sd, 0.01 * scale, scale)), np.full(len(curves), _REACH)
     grid = _grid(mean, factor, (-ends, ends), (low, high))
     near = [curves[-1].nearest(strength) for strength in grid.points[:, -1]]
-    for look in range(_LOOKS):
+    for look in range(MOST_ROUNDS):
         points = grid.points
         fits = _fitted(base, extension, points, near)
         density = np.array([fit.found.log_evidence for fit in fits])
@@ -183,7 +170,7 @@ def from_nothing(curve: Curve, found: Evidence, mean: float, sd: float) -> Locat
 
 def _fitted(base: Base, extension: Extension, added: FloatArray, near: Sequence[Fit]) -> list[Fit]:
     """Fits at strengths of what is added, (n, n_added), begun at others; these where nothing is found."""
-    given = np.column_stack([np.tile(base.strengths, (len(added), 1)), added])
+    given = base.given(added)
 
     def fitted(part: slice) -> list[Fit]:
         return refit(extension, base.rows, given[part], base.fit.start, Rounds(least=1), near[part])

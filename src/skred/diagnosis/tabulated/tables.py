@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, event_modes, log_joint
 from skred.diagnosis.evidence.event_quadrature import Budget, Spread, event_nodes
-from skred.diagnosis.evidence.extension import Extension, extended
+from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.marginal import Evidence, population_at
 from skred.diagnosis.tabulated.coefficient_grid import Grid, Located, from_nothing
 from skred.inference.hierarchical.surface import Nodes
@@ -48,11 +48,6 @@ class Tables:
         return self.located.grid
 
     @property
-    def mean(self) -> FloatArray:
-        """Posterior mean of the strengths by the comparison's formula, (n_added,)."""
-        return self.located.mean
-
-    @property
     def arrays(self) -> dict[str, Any]:
         """What the compiled interpolation reads, by name."""
         return {**self.grid._asdict(), **self.nodes._asdict()}
@@ -70,8 +65,7 @@ def build_tables(
     """
     grid, fits = located.grid, located.fits
     n, n_tables, n_events = len(base.law.mechanisms), len(fits), len(base.rows.event)
-    given = np.column_stack([np.tile(base.strengths, (n_tables, 1)), grid.points])
-    likelihood = EventLikelihood(extension, base.rows, base.strengths).in_groups(given)
+    likelihood = EventLikelihood(extension, base.rows, base.strengths).in_groups(base.given(grid.points))
     population = population_at(np.stack([fit.found.psi for fit in fits]), n)
     start = highest(likelihood, np.stack([fit.points for fit in fits]), population)
     # Populations of the posterior differ in mean and in spread.
@@ -92,10 +86,10 @@ def build_tables(
     return Tables(located, nodes.nodes, nodes.points[:, :, n].ravel(), points, budget)
 
 
-def wide_tables(base: Base, curve: Curve, found: Evidence, budget: Budget, mean: float, sd: float) -> Tables:
-    """Tables of one mechanism in which avalanches differ; parameters as `from_nothing` has them."""
-    extension = extended(base.problem, base.law, (*base.directions, curve.direction))
-    return build_tables(base, extension, from_nothing(curve, found, mean, sd), budget)
+def wide_tables(base: Base, curve: Curve, found: Evidence, budget: Budget) -> Tables:
+    """Tables of one mechanism in which avalanches differ; populations as `from_nothing` has them."""
+    located = from_nothing(curve, found, *curve.moments)
+    return build_tables(base, base.extended(curve.direction), located, budget)
 
 
 def highest(likelihood: EventLikelihood, points: FloatArray, population: Population) -> FloatArray:
@@ -103,6 +97,10 @@ def highest(likelihood: EventLikelihood, points: FloatArray, population: Populat
 
     Avalanches that stop at a place or pass it have two modes, and a table that is in the lower one of an
     event would stand out between its neighbours.
+
+    Parameters
+    ----------
+    points : (n_tables, n_events, n_base + 1) array
     """
 
     def climbed(start: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -114,18 +112,13 @@ def highest(likelihood: EventLikelihood, points: FloatArray, population: Populat
         tops, heights = zip(*side_by_side(climb, in_parts(len(start))), strict=True)
         return np.concatenate(tops), np.concatenate(heights)
 
-    best, height = climbed(_flat(points))
+    best, height = climbed(points.reshape(-1, points.shape[-1]))
     found = best.reshape(points.shape)
     for side in (1, -1):
-        tried, new = climbed(_flat(np.roll(found, side, axis=0)))
+        tried, new = climbed(np.roll(found, side, axis=0).reshape(best.shape))
         best = np.where((new > height)[:, None], tried, best)
         height = np.maximum(new, height)
     return best
-
-
-def _flat(points: FloatArray) -> FloatArray:
-    """Points of all tables, (n_tables, n_events, n), as rows."""
-    return points.reshape(-1, points.shape[-1])
 
 
 def exact_nodes(

@@ -55,7 +55,7 @@ _MEDIAN_LOG_MEAN, _MEDIAN_LOG_SD = -0.64, 1.1
 """Mean and standard deviation of the log of a half-normal variable of scale 1."""
 _COARSE_CELL = 0.25
 """Width of a patch while the population is looked for: about the widest of usual spreads."""
-_CHECKED_EVENTS, _CHECKED_DRAWS = 24, 40
+CHECKED_EVENTS, _CHECKED_DRAWS = 24, 40
 """Events and draws of the posterior that an integration is checked at, at most."""
 _LEAST_CHECKED, _CHECKED_RUNS, _FINER_COSTS = 6, 2_000_000, 6.0
 """Least number of events checked, most runs of the kernel in a check, and its cost in usual ones."""
@@ -293,7 +293,7 @@ class HierarchicalProblem(Problem):
         means, factors = population_of(law, samples)
         n_events = self.campaign.n_events
         runs_each = _FINER_COSTS * self.surfaces(law.mechanisms).n_runs / n_events
-        n_checked = int(np.clip(_CHECKED_RUNS / runs_each, _LEAST_CHECKED, _CHECKED_EVENTS))
+        n_checked = int(np.clip(_CHECKED_RUNS / runs_each, _LEAST_CHECKED, CHECKED_EVENTS))
         rng = np.random.default_rng([seed, 5])
         chosen = np.sort(rng.permutation(n_events)[:n_checked])
         fronts = self.fronts(law.mechanisms)

@@ -18,7 +18,7 @@ from skred.inference.hierarchical.event_draws import (
 )
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import interval
-from skred.inference.results import chain_and_draw, predictive, summary
+from skred.inference.results import chain_and_draw, draws_by_name, predictive, summary
 from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
@@ -45,7 +45,7 @@ def hierarchical_predictive(
     """
     rng = np.random.default_rng([seed, 1])
     kept = thinned(posterior, problem.campaign.n_events)
-    samples = _samples(problem, law, kept)
+    samples = draws_by_name(problem, law, kept)
     recorded = recorded_avalanches(problem, law, samples, rng)
     event_posterior = avalanche_dataset(problem, law, kept, recorded, fronts_of(problem, law, recorded))
     new = _predict(problem, law, kept, rng)
@@ -64,14 +64,10 @@ def thinned(draws: xr.Dataset, n_events: int) -> xr.Dataset:
     return draws.isel(draw=slice(None, None, max(1, -(-n * n_events // MOST_AVALANCHES))))
 
 
-def _samples(problem: HierarchicalProblem, law: Law, draws: xr.Dataset) -> dict[str, Any]:
-    return {p.name: draws[p.name].values.ravel() for p in problem.parameters(law)}
-
-
 def _predict(
     problem: HierarchicalProblem, law: Law, draws: xr.Dataset, rng: np.random.Generator
 ) -> xr.Dataset:
-    avalanches = new_avalanches(problem, law, _samples(problem, law, draws), rng)
+    avalanches = new_avalanches(problem, law, draws_by_name(problem, law, draws), rng)
     fronts = fronts_of(problem, law, avalanches)
     dataset = avalanche_dataset(problem, law, draws, avalanches, fronts)
     add_readings(problem, dataset, fronts, rng)
