@@ -1,14 +1,17 @@
 """How long `skred diagnose` takes by the clock, loading packages included: to its verdict, and to its report.
 
 ``python -m benchmarks.diagnose_time [--json FILE]`` runs the command on the 22 avalanches of Ryggfonn, one
-base law after the other, and on dense campaigns of the development seeds, each with the base law that its
-trial asks about. Asked: 60 s for 22 sparse events, 120 s for 15 events with 40 gates, on two cores. First
-each law is run once and not counted, so that everything is compiled. Both cores must be free.
+base law after the other, and on campaigns of the development seeds, each with the base law that its trial
+asks about: dense ones, and many avalanches at few sensors. Asked on two cores: 40 s for 22 sparse avalanches,
+60 s for 15 with 40 gates, 5 minutes for 200 and 25 for 1000 sparse ones, and 4 GB at most. First each law is
+run once and not counted, so that everything is compiled. Both cores must be free. ``--json`` is written after
+each campaign; ``--largest`` ends the many at so many avalanches.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -18,21 +21,30 @@ from typing import Annotated, Any
 
 import cyclopts
 
-from skred.campaign import find_campaign, read_campaign, write_campaign
+from benchmarks.commit import commit
+from benchmarks.files import write
+from skred.campaign import Campaign, find_campaign, read_campaign, write_campaign
 from skred.simulator.draw import draw_trial
+from skred.simulator.fresh import draw_fresh
 
 app = cyclopts.App(help=__doc__)
 LAWS = ("coulomb", "pcm", "constant", "voellmy")
 DENSE = ((1701, "nothing"), (1702, "obstacle"), (1703, "turbulent_drag"), (1704, "sensor_bias"))
 """Seeds of dense trials, and what they hide."""
+MANY = ((200, "coulomb"), (200, "pcm"), (200, "constant"), (200, "voellmy"), (1000, "pcm"))
+"""How many avalanches at few sensors, and the base law; what is hidden is friction on a stretch."""
+MANY_SEED = 1705
 
 
 def timed(name: str, campaign: Path | str, law: str, out: Path) -> dict[str, Any]:
-    """Seconds of one diagnosis, and what it says."""
+    """Seconds and memory of one diagnosis, and what it says."""
     command = ["diagnose", str(campaign), "--base-model", law, "--out", str(out), "--force"]
     started, clock = time.monotonic(), time.time()
-    subprocess.run([sys.executable, "-m", "skred.cli", *command], check=True, capture_output=True)
+    process = subprocess.Popen([sys.executable, "-m", "skred.cli", *command], stdout=subprocess.DEVNULL)
+    _, status, used = os.wait4(process.pid, 0)
     seconds = time.monotonic() - started
+    if status != 0:
+        raise SystemExit(f"skred {' '.join(command)} ended with status {os.waitstatus_to_exitcode(status)}")
     file = out / "verdict.json"  # written first, before report and figures
     verdict, told = json.loads(file.read_text(encoding="utf-8")), file.stat().st_mtime - clock
     found = read_campaign(find_campaign(str(campaign)))
@@ -43,33 +55,51 @@ def timed(name: str, campaign: Path | str, law: str, out: Path) -> dict[str, Any
         "base_model": law,
         "seconds": seconds,
         "verdict_seconds": told,
+        "cpu_seconds": used.ru_utime + used.ru_stime,
+        "memory_gb": used.ru_maxrss / 1024.0**2,
         "stages": verdict["seconds"],
         "verdict": verdict["verdict"],
     }
     print(
         f"{name} {law}: {row['events']} events, {row['sensors']} sensors, verdict after {told:.1f} s,"
-        f" all after {seconds:.1f} s, {row['verdict']}"
+        f" all after {seconds:.1f} s, {row['memory_gb']:.1f} GB, {row['verdict']}",
+        flush=True,
     )
     return row
 
 
+def simulated(largest: int) -> list[tuple[str, Campaign, str]]:
+    """Campaigns of the development seeds: what they are, recordings, base law."""
+    found = []
+    for seed, hidden in DENSE:
+        trial = draw_trial(seed, kind="dense", hidden=hidden)
+        found.append((f"dense, {hidden}", trial.campaign, trial.truth["base_model"]))
+    for n, law in MANY:
+        if n <= largest:
+            trial = draw_trial(MANY_SEED, kind="sparse", hidden="segment_friction", base=law)
+            found.append((f"sparse, {n} avalanches", draw_fresh(trial.source, n), law))
+    return found
+
+
 @app.default
 def main(
-    *, out: Annotated[Path | None, cyclopts.Parameter(name="--json", help="File for the figures.")] = None
+    *,
+    largest: Annotated[int, cyclopts.Parameter(help="Avalanches of a campaign at most.")] = 1000,
+    out: Annotated[Path | None, cyclopts.Parameter(name="--json", help="File for the figures.")] = None,
 ) -> None:
     """Measure."""
     with tempfile.TemporaryDirectory(prefix="diagnose-") as scratch:
-        folder = Path(scratch)
+        folder, rows = Path(scratch), list[dict[str, Any]]()
         for law in LAWS:
             timed("not counted: Ryggfonn", "ryggfonn", law, folder / "report")
-        rows = [timed("Ryggfonn", "ryggfonn", law, folder / "report") for law in LAWS]
-        for seed, hidden in DENSE:
-            trial, campaign = draw_trial(seed, kind="dense", hidden=hidden), folder / f"dense-{seed}"
-            write_campaign(trial.campaign, campaign)
-            law = trial.truth["base_model"]
-            rows.append(timed(f"dense, {hidden}", campaign, law, folder / "report"))
-    if out is not None:
-        out.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+        campaigns: list[tuple[str, Path | str, str]] = [("Ryggfonn", "ryggfonn", law) for law in LAWS]
+        for number, (name, campaign, law) in enumerate(simulated(largest)):
+            write_campaign(campaign, folder / f"{number}")
+            campaigns.append((name, folder / f"{number}", law))
+        for name, place, law in campaigns:
+            rows.append(timed(name, place, law, folder / "report"))
+            if out is not None:
+                write(out, {"commit": commit(), "runs": rows})
 
 
 if __name__ == "__main__":

@@ -5,15 +5,16 @@ from benchmarks.page.results import result_of
 
 def diagnosis() -> str:
     """What a diagnosis and concealed trials cost."""
-    here, slower = result_of("forward"), result_of("forward_slower")
+    here, slower, times = result_of("forward"), result_of("forward_slower"), result_of("diagnose_time")
     rows = ""
-    for row in result_of("diagnose_time"):
+    for row in times["runs"]:
         stages = ", ".join(f"{name} {value:.0f}" for name, value in row["stages"].items() if value >= 0.5)
         rows += f"| {row['campaign']} | {row['base_model']} | {stages} |\n"
     whole = "".join(
         f"| {row['campaign']} | {row['base_model']} | {row['events']} events, {row['sensors']} sensors"
-        f" | {row['verdict_seconds']:.0f} | {row['seconds']:.0f} | {row['verdict']} |\n"
-        for row in result_of("diagnose_time")
+        f" | {row['verdict_seconds']:.0f} | {row['seconds']:.0f} | {row['cpu_seconds']:.0f}"
+        f" | {row['memory_gb']:.1f} | {row['verdict']} |\n"
+        for row in times["runs"]
     )
     more = [slower[name] / here[name] for name in ("kernel", "pure Python")]
     proof = result_of("prove_throughput")
@@ -27,22 +28,22 @@ def diagnosis() -> str:
 
 `python -m benchmarks.diagnose_time --json benchmarks/results/diagnose_time.json`: `skred diagnose` by the
 clock, everything compiled, both cores free, loading packages included: until its verdict is written, and
-until report and figures are. Asked for the verdict: 60 s on 22 sparse events, 120 s on 15 events with 40
-gates.
+until report and figures are; by commit {times["commit"]}. Asked: 40 s on 22 avalanches at 4 sensors, 60 s
+on 15 with 40 gates, 5 minutes on 200 at 4 sensors, 25 on 1000, and at most 4 GB.
 
-| campaign | base law | recordings | verdict after [s] | report after [s] | verdict |
-| --- | --- | --- | --- | --- | --- |
+| campaign | base law | recordings | verdict after [s] | report after [s] | CPU [s] | memory [GB] | verdict |
+| --- | --- | --- | --- | --- | --- | --- | --- |
 {whole}
-Of that the stages [s]; the rest are packages and the report. All of this was measured on another machine
-with two cores, slower and of a varying speed: at its fastest the kernel takes {slower["kernel"]:.2f} us and
-pure Python {slower["pure Python"]:.0f} us, {more[0]:.1f} and {more[1]:.1f} times what they take above
-(`python -m benchmarks.forward --json benchmarks/results/forward_slower.json`).
+Of that the stages [s]; the rest are packages and the report.
 
 | campaign | base law | stages |
 | --- | --- | --- |
 {rows}
 `python -m benchmarks.prove_throughput --trials {n} --json benchmarks/results/prove_throughput.json`:
-{n} sparse trials that hide nothing, starting the workers included; on that slower machine.
+{n} sparse trials that hide nothing, starting the workers included, by the code of 22 November. This was on
+another machine with two cores, slower and of a varying speed: at its fastest the kernel takes
+{slower["kernel"]:.2f} us and pure Python {slower["pure Python"]:.0f} us, {more[0]:.1f} and {more[1]:.1f}
+times what they take above (`python -m benchmarks.forward --json benchmarks/results/forward_slower.json`).
 
 | workers | seconds | CPU seconds a trial |
 | --- | --- | --- |
