@@ -37,11 +37,12 @@ def recomputed(
     """
     height = {name: candidate.log_bayes_factor for name, candidate in candidates.items()}
     force = [one.log_bayes_factor for one in profiles]
-    # What is less probable than nothing raises no alarm with some nats more.
-    least = max(max(best, *height.values(), *force) - COUNTS, 0.0)
+    # Nothing is one of those compared: what it is told from by a few nats is known as well as it is.
+    least = max(best, 0.0, *height.values(), *force) - COUNTS
     leading = [name for name in height if height[name] > least]
     beside = any(candidates[name].residue is not None for name in leading)
-    some = max(force) - COUNTS if beside else least
+    # A force takes longer than all mechanisms; one less probable than nothing raises no alarm with some more.
+    some = max(force) - COUNTS if beside else max(least, 0.0)
     worth = [k for k, factor in enumerate(force) if factor > some]
     # Each waits for jobs of the pool, and takes none of its threads for that.
     with ThreadPoolExecutor(len(KINDS)) as waiting:
