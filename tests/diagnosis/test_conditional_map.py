@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from diagnosis_cases import base_of, dense_base, ryggfonn_base, sparse_base, trial
@@ -143,7 +145,7 @@ def test_groups_are_separate_calls() -> None:
 def many() -> tuple[Base, Rows, np.ndarray, np.ndarray]:
     """Forty campaigns of the sparse base law under normal errors, with true points and fronts."""
     base, n_groups = sparse_base(), 40
-    extension = extended(base.problem, base.law)
+    extension = extended(replace(base.problem, error_model=ERROR_MODELS["normal"]), base.law)
     factor = np.linalg.cholesky(base.population.covariance)
     rows, points = bootstrap_campaigns(
         extension,
@@ -151,7 +153,6 @@ def many() -> tuple[Base, Rows, np.ndarray, np.ndarray]:
         np.tile(base.population.mean, (n_groups, 1)),
         np.tile(factor, (n_groups, 1, 1)),
         np.random.default_rng(3),
-        ERROR_MODELS["normal"],
     )
     return base, rows, points, extension.predict(rows.event, points, NONE)
 
@@ -203,11 +204,11 @@ def test_replicas_under_other_errors(model: str) -> None:
     """Variance, and correlation of two speeds of an event, as each error model has them."""
     base, n_groups = sparse_base(), 120
     errors = ERROR_MODELS[model].errors
-    extension = extended(base.problem, base.law)
+    extension = extended(replace(base.problem, error_model=ERROR_MODELS[model]), base.law)
     factor = np.linalg.cholesky(base.population.covariance)
     rows, points = bootstrap_campaigns(
         extension, NONE, np.tile(base.population.mean, (n_groups, 1)),
-        np.tile(factor, (n_groups, 1, 1)), np.random.default_rng(5), ERROR_MODELS[model],
+        np.tile(factor, (n_groups, 1, 1)), np.random.default_rng(5),
     )  # fmt: skip
     z = standardised(rows, extension.predict(rows.event, points, NONE))
     first, second = z[:, 0], z[:, 1]
