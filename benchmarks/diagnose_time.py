@@ -99,7 +99,7 @@ def main(
         for name, place, law in campaigns:
             rows.append(timed(name, place, law, folder / "report"))
             if out is not None:
-                write(out, {"commit": commit(), "runs": rows})
+                write(out, {"commit": commit(), "largest": largest, "runs": rows})
 
 
 if __name__ == "__main__":
