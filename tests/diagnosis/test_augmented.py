@@ -262,6 +262,7 @@ def test_the_tree_has_all_groups(problem: AugmentedProblem, calibration: Any) ->
         assert set(tree[group].data_vars) == set(tree["observed_data"].data_vars)
     assert np.isfinite(tree["log_likelihood"]["recordings"].values).all()
     assert tree["constant_data"]["added_strength"].values.tolist() == ["turbulent_drag"]
+    assert calibration.entry()["added"][0]["id"] == "turbulent_drag"
 
 
 def test_recorded_avalanches_do_what_was_recorded(problem: AugmentedProblem, calibration: Any) -> None:

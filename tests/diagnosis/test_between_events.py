@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -246,16 +247,23 @@ def test_only_physics_of_track_and_stretch_may_differ() -> None:
     assert not differ & {"sensor_bias", "release_offset", "covariate_friction"}
 
 
-def test_of_one_each_has_its_own(few: tuple[Base, Curve]) -> None:
-    """What it may have is a component; what avalanches to come have is drawn. In two they cannot differ."""
+def test_of_two_both_are_components(few: tuple[Base, Curve]) -> None:
+    """Each pair is a component; what avalanches to come have is drawn for each of them."""
     base, found = few
-    added = augmented_problem(base, [found], SOME).added
-    samples = {"segment_friction": np.full(500, 2.0), "segment_friction_share": np.full(500, 0.3)}
-    own, log_shares = components_of(added, samples)
-    assert own.shape == (500, 2, 1)
+    problem = augmented_problem(base, [found], SOME)
+    (one,) = problem.added
+    other: Any = replace(one, name="other", between=SPREAD)
+    samples = {
+        "segment_friction": np.full(500, 2.0),
+        "segment_friction_share": np.full(500, 0.3),
+        "other": np.full(500, 1.0),
+        "other_spread": np.full(500, 0.4),
+    }
+    own, log_shares = components_of([one, other], samples)
+    assert own.shape == (500, 50, 2)
     assert_allclose(np.exp(log_shares).sum(axis=1), 1.0)
-    rows = new_rows(added, samples, np.random.default_rng(1), 8)
-    assert rows.shape == (500, 8, 1)
+    rows = new_rows([one, other], samples, np.random.default_rng(1), 8)
+    assert rows.shape == (500, 8, 2)
     assert abs((rows[..., 0] > 0.0).mean() - 0.3) < 0.03
     with pytest.raises(ValueError, match="differ in none"):
         augmented_problem(base, [found, found], SOME)

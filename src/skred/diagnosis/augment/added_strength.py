@@ -120,29 +120,39 @@ def components_of(
 ) -> tuple[FloatArray, FloatArray]:
     """Added strengths that avalanches may have, (n, n_components, n_added), and log shares that have each.
 
-    Where nothing differs between avalanches, as in two, there is one component.
+    Where nothing differs between avalanches there is one component; of two that do, each pair is one.
 
     Parameters
     ----------
     samples : mapping
         Arrays by name of parameter, n values each.
     """
-    if len(added) == 1:
-        own, log_shares = components(added[0].between, *_given(added[0], samples))
-        return own[:, :, None], log_shares
-    rows = np.column_stack([_given(one, samples)[0] for one in added])
-    return rows[:, None], np.zeros((len(rows), 1))
+    n = len(np.ravel(samples[added[0].name]))
+    own, log_shares = np.empty((n, 1, 0)), np.zeros((n, 1))
+    for one in added:
+        more, shares = components(one.between, *_given(one, samples))
+        first, second = own.shape[1], more.shape[1]
+        both = np.empty((n, first, second, own.shape[2] + 1))
+        both[..., :-1], both[..., -1] = own[:, :, None], more[:, None]
+        own = both.reshape(n, first * second, -1)
+        log_shares = (log_shares[:, :, None] + shares[:, None]).reshape(n, -1)
+    return own, log_shares
 
 
 def symbolic_components_of(added: Sequence[AddedStrength], strengths: Sequence[Any]) -> tuple[Any, Any]:
     """As `components_of`, of symbolic strengths in the current PyMC model: a matrix and a vector."""
     import pytensor.tensor as pt
 
-    if len(added) == 1:
-        way, parameter = added[0].between, variable(added[0].between, added[0].between_name)
-        own, log_shares = symbolic_components(way, strengths[0], parameter)
-        return own[:, None], log_shares
-    return pt.stack(list(strengths))[None], pt.zeros(1)
+    parts = [
+        symbolic_components(one.between, strength, variable(one.between, one.between_name))
+        for one, strength in zip(added, strengths, strict=True)
+    ]
+    own, log_shares = parts[0][0][:, None], parts[0][1]
+    for more, shares in parts[1:]:
+        first, second = own.shape[0], more.shape[0]
+        own = pt.concatenate([pt.repeat(own, second, axis=0), pt.tile(more, first)[:, None]], axis=1)
+        log_shares = pt.repeat(log_shares, second) + pt.tile(shares, first)
+    return own, log_shares
 
 
 def new_rows(

@@ -36,6 +36,7 @@ from skred.inference.hierarchical.rough_population import moments_of
 from skred.inference.hierarchical.surface import Surfaces
 from skred.inference.results import draws_by_name
 from skred.parallel.threads import in_parts, side_by_side
+from skred.physics.kernel.fronts import front_speeds
 from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
 
@@ -234,6 +235,23 @@ class AugmentedProblem(HierarchicalProblem):
         parts = exact.reshape(*log_shares.shape, -1) + log_shares[:, :, None]
         together: FloatArray = np.logaddexp.reduce(parts, axis=1)
         return self.log_likelihood(law, samples)[:, chosen] - together
+
+    def speeds(
+        self,
+        mechanisms: Sequence[Mechanism],
+        strengths: FloatArray,
+        release_s_m: float | FloatArray,
+        release_speed_m_s: float | FloatArray = 0.0,
+    ) -> FloatArray:
+        """Front speed [m/s] at the cell edges, what is added as strong as its posterior mean."""
+        extension = self.extension
+        added = np.concatenate([self.base.strengths, self.tables.located.mean])
+        columns = np.repeat(added, [len(d.columns) for d in extension.directions])
+        rows = np.column_stack([np.asarray(strengths, float), np.tile(columns, (len(strengths), 1))])
+        releases = np.full(len(rows), release_s_m, dtype=float)  # where fronts start, an offset included
+        law = extension.contributions
+        speeds: FloatArray = front_speeds(rows, releases, self.path, law, release_speed_m_s)
+        return speeds
 
     def finer(self, law: Law, posterior: xr.Dataset) -> AugmentedProblem | None:
         """The same with finer tables; None where there are such already.
