@@ -150,3 +150,18 @@ def test_what_a_force_beside_adds() -> None:
     """With it or without it, at even odds."""
     assert log_gain(-50.0) == pytest.approx(np.log(0.5)) and log_gain(0.0) == pytest.approx(0.0)
     assert log_gain(50.0) == pytest.approx(50.0 + np.log(0.5))
+
+
+def test_nothing_is_one_of_those_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A mechanism a little less probable than nothing is computed again; one far less probable is not."""
+    base, drag, _ = fitted(rolling(2.4e-4, n_events=6))
+    heights = {"turbulent_drag": -1.0, "viscous_drag": -7.0}
+    candidates = {
+        name: replace(drag, mechanism=mechanisms()[name], correction=height - drag.alone)
+        for name, height in heights.items()
+    }
+    monkeypatch.setattr("skred.diagnosis.compare.recomputed.computed_again", lambda *given: (5.0, 0.125))
+    with ThreadPoolExecutor(1) as pool:
+        found, _ = recomputed(base, candidates, [], pool)
+    assert found["turbulent_drag"].error == 0.125
+    assert found["viscous_drag"] is candidates["viscous_drag"]
