@@ -19,7 +19,7 @@ BASE: Any = SimpleNamespace(law=SimpleNamespace(id="pcm"), problem=None, plain=l
 def compared(**shares: float) -> Any:
     """A comparison with these probabilities."""
     ways = (BetweenEvents.COMMON,)
-    candidates = {name: SimpleNamespace(best=name, likely_ways=ways) for name in shares}
+    candidates = {name: SimpleNamespace(best=name, likely_ways=ways, ways=None) for name in shares}
     under_errors = SimpleNamespace(base=BASE, candidates=candidates)
     return SimpleNamespace(probability=shares, leading=lambda name: under_errors, log_odds=3.0)
 
@@ -34,7 +34,7 @@ class MadeUp(Adding):
         self.p_values, self.second, self.gates = iter(p_values), second, iter(passed)
         self.p_of_odds = repeat(p_of_odds)
 
-    def calibrated(self, base: Any, chosen: Any, way: Any) -> Any:
+    def calibrated(self, base: Any, chosen: Any, way: Any, ways: Any) -> Any:
         return SimpleNamespace(gate=SimpleNamespace(passed=next(self.gates), problems=("r-hat",)))
 
     def checked(self, base: Any, calibration: Any, chosen: Any) -> Any:

@@ -16,8 +16,8 @@ from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.diagnosis.augment.added_strength import components_of, new_rows
 from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.augment.coefficient import multiples_of_events
-from skred.diagnosis.compare.between import TABLES, gains_or_none, may_differ, ways_of
-from skred.diagnosis.compare.candidate import BESIDE, log_gain
+from skred.diagnosis.compare.between import finer, may_differ, searched
+from skred.diagnosis.compare.candidate import BESIDE, gains_of, log_gain
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
 from skred.diagnosis.evidence.extension import extended, setting_of
@@ -145,7 +145,7 @@ def dense_log_evidence(base: Base, found: Curve, way: BetweenEvents) -> float:
 def test_gains_are_those_of_dense_grids(few: tuple[Base, Curve]) -> None:
     base, found = few
     gains, dense = (
-        gains_or_none(base, found, TABLES),
+        gains_of(finer(base, found, searched(base, found))),
         {way: dense_log_evidence(base, found, way) for way in BetweenEvents},
     )
     exact = {way: value - dense[COMMON] for way, value in dense.items()}
@@ -160,7 +160,7 @@ def test_a_base_law_with_the_term_has_the_same_evidence() -> None:
     assert drag.added is not None
     shape = drag.added.shapes(coulomb.setting)[0]
     found = curve_near(coulomb, curve(coulomb, drag, shape), shape)
-    ways = ways_of(coulomb, found)
+    ways = finer(coulomb, found, searched(coulomb, found))
     common = ways[COMMON].populations.log_evidence
     differ = ways[SPREAD].populations.log_evidence - coulomb.fit.found.log_evidence
     assert differ - found.log_bayes_factor > 20.0

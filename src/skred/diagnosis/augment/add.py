@@ -10,6 +10,7 @@ from skred.diagnosis.augment.check_again import Again, check_again
 from skred.diagnosis.augment.reference import Reference
 from skred.diagnosis.augment.step import Augmented, Left, NotAugmented, Step
 from skred.diagnosis.check.decision import decide
+from skred.diagnosis.compare.candidate import Ways
 from skred.diagnosis.compare.comparison import Comparison, compare
 from skred.diagnosis.effort import Run
 from skred.diagnosis.evidence.coefficient import Base, Curve
@@ -37,9 +38,11 @@ class Adding:
     reference: Reference
     run: Run
 
-    def calibrated(self, base: Base, chosen: Sequence[Curve], way: BetweenEvents) -> Calibration:
+    def calibrated(
+        self, base: Base, chosen: Sequence[Curve], way: BetweenEvents, ways: Ways | None
+    ) -> Calibration:
         """The law with what is chosen added, calibrated; avalanches may differ in it where it is one."""
-        problem, settings = augmented_problem(base.plain(), chosen, way), self.run.settings
+        problem, settings = augmented_problem(base.plain(), chosen, way, ways), self.run.settings
         # Its chains start around the posterior: half the tuning does.
         return calibrate_surely(problem, base.law, replace(settings, tune=settings.tune // 2))
 
@@ -76,7 +79,7 @@ def add_mechanisms(
         reference.begin(under_errors.base.problem)
         # What cannot be sampled where avalanches differ is still an effect with a strength in common.
         for way in dict.fromkeys((*(candidate.likely_ways if number == 0 else ()), BetweenEvents.COMMON)):
-            calibration = adding.calibrated(under_errors.base, chosen, way)
+            calibration = adding.calibrated(under_errors.base, chosen, way, candidate.ways)
             if calibration.gate.passed:
                 break
         if not calibration.gate.passed:

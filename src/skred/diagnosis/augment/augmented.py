@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import skred.diagnosis.augment.results  # noqa: F401 - registers what it says of readings
 from skred.diagnosis.augment.added_strength import added_strengths
 from skred.diagnosis.augment.problem import AugmentedProblem
-from skred.diagnosis.compare.between import ways_of
+from skred.diagnosis.compare.between import finer, searched
+from skred.diagnosis.compare.candidate import Ways
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import FINE
 from skred.diagnosis.tabulated.coefficient_grid import TABLES, from_nothing, locate
@@ -16,7 +17,10 @@ from skred.inference.between_events import BetweenEvents
 
 
 def augmented_problem(
-    base: Base, curves: Sequence[Curve], way: BetweenEvents = BetweenEvents.COMMON
+    base: Base,
+    curves: Sequence[Curve],
+    way: BetweenEvents = BetweenEvents.COMMON,
+    ways: Ways | None = None,
 ) -> AugmentedProblem:
     """Problem of a base law with the mechanisms of some curves added, one or two.
 
@@ -27,6 +31,8 @@ def augmented_problem(
     ----------
     way : BetweenEvents
         How avalanches differ in what is added, where that is one.
+    ways : mapping of BetweenEvents to Way, optional
+        What a comparison has of it; looked for otherwise.
 
     Raises
     ------
@@ -43,7 +49,7 @@ def augmented_problem(
     elif len(curves) > 1:
         raise ValueError("of two mechanisms that are added avalanches can differ in none")
     else:
-        found = ways_of(base, curves[0])[way]
+        found = (ways or finer(base, curves[0], searched(base, curves[0])))[way]
         # Half the steps of a comparison's: what is left of errors there is between the strengths.
         located = from_nothing(curves[0], found.populations, *found.strength).finer
     old, tables = base.problem, build_tables(base, extension, located, FINE)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import batched
 from typing import NamedTuple
 
@@ -26,7 +27,8 @@ from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
 from skred.diagnosis.evidence.linear_mixed_model import Scores, fit_population
 from skred.diagnosis.limits import LIMIT, NOTHING_AT_MOST
-from skred.parallel.threads import side_by_side, threads
+from skred.parallel.processes import worker_pool
+from skred.parallel.threads import threads
 
 FloatArray = NDArray[np.float64]
 _ENOUGH_ABOVE = 4
@@ -98,12 +100,11 @@ def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_o
     test = ScoreTest(base.problem, base.law, base.setting, base.directions, base.strengths)
 
     def by_fronts(refitted: _Refitted, first: int) -> Iterator[float]:
-        def one(group: int) -> float:
-            rng = np.random.default_rng([seed, 22, first + group])
-            return log_odds_by_fronts(base, test, *refitted.one(group), log_odds, rng)
-
-        for some in batched(range(len(refitted.log_odds)), threads()):
-            yield from side_by_side(one, some)
+        with worker_pool() as pool:
+            for some in batched(range(len(refitted.log_odds)), threads()):
+                rngs = [np.random.default_rng([seed, 22, first + group]) for group in some]
+                campaigns = zip(*map(refitted.one, some), strict=True)
+                yield from pool.map(partial(log_odds_by_fronts, base, test, log_odds), *campaigns, rngs)
 
     to_place = math.log((1.0 - NOTHING_AT_MOST) / NOTHING_AT_MOST) < log_odds < _RARE
     most = _FEWEST if to_place else _FEW

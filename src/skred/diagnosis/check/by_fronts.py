@@ -33,10 +33,10 @@ FloatArray = NDArray[np.float64]
 def log_odds_by_fronts(
     base: Base,
     score_test: ScoreTest,
+    reach: float,
     rows: Rows,
     start: tuple[Population, FloatArray],
     scores: Scores,
-    reach: float,
     rng: np.random.Generator,
 ) -> float:
     """Log odds of anything against nothing of one simulated campaign.
@@ -45,14 +45,14 @@ def log_odds_by_fronts(
     ----------
     base : Base
         The law that it was simulated from.
+    reach : float
+        The odds to compare with.
     rows : Rows
         The campaign's, of one group.
     start : (Population, (n_events, n_base + 1) array)
         Fitted to it.
     scores : Scores
         Of one group.
-    reach : float
-        The odds to compare with.
     """
     fit = refit(base.extended(), rows, base.strengths[None, :], start, Rounds(USUAL))[0]
     simulated = replace(base, rows=rows, fit=fit)

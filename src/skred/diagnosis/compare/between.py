@@ -7,24 +7,25 @@ what counts is what each has more than the strength in common.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.candidate import Candidate, Ways
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import FINE, Budget
 from skred.diagnosis.evidence.tolerance import COUNTS
-from skred.diagnosis.tabulated.between_evidence import BetweenTarget, Way, between_evidence, search, way_of
+from skred.diagnosis.tabulated.between_evidence import BetweenTarget, between_evidence, searched_evidence
 from skred.diagnosis.tabulated.tables import wide_tables
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism
 
-TABLES = Budget(64, 64, 128, 1.5, 1.8), FINE
-"""Quadrature points of an event in each table: to find where modes are, and then there."""
+SEARCH = Budget(64, 64, 128, 1.5, 1.8)
+"""Quadrature points of an event in the tables by which modes are looked for."""
 
 
 def may_differ(mechanism: Mechanism) -> bool:
@@ -51,49 +52,37 @@ def with_ways(
         The most that a candidate has under another error model, in nats above nothing under this one.
     """
     looked = [one for one in candidates.values() if may_differ(one.mechanism) and one.alone > 0.0]
-
-    def gained(some: Sequence[Candidate], budgets: Sequence[Budget]) -> list[Candidate]:
-        gains = pool.map(partial(gains_or_none, base, budgets=budgets), [one.best for one in some])
-        return [replace(one, ways=ways) for one, ways in zip(some, gains, strict=True)]
-
-    looked = gained(looked, TABLES[:1])
+    found = pool.map(partial(or_none, searched, base), [one.best for one in looked])
+    looked = [replace(one, ways=ways) for one, ways in zip(looked, found, strict=True)]
     least = max([best, *(one.log_bayes_factor for one in looked)]) - COUNTS
-    found = [*looked, *gained([one for one in looked if one.log_bayes_factor > least], TABLES)]
-    return {**candidates, **{one.mechanism.id: one for one in found}}
+    leading = [one for one in looked if one.log_bayes_factor > least and one.ways is not None]
+    found = pool.map(
+        partial(or_none, finer, base), [one.best for one in leading], [one.ways for one in leading]
+    )
+    again = [replace(one, ways=ways) for one, ways in zip(leading, found, strict=True)]
+    return {**candidates, **{one.mechanism.id: one for one in (*looked, *again)}}
 
 
-def gains_or_none(base: Base, curve: Curve, budgets: Sequence[Budget]) -> dict[BetweenEvents, float] | None:
-    """What each way has more than the strength in common, in nats; parameters as `ways_of` has them.
-
-    None where some way has no density that draws find.
-    """
+def or_none(compute: Callable[..., Ways], *given: Any) -> Ways | None:
+    """What is computed; None where some way has no density that draws find."""
     try:
-        ways = ways_of(base, curve, budgets)
+        return compute(*given)
     except np.linalg.LinAlgError:
         return None
-    common = ways[BetweenEvents.COMMON].populations.log_evidence
-    return {kind: way.populations.log_evidence - common for kind, way in ways.items()}
 
 
-def ways_of(base: Base, curve: Curve, budgets: Sequence[Budget] = TABLES) -> dict[BetweenEvents, Way]:
-    """Evidence of each way at a curve's shape.
-
-    Parameters
-    ----------
-    budgets : sequence of Budget
-        Quadrature points of an event in the tables by which modes are looked for, and in those by which
-        evidence is computed around the populations that were found; one where they are the same.
-    """
+def searched(base: Base, curve: Curve) -> Ways:
+    """Each way at a curve's shape, by tables that are fine enough to find where it is."""
     near = curve.nearest(curve.moments[0]).found
-    tables = wide_tables(base, curve, near, budgets[0])
-    targets = {kind: BetweenTarget(base, curve, tables, kind) for kind in BetweenEvents}
-    found = {kind: search(target, near) for kind, target in targets.items()}
-    if len(budgets) == 1:
-        return {kind: way_of(target, found[kind]) for kind, target in targets.items()}
-    best = max(found, key=lambda kind: math.log(PRIOR[kind]) + found[kind].log_integral)
-    around = way_of(targets[best], found[best]).populations
-    tables = wide_tables(base, curve, around, budgets[1])
+    tables = wide_tables(base, curve, near, SEARCH)
+    return {kind: searched_evidence(BetweenTarget(base, curve, tables, kind), near) for kind in BetweenEvents}
+
+
+def finer(base: Base, curve: Curve, ways: Ways) -> Ways:
+    """The same by many more quadrature points, around the populations of the most probable way."""
+    around = max(ways, key=lambda kind: math.log(PRIOR[kind]) + ways[kind].populations.log_evidence)
+    tables = wide_tables(base, curve, ways[around].populations, FINE)
     return {
-        kind: between_evidence(BetweenTarget(base, curve, tables, kind), one.proposal)
-        for kind, one in found.items()
+        kind: between_evidence(BetweenTarget(base, curve, tables, kind), way.proposal)
+        for kind, way in ways.items()
     }

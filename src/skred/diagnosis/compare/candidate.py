@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.evidence.coefficient import Curve
+from skred.diagnosis.tabulated.between_evidence import Way
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.physics.mechanisms.spec import Group, Mechanism
 from skred.physics.mechanisms.stretches import is_opposed
@@ -27,19 +28,29 @@ BESIDE = 0.5
 another one, has more evidence than it: then something acts beside it or in its place, at even odds."""
 
 
-def log_gain(residue: float | None, ways: Mapping[BetweenEvents, float] | None = None) -> float:
+Ways = Mapping[BetweenEvents, Way]
+"""Each way in which avalanches may differ in a mechanism's strength."""
+
+
+def gains_of(ways: Ways) -> dict[BetweenEvents, float]:
+    """What each way has more than the strength in common, in nats."""
+    common = ways[BetweenEvents.COMMON].populations.log_evidence
+    return {kind: way.populations.log_evidence - common for kind, way in ways.items()}
+
+
+def log_gain(residue: float | None, gains: Mapping[BetweenEvents, float] | None = None) -> float:
     """What is added to a mechanism's log Bayes factor, of what was looked at with its prior probability.
 
     Parameters
     ----------
     residue : float or None
         Log Bayes factor of a force beside it.
-    ways : mapping of BetweenEvents to float, optional
+    gains : mapping of BetweenEvents to float, optional
         What each way in which avalanches may differ has more than the strength in common.
     """
     own = 0.0
-    if ways is not None:
-        own = float(np.logaddexp.reduce([math.log(PRIOR[kind]) + gain for kind, gain in ways.items()]))
+    if gains is not None:
+        own = float(np.logaddexp.reduce([math.log(PRIOR[kind]) + gain for kind, gain in gains.items()]))
     if residue is None:
         return own
     return float(np.logaddexp(math.log1p(-BESIDE) + own, math.log(BESIDE) + residue))
@@ -69,9 +80,8 @@ class Candidate:
         Standard error of the log Bayes factor by importance sampling, in nats; None where not looked at.
     residue : float or None
         Log Bayes factor of a force not in the list beside it; None where not looked at.
-    ways : mapping of BetweenEvents to float, or None
-        What each way in which avalanches may differ in the strength has more than the strength in common, in
-        nats; None where not looked at.
+    ways : mapping of BetweenEvents to Way, or None
+        Each way in which avalanches may differ in the strength; None where not looked at.
     """
 
     mechanism: Mechanism
@@ -80,7 +90,7 @@ class Candidate:
     correction: float = 0.0
     error: float | None = None
     residue: float | None = None
-    ways: Mapping[BetweenEvents, float] | None = None
+    ways: Ways | None = None
 
     @property
     def log_factors(self) -> FloatArray:
@@ -95,7 +105,7 @@ class Candidate:
     @property
     def log_bayes_factor(self) -> float:
         """Against nothing; differing, or with a force not in the list beside it, as far as is probable."""
-        return self.alone + log_gain(self.residue, self.ways)
+        return self.alone + log_gain(self.residue, self.gains)
 
     @property
     def in_common(self) -> float:
@@ -103,12 +113,17 @@ class Candidate:
         return self.alone + log_gain(self.residue)
 
     @property
+    def gains(self) -> dict[BetweenEvents, float] | None:
+        """What each way has more than the strength in common, in nats; None where not looked at."""
+        return None if self.ways is None else gains_of(self.ways)
+
+    @property
     def between(self) -> dict[BetweenEvents, float]:
         """Probability of each way in which avalanches may differ in the strength."""
-        ways = {BetweenEvents.COMMON: 0.0} if self.ways is None else self.ways
-        heights = np.array([math.log(PRIOR[kind]) + gain for kind, gain in ways.items()])
+        gains = self.gains or {BetweenEvents.COMMON: 0.0}
+        heights = np.array([math.log(PRIOR[kind]) + gain for kind, gain in gains.items()])
         shares = np.exp(heights - np.logaddexp.reduce(heights))
-        return dict.fromkeys(BetweenEvents, 0.0) | dict(zip(ways, shares.tolist(), strict=True))
+        return dict.fromkeys(BetweenEvents, 0.0) | dict(zip(gains, shares.tolist(), strict=True))
 
     @property
     def likely_ways(self) -> tuple[BetweenEvents, ...]:

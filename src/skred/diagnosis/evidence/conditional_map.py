@@ -205,9 +205,12 @@ def deviations(points: FloatArray, rows: Rows, population: Population) -> FloatA
 def log_joint(likelihood: EventLikelihood, points: FloatArray, population: Population) -> FloatArray:
     """Log likelihood of each row plus the exponent of its population's density, (n_rows,)."""
     deviation = deviations(points, likelihood.rows, population)
-    return likelihood.at(points) - 0.5 * np.einsum(
-        "ri,rij,rj->r", deviation, population.precision[likelihood.rows.group], deviation
-    )
+    return likelihood.at(points) - _half_square(deviation, population.precision[likelihood.rows.group])
+
+
+def _half_square(deviation: FloatArray, precision: FloatArray) -> FloatArray:
+    """Minus the exponent of a normal density, (n_rows, n) and (n_rows, n, n) to (n_rows,)."""
+    return 0.5 * np.einsum("ri,rij,rj->r", deviation, precision, deviation)
 
 
 def event_modes(
@@ -234,16 +237,15 @@ def event_modes(
 
 def _climbed(likelihood: EventLikelihood, start: FloatArray, population: Population, n_steps: int) -> Modes:
     """Where damped Gauss-Newton steps from one place lead."""
-    points, precision = start.copy(), population.precision
-    best = log_joint(likelihood, points, population)
+    points, precision = start.copy(), population.precision[likelihood.rows.group]
+    best = likelihood.at(points) - _half_square(deviations(points, likelihood.rows, population), precision)
     damping = np.full(len(points), _STARTING_DAMPING)
     active = np.arange(len(points))
     found: Modes | None = None
     for _ in range(n_steps):
-        part = likelihood.take(active)
+        part = likelihood if len(active) == len(points) else likelihood.take(active)
         around = look_around(part, points[active])
-        deviation = deviations(points[active], part.rows, population)
-        prior = precision[part.rows.group]
+        deviation, prior = deviations(points[active], part.rows, population), precision[active]
         gradient = np.einsum("ri,rij->rj", around.slope, around.by_points)
         gradient -= np.einsum("rij,rj->ri", prior, deviation)
         damped = around.information + prior
@@ -252,10 +254,11 @@ def _climbed(likelihood: EventLikelihood, start: FloatArray, population: Populat
         step = np.linalg.solve(damped, gradient[:, :, None])[:, :, 0]
         # By a factor e at most: tangents say nothing of a front three times as strong.
         step *= (1.0 / np.maximum(np.abs(step).max(axis=1), 1.0))[:, None]
-        new = log_joint(part, points[active] + step, population)
+        ahead = points[active] + step
+        new = part.at(ahead) - _half_square(deviations(ahead, part.rows, population), prior)
         gained = new - best[active]
         better = gained >= -1e-9
-        points[active[better]] += step[better]
+        points[active[better]] = ahead[better]
         best[active[better]] = new[better]
         damping[active] = np.where(better, 0.2 * damping[active], np.maximum(20.0 * damping[active], 0.1))
         if found is None:

@@ -129,22 +129,23 @@ class Extension:
         self, events: IntArray, points: FloatArray, strengths: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Strengths of all columns, releases and the speeds there, and factors of the readings."""
-        releases = self.problem.releases
+        releases, n = self.problem.releases, self.n_base
         place = releases.mean[events] + releases.sd[events] * points[:, -1]
-        # By the mechanisms added: of the first strength, of the readings, and what each event has of each.
-        log_shift, log_factor = np.zeros(len(events)), np.zeros((len(events), len(self.problem.sensors)))
-        own = np.ones((len(events), len(self.directions)))
+        rows = np.empty((len(events), n + len(self._owner)))
+        rows[:, :n] = points[:, :n]
+        rows[:, n:] = strengths[:, self._owner]
+        log_factor = np.zeros((1, len(self.problem.sensors)))
         for k, direction in enumerate(self.directions):
-            place = place + strengths[:, k] * direction.release
+            if direction.release:
+                place += strengths[:, k] * direction.release
             if direction.own is not None:
-                own[:, k] = direction.own[events]
+                rows[:, n:][:, self._owner == k] *= direction.own[events][:, None]
             if direction.log_strengths is not None:
-                log_shift += strengths[:, k] * direction.log_strengths[events]
+                rows[:, 0] += strengths[:, k] * direction.log_strengths[events]
             if direction.log_readings is not None:
-                log_factor[:, :-1] += np.outer(strengths[:, k], direction.log_readings)
-        logs = points[:, : self.n_base].copy()
-        logs[:, 0] += log_shift
-        rows = np.column_stack([np.exp(logs), (strengths * own)[:, self._owner]])
+                reads = np.append(direction.log_readings, 0.0)
+                log_factor = log_factor + np.outer(strengths[:, k], reads)
+        rows[:, :n] = np.exp(rows[:, :n])
         place = np.clip(place, releases.first, releases.length)
         return rows, place, releases.speeds(events, points[:, -1]), np.exp(log_factor)
 

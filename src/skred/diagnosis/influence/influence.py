@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from skred.diagnosis.compare.between import TABLES, gains_or_none
-from skred.diagnosis.compare.candidate import Candidate, log_gain
+from skred.diagnosis.compare.between import or_none, searched
+from skred.diagnosis.compare.candidate import Candidate, gains_of, log_gain
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of, most_probable
@@ -113,17 +113,21 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray) -> Influe
     else:
         candidate = under_errors.candidates[answer]
         again = _of_mechanism(candidate)
-        stated = candidate.alone + log_gain(None, candidate.ways)
+        stated = candidate.alone + log_gain(None, candidate.gains)
     n = len(base.rows.event)
     everything = np.ones(n, dtype=bool)
     kinds = _kinds(base)
     parts = [_Part(everything, chosen) for _, _, chosen in kinds]
-    whole, *found = side_by_side(lambda part: again(base, part), [_Part(everything), *parts])
     without_each = stated - gained
     needed = math.log((1.0 - LIMIT) / LIMIT * comparison.odds[NOTHING] / comparison.odds[answer])
-    order = np.argsort(without_each)
+    order, third = np.argsort(without_each), int(MOST * n)
+    parts = [_Part(everything), _first_left_out(order, third), *parts]
     # By the same, quicker method on both sides; only the difference is taken from it.
-    carried, left = _carried(lambda part: stated + again(base, part) - whole, order, needed)
+    whole, *found = side_by_side(lambda part: again(base, part), parts)
+    without_third, *without_kinds = stated + np.array(found) - whole
+    many, left = _carried(
+        lambda many: stated + again(base, _first_left_out(order, many)) - whole, third, without_third, needed
+    )
     ids = base.problem.campaign.event_ids
     return Influence(
         answer,
@@ -131,12 +135,12 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray) -> Influe
         needed,
         tuple(ids),
         without_each,
-        tuple(ids[k] for k in sorted(carried)),
-        left if carried else None,
-        None if carried else left,
+        tuple(ids[k] for k in sorted(order[:many])),
+        float(left) if many else None,
+        None if many else float(left),
         tuple(
             ReadingsLeftOut(kind, sensor, int(chosen.sum()), float(factor))
-            for (kind, sensor, chosen), factor in zip(kinds, stated + np.array(found) - whole, strict=True)
+            for (kind, sensor, chosen), factor in zip(kinds, without_kinds, strict=True)
         ),
     )
 
@@ -192,7 +196,8 @@ def _of_mechanism(candidate: Candidate) -> Again:
         if candidate.ways is None:
             return in_common
         best = max(found, key=lambda one: one[0])[1]
-        return in_common + log_gain(None, gains_or_none(rest, best, TABLES[:1]))
+        ways = or_none(searched, rest, best)
+        return in_common + log_gain(None, None if ways is None else gains_of(ways))
 
     return again
 
@@ -207,33 +212,35 @@ def _of_profile(profile: Profile) -> Again:
     return again
 
 
-def _carried(
-    factor: Callable[[_Part], float], order: NDArray[np.int64], needed: float
-) -> tuple[list[int], float | None]:
-    """The fewest first avalanches of an order without which an answer has too little; what it has then.
+def _first_left_out(order: NDArray[np.int64], many: int) -> _Part:
+    """The recordings without the first avalanches of an order."""
+    return _Part(~np.isin(np.arange(len(order)), order[:many]))
 
-    None, and what it has without a third of them, where that is still enough. The order is of what each
-    takes, so that each one more leaves less: their number is found by halving.
+
+def _carried(factor: Callable[[int], float], third: int, left: float, needed: float) -> tuple[int, float]:
+    """How many avalanches an answer needs, and what it has without; 0 where it has enough without a third.
+
+    They are left out in the order of what each takes, so that each one more leaves less: their number is
+    found by halving.
+
+    Parameters
+    ----------
+    factor : callable
+        What the answer has without the first so many.
+    third : int
+        How many a third are, without which it has `left`.
     """
-    n = len(order)
-
-    def without(many: int) -> float:
-        kept = np.ones(n, dtype=bool)
-        kept[order[:many]] = False
-        return factor(_Part(kept))
-
-    enough, too_many = 0, int(MOST * n)
-    left = without(too_many) if too_many else None
-    if left is None or left >= needed:
-        return [], left
+    if left >= needed:
+        return 0, left
+    enough, too_many = 0, third
     while too_many - enough > 1:
         many = (enough + too_many) // 2
-        there = without(many)
+        there = factor(many)
         if there < needed:
             too_many, left = many, there
         else:
             enough = many
-    return [int(k) for k in order[:too_many]], left
+    return too_many, left
 
 
 def _kinds(base: Base) -> list[tuple[str, str | None, BoolArray]]:

@@ -48,10 +48,13 @@ class Way(NamedTuple):
         The way's own, with mean and covariance over its posterior.
     strength : (float, float)
         Mean and standard deviation over it.
+    proposal : Mixture
+        Adapted to it.
     """
 
     populations: Evidence
     strength: tuple[float, float]
+    proposal: Mixture
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +114,8 @@ class BetweenTarget:
         return result
 
 
-def search(target: BetweenTarget, near: Evidence) -> Weighted:
-    """Look for the highest mode, and by draws around it how far the posterior reaches.
+def searched_evidence(target: BetweenTarget, near: Evidence) -> Way:
+    """One way, by draws around its highest mode, which is looked for.
 
     Parameters
     ----------
@@ -128,10 +131,10 @@ def search(target: BetweenTarget, near: Evidence) -> Weighted:
         tops.append(_climbed(target, np.array(start)))
     top = max(tops, key=lambda x: float(target(x[None])[0]))
     proposal = Mixture.on([Mode(top, _curvature(target, top))])
-    return weighted_draws(target, proposal, np.random.default_rng([0, 71]))
+    return _way(target, weighted_draws(target, proposal, np.random.default_rng([0, 71])))
 
 
-def way_of(target: BetweenTarget, found: Weighted) -> Way:
+def _way(target: BetweenTarget, found: Weighted) -> Way:
     """One way, from draws of its posterior."""
     shares = found.shares
     psi, strengths, _, _ = target.split(found.draws)
@@ -139,12 +142,12 @@ def way_of(target: BetweenTarget, found: Weighted) -> Way:
     away = psi - mean
     populations = Evidence(found.log_integral, mean, away.T @ (shares[:, None] * away))
     sd = math.sqrt(float(shares @ (strengths - middle) ** 2))
-    return Way(populations, (middle, sd))
+    return Way(populations, (middle, sd), found.proposal)
 
 
 def between_evidence(target: BetweenTarget, proposal: Mixture) -> Way:
     """One way, from a proposal that may be by other tables."""
-    return way_of(target, weighted_draws(target, proposal, np.random.default_rng([0, 72])))
+    return _way(target, weighted_draws(target, proposal, np.random.default_rng([0, 72])))
 
 
 def _climbed(target: BetweenTarget, start: FloatArray) -> FloatArray:
