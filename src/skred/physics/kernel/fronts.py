@@ -13,7 +13,7 @@ from skred.parallel.compile_cache import compiled, inner
 from skred.physics.kernel.columns import Column
 from skred.physics.kernel.inputs import Contributions, Path, cell_of, spans_of
 from skred.physics.kernel.march import fill_increments, fill_steps, fill_table, march, march_tangents
-from skred.physics.kernel.march_abreast import ABREAST, march_abreast, room
+from skred.physics.kernel.march_abreast import ABREAST, cells_alike, march_abreast, room
 from skred.physics.kernel.reading import read, read_tangents
 from skred.physics.kernel.scaled_ground import scale_ground
 
@@ -49,6 +49,7 @@ def fill_readings(  # type: ignore[no-untyped-def]
     spans = spans_of(profiles)
     table = np.zeros((_N_COLUMNS, n_cells))
     keep, gain, v = np.empty(n_cells), np.empty(n_cells), np.empty(n_cells + 1)
+    alike = cells_alike(profiles[:, : n_cells if speed_terms else 1])
     own, work, rows, runouts, lasts, firsts = room(columns.size, n_cells if speed_terms else 0)
     # All that only tangents need is empty without them.
     n_rows = n_cells if n_tangents > 0 else 0
@@ -68,7 +69,7 @@ def fill_readings(  # type: ignore[no-untyped-def]
             if place == 0:
                 march_abreast(
                     run, strengths, releases, start_v, edge, ground, scaled, barriers, limits, columns,
-                    profiles, u_c, own, work, rows, runouts, lasts, firsts,
+                    profiles, alike, u_c, own, work, rows, runouts, lasts, firsts,
                 )  # fmt: skip
             for i in range(n_cells + 1):
                 v[i] = rows[place, i]

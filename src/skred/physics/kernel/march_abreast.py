@@ -32,6 +32,17 @@ _LEAST_SHARE = 0.5
 """Share of the speed below which a cell would slow a front so much that the first guess is no guess."""
 
 
+@inner()
+def cells_alike(profiles):  # type: ignore[no-untyped-def]
+    """Whether the strengths enter each cell as they enter the one above it."""
+    alike = np.ones(profiles.shape[1], dtype=np.bool_)
+    alike[0] = False
+    for k in range(profiles.shape[0]):
+        for i in range(1, alike.size):
+            alike[i] &= profiles[k, i] == profiles[k, i - 1]
+    return alike
+
+
 @inner(fastmath={"contract"})
 def _fill_coefficients(i, strengths, columns, profiles, work):  # type: ignore[no-untyped-def]
     """Each front's row of the coefficient table at cell i; strengths are (n_strengths, ABREAST)."""
@@ -100,8 +111,8 @@ def _cell_of_front(i, j, ground, u_c, work):  # type: ignore[no-untyped-def]
 
 @inner()
 def march_abreast(  # type: ignore[no-untyped-def]
-    run, strengths, releases, start_v, edge, ground, scaled, barriers, limits, columns, profiles, u_c,
-    own, work, v, runout, last, first,
+    run, strengths, releases, start_v, edge, ground, scaled, barriers, limits, columns, profiles, alike,
+    u_c, own, work, v, runout, last, first,
 ):  # fmt: skip
     """The fronts from `run` on, as many as go abreast or are left.
 
@@ -127,7 +138,8 @@ def march_abreast(  # type: ignore[no-untyped-def]
         begin = min(begin, first[j])
     under_way = n
     for i in range(begin, n_cells):
-        _fill_coefficients(i, own, columns, profiles, work)
+        if i == begin or not alike[i]:
+            _fill_coefficients(i, own, columns, profiles, work)
         for j in range(n):
             at_edge = i > first[j] or releases[run + j] == edge[i]
             work[_GOING + j] = 1.0 if at_edge and i <= last[j] else 0.0
