@@ -88,6 +88,8 @@ def measure(repeat: int) -> dict[str, float]:
     usual = np.column_stack([rng.uniform(0.2, 0.3, N_RUNS), rng.uniform(2e-3, 4e-3, N_RUNS)])
     strong = usual * [1.0, 15.0]
     slippery = rng.uniform(0.1, 0.3, (N_RUNS, 1))
+    viscous = law_of(terrain, "coulomb_friction", "turbulent_drag", "viscous_drag")
+    with_viscous = np.column_stack([usual, rng.uniform(0.01, 0.05, N_RUNS)])
     ground = (terrain.edge_s_m, terrain.sin_slope, terrain.cos_slope, terrain.curvature)
     peer = (*ground, *(np.ascontiguousarray(column) for column in usual.T), releases, SENSOR_S_M)
     assert np.allclose(simulate(usual, releases, path, pcm, SENSORS), numba_peer(*peer), rtol=1e-10)
@@ -95,12 +97,15 @@ def measure(repeat: int) -> dict[str, float]:
 
     def kernel(law: Contributions, strengths: FloatArray, run: Any = simulate) -> float:
         n_runs = len(strengths)
-        return microseconds(lambda: run(strengths, releases[:n_runs], path, law, SENSORS), n_runs, repeat)
+        return microseconds(lambda: run(strengths, np.zeros(n_runs), path, law, SENSORS), n_runs, repeat)
 
     return {
         "kernel": kernel(pcm, usual),
         "kernel, exponents beyond the series": kernel(pcm, strong),
         "kernel, normal force switching (M1)": kernel(coulomb, slippery),
+        "kernel, terms in U": kernel(viscous, with_viscous),
+        "kernel, terms in U, 16 times as many": kernel(viscous, np.tile(with_viscous, (16, 1))),
+        "kernel, 16 times as many": kernel(pcm, np.tile(usual, (16, 1))),
         "kernel with jacobian": kernel(pcm, usual, simulate_with_jacobian),
         "kernel, a single run": kernel(pcm, usual[:1]),
         "plain numba loop": microseconds(lambda: numba_peer(*peer), N_RUNS, repeat),
