@@ -5,7 +5,7 @@ base law after the other, and on campaigns of the development seeds, each with t
 asks about: dense ones, and many avalanches at few sensors. Asked on two cores: 40 s for 22 sparse avalanches,
 60 s for 15 with 40 gates, 5 minutes for 200 and 25 for 1000 sparse ones, and 4 GB at most. First each law is
 run once and not counted, so that everything is compiled. Both cores must be free. ``--json`` is written after
-each campaign; ``--largest`` ends the many at so many avalanches.
+each campaign, and keeps those that it has; ``--least`` and ``--largest`` say which are diagnosed.
 """
 
 from __future__ import annotations
@@ -84,12 +84,15 @@ def simulated(largest: int) -> list[tuple[str, Campaign, str]]:
 @app.default
 def main(
     *,
+    least: Annotated[int, cyclopts.Parameter(help="Avalanches of a campaign at least.")] = 1,
     largest: Annotated[int, cyclopts.Parameter(help="Avalanches of a campaign at most.")] = 1000,
     out: Annotated[Path | None, cyclopts.Parameter(name="--json", help="File for the figures.")] = None,
 ) -> None:
-    """Measure."""
+    """Measure; figures of other campaigns that the file has already are kept."""
+    kept = json.loads(out.read_text(encoding="utf-8"))["runs"] if out is not None and out.exists() else []
+    rows = {(row["campaign"], row["base_model"]): row for row in kept}
     with tempfile.TemporaryDirectory(prefix="diagnose-") as scratch:
-        folder, rows = Path(scratch), list[dict[str, Any]]()
+        folder = Path(scratch)
         for law in LAWS:
             timed("not counted: Ryggfonn", "ryggfonn", law, folder / "report")
         campaigns: list[tuple[str, Path | str, str]] = [("Ryggfonn", "ryggfonn", law) for law in LAWS]
@@ -97,9 +100,10 @@ def main(
             write_campaign(campaign, folder / f"{number}")
             campaigns.append((name, folder / f"{number}", law))
         for name, place, law in campaigns:
-            rows.append(timed(name, place, law, folder / "report"))
-            if out is not None:
-                write(out, {"commit": commit(), "largest": largest, "runs": rows})
+            if read_campaign(find_campaign(str(place))).n_events >= least:
+                rows[name, law] = timed(name, place, law, folder / "report") | {"commit": commit()}
+                if out is not None:
+                    write(out, {"runs": list(rows.values())})
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ def diagnosis() -> str:
     whole = "".join(
         f"| {row['campaign']} | {row['base_model']} | {row['events']} events, {row['sensors']} sensors"
         f" | {row['verdict_seconds']:.0f} | {row['seconds']:.0f} | {row['cpu_seconds']:.0f}"
-        f" | {row['memory_gb']:.1f} | {row['verdict']} |\n"
+        f" | {row['memory_gb']:.1f} | {row['verdict']} | {row['commit']} |\n"
         for row in times["runs"]
     )
     more = [slower[name] / here[name] for name in ("kernel", "pure Python")]
@@ -26,14 +26,13 @@ def diagnosis() -> str:
     return f"""
 ## A diagnosis, and concealed trials
 
-`python -m benchmarks.diagnose_time --largest {times["largest"]}
---json benchmarks/results/diagnose_time.json`: `skred diagnose` by the clock, everything compiled, both cores
-free, loading packages included: until its verdict is written, and until report and figures are; by commit
-{times["commit"]}. Asked: 40 s on 22 avalanches at 4 sensors, 60 s on 15 with 40 gates, and at most 4 GB.
-Without `--largest` campaigns of 200 and 1000 avalanches are diagnosed too (asked: 5 and 25 minutes).
+`python -m benchmarks.diagnose_time --json benchmarks/results/diagnose_time.json`: `skred diagnose` by the
+clock, everything compiled, both cores free, loading packages included: until its verdict is written, and until
+report and figures are. Asked: 40 s on 22 avalanches at 4 sensors, 60 s on 15 with 40 gates, 5 minutes on 200
+sparse ones and 25 on 1000, and at most 4 GB.
 
-| campaign | base law | recordings | verdict after [s] | report after [s] | CPU [s] | memory [GB] | verdict |
-| --- | --- | --- | --- | --- | --- | --- | --- |
+| campaign | base law | recordings | verdict after [s] | report after [s] | CPU [s] | memory [GB] | verdict | commit |
+| --- | --- | --- | --- | --- | --- | --- | --- | --- |
 {whole}
 Of that the stages [s]; the rest are packages and the report.
 

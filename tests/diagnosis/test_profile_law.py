@@ -19,7 +19,7 @@ from skred.diagnosis.evidence.extension import extended, setting_of
 from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.predict.held_out import held_out
 from skred.diagnosis.predict.predictor_document import as_dict, from_dict
-from skred.diagnosis.predict.profile_law import ProfileLaw, profile_law
+from skred.diagnosis.predict.profile_law import ProfileLaw, parts_left_out, profile_law
 from skred.diagnosis.predict.unseen import ProfileTerm, log_scores
 from skred.diagnosis.verdict.predictors import predictors_of, promised_gain
 from skred.errors import InputError
@@ -47,6 +47,14 @@ def hidden() -> Base:
 @pytest.fixture(scope="module")
 def added(hidden: Base) -> ProfileLaw:
     return law_of(hidden)
+
+
+def test_few_avalanches_are_left_out_one_by_one_and_many_in_parts() -> None:
+    assert [part.tolist() for part in parts_left_out(22, 0)] == [[event] for event in range(22)]
+    parts = parts_left_out(200, 0)
+    assert len(parts) == 24 and {len(part) for part in parts} == {8, 9}
+    assert sorted(np.concatenate(parts)) == list(range(200))
+    assert parts[0].tolist() != list(range(9))  # avalanches stand in the order of their dates
 
 
 @pytest.mark.slow

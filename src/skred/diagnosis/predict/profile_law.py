@@ -1,10 +1,10 @@
 """A force that is not in the list, added: the law with it checked again, and tried on avalanches left out.
 
-A profile has many coefficients, so nothing that it was fitted to may try it. For each avalanche the base law
-and the profile, with its amplitude, correlation length and place, are fitted to the others alone; only how
-it goes with speed is not chosen again. Populations are drawn by importance sampling, profiles around their
-mean by the Laplace approximation. The base law is tried likewise, so that before and after differ by the
-profile alone.
+A profile has many coefficients, so nothing that it was fitted to may try it. For each avalanche, or part of
+many, the base law and the profile, with its amplitude, correlation length and place, are fitted to the
+others alone; only how it goes with speed is not chosen again. Populations are drawn by importance sampling,
+profiles around their mean by the Laplace approximation. The base law is tried likewise, so that before and
+after differ by the profile alone.
 """
 
 from __future__ import annotations
@@ -31,6 +31,10 @@ from skred.diagnosis.predict.unseen import log_densities
 from skred.parallel.threads import side_by_side
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+_PARTS = 24
+"""Parts that are left out one after the other, of more avalanches than that: each leaves nearly all others,
+and a refit to these takes as much longer as they are more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +76,9 @@ def profile_law(under_errors: ComparisonUnderErrors, most: int, seed: int) -> Pr
         Campaigns simulated at most for the check.
     """
     base, profile = under_errors.base, most_probable(under_errors.profiles)
-    events = range(len(base.rows.event))
-    parts = side_by_side(lambda event: _left_out(base, profile, event, seed), events)
-    before, after = (_held_out(base, others, seed) for others in zip(*parts, strict=True))
+    parts = parts_left_out(len(base.rows.event), seed)
+    fitted = side_by_side(lambda part: _left_out(base, profile, part, seed), parts)
+    before, after = (_held_out(base, others, seed) for others in zip(*_by_event(fitted), strict=True))
     check, rng = _check(base, profile, most, seed), np.random.default_rng([seed, 55])
     without, within = _plain(base, rng).draws, with_profile(base, profile, rng).draws
     return ProfileLaw(profile, base.problem.error_model.id, check, before, after, without, within)
@@ -87,23 +91,37 @@ def _check(base: Base, profile: Profile, most: int, seed: int) -> BootstrapTest:
     return linear_test(added, (draws.means, draws.factors), seed + 1, most)
 
 
-def _left_out(base: Base, profile: Profile, event: int, seed: int) -> tuple[LeftOut, LeftOut]:
-    """What the others say of one avalanche, without the profile and with it."""
-    rest, rng = _without(base, event), _rng(seed, event)
+def parts_left_out(n: int, seed: int) -> list[IntArray]:
+    """Which of `n` avalanches are left out together: each by itself, or of many some at random."""
+    order = np.arange(n) if n <= _PARTS else np.random.default_rng([seed, 54]).permutation(n)
+    return np.array_split(order, min(n, _PARTS))
+
+
+def _by_event[Fitted](fitted: Sequence[tuple[IntArray, Fitted]]) -> list[Fitted]:
+    """What was fitted without each avalanche, from what was without each part."""
+    of_event = {int(event): one for part, one in fitted for event in part}
+    return [of_event[event] for event in sorted(of_event)]
+
+
+def _left_out(
+    base: Base, profile: Profile, part: IntArray, seed: int
+) -> tuple[IntArray, tuple[LeftOut, LeftOut]]:
+    """A part, and what the others say of its avalanches, without the profile and with it."""
+    rest, rng = _without(base, part), _rng(seed, part)
     before = _plain(rest, rng)
-    others = np.flatnonzero(base.rows.event != event)
-    near = profile.mean, (profile.fit.population, profile.fit.points[others])
-    return before, with_profile(rest, fit_profile(rest, profile.kind, near, profile.prior), rng)
+    near = profile.mean, (profile.fit.population, np.delete(profile.fit.points, part, axis=0))
+    return part, (before, with_profile(rest, fit_profile(rest, profile.kind, near, profile.prior), rng))
 
 
 def base_left_out(base: Base, seed: int) -> HeldOut:
     """Each avalanche as the base law has it, fitted to the others."""
-    events = range(len(base.rows.event))
-    return _held_out(base, [_plain(_without(base, event), _rng(seed, event)) for event in events], seed)
+    parts = parts_left_out(len(base.rows.event), seed)
+    fitted = [(part, _plain(_without(base, part), _rng(seed, part))) for part in parts]
+    return _held_out(base, _by_event(fitted), seed)
 
 
-def _rng(seed: int, event: int) -> np.random.Generator:
-    return np.random.default_rng([seed, 53, event])
+def _rng(seed: int, part: IntArray) -> np.random.Generator:
+    return np.random.default_rng([seed, 53, int(part[0])])
 
 
 def _plain(base: Base, rng: np.random.Generator) -> LeftOut:
@@ -129,10 +147,10 @@ def _with_mean(base: Base, profile: Profile) -> Base:
     return replace(base, directions=directions, strengths=strengths, fit=profile.fit)
 
 
-def _without(base: Base, event: int) -> Base:
-    """The base law fitted to all events but one."""
-    others = np.flatnonzero(base.rows.event != event)
-    rows, start = base.rows.take(others), (base.population, base.fit.points[others])
+def _without(base: Base, part: IntArray) -> Base:
+    """The base law fitted to all events but some."""
+    rows = base.rows.take(np.delete(np.arange(len(base.rows.event)), part))
+    start = base.population, np.delete(base.fit.points, part, axis=0)
     fit = refit(base.extended(), rows, base.strengths[None, :], start, Rounds())[0]
     return replace(base, rows=rows, fit=fit)
 
