@@ -48,8 +48,8 @@ front stops, and is itself far faster than the 8 to 15 us it was expected to tak
 difference from the reference over the prior's range {difference:.1e} (asked: below 1e-10).
 
 Asked, too: fronts that leave the ground (M1) and terms in U within 2 times the plain kernel. Measured:
-{switching:.1f} times, and {in_u[0]:.1f} ({in_u[1]:.1f} with 16 times as many fronts): with such a term no cell
-has a closed form, and its speed is solved for, two of Newton's steps in each.
+{switching:.1f} times, and {in_u[0]:.1f} ({in_u[1]:.1f} with 16 times as many fronts): with such a term no
+cell has a closed form, and its speed is solved for, two of Newton's steps in each.
 """
 
 
