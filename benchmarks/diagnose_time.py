@@ -100,7 +100,7 @@ def main(
             write_campaign(campaign, folder / f"{number}")
             campaigns.append((name, folder / f"{number}", law))
         for name, place, law in campaigns:
-            if read_campaign(find_campaign(str(place))).n_events >= least:
+            if least <= read_campaign(find_campaign(str(place))).n_events <= largest:
                 rows[name, law] = timed(name, place, law, folder / "report") | {"commit": commit()}
                 if out is not None:
                     write(out, {"runs": list(rows.values())})

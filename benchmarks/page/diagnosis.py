@@ -27,11 +27,11 @@ def diagnosis() -> str:
 ## A diagnosis, and concealed trials
 
 `python -m benchmarks.diagnose_time --json benchmarks/results/diagnose_time.json`: `skred diagnose` by the
-clock, everything compiled, both cores free, loading packages included: until its verdict is written, and until
-report and figures are. Asked: 40 s on 22 avalanches at 4 sensors, 60 s on 15 with 40 gates, 5 minutes on 200
-sparse ones and 25 on 1000, and at most 4 GB.
+clock, everything compiled, both cores free, loading packages included: seconds until its verdict is written,
+and until report and figures are. Asked: 40 s on 22 avalanches at 4 sensors, 60 s on 15 with 40 gates, 5
+minutes on 200 sparse ones and 25 on 1000, and at most 4 GB.
 
-| campaign | base law | recordings | verdict after [s] | report after [s] | CPU [s] | memory [GB] | verdict | commit |
+| campaign | base law | recordings | verdict [s] | report [s] | CPU [s] | memory [GB] | verdict | commit |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 {whole}
 Of that the stages [s]; the rest are packages and the report.

@@ -88,7 +88,7 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
     if isinstance(finding, NotAugmented):
         decision = Decision("cannot_tell", ())
     if decision.verdict == "unexplained":
-        clock.stage("profile", "the force profile added: checked again, fitted anew without each avalanche")
+        clock.stage("profile", "the force profile added: checked again, fitted anew without some avalanches")
         finding = profile_law(comparison.leading(UNLISTED), effort.replicas, run.seed)
     before, after = _left_out(finding, calibration, run)
     hangs_on = given = None

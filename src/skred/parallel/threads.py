@@ -36,7 +36,7 @@ def _enter() -> None:
     _inside.one_of_many = True
 
 
-def in_parts(n: int) -> list[slice]:
-    """Split 0 to n into parts of similar size, at most one for each thread, none empty."""
-    ends = np.unique(np.linspace(0, n, threads() + 1).round().astype(int))
+def in_parts(n: int, at_least: int = 1) -> list[slice]:
+    """Split 0 to n into parts of similar size, none empty: one for each thread, or more if asked for."""
+    ends = np.unique(np.linspace(0, n, max(threads(), at_least) + 1).round().astype(int))
     return [slice(int(first), int(end)) for first, end in pairwise(ends)]

@@ -49,7 +49,10 @@ def augmented_problem(
     elif len(curves) > 1:
         raise ValueError("of two mechanisms that are added avalanches can differ in none")
     else:
-        found = (ways or finer(base, curves[0], searched(base, curves[0])))[way]
+        ways = ways or searched(base, curves[0])
+        if ways[way].budget != FINE:  # a comparison takes the finer tables for what leads without a residue
+            ways = finer(base, curves[0], ways)
+        found = ways[way]
         # Half the steps of a comparison's: what is left of errors there is between the strengths.
         located = from_nothing(curves[0], found.populations, *found.strength).finer
     old, tables = base.problem, build_tables(base, extension, located, FINE)

@@ -1,11 +1,11 @@
 """How far an answer hangs on few recordings: its evidence again without each avalanche, each kind of reading.
 
 Of a single avalanche no refit is needed: evidence is what all others have, times the density of this one
-given them. So the Bayes factor without it is that of all, less what it is predicted better with the answer.
-Without several, or without a kind of reading, population and every avalanche are refitted to what is left, at
-all strengths of the named mechanism's leading shapes, or with the whole profile. Nothing is chosen again: the
-question is whether what was answered would still stand. Of a speed that is left out it stays known that the
-front came there.
+given them. So the Bayes factor without it is that of all, less what it is predicted better with the answer
+(nearly, where many are left out in parts). Without several, or without a kind of reading, population and
+every avalanche are refitted to what is left, at all strengths of the named mechanism's leading shapes, or
+with the whole profile. Nothing is chosen again: the question is whether what was answered would still stand.
+Of a speed that is left out it stays known that the front came there.
 """
 
 from __future__ import annotations

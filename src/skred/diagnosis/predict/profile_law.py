@@ -114,7 +114,7 @@ def _left_out(
 
 
 def base_left_out(base: Base, seed: int) -> HeldOut:
-    """Each avalanche as the base law has it, fitted to the others."""
+    """Each avalanche as the base law has it, fitted to the others, or to those outside its part."""
     parts = parts_left_out(len(base.rows.event), seed)
     fitted = [(part, _plain(_without(base, part), _rng(seed, part))) for part in parts]
     return _held_out(base, _by_event(fitted), seed)

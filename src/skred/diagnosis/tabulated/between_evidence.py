@@ -18,6 +18,7 @@ from scipy.optimize import minimize
 
 from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, Weighted, weighted_draws
 from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.marginal import Evidence, curvatures, population_at
 from skred.diagnosis.evidence.population_target import NARROWEST, log_correlation_constant, log_priors
 from skred.diagnosis.tabulated.tables import Tables
@@ -50,11 +51,14 @@ class Way(NamedTuple):
         Mean and standard deviation over it.
     proposal : Mixture
         Adapted to it.
+    budget : Budget
+        Quadrature points of the tables that it is by.
     """
 
     populations: Evidence
     strength: tuple[float, float]
     proposal: Mixture
+    budget: Budget
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +146,7 @@ def _way(target: BetweenTarget, found: Weighted) -> Way:
     away = psi - mean
     populations = Evidence(found.log_integral, mean, away.T @ (shares[:, None] * away))
     sd = math.sqrt(float(shares @ (strengths - middle) ** 2))
-    return Way(populations, (middle, sd), found.proposal)
+    return Way(populations, (middle, sd), found.proposal, target.tables.budget)
 
 
 def between_evidence(target: BetweenTarget, proposal: Mixture) -> Way:

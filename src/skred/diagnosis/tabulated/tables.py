@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,7 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population
 from skred.diagnosis.evidence.event_quadrature import Budget, Spread, event_nodes
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.marginal import Evidence, population_at
+from skred.diagnosis.evidence.refit import MOST_NODES
 from skred.diagnosis.tabulated.coefficient_grid import Grid, Located, from_nothing
 from skred.inference.hierarchical.surface import Nodes
 from skred.parallel.threads import in_parts, side_by_side
@@ -81,7 +83,7 @@ def build_tables(
         modes = event_modes(own, start[part], population, n_steps=8)
         return event_nodes(own, around, modes, budget, reference), modes.points
 
-    spreads, modes = zip(*side_by_side(spread, in_parts(len(start))), strict=True)
+    spreads, modes = zip(*side_by_side(spread, _lots(n_tables, n_events, budget)), strict=True)
     nodes, points = Spread.joined(spreads), np.concatenate(modes).reshape(n_tables, n_events, n + 1)
     return Tables(located, nodes.nodes, nodes.points[:, :, n].ravel(), points, budget)
 
@@ -152,4 +154,11 @@ def exact_nodes(
         shifted = None if shifts is None else shifts[part]
         return event_nodes(own, population, modes, budget, reference, shifted)
 
-    return Spread.joined(side_by_side(spread, in_parts(n_rows))).nodes
+    return Spread.joined(side_by_side(spread, _lots(*start.shape[:2], budget))).nodes
+
+
+def _lots(n_groups: int, n_events: int, budget: Budget) -> list[slice]:
+    """Rows of all groups, so many groups at a time as have points that memory is no matter."""
+    at_once = max(MOST_NODES // (n_events * budget.total), 1)
+    lots = in_parts(n_groups, math.ceil(n_groups / at_once))
+    return [slice(n_events * lot.start, n_events * lot.stop) for lot in lots]

@@ -117,8 +117,8 @@ def march_abreast(  # type: ignore[no-untyped-def]
     """The fronts from `run` on, as many as go abreast or are left.
 
     Fills v (ABREAST, n_cells + 1) at every edge and, (ABREAST,) each, the runout [m], the last cell entered
-    and the cell of the release, at whose upper edge v is what the front starts with; `own`
-    (n_strengths, ABREAST) and `work` are for its own use, see `room`.
+    and the cell of the release, at whose upper edge v is what the front starts with. `alike` (n_cells,) is by
+    `cells_alike`; `own` (n_strengths, ABREAST) and `work` are for its own use, see `room`.
     """
     n, n_cells = min(ABREAST, releases.size - run), ground.shape[1]
     weakens, per_scale = False, 1.0 / u_c
