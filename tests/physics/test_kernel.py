@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from test_reference import counter_slope, plane, roll_over_slope, terrain_from_slope
@@ -244,6 +244,8 @@ def test_readings_and_jacobian_agree_with_the_reference(name: str) -> None:
 @settings(max_examples=100, deadline=None, derandomize=True)
 @given(cases(speed_terms=False))
 def test_jacobian_agrees_with_a_complex_step_of_the_reference(case: Case) -> None:
+    # A front released with a speed at the very place of a barrier stops there, or goes on from just below it.
+    assume(case.release_speed == 0.0 or case.release_s_m not in [place for place, _, _ in case.barriers])
     jacobian, settled = case.kernel()[1], case.settled()
     settled &= [case.release_s_m not in (s, t) for _, s, t in case.sensors]
     for k in (Column.CONSTANT, Column.QUADRATIC, Column.FRICTION, 5, 6):
