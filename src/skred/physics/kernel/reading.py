@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from skred.parallel.compile_cache import inner
-from skred.physics.kernel.cell import CONSTANT, FRICTION, QUADRATIC, cell_at, phi1, psi
+from skred.physics.kernel.cell import CONSTANT, FRICTION, QUADRATIC, cell_at, phi1, psi, step_v
 from skred.physics.kernel.columns import GRAVITY
 from skred.physics.kernel.inputs import RUNOUT, VELOCITY_TO_STOP, cell_of
 from skred.physics.kernel.march import (
@@ -44,10 +44,29 @@ def span_end(quantity, s_from, s_to, release, runout):  # type: ignore[no-untype
 @inner(fastmath=_SUMS)
 def _time_over(i, last, edge, v):  # type: ignore[no-untyped-def]
     """Time [s] over whole cells from i to before `last`, in which nothing happens."""
-    time = 0.0
-    for cell in range(np.uint64(i), np.uint64(last)):
+    time, above = 0.0, np.uint64(i)
+    for k in range(last - i):  # not from i to `last`: only a loop from 0 on is vectorised
+        cell = above + np.uint64(k)
         time += (edge[cell + _ONE] - edge[cell]) / (np.sqrt(v[cell]) + np.sqrt(v[cell + _ONE]))
     return 2.0 * time
+
+
+@inner()
+def _speed_in(place, i, edge, ground, table, v):  # type: ignore[no-untyped-def]
+    """Speed [m/s] at a place of cell i, in which nothing happens."""
+    a, b = contact_law(i, ground, table)
+    return np.sqrt(max(step_v(v[i], place - edge[i], a, b), 0.0))
+
+
+@inner()
+def _regular_time(s_from, s_to, i, last, edge, ground, table, v):  # type: ignore[no-untyped-def]
+    """Time [s] from a place in cell i to one in cell `last`, if nothing happens in these or between them."""
+    u0, u1 = _speed_in(s_from, i, edge, ground, table, v), _speed_in(s_to, last, edge, ground, table, v)
+    if last == i:
+        return 2.0 * (s_to - s_from) / (u0 + u1)
+    begun = 2.0 * (edge[i + 1] - s_from) / (u0 + np.sqrt(v[i + 1]))
+    ended = 2.0 * (s_to - edge[last]) / (np.sqrt(v[last]) + u1)
+    return begun + _time_over(i + 1, last, edge, v) + ended
 
 
 @inner()
@@ -70,6 +89,8 @@ def span_speed(  # type: ignore[no-untyped-def]
     if end <= s_from:
         return 0.0
     time, whole_to = 0.0, cell_of(edge, end)
+    if i > first and not speed_terms and regular_until(i, whole_to + 1, limits, v) > whole_to:
+        return (end - s_from) / _regular_time(s_from, end, i, whole_to, edge, ground, table, v)
     while i < edge.size - 1 and edge[i] < end:
         last = _whole_until(i, first, s_from, whole_to, limits, edge, v)
         if last > i:
@@ -145,13 +166,37 @@ def _regular_speed_tangents(  # type: ignore[no-untyped-def]
 @inner(fastmath=_SUMS)
 def _time_tangents(i, last, edge, v, dv, d_time):  # type: ignore[no-untyped-def]
     """Tangents of the time over whole cells from i to before `last`, added to `d_time`."""
+    above = np.uint64(i)
     for k in range(d_time.size):
         change = 0.0
-        for cell in range(np.uint64(i), np.uint64(last)):
+        for one in range(last - i):
+            cell = above + np.uint64(one)
             u0, u1 = np.sqrt(v[cell]), np.sqrt(v[cell + _ONE])
             by_mean = (edge[cell + _ONE] - edge[cell]) / ((u0 + u1) * (u0 + u1))
             change += by_mean * (dv[k, cell] / u0 + dv[k, cell + _ONE] / u1)
         d_time[k] -= change
+
+
+@inner()
+def _regular_time_tangents(  # type: ignore[no-untyped-def]
+    s_from, s_to, i, last, edge, ground, table, columns, profiles, v, dv, du0, du1, d_time
+):
+    """Tangents of `_regular_time`, added to `d_time`; those of the speeds at both places go to du0 and du1."""
+    u0, u1 = _speed_in(s_from, i, edge, ground, table, v), _speed_in(s_to, last, edge, ground, table, v)
+    _regular_speed_tangents(u0, s_from - edge[i], i, ground, table, columns, profiles, v, dv, du0)
+    _regular_speed_tangents(u1, s_to - edge[last], last, ground, table, columns, profiles, v, dv, du1)
+    if last == i:
+        by_mean = 2.0 * (s_to - s_from) / ((u0 + u1) * (u0 + u1))
+        for k in range(d_time.size):
+            d_time[k] -= by_mean * (du0[k] + du1[k])
+        return
+    below, above = np.sqrt(v[i + 1]), np.sqrt(v[last])
+    begun = 2.0 * (edge[i + 1] - s_from) / ((u0 + below) * (u0 + below))
+    ended = 2.0 * (s_to - edge[last]) / ((above + u1) * (above + u1))
+    for k in range(d_time.size):
+        d_time[k] -= begun * (du0[k] + 0.5 * dv[k, i + 1] / below)
+        d_time[k] -= ended * (du1[k] + 0.5 * dv[k, last] / above)
+    _time_tangents(i + 1, last, edge, v, dv, d_time)
 
 
 @inner()
@@ -163,6 +208,11 @@ def _span_tangents(  # type: ignore[no-untyped-def]
     end = min(s_to, runout)
     whole_to = cell_of(edge, end)
     d_time[:] = 0.0
+    if i > first and not speed_terms and regular_until(i, whole_to + 1, limits, v) > whole_to:
+        _regular_time_tangents(
+            s_from, end, i, whole_to, edge, ground, table, columns, profiles, v, dv, step, shift, d_time
+        )
+        i = edge.size - 1
     while i < edge.size - 1 and edge[i] < end:
         last = _whole_until(i, first, s_from, whole_to, limits, edge, v)
         if last > i:
