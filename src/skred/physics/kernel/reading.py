@@ -181,7 +181,7 @@ def _time_tangents(i, last, edge, v, dv, d_time):  # type: ignore[no-untyped-def
 def _regular_time_tangents(  # type: ignore[no-untyped-def]
     s_from, s_to, i, last, edge, ground, table, columns, profiles, v, dv, du0, du1, d_time
 ):
-    """Tangents of `_regular_time`, added to `d_time`; those of the speeds at both places go to du0 and du1."""
+    """Tangents of `_regular_time`, added to `d_time`; those of the speeds at both ends go to du0 and du1."""
     u0, u1 = _speed_in(s_from, i, edge, ground, table, v), _speed_in(s_to, last, edge, ground, table, v)
     _regular_speed_tangents(u0, s_from - edge[i], i, ground, table, columns, profiles, v, dv, du0)
     _regular_speed_tangents(u1, s_to - edge[last], last, ground, table, columns, profiles, v, dv, du1)
