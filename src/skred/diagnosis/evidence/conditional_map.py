@@ -178,8 +178,11 @@ class EventLikelihood:
 
     def at(self, points: FloatArray) -> FloatArray:
         """Log likelihood of each row at its point, (n_rows, n_base + 1) to (n_rows,)."""
-        predictions = self.extension.predict(self.rows.event, points, self.strengths)
-        return log_likelihoods(np.arange(len(points)), predictions, self.rows.readings, self.rows.errors)
+        return self.of(self.extension.predict(self.rows.event, points, self.strengths))
+
+    def of(self, predictions: FloatArray) -> FloatArray:
+        """Log likelihood of each row given what its front does, (n_rows, n_columns) to (n_rows,)."""
+        return log_likelihoods(np.arange(len(predictions)), predictions, self.rows.readings, self.rows.errors)
 
 
 def look_around(likelihood: EventLikelihood, points: FloatArray) -> Modes:
@@ -204,8 +207,12 @@ def deviations(points: FloatArray, rows: Rows, population: Population) -> FloatA
 
 def log_joint(likelihood: EventLikelihood, points: FloatArray, population: Population) -> FloatArray:
     """Log likelihood of each row plus the exponent of its population's density, (n_rows,)."""
-    deviation = deviations(points, likelihood.rows, population)
-    return likelihood.at(points) - _half_square(deviation, population.precision[likelihood.rows.group])
+    return likelihood.at(points) - half_square(points, likelihood.rows, population)
+
+
+def half_square(points: FloatArray, rows: Rows, population: Population) -> FloatArray:
+    """Minus the exponent of its population's density at each row's point, (n_rows,)."""
+    return _half_square(deviations(points, rows, population), population.precision[rows.group])
 
 
 def _half_square(deviation: FloatArray, precision: FloatArray) -> FloatArray:
@@ -238,7 +245,7 @@ def event_modes(
 def _climbed(likelihood: EventLikelihood, start: FloatArray, population: Population, n_steps: int) -> Modes:
     """Where damped Gauss-Newton steps from one place lead."""
     points, precision = start.copy(), population.precision[likelihood.rows.group]
-    best = likelihood.at(points) - _half_square(deviations(points, likelihood.rows, population), precision)
+    best = np.empty(len(points))
     damping = np.full(len(points), _STARTING_DAMPING)
     active = np.arange(len(points))
     found: Modes | None = None
@@ -246,6 +253,8 @@ def _climbed(likelihood: EventLikelihood, start: FloatArray, population: Populat
         part = likelihood if len(active) == len(points) else likelihood.take(active)
         around = look_around(part, points[active])
         deviation, prior = deviations(points[active], part.rows, population), precision[active]
+        if found is None:
+            best[:] = part.of(around.predictions) - _half_square(deviation, prior)
         gradient = np.einsum("ri,rij->rj", around.slope, around.by_points)
         gradient -= np.einsum("rij,rj->ri", prior, deviation)
         damped = around.information + prior
