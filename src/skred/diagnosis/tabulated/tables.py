@@ -154,7 +154,7 @@ def exact_nodes(
         shifted = None if shifts is None else shifts[part]
         return event_nodes(own, population, modes, budget, reference, shifted)
 
-    return Spread.joined(side_by_side(spread, _lots(*start.shape[:2], budget))).nodes
+    return Spread.joined(side_by_side(spread, _lots(start.shape[0], start.shape[1], budget))).nodes
 
 
 def _lots(n_groups: int, n_events: int, budget: Budget) -> list[slice]:
