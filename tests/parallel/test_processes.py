@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import time
+from multiprocessing import util
 from pathlib import Path
 
 import pytest
@@ -47,6 +49,21 @@ def test_one_core_has_no_helpers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     with helpers():
         assert meanwhile(os.getpid)() == os.getpid()
+
+
+def test_no_semaphore_is_left_to_the_end_of_the_interpreter(two_cores: None) -> None:
+    def semaphores() -> int:
+        return sum("/loky-" in repr(one) for one in util._finalizer_registry.values())  # type: ignore[attr-defined]
+
+    gc.collect()
+    gc.disable()  # what is left is not to be collected by chance
+    try:
+        with helpers():
+            assert meanwhile(os.getpid)() != os.getpid()
+            assert semaphores() > 0
+        assert semaphores() == 0
+    finally:
+        gc.enable()
 
 
 def test_meanwhile_something_is_done_elsewhere(two_cores: None) -> None:

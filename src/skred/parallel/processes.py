@@ -7,6 +7,7 @@ starts a process by itself. If a worker is killed, perhaps for its memory, its w
 
 from __future__ import annotations
 
+import gc
 import itertools
 import threading
 from collections.abc import Callable, Iterator
@@ -40,6 +41,17 @@ def helpers(*modules: str) -> Iterator[None]:
     if n < 1 or _there:
         yield
         return
+    try:
+        with _started(n, modules):
+            yield
+    finally:
+        # What is left of them are cycles with semaphores in. Were they collected while the interpreter ends,
+        # one could be removed and not be told of, and the user would be warned of it.
+        gc.collect()
+
+
+@contextmanager
+def _started(n: int, modules: tuple[str, ...]) -> Iterator[None]:
     from loky import ProcessPoolExecutor  # it does not run the caller's script again, as others do
 
     executor = ProcessPoolExecutor(n, env=_ENVIRONMENT)
