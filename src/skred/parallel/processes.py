@@ -7,7 +7,6 @@ starts a process by itself. If a worker is killed, perhaps for its memory, its w
 
 from __future__ import annotations
 
-import gc
 import itertools
 import threading
 from collections.abc import Callable, Iterator
@@ -24,6 +23,8 @@ _ENVIRONMENT = {"OMP_NUM_THREADS": "1", "LOKY_MAX_MEMORY_LEAK_SIZE": "2e9"}
 starts them anew with warnings."""
 _MOST = 3
 """Most workers; each holds all packages in memory."""
+_FEEDER, _PATIENCE_S = "QueueFeederThread", 5.0
+"""Name of the thread that passes work on to workers, and how long it may take to end [s]."""
 _seat = threading.local()
 _there: list[Executor] = []
 
@@ -45,9 +46,11 @@ def helpers(*modules: str) -> Iterator[None]:
         with _started(n, modules):
             yield
     finally:
-        # What is left of them are cycles with semaphores in. Were they collected while the interpreter ends,
-        # one could be removed and not be told of, and the user would be warned of it.
-        gc.collect()
+        # A thread of theirs is not waited for, and holds semaphores. Were one removed just when the interpreter
+        # ends, this could not be told of any more, and the user would be warned of a leak.
+        for thread in threading.enumerate():
+            if thread.name == _FEEDER:
+                thread.join(_PATIENCE_S)
 
 
 @contextmanager
