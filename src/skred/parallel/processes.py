@@ -46,8 +46,8 @@ def helpers(*modules: str) -> Iterator[None]:
         with _started(n, modules):
             yield
     finally:
-        # A thread of theirs is not waited for, and holds semaphores. Were one removed just when the interpreter
-        # ends, this could not be told of any more, and the user would be warned of a leak.
+        # A thread of theirs is not waited for, and holds semaphores. Were one removed just as the interpreter
+        # ends, that could not be told of any more, and the user would be warned of a leak.
         for thread in threading.enumerate():
             if thread.name == _FEEDER:
                 thread.join(_PATIENCE_S)
