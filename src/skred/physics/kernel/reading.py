@@ -208,12 +208,12 @@ def _span_tangents(  # type: ignore[no-untyped-def]
     end = min(s_to, runout)
     whole_to = cell_of(edge, end)
     d_time[:] = 0.0
-    if i > first and not speed_terms and regular_until(i, whole_to + 1, limits, v) > whole_to:
+    regular = i > first and not speed_terms and regular_until(i, whole_to + 1, limits, v) > whole_to
+    if regular:
         _regular_time_tangents(
             s_from, end, i, whole_to, edge, ground, table, columns, profiles, v, dv, step, shift, d_time
         )
-        i = edge.size - 1
-    while i < edge.size - 1 and edge[i] < end:
+    while not regular and i < edge.size - 1 and edge[i] < end:
         last = _whole_until(i, first, s_from, whole_to, limits, edge, v)
         if last > i:
             _time_tangents(i, last, edge, v, dv, d_time)
