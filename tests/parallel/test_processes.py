@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import signal
+import threading
 import time
 from pathlib import Path
 
@@ -61,6 +62,9 @@ def test_no_semaphore_is_left_to_the_end_of_the_interpreter(two_cores: None) -> 
         with helpers():
             assert meanwhile(os.getpid)() != os.getpid()
             assert semaphores()
+            slow = threading.Thread(target=time.sleep, args=(1.0,), name="QueueFeederThread", daemon=True)
+            slow.start()
+        assert not slow.is_alive()
         assert not semaphores()
     finally:
         gc.enable()

@@ -205,14 +205,22 @@ def deviations(points: FloatArray, rows: Rows, population: Population) -> FloatA
     return deviation
 
 
-def log_joint(likelihood: EventLikelihood, points: FloatArray, population: Population) -> FloatArray:
-    """Log likelihood of each row plus the exponent of its population's density, (n_rows,)."""
-    return likelihood.at(points) - half_square(points, likelihood.rows, population)
+def log_joint(
+    likelihood: EventLikelihood,
+    points: FloatArray,
+    population: Population,
+    predictions: FloatArray | None = None,
+) -> FloatArray:
+    """Log likelihood of each row plus the exponent of its population's density, (n_rows,).
 
-
-def half_square(points: FloatArray, rows: Rows, population: Population) -> FloatArray:
-    """Minus the exponent of its population's density at each row's point, (n_rows,)."""
-    return _half_square(deviations(points, rows, population), population.precision[rows.group])
+    Parameters
+    ----------
+    predictions : (n_rows, n_columns) array, optional
+        What the fronts do there, where that is known.
+    """
+    log_l = likelihood.at(points) if predictions is None else likelihood.of(predictions)
+    deviation = deviations(points, likelihood.rows, population)
+    return log_l - _half_square(deviation, population.precision[likelihood.rows.group])
 
 
 def _half_square(deviation: FloatArray, precision: FloatArray) -> FloatArray:

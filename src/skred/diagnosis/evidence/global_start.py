@@ -23,7 +23,7 @@ from skred.diagnosis.evidence.conditional_map import (
     Rows,
     deviations,
     event_modes,
-    half_square,
+    log_joint,
     look_around,
 )
 from skred.diagnosis.evidence.extension import Extension
@@ -117,8 +117,7 @@ class _Climb:
     ) -> FloatArray:
         """Log posterior density, each event's integral by the Laplace approximation."""
         precision = population.precision[likelihood.rows.group]
-        integrals = likelihood.of(modes.predictions)
-        integrals -= half_square(modes.points, likelihood.rows, population)
+        integrals = log_joint(likelihood, modes.points, population, modes.predictions)
         with np.errstate(invalid="ignore"):  # a climb that has left what numbers can hold is not taken
             integrals -= 0.5 * np.linalg.slogdet(modes.information + precision)[1]
             integrals += 0.5 * np.linalg.slogdet(precision)[1]
