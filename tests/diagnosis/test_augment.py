@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import repeat
 from types import SimpleNamespace
 from typing import Any
 
@@ -27,12 +26,9 @@ def compared(**shares: float) -> Any:
 class MadeUp(Adding):
     """Adding with made-up p-values of the checks, second comparison, and which calibrations converge."""
 
-    def __init__(
-        self, p_values: list[float], second: Any, passed: tuple[bool, ...], reference: Any, p_of_odds: float
-    ) -> None:
+    def __init__(self, p_values: list[float], second: Any, passed: tuple[bool, ...], reference: Any) -> None:
         super().__init__(reference, Run(SamplerSettings(), Effort(), Clock(lambda line: None)))
         self.p_values, self.second, self.gates = iter(p_values), second, iter(passed)
-        self.p_of_odds = repeat(p_of_odds)
 
     def calibrated(self, base: Any, chosen: Any, way: Any, ways: Any) -> Any:
         return SimpleNamespace(gate=SimpleNamespace(passed=next(self.gates), problems=("r-hat",)))
@@ -40,8 +36,7 @@ class MadeUp(Adding):
     def checked(self, base: Any, calibration: Any, chosen: Any) -> Any:
         p_value = next(self.p_values)
         check = SimpleNamespace(p_value=p_value, fired=p_value <= 0.01)
-        odds = SimpleNamespace(p_value=next(self.p_of_odds))
-        return SimpleNamespace(check=check, base=BASE, at=lambda log_odds: odds)
+        return SimpleNamespace(check=check, base=BASE)
 
     def compared(self, base: Any) -> Any:
         return self.second
@@ -52,26 +47,25 @@ def added(
     second: Any,
     passed: tuple[bool, ...] = (True, True),
     same_errors: str = "",
-    p_of_odds: float = 0.002,
 ) -> Any:
     """What becomes of an obstacle that a first comparison is sure of."""
     reference: Any = SimpleNamespace(begin=lambda problem: None, on=lambda problem: ("base", same_errors))
     first = compared(nothing=0.0, unlisted=0.0, obstacle=1.0)
-    return add_mechanisms(BASE, first, ("obstacle",), MadeUp(p_values, second, passed, reference, p_of_odds))
+    return add_mechanisms(BASE, first, ("obstacle",), MadeUp(p_values, second, passed, reference))
 
 
-def test_a_check_without_doubt_ends_it() -> None:
-    found = added([0.3], compared(nothing=0.0, unlisted=0.0, segment_drag=1.0))
+def test_without_an_alarm_nothing_more_is_looked_for() -> None:
+    found = added([0.02], compared(nothing=0.0, unlisted=0.0, segment_drag=1.0))
     assert len(found.steps) == 1 and found.reference == "base" and found.left is None
 
 
-def test_in_doubt_the_comparison_has_to_be_sure() -> None:
+def test_after_an_alarm_the_comparison_has_to_be_sure() -> None:
     sure = compared(nothing=0.005, unlisted=0.0, segment_drag=0.995)
-    found = added([0.15, 0.5], sure)
+    found = added([0.01, 0.5], sure)
     assert [step.candidate.best for step in found.steps] == ["obstacle", "segment_drag"]
     assert found.left is None
     unsure = compared(nothing=0.3, unlisted=0.0, segment_drag=0.7)
-    found = added([0.15], unsure, p_of_odds=0.03)  # 3 % of clean campaigns have such odds
+    found = added([0.01], unsure)
     assert len(found.steps) == 1 and found.left.comparison is unsure and not found.left.reason
 
 

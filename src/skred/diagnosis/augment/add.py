@@ -1,4 +1,7 @@
-"""Mechanisms added to a law one after the other: the named one, and a second only if it earns its place."""
+"""Mechanisms added to a law one after the other: the named one, and a second only if it earns its place.
+
+A second one is looked for where the check of the law with the first raises an alarm, by the limit of any.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +19,6 @@ from skred.diagnosis.effort import Run
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.inference.between_events import BetweenEvents
 from skred.inference.calibrate import Calibration, calibrate_surely
-
-COMPARE_AGAIN = 0.2
-"""P-value of the augmented law's check below which a second mechanism is looked for.
-
-The linear model sees little of a second one beside the first. The alarm has the limit of the first.
-"""
 
 
 @dataclass(eq=False)
@@ -93,12 +90,12 @@ def add_mechanisms(
         again = adding.checked(under_errors.base, calibration, chosen)
         steps.append(Step(candidate, tuple(names[1:]), comparison, calibration, again.check))
         left, problem = None, under_errors.base.problem
-        if again.check.p_value > COMPARE_AGAIN or number + 1 == run.effort.max_mechanisms:
+        if not again.check.fired or number + 1 == run.effort.max_mechanisms:
             break
         run.clock.stage("second comparison", "something may be left: every candidate refitted again")
         comparison = adding.compared(again.base)
         left = Left(comparison)
-        second = decide(comparison.probability, again.at(comparison.log_odds).p_value, True)
+        second = decide(comparison.probability, again.check.p_value, True)
         if not second.names:
             break
         if way is not BetweenEvents.COMMON:

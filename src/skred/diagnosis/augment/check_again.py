@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 from skred.diagnosis.augment.coefficient import augmented_of, multiples_of_events
-from skred.diagnosis.check.bootstrap_test import BootstrapTest, linear_test, odds_test
+from skred.diagnosis.check.bootstrap_test import BootstrapTest, linear_test
 from skred.diagnosis.effort import Run
 from skred.diagnosis.evidence.coefficient import Base, Curve, fit_base
 from skred.diagnosis.evidence.population_draws import population_draws, typical
@@ -25,13 +24,10 @@ class Again:
     base : Base
         That law, its added strengths held at their means, each avalanche's own where they differ: for another
         comparison.
-    at : callable
-        The log odds of that comparison to the bootstrap test of them.
     """
 
     check: BootstrapTest
     base: Base
-    at: Callable[[float], BootstrapTest]
 
 
 def check_again(base: Base, calibration: Calibration, chosen: Sequence[Curve], run: Run) -> Again:
@@ -55,5 +51,4 @@ def check_again(base: Base, calibration: Calibration, chosen: Sequence[Curve], r
     everywhere = [one.mechanism.id for one in chosen if one.shape.place_m is None]
     setting = replace(again.setting, base=(*base.setting.base, *everywhere))
     again = replace(again, setting=setting)
-    check = linear_test(again, draws, run.seed + 1, run.effort.replicas)
-    return Again(check, again, partial(odds_test, again, draws, run.seed + 1))
+    return Again(linear_test(again, draws, run.seed + 1, run.effort.replicas), again)

@@ -26,7 +26,7 @@ from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
 from skred.diagnosis.evidence.linear_mixed_model import Scores, fit_population
-from skred.diagnosis.limits import LIMIT, NOTHING_AT_MOST
+from skred.diagnosis.limits import FEWEST_CLEAN, LIMIT, NOTHING_AT_MOST
 from skred.parallel.processes import worker_pool
 from skred.parallel.threads import threads
 
@@ -35,10 +35,9 @@ _ENOUGH_ABOVE = 4
 """Clean campaigns at least as odd after which sampling stops: p is known to half of itself then."""
 _BATCH = 25
 """Campaigns refitted together: large enough for arrays, small enough to stop early."""
-_FEWEST = round(1.0 / LIMIT) - 1
-"""Clean campaigns by fronts at most: the fewest that place the limit, which none of them may reach then."""
 _FEW = 9
-"""The same where nothing is too probable for a claim, or the odds are rare: they show what is usual."""
+"""Clean campaigns by fronts at most where nothing is too probable for a claim, or the odds are rare: they
+show what is usual. Else as few as place the limit."""
 _RARE = -math.log(LIMIT)
 """Log odds that at most so many of clean campaigns have, by Markov's inequality."""
 
@@ -86,7 +85,7 @@ class BootstrapTest:
 
 
 def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_odds: float) -> BootstrapTest:
-    """Check a law, perhaps with mechanisms added, by the odds that a comparison gives.
+    """Check a base law by the odds that its comparison gives.
 
     Parameters
     ----------
@@ -107,12 +106,12 @@ def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_o
                 yield from pool.map(partial(log_odds_by_fronts, base, test, log_odds), *campaigns, rngs)
 
     to_place = math.log((1.0 - NOTHING_AT_MOST) / NOTHING_AT_MOST) < log_odds < _RARE
-    most = _FEWEST if to_place else _FEW
+    most = FEWEST_CLEAN if to_place else _FEW
     return BootstrapTest(log_odds, _until_clear(test, draws, seed, log_odds, most, by_fronts))
 
 
 def linear_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, most: int) -> BootstrapTest:
-    """Check a law, perhaps with mechanisms added, by the linear model's odds of what may be missing still.
+    """Check a law with something added by the linear model's odds of what may be missing still.
 
     Parameters
     ----------
