@@ -25,7 +25,8 @@ from skred.diagnosis.augment.problem import as_diagnosed
 from skred.diagnosis.detect.detectability import identify
 from skred.diagnosis.detect.run import base_of, identify_document, identify_to
 from skred.diagnosis.detect.score_test import placed_mechanisms
-from skred.diagnosis.effort import QUICK_REPLICAS, SAMPLING, Effort
+from skred.diagnosis.effort import SAMPLING, Effort
+from skred.diagnosis.limits import FEWEST_CLEAN
 from skred.inference.calibrate import calibrate
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.physics.laws import load_law
@@ -320,8 +321,8 @@ def test_a_diagnosis_is_told_with_its_statement(few: Path, capsys: pytest.Captur
     ("words", "expected"),
     [
         ([], Effort()),
-        (["--quick"], Effort(QUICK_REPLICAS, 1)),
-        (["--quick", "--max-mechanisms", "2"], Effort(QUICK_REPLICAS, 2)),
+        (["--quick"], Effort(FEWEST_CLEAN, 1)),
+        (["--quick", "--max-mechanisms", "2"], Effort(FEWEST_CLEAN, 2)),
         (["--max-mechanisms", "1", "--exact-loo"], Effort(Effort().replicas, 1, exact_loo=True)),
     ],
 )
@@ -343,7 +344,7 @@ def test_what_a_diagnosis_is_asked(folder: Path) -> None:
     document = json.loads((folder / "told" / "verdict.json").read_text())
     settings = replace(SAMPLING, seed=7)
     assert document["base_model"] == "constant"
-    assert document["settings"] == settings.as_dict() | {"replicas": QUICK_REPLICAS}
+    assert document["settings"] == settings.as_dict() | {"replicas": FEWEST_CLEAN}
     problem = as_diagnosed(hierarchical_problem(campaign, error_model="student", smoothing_m=20.0))
     draws = calibrate(problem, load_law("constant"), settings).tree["posterior"]["retardation"]
     with xr.open_datatree(folder / "told" / "base.nc", engine="h5netcdf") as written:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from skred.diagnosis.clock import Clock
+from skred.diagnosis.limits import FEWEST_CLEAN
 from skred.inference.sampling import SamplerSettings
 
 SAMPLING = SamplerSettings("metropolis", draws=600, tune=1000, chains=4, seed=0)
 """How a diagnosis samples: enough to converge nearly always; with more draws where it did not."""
 REPLICAS = 500
 """Clean campaigns of an augmented law: where 1 % of them are as odd, about five of these are."""
-QUICK_REPLICAS = 100
-"""The same of a quick diagnosis: nearly the fewest with which a p-value can reach 0.01."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,7 @@ def effort_of(quick: bool) -> Effort:
 
     A quick one adds no second mechanism: that takes another comparison, half of the time.
     """
-    return Effort(QUICK_REPLICAS, max_mechanisms=1) if quick else Effort()
+    return Effort(FEWEST_CLEAN, max_mechanisms=1) if quick else Effort()
 
 
 @dataclass(frozen=True)

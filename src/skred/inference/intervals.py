@@ -9,12 +9,14 @@ import numpy as np
 INTERVAL_KIND = "equal-tailed"
 INTERVAL_PROBABILITY = 0.9
 """Of intervals, bands and credible sets, and of finding a strength at its detection limit."""
+_TAIL = round(0.5 * (1.0 - INTERVAL_PROBABILITY), 9)
+ENDS = (_TAIL, 1.0 - _TAIL)
+"""Quantiles at which an equal-tailed interval ends."""
 PRACTICAL_DIFFERENCE = 4.0
 """Smaller differences of elpd are called no practical difference."""
 
 
 def interval(values: Any) -> tuple[float, float]:
     """Equal-tailed interval of draws."""
-    tail = 0.5 * (1.0 - INTERVAL_PROBABILITY)
-    low, high = np.quantile(np.ravel(values), [tail, 1.0 - tail])
+    low, high = np.quantile(np.ravel(values), ENDS)
     return float(low), float(high)

@@ -9,7 +9,6 @@ never at the population's mean: that would alarm on clean recordings with small 
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -24,17 +23,15 @@ from skred.diagnosis.evidence.conditional_map import (
     event_modes,
 )
 from skred.inference.hierarchical.rough_population import (
-    PRIOR_EVENTS,
-    SPREAD_LOG_SD,
-    SPREAD_MEDIAN,
+    MEDIAN_LOG_MEAN,
+    MEDIAN_LOG_SD,
     STARTING_SPREAD,
+    spreads_and_correlations,
 )
 from skred.physics.law import Law
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-MEDIAN_LOG_MEAN, MEDIAN_LOG_SD = -0.64, 1.1
-"""Mean and standard deviation of the log of a half-normal variable of scale 1."""
 
 
 class MeanPrior(NamedTuple):
@@ -297,17 +294,9 @@ def most_probable_covariance(rows: Rows, deviation: FloatArray, cover: FloatArra
     cover : (n_rows, n, n) array
         What is left open of them.
     """
-    moment = _by_group(rows, np.einsum("ri,rj->rij", deviation, deviation) + cover)
-    squares, n_events = _diagonal(moment), len(rows.event) // rows.n_groups
-    log_spread = 0.5 * np.log(squares / n_events + 1e-12)
-    for _ in range(12):
-        ratio = squares * np.exp(-2.0 * log_spread)
-        slope = n_events - ratio + (log_spread - math.log(SPREAD_MEDIAN)) / SPREAD_LOG_SD**2
-        log_spread = log_spread - np.clip(slope / (2.0 * ratio + SPREAD_LOG_SD**-2.0), -1.0, 1.0)
-    regular = moment + PRIOR_EVENTS * SPREAD_MEDIAN**2 * np.eye(moment.shape[1])
-    scale = np.sqrt(_diagonal(regular))
-    spread = np.exp(log_spread)
-    return regular * (spread / scale)[:, :, None] * (spread / scale)[:, None, :]
+    moments = _by_group(rows, np.einsum("ri,rj->rij", deviation, deviation) + cover)
+    spreads, correlations = spreads_and_correlations(moments, len(rows.event) // rows.n_groups)
+    return correlations * spreads[:, :, None] * spreads[:, None, :]
 
 
 def starting_population(law: Law) -> Population:

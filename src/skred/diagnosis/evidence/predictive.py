@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.diagnosis.evidence.extension import Extension
+from skred.inference.intervals import ENDS
 
 FloatArray = NDArray[np.float64]
 
@@ -64,5 +65,5 @@ def predict_event(
     points = np.column_stack([logs, rng.standard_normal(len(means))])
     fronts = extension.predict(np.full(len(means), event), points, added)[:, :-1]
     noisy = problem.error_model.draw(fronts, readings.sd(event, fronts), readings.is_velocity, rng)
-    low, high = np.quantile(noisy, [0.05, 0.95], axis=0)
+    low, high = np.quantile(noisy, ENDS, axis=0)
     return Predicted(fronts.mean(axis=0), low, high)

@@ -10,9 +10,9 @@ from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.predict.unseen import ProfileTerm
-from skred.diagnosis.verdict.mechanisms import INTERVAL
 from skred.inference.added_terms import GROUP, AddedTerm, added_group
 from skred.inference.hierarchical.population import POPULATION, population_group
+from skred.inference.intervals import ENDS
 from skred.inference.recorded_data import recorded_groups
 from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism, Shape
 
@@ -32,7 +32,7 @@ def augmented_draws(found: Diagnosis) -> xr.DataTree:
     names = [one.name for one in added]
     units = [step.candidate.mechanism.strength.unit for step in found.steps]
     strengths = [strength_of(found.steps, number) for number in range(len(names))]
-    quantiles = (INTERVAL[0], 0.5, INTERVAL[1])
+    quantiles = (ENDS[0], 0.5, ENDS[1])
     ends = np.array(
         [[step.candidate.ends(share) or (np.nan, np.nan) for share in quantiles] for step in found.steps]
     )

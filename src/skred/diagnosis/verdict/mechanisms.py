@@ -15,17 +15,15 @@ from skred.diagnosis.compare.location import Location
 from skred.diagnosis.evidence.covariates import standard_of
 from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.verdict.between import between_document, ways_document
+from skred.inference.intervals import ENDS
 from skred.physics.mechanisms.spec import Mechanism
 from skred.physics.mechanisms.stretches import equation_of
-
-INTERVAL = (0.05, 0.95)
-"""Quantiles that are the ends of a stated interval: 90 %, as everywhere."""
 
 
 def place_of(candidate: Candidate) -> dict[str, Any] | None:
     """Medians of both ends of a mechanism's stretch, and their 90 % intervals; None where it is not local."""
     middle = candidate.stretch()
-    low, high = (candidate.ends(share) for share in INTERVAL)
+    low, high = (candidate.ends(share) for share in ENDS)
     if middle is None or low is None or high is None:
         return None
     return {

@@ -30,7 +30,13 @@ from skred.inference.hierarchical.population import (
     spread_parameters,
 )
 from skred.inference.hierarchical.releases import Releases, releases_of, terrain_with_releases
-from skred.inference.hierarchical.rough_population import RoughPopulation, envelope_around, rough_population
+from skred.inference.hierarchical.rough_population import (
+    MEDIAN_LOG_MEAN,
+    MEDIAN_LOG_SD,
+    RoughPopulation,
+    envelope_around,
+    rough_population,
+)
 from skred.inference.hierarchical.surface import Surfaces, build_surfaces
 from skred.inference.problem import Problem
 from skred.physics.geometry import sensor_table
@@ -51,8 +57,6 @@ without drag do not bound it from below, and chains would leave the range that w
 _WIDER_CHECK = 1.0
 """How much farther the box of log coefficients reaches for each step of fineness: a check must see what the
 box may have missed."""
-_MEDIAN_LOG_MEAN, _MEDIAN_LOG_SD = -0.64, 1.1
-"""Mean and standard deviation of the log of a half-normal variable of scale 1."""
 _COARSE_CELL = 0.25
 """Width of a patch while the population is looked for: about the widest of usual spreads."""
 CHECKED_EVENTS, _CHECKED_DRAWS = 24, 40
@@ -271,7 +275,7 @@ class HierarchicalProblem(Problem):
     def _looked_for(self, mechanisms: Sequence[Mechanism], box: FloatArray) -> RoughPopulation:
         """Approximate population of a law within a range of coefficients."""
         n = len(mechanisms)
-        mean, sd = _log_scales(mechanisms) + _MEDIAN_LOG_MEAN, np.full(n, _MEDIAN_LOG_SD)
+        mean, sd = _log_scales(mechanisms) + MEDIAN_LOG_MEAN, np.full(n, MEDIAN_LOG_SD)
         coarse = build_surfaces(self.fronts(mechanisms), box, COARSE, np.full(n, _COARSE_CELL))
         return rough_population(coarse, mean, sd)
 
