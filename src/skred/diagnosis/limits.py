@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from skred.inference.intervals import LEFT_OUT
+
 LIMIT = 0.01
 """Share of clean campaigns that may be called wrong: the one limit of an alarm."""
-NOTHING_AT_MOST = 0.1
+NOTHING_AT_MOST = LEFT_OUT
 """Probability of nothing from which on it is in every set that holds as much as a credible one: no claim."""
 FEWEST_CLEAN = round(1.0 / LIMIT) - 1
 """Clean campaigns that place the limit at least: none of them may reach it then."""

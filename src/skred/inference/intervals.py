@@ -9,8 +9,9 @@ import numpy as np
 INTERVAL_KIND = "equal-tailed"
 INTERVAL_PROBABILITY = 0.9
 """Of intervals, bands and credible sets, and of finding a strength at its detection limit."""
-_TAIL = round(0.5 * (1.0 - INTERVAL_PROBABILITY), 9)
-ENDS = (_TAIL, 1.0 - _TAIL)
+LEFT_OUT = round(1.0 - INTERVAL_PROBABILITY, 9)
+"""What a credible set leaves out at most."""
+ENDS = (0.5 * LEFT_OUT, 1.0 - 0.5 * LEFT_OUT)
 """Quantiles at which an equal-tailed interval ends."""
 PRACTICAL_DIFFERENCE = 4.0
 """Smaller differences of elpd are called no practical difference."""

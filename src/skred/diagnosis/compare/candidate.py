@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from skred.diagnosis.evidence.coefficient import Curve
 from skred.diagnosis.tabulated.between_evidence import Way
 from skred.inference.between_events import PRIOR, BetweenEvents
+from skred.inference.intervals import LEFT_OUT
 from skred.physics.mechanisms.spec import Group, Mechanism
 from skred.physics.mechanisms.stretches import is_opposed
 
@@ -21,8 +22,6 @@ FORM = 0.3
 """Relative standard deviation of a physical strength for the form of its term: edges, exponents, supply that
 real forces have otherwise. Set on 28 opened trials, whose true forms differ on purpose: 90 % intervals held
 16 of the true strengths without it, 24 with it."""
-_UNLIKELY = 0.1
-"""Probability up to which a way in which avalanches may differ is not modelled in place of a likelier one."""
 BESIDE = 0.5
 """Prior probability that a force in no list acts beside a mechanism, where such a force, by itself or beside
 another one, has more evidence than it: then something acts beside it or in its place, at even odds."""
@@ -127,9 +126,9 @@ class Candidate:
 
     @property
     def likely_ways(self) -> tuple[BetweenEvents, ...]:
-        """How avalanches probably differ in it, the most probable way first."""
+        """How avalanches may differ, the most probable way first; none that a credible set leaves out."""
         shares = self.between
-        likely = [kind for kind in shares if shares[kind] > _UNLIKELY]
+        likely = [kind for kind in shares if shares[kind] > LEFT_OUT]
         return tuple(sorted(likely, key=lambda kind: -shares[kind]))
 
     @property

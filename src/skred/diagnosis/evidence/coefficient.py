@@ -151,10 +151,13 @@ class Curve:
         floor = self.log_evidence.max() - _DEEP
         heights = np.maximum(self.log_evidence, floor)
         spline = Akima1DInterpolator(self.strengths, heights, method="makima")
-        log_prior = -0.5 * (strengths / scale) ** 2 - 0.5 * math.log(2.0 * math.pi * scale**2)
-        if not self.added.either_sign:
-            log_prior = log_prior + math.log(2.0)
-        return strengths, spline(strengths) + log_prior
+        return strengths, spline(strengths) + self.log_prior(strengths, scale)
+
+    def log_prior(self, strengths: FloatArray, scale: float) -> FloatArray:
+        """Log density of the strength's prior if it had some scale: normal, or half of it."""
+        constant = -0.5 * math.log(2.0 * math.pi * scale**2)
+        constant += 0.0 if self.added.either_sign else math.log(2.0)
+        return np.asarray(constant - 0.5 * (strengths / scale) ** 2)
 
     @property
     def is_cut(self) -> bool:

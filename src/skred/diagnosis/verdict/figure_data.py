@@ -21,6 +21,7 @@ from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.verdict.conditional import conditional_dataset
 from skred.diagnosis.verdict.mechanisms import candidates_of
 from skred.diagnosis.verdict.report_facts import checks_of, comparisons_of
+from skred.diagnosis.words import TOLD_FROM
 from skred.inference.recorded_data import recorded_groups
 from skred.inference.results import FORMAT
 from skred.physics.mechanisms.stretches import is_opposed
@@ -28,8 +29,6 @@ from skred.physics.mechanisms.stretches import is_opposed
 FloatArray = NDArray[np.float64]
 PRIOR_SCALES = np.geomspace(0.1, 10.0, 13)
 """Scales of a strength's prior, relative to the one used, at which the Bayes factor is given."""
-_RELEVANT = 0.01
-"""Probability below which no figure shows a candidate's Bayes factor by the prior's scale."""
 _READING = {"units": "m s-1; m for the runout"}
 _NATS = {"units": "nat"}
 _OF_CANDIDATE = {"units": "see the variable unit"}
@@ -152,30 +151,20 @@ def _curves(comparison: Comparison) -> xr.Dataset:
 def _looked_at(comparison: Comparison, names: Sequence[str]) -> list[int]:
     """Rows of the candidates whose Bayes factor is given by the prior's scale: those that figures show."""
     shares = [comparison.probability[name] for name in names]
-    least = min(_RELEVANT, max(shares, default=0.0))
+    least = min(TOLD_FROM, max(shares, default=0.0))
     return [row for row, share in enumerate(shares) if share >= least]
 
 
 def _fine(curve: Curve) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Strengths on a fine grid, log evidence and log prior density there."""
     strengths, log_density = curve.fine()
-    log_prior = _log_prior(curve, strengths)
+    log_prior = curve.log_prior(strengths, curve.scale)
     return strengths, log_density - log_prior, log_prior
-
-
-def _log_prior(curve: Curve, strengths: FloatArray) -> FloatArray:
-    added = curve.mechanism.added
-    assert added is not None
-    scale = added.scale_of(curve.shape)
-    constant = -0.5 * math.log(2.0 * math.pi * scale**2) + (0.0 if added.either_sign else math.log(2.0))
-    return np.asarray(-0.5 * (strengths / scale) ** 2 + constant)
 
 
 def _factor_at(candidate: Candidate, relative: float) -> float:
     """Log Bayes factor of a candidate with its prior scale multiplied; re-computed at its own scale alone."""
-    added = candidate.mechanism.added
-    assert added is not None
-    factors = [one.log_bayes_factor_at(relative * added.scale_of(one.shape)) for one in candidate.curves]
+    factors = [one.log_bayes_factor_at(relative * one.scale) for one in candidate.curves]
     moved = float(logsumexp(candidate.log_weights + np.array(factors)) - logsumexp(candidate.log_factors))
     return candidate.log_bayes_factor + moved
 
