@@ -14,7 +14,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from itertools import batched
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +27,6 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population
 from skred.diagnosis.evidence.linear_mixed_model import Scores, fit_population
 from skred.diagnosis.limits import FEWEST_CLEAN, LIMIT, NOTHING_AT_MOST
 from skred.parallel.processes import worker_pool
-from skred.parallel.threads import threads
 
 FloatArray = NDArray[np.float64]
 _ENOUGH_ABOVE = 4
@@ -99,11 +97,11 @@ def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_o
     test = ScoreTest(base.problem, base.law, base.setting, base.directions, base.strengths)
 
     def by_fronts(refitted: _Refitted, first: int) -> Iterator[float]:
-        with worker_pool() as pool:
-            for some in batched(range(len(refitted.log_odds)), threads()):
-                rngs = [np.random.default_rng([seed, 22, first + group]) for group in some]
-                campaigns = zip(*map(refitted.one, some), strict=True)
-                yield from pool.map(partial(log_odds_by_fronts, base, test, log_odds), *campaigns, rngs)
+        groups = range(len(refitted.log_odds))
+        rngs = [np.random.default_rng([seed, 22, first + group]) for group in groups]
+        campaigns = zip(*map(refitted.one, groups), strict=True)
+        with worker_pool() as pool:  # those that nobody waits for any more are not begun
+            yield from pool.map(partial(log_odds_by_fronts, base, test, log_odds), *campaigns, rngs)
 
     to_place = math.log((1.0 - NOTHING_AT_MOST) / NOTHING_AT_MOST) < log_odds < _RARE
     most = FEWEST_CLEAN if to_place else _FEW

@@ -228,8 +228,9 @@ def _under_errors(
     with worker_pool() as pool:
         curves = screened(base, pool, tell, before)
         candidates = refine(base.setting, curves, partial(curve_near, base), pool, best)
-        profiles = list(pool.map(partial(free_force, base, candidates=candidates), KINDS))
+        fitted = pool.map(partial(free_force, base, candidates=candidates), KINDS)  # and meanwhile:
         candidates = with_ways(base, candidates, pool, best)
+        profiles = list(fitted)
         candidates = with_residues(base, candidates, profiles, pool)
         candidates, profiles = recomputed(base, candidates, profiles, pool, best)
     return ComparisonUnderErrors(error_model, base, candidates, profiles, curves)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,7 @@ from skred.diagnosis.evidence.refit import Fit
 from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
 from skred.diagnosis.limits import LIMIT
 from skred.diagnosis.predict.conditional import sensor_ends
-from skred.parallel.threads import side_by_side
+from skred.parallel.processes import worker_pool
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -108,11 +109,11 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray) -> Influe
     under_errors = comparison.leading(answer)
     base = under_errors.base
     if answer == UNLISTED:
-        again = _of_profile(most_probable(under_errors.profiles))
+        again = partial(_by_profile, most_probable(under_errors.profiles), base)
         stated = log_evidence_of(under_errors.profiles)
     else:
         candidate = under_errors.candidates[answer]
-        again = _of_mechanism(candidate)
+        again = partial(_by_mechanism, candidate, base)
         stated = candidate.alone + log_gain(None, candidate.gains)
     n = len(base.rows.event)
     everything = np.ones(n, dtype=bool)
@@ -123,10 +124,11 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray) -> Influe
     order, third = np.argsort(without_each), int(MOST * n)
     parts = [_Part(everything), _first_left_out(order, third), *parts]
     # By the same, quicker method on both sides; only the difference is taken from it.
-    whole, *found = side_by_side(lambda part: again(base, part), parts)
+    with worker_pool() as pool:
+        whole, *found = pool.map(again, parts)
     without_third, *without_kinds = stated + np.array(found) - whole
     many, left = _carried(
-        lambda many: stated + again(base, _first_left_out(order, many)) - whole, third, without_third, needed
+        lambda many: stated + again(_first_left_out(order, many)) - whole, third, without_third, needed
     )
     ids = base.problem.campaign.event_ids
     return Influence(
@@ -177,39 +179,26 @@ class _Part:
         return replace(base, rows=rows.take(np.flatnonzero(self.kept)), fit=self.fit(base.fit))
 
 
-Again = Callable[[Base, _Part], float]
-
-
-def _of_mechanism(candidate: Candidate) -> Again:
+def _by_mechanism(candidate: Candidate, base: Base, part: _Part) -> float:
     """The log Bayes factor of a mechanism by a part of the recordings, over its leading shapes."""
     factors = candidate.log_factors
-    chosen = np.flatnonzero(factors > factors.max() - DECIDES_NOTHING)
-
-    def again(base: Base, part: _Part) -> float:
-        rest, found = part.base(base), list[tuple[float, Curve]]()
-        for k in chosen:
-            curve = candidate.curves[k]
-            known = {strength: part.fit(fit) for strength, fit in curve.known.items()}
-            one = curve_at(rest, curve.mechanism, curve.shape, curve.strengths, USUAL, known)
-            found.append((candidate.log_weights[k] + one.log_bayes_factor, one))
-        in_common = float(np.logaddexp.reduce([factor for factor, _ in found]))
-        if candidate.ways is None:
-            return in_common
-        best = max(found, key=lambda one: one[0])[1]
-        ways = or_none(searched, rest, best)
-        return in_common + log_gain(None, None if ways is None else gains_of(ways))
-
-    return again
+    rest, found = part.base(base), list[tuple[float, Curve]]()
+    for k in np.flatnonzero(factors > factors.max() - DECIDES_NOTHING):
+        curve = candidate.curves[k]
+        known = {strength: part.fit(fit) for strength, fit in curve.known.items()}
+        one = curve_at(rest, curve.mechanism, curve.shape, curve.strengths, USUAL, known)
+        found.append((candidate.log_weights[k] + one.log_bayes_factor, one))
+    in_common = float(np.logaddexp.reduce([factor for factor, _ in found]))
+    if candidate.ways is None:
+        return in_common
+    ways = or_none(searched, rest, max(found, key=lambda one: one[0])[1])
+    return in_common + log_gain(None, None if ways is None else gains_of(ways))
 
 
-def _of_profile(profile: Profile) -> Again:
+def _by_profile(profile: Profile, base: Base, part: _Part) -> float:
     """The log Bayes factor of a profile by a part of the recordings."""
-
-    def again(base: Base, part: _Part) -> float:
-        near = profile.mean, part.fit(profile.fit).start
-        return fit_profile(part.base(base), profile.kind, near, profile.prior).log_bayes_factor
-
-    return again
+    near = profile.mean, part.fit(profile.fit).start
+    return fit_profile(part.base(base), profile.kind, near, profile.prior).log_bayes_factor
 
 
 def _first_left_out(order: NDArray[np.int64], many: int) -> _Part:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,7 @@ from skred.diagnosis.evidence.refit import Rounds, refit
 from skred.diagnosis.predict.draws import N_DRAWS, Draws, LeftOut
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.predict.unseen import log_densities
+from skred.parallel.processes import worker_pool
 from skred.parallel.threads import side_by_side
 
 FloatArray = NDArray[np.float64]
@@ -77,7 +79,8 @@ def profile_law(under_errors: ComparisonUnderErrors, most: int, seed: int) -> Pr
     """
     base, profile = under_errors.base, most_probable(under_errors.profiles)
     parts = parts_left_out(len(base.rows.event), seed)
-    fitted = side_by_side(lambda part: _left_out(base, profile, part, seed), parts)
+    with worker_pool() as pool:
+        fitted = list(pool.map(partial(_left_out, base, profile, seed), parts))
     before, after = (_held_out(base, others, seed) for others in zip(*_by_event(fitted), strict=True))
     check, rng = _check(base, profile, most, seed), np.random.default_rng([seed, 55])
     without, within = _plain(base, rng).draws, with_profile(base, profile, rng).draws
@@ -104,7 +107,7 @@ def _by_event[Fitted](fitted: Sequence[tuple[IntArray, Fitted]]) -> list[Fitted]
 
 
 def _left_out(
-    base: Base, profile: Profile, part: IntArray, seed: int
+    base: Base, profile: Profile, seed: int, part: IntArray
 ) -> tuple[IntArray, tuple[LeftOut, LeftOut]]:
     """A part, and what the others say of its avalanches, without the profile and with it."""
     rest, rng = _without(base, part), _rng(seed, part)
