@@ -25,6 +25,32 @@ from skred.inference.reading_table import (
 )
 from skred.parallel.compile_cache import compiled, inner
 
+_SQRT_2 = math.sqrt(2.0)
+_SQRT_2PI = math.sqrt(2.0 * math.pi)
+_FAR = 6.0
+"""Standard deviations beyond which the slope of a normal tail is taken from its asymptote: the tail itself
+underflows."""
+
+
+@inner()
+def _stop_slopes(stop, reached, not_reached, place_sd):  # type: ignore[no-untyped-def]
+    """Slope and curvature of the log probability that a stop is seen between two places."""
+    if reached == -np.inf and not_reached == np.inf:
+        return 0.0, 0.0
+    low, high = (reached - stop) / place_sd, (not_reached - stop) / place_sd
+    if low > _FAR:
+        return (low + 1.0 / low) / place_sd, 1.0 / place_sd**2
+    if high < -_FAR:
+        return (high + 1.0 / high) / place_sd, 1.0 / place_sd**2
+    inside = 0.5 * (math.erfc(-high / _SQRT_2) - math.erfc(-low / _SQRT_2))
+    inside = max(inside, 1e-12)
+    at_low = math.exp(-0.5 * low * low) / _SQRT_2PI if low > -np.inf else 0.0
+    at_high = math.exp(-0.5 * high * high) / _SQRT_2PI if high < np.inf else 0.0
+    slope = (at_low - at_high) / inside
+    bend = (low * at_low if at_low > 0.0 else 0.0) - (high * at_high if at_high > 0.0 else 0.0)
+    curvature = slope * slope - bend / inside
+    return slope / place_sd, min(max(curvature, 0.0), 1.0) / place_sd**2
+
 
 @inner()
 def _common_slopes(table, row, predictions, i, common, slope, curvature, shared):  # type: ignore[no-untyped-def]
@@ -103,9 +129,8 @@ def reading_slopes(rows, predictions, readings, errors):  # type: ignore[no-unty
     for i in range(n):
         row = rows[i]
         stop = predictions[i, n_columns - 1]
-        above, below = (reached[row] - stop) / place_sd, (not_reached[row] - stop) / place_sd
-        at_stop, bend = bound_slopes(above, below, 0.0, 0.0, False)
-        slope[i, n_columns - 1], curvature[i, n_columns - 1] = at_stop / place_sd, bend / place_sd**2
+        at_stop, bend = _stop_slopes(stop, reached[row], not_reached[row], place_sd)
+        slope[i, n_columns - 1], curvature[i, n_columns - 1] = at_stop, bend
         if common > 0.0:
             _common_slopes(table, row, predictions, i, common, slope, curvature, shared)
             weights[0] = 1.0  # these errors are one case
