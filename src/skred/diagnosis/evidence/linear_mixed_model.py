@@ -9,6 +9,7 @@ never at the population's mean: that would alarm on clean recordings with small 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -25,8 +26,10 @@ from skred.diagnosis.evidence.conditional_map import (
 from skred.inference.hierarchical.rough_population import (
     MEDIAN_LOG_MEAN,
     MEDIAN_LOG_SD,
+    PRIOR_EVENTS,
+    SPREAD_LOG_SD,
+    SPREAD_MEDIAN,
     STARTING_SPREAD,
-    spreads_and_correlations,
 )
 from skred.physics.law import Law
 
@@ -294,9 +297,17 @@ def most_probable_covariance(rows: Rows, deviation: FloatArray, cover: FloatArra
     cover : (n_rows, n, n) array
         What is left open of them.
     """
-    moments = _by_group(rows, np.einsum("ri,rj->rij", deviation, deviation) + cover)
-    spreads, correlations = spreads_and_correlations(moments, len(rows.event) // rows.n_groups)
-    return correlations * spreads[:, :, None] * spreads[:, None, :]
+    moment = _by_group(rows, np.einsum("ri,rj->rij", deviation, deviation) + cover)
+    squares, n_events = _diagonal(moment), len(rows.event) // rows.n_groups
+    log_spread = 0.5 * np.log(squares / n_events + 1e-12)
+    for _ in range(12):
+        ratio = squares * np.exp(-2.0 * log_spread)
+        slope = n_events - ratio + (log_spread - math.log(SPREAD_MEDIAN)) / SPREAD_LOG_SD**2
+        log_spread = log_spread - np.clip(slope / (2.0 * ratio + SPREAD_LOG_SD**-2.0), -1.0, 1.0)
+    regular = moment + PRIOR_EVENTS * SPREAD_MEDIAN**2 * np.eye(moment.shape[1])
+    scale = np.sqrt(_diagonal(regular))
+    spread = np.exp(log_spread)
+    return regular * (spread / scale)[:, :, None] * (spread / scale)[:, None, :]
 
 
 def starting_population(law: Law) -> Population:

@@ -91,7 +91,7 @@ def rough_population(surfaces: Surfaces, prior_mean: FloatArray, prior_sd: Float
             precision @ (weight @ points) + prior_mean / prior_sd**2,
         )
         moment = _moment(points - centre, weight, within)
-        spread, correlation = spreads_and_correlations(moment, n_events)
+        spread, correlation = _spreads(moment, n_events)
         change = np.abs(centre - mean).max() + np.abs(spread**2 - np.diag(covariance)).max()
         mean, covariance = centre, np.outer(spread, spread) * correlation
         if iteration == _SEARCH:  # found; from here on what the data leave open is the prior's
@@ -145,28 +145,17 @@ def _moment(deviation: FloatArray, weight: FloatArray, within: FloatArray) -> Fl
     return total
 
 
-def spreads_and_correlations(moments: FloatArray, n_events: int) -> tuple[FloatArray, FloatArray]:
-    """Most probable spreads under their log-normal prior, by Newton's method, and mild correlations.
-
-    Parameters
-    ----------
-    moments : (..., n_strengths, n_strengths) array
-        Sums over events of the expected squares of deviations from the mean.
-
-    Returns
-    -------
-    spreads : (..., n_strengths) array
-    correlations : (..., n_strengths, n_strengths) array
-    """
-    squares = np.einsum("...ii->...i", moments)
+def _spreads(moment: FloatArray, n_events: int) -> tuple[FloatArray, FloatArray]:
+    """Most probable spreads under their log-normal prior, by Newton's method, and correlation."""
+    squares = np.diag(moment)
     log_spread = 0.5 * np.log(squares / n_events + 1e-12)
     for _ in range(20):
         ratio = squares * np.exp(-2.0 * log_spread)
         slope = n_events - ratio + (log_spread - math.log(SPREAD_MEDIAN)) / SPREAD_LOG_SD**2
         log_spread = log_spread - np.clip(slope / (2.0 * ratio + SPREAD_LOG_SD**-2.0), -1.0, 1.0)
-    regular = moments + PRIOR_EVENTS * SPREAD_MEDIAN**2 * np.eye(moments.shape[-1])
-    scale = np.sqrt(np.einsum("...ii->...i", regular))
-    return np.exp(log_spread), regular / (scale[..., :, None] * scale[..., None, :])
+    regular = moment + PRIOR_EVENTS * SPREAD_MEDIAN**2 * np.eye(len(moment))
+    scale = np.sqrt(np.diag(regular))
+    return np.exp(log_spread), regular / np.outer(scale, scale)
 
 
 def _own_variance(
