@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +26,8 @@ from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Shape
 
 DRAG = mechanisms()["turbulent_drag"]
+ENOUGH = math.log(99.0)
+"""Log odds that raise an alarm whatever clean campaigns are like."""
 
 
 def drag_in(campaign: Campaign) -> tuple[Comparison, Curve]:
@@ -58,7 +61,7 @@ def test_without_an_avalanche_as_in_a_campaign_that_never_had_it() -> None:
     without = calibrate(base.problem, base.law, settings)
     assert with_drag.gate.numerics and without.gate.numerics
     gained = held_out(with_drag, 0).pointwise - held_out(without, 0).pointwise
-    said = influence(comparison, DRAG.id, gained)
+    said = influence(comparison, DRAG.id, gained, ENOUGH)
     assert said.log_bayes_factor == pytest.approx(found.log_bayes_factor)
     for event in (0, 7):
         assert said.without_each[event] == pytest.approx(without_one(campaign, event), abs=0.5)
@@ -66,7 +69,7 @@ def test_without_an_avalanche_as_in_a_campaign_that_never_had_it() -> None:
 
 def test_a_strong_effect_in_all_avalanches_hangs_on_no_few() -> None:
     comparison = drag_in(rolling(2.4e-4, n_events=12))[0]
-    said = influence(comparison, DRAG.id, np.full(12, comparison.log_factors[DRAG.id] / 12))
+    said = influence(comparison, DRAG.id, np.full(12, comparison.log_factors[DRAG.id] / 12), ENOUGH)
     assert said.carried_by == () and said.without_them is None
     assert said.without_a_third is not None and said.needed < said.without_a_third < said.log_bayes_factor
 
@@ -78,7 +81,7 @@ def test_avalanches_that_carry_an_answer_are_found() -> None:
     coarse[[2, 5]] = 0.1
     campaign = replace(campaign, stated_sd=coarse)
     comparison = drag_in(campaign)[0]
-    said = influence(comparison, DRAG.id, each_takes(campaign, comparison))
+    said = influence(comparison, DRAG.id, each_takes(campaign, comparison), ENOUGH)
     assert set(said.carried_by) <= {"run02", "run05"} and said.carried_by
     assert len(said.carried_by) <= MOST * campaign.n_events
     assert said.without_them is not None and said.without_them < said.needed < said.log_bayes_factor
@@ -90,6 +93,14 @@ def test_readings_are_left_out_by_sensor_and_kind() -> None:
     campaign = rolling(2.4e-4, n_events=8)
     values = np.array(campaign.values)
     values[3, -1] = 0.0
-    said = influence(drag_in(replace(campaign, values=values))[0], DRAG.id, np.zeros(8))
+    said = influence(drag_in(replace(campaign, values=values))[0], DRAG.id, np.zeros(8), ENOUGH)
     kinds = [(one.kind, one.sensor, one.n) for one in said.readings]
     assert kinds == [("zeros", None, 1), *(("sensor", f"s{k}", 8) for k in range(6))]
+
+
+def test_an_answer_may_lose_what_the_alarm_has_to_spare() -> None:
+    """Others that are tied with it raise the alarm, too: by itself it may have less than an alarm takes."""
+    campaign = rolling(2.4e-4, n_events=8)
+    comparison = drag_in(campaign)[0]
+    said = influence(comparison, DRAG.id, np.zeros(8), comparison.log_odds - 1.5)
+    assert said.needed == pytest.approx(said.log_bayes_factor - 1.5)

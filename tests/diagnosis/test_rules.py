@@ -73,6 +73,13 @@ def test_p_value_of_besag_and_clifford() -> None:
     assert BootstrapTest(5.0, np.append(np.zeros(8), 6.0)).p_value == 0.2  # the evidence is at fault
 
 
+def test_odds_that_still_raise_an_alarm() -> None:
+    """More than simulated ones have; those of 100 to 1 where few were simulated; and nothing below 0.1."""
+    assert BootstrapTest(4.0, np.linspace(-2.0, 3.5, 99)).needed == pytest.approx(3.5)
+    assert BootstrapTest(4.0, np.linspace(-2.0, 0.0, 99)).needed == pytest.approx(np.log(9.0))
+    assert BootstrapTest(9.0, np.zeros(9)).needed == pytest.approx(np.log(100.0))
+
+
 def test_limit_of_the_check() -> None:
     assert LIMIT == 0.01
     assert BootstrapTest(4.0, np.zeros(99)).fired and not BootstrapTest(4.0, np.zeros(98)).fired

@@ -98,7 +98,8 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
         with_the_answer = after
         if isinstance(finding, Augmented) and len(finding.steps) > 1:  # the first of them is the answer
             with_the_answer = held_out(finding.steps[0].calibration, run.seed)
-        hangs_on = influence(comparison, decision.answer, with_the_answer.pointwise - before.pointwise)
+        gained = with_the_answer.pointwise - before.pointwise
+        hangs_on = influence(comparison, decision.answer, gained, check.needed)
         clock.stage("conditional", "predicting each reading from those above it")
         given = BeforeAfter.of(before, after, run.seed)
     clock.end()

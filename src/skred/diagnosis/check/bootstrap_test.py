@@ -38,6 +38,8 @@ _FEW = 9
 show what is usual. Else as few as place the limit."""
 _RARE = -math.log(LIMIT)
 """Log odds that at most so many of clean campaigns have, by Markov's inequality."""
+_OF_A_CLAIM = math.log((1.0 - NOTHING_AT_MOST) / NOTHING_AT_MOST)
+"""Log odds above which nothing is not too probable for a claim."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +79,12 @@ class BootstrapTest:
         return (above + 1) / (len(self.simulated) + 1)
 
     @property
+    def needed(self) -> float:
+        """Log odds that would still raise an alarm: rare ones, or more than clean campaigns have."""
+        beyond = _RARE if self.is_bound else float(self.simulated.max(initial=-math.inf))
+        return max(beyond, _OF_A_CLAIM)
+
+    @property
     def fired(self) -> bool:
         """Whether the calibrated limit is passed."""
         return self.p_value <= LIMIT
@@ -103,8 +111,7 @@ def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_o
         with worker_pool() as pool:  # those that nobody waits for any more are not begun
             yield from pool.map(partial(log_odds_by_fronts, base, test, log_odds), *campaigns, rngs)
 
-    to_place = math.log((1.0 - NOTHING_AT_MOST) / NOTHING_AT_MOST) < log_odds < _RARE
-    most = FEWEST_CLEAN if to_place else _FEW
+    most = FEWEST_CLEAN if _OF_A_CLAIM < log_odds < _RARE else _FEW
     return BootstrapTest(log_odds, _until_clear(test, draws, seed, log_odds, most, by_fronts))
 
 

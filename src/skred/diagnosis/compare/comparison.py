@@ -35,7 +35,7 @@ from skred.diagnosis.evidence.conditional_map import (
     log_joint,
 )
 from skred.diagnosis.evidence.event_quadrature import FINE, SCREENING, USUAL, event_nodes
-from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds, stated
+from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, log_odds, prior_odds, stated
 from skred.diagnosis.evidence.refit import Rounds, refit
 from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING
 from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
@@ -123,8 +123,7 @@ class Comparison:
     def log_odds(self) -> float:
         """Of anything against nothing, strengths in common: as odds of simulated campaigns are computed."""
         in_common = self._over_errors([under_errors.in_common for under_errors in self.under_each])
-        nothing = stated(in_common, self.odds)[NOTHING]
-        return math.log(max(1.0 - nothing, 1e-300)) - math.log(max(nothing, 1e-300))
+        return log_odds(in_common, self.odds)
 
     def leading(self, name: str) -> ComparisonUnderErrors:
         """The comparison under the error model that an id has most of its evidence under."""

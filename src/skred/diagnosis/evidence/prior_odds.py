@@ -59,6 +59,12 @@ def probabilities(log_factors: Mapping[str, float], odds: Mapping[str, float]) -
     return {name: weight / total for name, weight in weights.items()}
 
 
+def log_odds(log_factors: Mapping[str, float], odds: Mapping[str, float]) -> float:
+    """Log posterior odds of anything against nothing, from log Bayes factors against nothing."""
+    logs = [math.log(odds[name]) + log_factors.get(name, 0.0) for name in odds if name != NOTHING]
+    return float(np.logaddexp.reduce(logs)) - math.log(odds[NOTHING])
+
+
 def stated(
     log_factors: Mapping[str, float], odds: Mapping[str, float], power: float = POWER
 ) -> dict[str, float]:

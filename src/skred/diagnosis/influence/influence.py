@@ -10,7 +10,6 @@ Of a speed that is left out it stays known that the front came there.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -25,10 +24,9 @@ from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of, most_probable
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
 from skred.diagnosis.evidence.event_quadrature import USUAL
-from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
+from skred.diagnosis.evidence.prior_odds import UNLISTED, log_odds
 from skred.diagnosis.evidence.refit import Fit
 from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
-from skred.diagnosis.limits import LIMIT
 from skred.diagnosis.predict.conditional import sensor_ends
 from skred.parallel.processes import worker_pool
 
@@ -70,8 +68,7 @@ class Influence:
     log_bayes_factor : float
         Against nothing, by all recordings.
     needed : float
-        Log Bayes factor that it needs for an alarm by itself: it makes nothing so improbable as at most one
-        in a hundred clean campaigns does, whatever they are like (Markov's inequality).
+        Log Bayes factor that it needs for an alarm, if whatever else may be missing falls with it.
     events : tuple of str
     without_each : (n_events,) array
         Log Bayes factor without each avalanche.
@@ -96,7 +93,7 @@ class Influence:
     readings: tuple[ReadingsLeftOut, ...]
 
 
-def influence(comparison: Comparison, answer: str, gained: FloatArray) -> Influence:
+def influence(comparison: Comparison, answer: str, gained: FloatArray, enough: float) -> Influence:
     """What an answer of a comparison hangs on, under the error model that it has most evidence under.
 
     Parameters
@@ -105,6 +102,8 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray) -> Influe
         Id of a mechanism that was compared, or ``unlisted``.
     gained : (n_events,) array
         Log predictive density of each avalanche given the others with the answer, less that without it.
+    enough : float
+        Log odds of anything against nothing that raise an alarm.
     """
     under_errors = comparison.leading(answer)
     base = under_errors.base
@@ -120,7 +119,8 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray) -> Influe
     kinds = _kinds(base)
     parts = [_Part(everything, chosen) for _, _, chosen in kinds]
     without_each = stated - gained
-    needed = math.log((1.0 - LIMIT) / LIMIT * comparison.odds[NOTHING] / comparison.odds[answer])
+    # What is tied with the answer explains the same recordings: without some of them it falls as much.
+    needed = stated - (log_odds(comparison.log_factors, comparison.odds) - enough)
     order, third = np.argsort(without_each), int(MOST * n)
     parts = [_Part(everything), _first_left_out(order, third), *parts]
     # By the same, quicker method on both sides; only the difference is taken from it.
