@@ -19,9 +19,11 @@ from skred.diagnosis.compare.candidate import FORM, Candidate
 from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.evidence.refit import Fit
+from skred.diagnosis.influence.influence import ReadingsLeftOut
 from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.verdict.document import verdict
 from skred.diagnosis.verdict.figure_data import figure_data
+from skred.diagnosis.verdict.hangs_on import hangs_on
 from skred.diagnosis.verdict.statement import statement
 from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Setting
@@ -210,6 +212,18 @@ def test_that_few_avalanches_carry_an_answer_comes_first() -> None:
     )
     named = verdict(diagnosis("two"))["statement"]
     assert "Take this with care" not in named and "It does not hang on a few avalanches" in named
+
+
+def test_of_many_sensors_that_an_answer_needs_five_are_named() -> None:
+    """Those without which least is left; how many more there are is told."""
+    found = diagnosis("unexplained").influence
+    assert found is not None
+    of_gates = [ReadingsLeftOut("sensor", f"gate{k:02d}", 9, found.needed - k) for k in range(1, 41)]
+    zeros = ReadingsLeftOut("zeros", None, 3, found.needed - 0.5)
+    said = hangs_on(replace(found, readings=(*of_gates, zeros)))[-1]
+    assert said.startswith("It would not be given without readings of zero (3) or without the readings of")
+    assert "without the readings of gate40 (9) or without the readings of gate39 (9)" in said
+    assert said.endswith("gate37 (9), nor without those of any one of 36 further sensors.")
 
 
 def test_the_force_profile_added_is_told() -> None:

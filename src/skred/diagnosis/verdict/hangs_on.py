@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from skred.diagnosis.influence.influence import Influence, ReadingsLeftOut
+from skred.diagnosis.words import MOST_NAMED, counted
 from skred.inference import influence_words
 
 _KINDS = {"zeros": "readings of zero", "near a stop": "speeds beside the same avalanche's stop"}
@@ -29,9 +30,13 @@ def hangs_on(found: Influence | None) -> list[str]:
             "It does not hang on a few avalanches: without the third that carry most of it, its log Bayes"
             f" factor is still {evidence}."
         )
-    lost = [_words(one) for one in found.readings if one.log_bayes_factor < found.needed]
+    lost = [one for one in found.readings if one.log_bayes_factor < found.needed]
+    lost.sort(key=lambda one: (one.sensor is not None, one.log_bayes_factor))
     if lost:
-        sentences.append(f"It would not be given without {' or without '.join(lost)}.")
+        named = " or without ".join(_words(one) for one in lost[:MOST_NAMED])
+        more = counted(len(lost[MOST_NAMED:]), "further sensor")
+        rest = f", nor without those of any one of {more}" if len(lost) > MOST_NAMED else ""
+        sentences.append(f"It would not be given without {named}{rest}.")
     return sentences
 
 
