@@ -255,6 +255,19 @@ def test_what_the_form_of_a_term_is_uncertain_by_is_in_the_strength(kind: str) -
     assert sd == pytest.approx(float(np.hypot(draws.std(ddof=1), form)), rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [("sensor", ": it reads {} too "), ("two", ": one standard deviation up, friction is {} ")],
+)
+def test_logarithms_of_factors_are_said_in_percent_too(kind: str, words: str) -> None:
+    document = verdict(diagnosis(kind))
+    factor = np.exp(document["strength"]["mean"])
+    way = {"sensor": ("low", "high"), "two": ("less", "more")}[kind][int(factor > 1.0)]
+    size = f"{100.0 * abs(factor - 1.0):.0f} %"
+    assert f"{words.format(size)}{way}." in document["statement"]
+    assert ": it reads" not in verdict(diagnosis("tie"))["statement"]
+
+
 @pytest.mark.parametrize("logarithm", [False, True])
 def test_how_a_covariate_enters_is_told(logarithm: bool) -> None:
     """To programs with what it is standardised by, to readers in the statement."""

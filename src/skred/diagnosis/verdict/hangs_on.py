@@ -34,8 +34,9 @@ def hangs_on(found: Influence | None) -> list[str]:
     lost.sort(key=lambda one: (one.sensor is not None, one.log_bayes_factor))
     if lost:
         named = " or without ".join(_words(one) for one in lost[:MOST_NAMED])
-        more = counted(len(lost[MOST_NAMED:]), "further sensor")
-        rest = f", nor without those of any one of {more}" if len(lost) > MOST_NAMED else ""
+        more = len(lost[MOST_NAMED:])
+        any_of = "any one of " if more > 1 else ""
+        rest = f", nor without those of {any_of}{counted(more, 'further sensor')}" if more else ""
         sentences.append(f"It would not be given without {named}{rest}.")
     return sentences
 

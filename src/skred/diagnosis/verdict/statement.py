@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -86,7 +87,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         f" {percent(probability[name])} (nothing: {percent(probability[NOTHING])}; a force not in the list:"
         f" {percent(probability[UNLISTED])}).",
         f"Its {strength['parameter'].replace('_', ' ')} is"
-        f" {plus_minus(strength['mean'], strength['sd'], strength['unit'])}.",
+        f" {plus_minus(strength['mean'], strength['sd'], strength['unit'])}{_in_percent(document)}.",
         between_sentence(strength),
         _compensated(document["mechanisms"][0]["constants"]),
     ]
@@ -104,6 +105,17 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     sentences.append(improvement(document))
     sentences.append(_still_fired(found.steps[-1].check))
     return [*sentences, _left(document)]
+
+
+def _in_percent(document: dict[str, Any]) -> str:
+    """What a strength does that is the logarithm of a factor; empty for all others."""
+    change = math.expm1(document["strength"]["mean"])
+    size = f"{100.0 * abs(change):.0f} %"
+    if document["sensor"]:
+        return f": it reads {size} too {'high' if change > 0.0 else 'low'}"
+    if document["covariate"]:
+        return f": one standard deviation up, friction is {size} {'more' if change > 0.0 else 'less'}"
+    return ""
 
 
 def _tied(document: dict[str, Any]) -> str:
