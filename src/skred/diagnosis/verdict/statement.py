@@ -214,13 +214,13 @@ def _by_speed(location: Location) -> str:
 
 
 def _closest(found: Diagnosis, document: dict[str, Any]) -> str:
-    """The listed candidate of the highest evidence, beside the force that is not in the list."""
-    factors = found.comparison.log_factors
-    listed = {name: value for name, value in factors.items() if name not in (NOTHING, UNLISTED)}
-    name = max(listed, key=lambda one: listed[one])
+    """The most probable listed candidate, beside the force that is not in the list."""
+    factors, probability = found.comparison.log_factors, document["probability"]
+    listed = [name for name in factors if name not in (NOTHING, UNLISTED)]
+    name = max(listed, key=lambda one: probability[one])
     return (
-        f"Of the listed mechanisms, {_title(name)} comes closest ({percent(document['probability'][name])}):"
-        f" its log Bayes factor against nothing is {listed[name]:.1f} nats, that of a force not in the list"
+        f"Of the listed mechanisms, {_title(name)} comes closest ({percent(probability[name])}):"
+        f" its log Bayes factor against nothing is {factors[name]:.1f} nats, that of a force not in the list"
         f" {factors[UNLISTED]:.1f}."
     )
 
