@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _MOST_NAMED = 40
-"""Avalanches that are named on the axis; of more only those that carry the answer are."""
+"""Avalanches, or kinds of readings, that are named on the axis; of more only those that the answer needs."""
 
 
 def has_influence(document: doc.Document) -> bool:
@@ -83,7 +83,8 @@ def _points(
         colours = [MISMATCH if name in carried else AFTER for name in names]
         axes.vlines(at, values, found["log_bayes_factor"], color=colours, linewidth=1.4, alpha=0.5)
         axes.scatter(at, values, color=colours, s=18, zorder=3)
-    shown = names if len(names) <= _MOST_NAMED else [one if one in carried else "" for one in names]
+    told = {one for one, value in zip(names, values, strict=True) if value < found["needed"]} | carried
+    shown = names if len(names) <= _MOST_NAMED else [one if one in told else "" for one in names]
     axes.set_xticks(at, [figure_text(one, 16) for one in shown], rotation=90, fontsize=7)
     axes.set_xlim(-0.7, max(len(names), 1) - 0.3)
 
