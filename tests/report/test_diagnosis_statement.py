@@ -26,7 +26,7 @@ from skred.diagnosis.verdict.figure_data import figure_data
 from skred.diagnosis.verdict.hangs_on import hangs_on
 from skred.diagnosis.verdict.statement import statement
 from skred.physics.mechanisms.placed import direction_of
-from skred.physics.mechanisms.spec import Setting
+from skred.physics.mechanisms.spec import Direction, Setting
 from skred.physics.mechanisms.stretches import U_1, U_2
 from skred.report.diagnosis.report import render_diagnosis
 from skred.report.shared.draws import chains_of
@@ -256,16 +256,25 @@ def test_what_the_form_of_a_term_is_uncertain_by_is_in_the_strength(kind: str) -
 
 
 @pytest.mark.parametrize(
-    ("kind", "words"),
-    [("sensor", ": it reads {} too "), ("two", ": one standard deviation up, friction is {} ")],
+    ("kind", "direction", "words"),
+    [
+        ("sensor", Direction(log_readings=np.zeros(4)), ": it reads {} too high."),
+        (
+            "two",
+            Direction(log_strengths=np.zeros(22)),
+            ": one standard deviation up, dry friction is {} more.",
+        ),
+    ],
 )
-def test_logarithms_of_factors_are_said_in_percent_too(kind: str, words: str) -> None:
-    document = verdict(diagnosis(kind))
-    factor = np.exp(document["strength"]["mean"])
-    way = {"sensor": ("low", "high"), "two": ("less", "more")}[kind][int(factor > 1.0)]
-    size = f"{100.0 * abs(factor - 1.0):.0f} %"
-    assert f"{words.format(size)}{way}." in document["statement"]
-    assert ": it reads" not in verdict(diagnosis("tie"))["statement"]
+def test_logarithms_of_factors_are_said_in_percent_too(kind: str, direction: Direction, words: str) -> None:
+    found = diagnosis(kind)
+    step = found.steps[0]
+    curves = tuple(replace(one, direction=direction) for one in step.candidate.curves)
+    step = replace(step, candidate=replace(step.candidate, curves=curves))
+    document = verdict(with_finding(found, steps=(step, *found.steps[1:])))
+    change = np.expm1(document["strength"]["mean"])
+    assert words.format(f"{100.0 * change:.0f} %") in document["statement"]
+    assert "it reads" not in verdict(diagnosis("tie"))["statement"]
 
 
 @pytest.mark.parametrize("logarithm", [False, True])

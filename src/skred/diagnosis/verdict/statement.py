@@ -87,7 +87,8 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         f" {percent(probability[name])} (nothing: {percent(probability[NOTHING])}; a force not in the list:"
         f" {percent(probability[UNLISTED])}).",
         f"Its {strength['parameter'].replace('_', ' ')} is"
-        f" {plus_minus(strength['mean'], strength['sd'], strength['unit'])}{_in_percent(document)}.",
+        f" {plus_minus(strength['mean'], strength['sd'], strength['unit'])}"
+        f"{_in_percent(found, strength['mean'])}.",
         between_sentence(strength),
         _compensated(document["mechanisms"][0]["constants"]),
     ]
@@ -107,14 +108,15 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     return [*sentences, _left(document)]
 
 
-def _in_percent(document: dict[str, Any]) -> str:
+def _in_percent(found: Diagnosis, mean: float) -> str:
     """What a strength does that is the logarithm of a factor; empty for all others."""
-    change = math.expm1(document["strength"]["mean"])
+    direction, change = found.steps[0].candidate.best.direction, math.expm1(mean)
     size = f"{100.0 * abs(change):.0f} %"
-    if document["sensor"]:
+    if direction.log_readings is not None:
         return f": it reads {size} too {'high' if change > 0.0 else 'low'}"
-    if document["covariate"]:
-        return f": one standard deviation up, friction is {size} {'more' if change > 0.0 else 'less'}"
+    if direction.log_strengths is not None:
+        what = found.law.mechanisms[0].strength.name.replace("_", " ")
+        return f": one standard deviation up, {what} is {size} {'more' if change > 0.0 else 'less'}"
     return ""
 
 
