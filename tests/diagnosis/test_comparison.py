@@ -250,7 +250,7 @@ def test_a_place_is_parted_where_one_part_holds_most(
     candidate = found["segment_friction"]
     assert np.exp(candidate.log_weights).sum() == pytest.approx(1.0)
     assert len(looked) <= most_looks and len(set(looked)) == len(looked)
-    assert max(abs(a - b) for a, b in zip(candidate.stretch() or (), PEAK_M, strict=True)) < off
+    assert max(abs(a - b) for a, b in zip(candidate.ends(0.5) or (), PEAK_M, strict=True)) < off
     # A stretch stands for those moved by up to a fifth of its length and up to 1.6 times as long or short.
     rng = np.random.default_rng(0)
     heights = []
@@ -291,7 +291,7 @@ def test_a_place_is_quantiles_over_the_places() -> None:
     curves = [made("segment_drag", 100.0 * k, 1.0) for k in range(5)]
     (candidate,) = candidates_of(screened_parts(curves)).values()
     first = [one.shape.s_from_m for one in candidate.curves]
-    assert candidate.stretch() == (curves[2].shape.s_from_m, curves[2].shape.s_to_m)
+    assert candidate.ends(0.5) == (curves[2].shape.s_from_m, curves[2].shape.s_to_m)
     (low, _), (high, _) = candidate.ends(0.05), candidate.ends(0.95)
     assert (low, high) == (min(first), max(first))
 

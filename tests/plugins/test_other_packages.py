@@ -83,7 +83,7 @@ lacking = base_of(campaign, "constant")
 table = identify_document(lacking.problem, lacking.law, identify(lacking))
 print(json.dumps(plain({
     "probability": found.probability,
-    "stretch": found.under_each[0].candidates["ledge"].stretch(),
+    "stretch": found.under_each[0].candidates["ledge"].ends(0.5),
     "looked_for_without_it": [row["id"] for row in table["identifiability"]],
     "verdicts": {name: verdict(diagnosis(name)) for name in ("ledge", "clock")},
 })))

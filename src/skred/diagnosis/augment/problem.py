@@ -27,9 +27,8 @@ from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
 from skred.diagnosis.evidence.event_quadrature import FINE
 from skred.diagnosis.evidence.extension import Extension
-from skred.diagnosis.tabulated.tables import Tables, build_tables, exact_nodes
+from skred.diagnosis.tabulated.tables import Tables, build_tables, exact_log_densities
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
-from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.population import population_of, population_samples, population_variables
 from skred.inference.hierarchical.problem import CHECKED_EVENTS, COARSER, HierarchicalProblem
 from skred.inference.hierarchical.rough_population import moments_of
@@ -48,8 +47,6 @@ for 22 events.
 A claim of a mechanism rests on several nats; where fronts stop on a stretch that is added, an event's
 likelihood bends sharply with the strength, and more quadrature points do not help.
 """
-_EXACT = FINE.times(2)
-"""Quadrature points of what the tables are compared with: so many that their own error counts for little."""
 _EXACT_DRAWS = 16
 """Draws compared, evenly over the posterior; by the root of what an avalanche may have fewer."""
 _START_WIDER = 1.5
@@ -221,17 +218,13 @@ class AugmentedProblem(HierarchicalProblem):
         base, (means, factors) = self.base, population_of(law, samples)
         own, log_shares = components_of(self.added, samples)
         added, every = own.reshape(-1, own.shape[2]), np.repeat(np.arange(len(own)), own.shape[1])
-        means, factors = means[every], factors[every]
-        population = Population(means, np.einsum("nij,nkj->nik", factors, factors))
         rows = Rows(chosen, np.zeros_like(chosen), base.rows.readings.take(chosen), base.rows.errors)
         start = self.tables.modes[self.tables.grid.nearest(added)][:, chosen]
         likelihood = EventLikelihood(self.extension, rows, base.strengths).in_groups(base.given(added))
-        nodes = exact_nodes(likelihood, population, start, _EXACT, base.population)
-        exact = np.empty((len(added), len(chosen)))
-        for k in range(len(added)):
-            first = nodes.first[k * len(chosen) : (k + 1) * len(chosen) + 1]
-            of_event = np.tile(means[k], (len(chosen), 1))
-            exact[k] = integrated_log_density(of_event, factors[k], first, nodes.points, nodes.log_weights)
+        # By so many nodes that their own error counts for little.
+        exact = exact_log_densities(
+            likelihood, means[every], factors[every], start, FINE.times(2), base.population
+        )
         parts = exact.reshape(*log_shares.shape, -1) + log_shares[:, :, None]
         together: FloatArray = np.logaddexp.reduce(parts, axis=1)
         return self.log_likelihood(law, samples)[:, chosen] - together

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from skred.diagnosis.augment.added_strength import AddedStrength, components_of, new_rows
 from skred.diagnosis.augment.problem import AugmentedProblem
-from skred.diagnosis.evidence.extension import Extension
 from skred.inference.hierarchical.event_density import draw_nodes
-from skred.inference.hierarchical.event_draws import Avalanches, new_avalanches
+from skred.inference.hierarchical.event_draws import Avalanches, new_points
 from skred.inference.hierarchical.population import population_of
 from skred.inference.hierarchical.results import (
     add_readings,
@@ -82,9 +81,7 @@ def _added_row(one: AddedStrength) -> dict[str, Any]:
 
 def _predict(problem: AugmentedProblem, law: Law, draws: xr.Dataset, rng: np.random.Generator) -> xr.Dataset:
     samples = draws_by_name(problem, law, draws)
-    drawn = new_avalanches(problem, law, samples, rng)
-    deviation = _deviations(problem, drawn)
-    points = np.concatenate([np.log(drawn.strengths), deviation[..., None]], axis=-1)
+    points = new_points(problem, law, samples, rng)
     own = new_rows(problem.added, samples, rng, problem.campaign.n_events)
     avalanches, fronts = fronts_of(problem, points, own)
     dataset = _with_added(problem, avalanche_dataset(problem, law, draws, avalanches, fronts), own)
@@ -100,18 +97,6 @@ def _with_added(problem: AugmentedProblem, avalanches: xr.Dataset, own: FloatArr
     return avalanches.assign(
         {one.name: (dims, own[..., k].reshape(sizes), units[k]) for k, one in enumerate(problem.added)}
     )
-
-
-def _deviations(problem: AugmentedProblem, avalanches: Avalanches) -> FloatArray:
-    """How far releases are from what was noted, (n, n_events), in standard deviations."""
-    noted = problem.releases
-    deviation = np.zeros(avalanches.releases.shape)
-    for found, mean, sd in (
-        (avalanches.releases, noted.mean, noted.sd),
-        (avalanches.release_speeds, noted.speed, noted.speed_sd),
-    ):
-        deviation += np.where(sd > 0.0, (found - mean) / np.where(sd > 0.0, sd, 1.0), 0.0)
-    return deviation
 
 
 def recorded_strengths(
@@ -170,19 +155,6 @@ def recorded_points(
     return result
 
 
-class _Instruments(Extension):
-    """An extension read as instruments do: 0 where a front does not come, spans as a whole."""
-
-    def read(
-        self, events: NDArray[np.int64], points: FloatArray, strengths: FloatArray
-    ) -> tuple[Avalanches, FloatArray]:
-        """Strengths and releases with what is added, and readings without errors, runout last."""
-        rows, releases, begin, factors = self._inputs(events, points, strengths)
-        table = sensor_table([*self.problem.sensor_places, None])
-        readings = simulate(rows, releases, self.problem.path, self.contributions, table, begin)
-        return Avalanches(rows[:, : self.n_base], releases, begin), readings * factors
-
-
 def fronts_of(
     problem: AugmentedProblem, points: FloatArray, own: FloatArray
 ) -> tuple[Avalanches, FloatArray]:
@@ -201,14 +173,15 @@ def fronts_of(
         The runout last.
     """
     n, n_events = points.shape[:2]
-    extension = problem.extension
-    instruments = _Instruments(extension.problem, extension.law, extension.directions)
+    extension, events = problem.extension, np.tile(np.arange(n_events), n)
     given = problem.base.given(own.reshape(n * n_events, -1))
-    avalanches, fronts = instruments.read(
-        np.tile(np.arange(n_events), n), points.reshape(n * n_events, -1), given
+    rows, releases, speeds, factors = extension.inputs(events, points.reshape(n * n_events, -1), given)
+    # As instruments read: 0 where a front does not come, spans as a whole.
+    table = sensor_table([*problem.sensor_places, None])
+    fronts = factors * simulate(rows, releases, problem.path, extension.contributions, table, speeds)
+    avalanches = Avalanches(
+        rows[:, : extension.n_base].reshape(n, n_events, -1),
+        releases.reshape(n, n_events),
+        speeds.reshape(n, n_events),
     )
-    strengths, *begin = avalanches
-    shaped = Avalanches(
-        strengths.reshape(n, n_events, -1), *(values.reshape(n, n_events) for values in begin)
-    )
-    return shaped, fronts.reshape(n, n_events, -1)
+    return avalanches, fronts.reshape(n, n_events, -1)

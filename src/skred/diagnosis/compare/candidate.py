@@ -168,27 +168,19 @@ class Candidate:
         form = FORM * abs(mean) if self.mechanism.group is Group.PHYSICS else 0.0
         return Strength(mean, math.hypot(sd, between, form))
 
-    def stretch(self) -> tuple[float, float] | None:
-        """Where it acts: medians of both ends over the place's posterior [m], None where it is not local."""
-        return self.ends(0.5)
-
     def ends(self, share: float) -> tuple[float, float] | None:
         """Quantiles of both ends over the place's posterior [m], None where it is not local."""
         if self.best.shape.place_m is None:
             return None
-        first = np.array([one.shape.s_from_m for one in self.curves], dtype=float)
-        last = np.array([one.shape.s_to_m for one in self.curves], dtype=float)
+        ends = np.array([(one.shape.s_from_m, one.shape.s_to_m) for one in self.curves], dtype=float)
         weights = self.shape_weights
-        return _weighted_quantile(first, weights, share), _weighted_quantile(last, weights, share)
+        first, last = (
+            float(np.quantile(side, share, weights=weights, method="inverted_cdf")) for side in ends.T
+        )
+        return first, last
 
 
 def _quantity(curve: Curve) -> tuple[str | None, str | None, bool, float | None]:
     """What a shape's strength is: the same quantity where this is the same."""
     shape = curve.shape
     return shape.sensor, shape.covariate, is_opposed(shape), curve.direction.weakening_speed
-
-
-def _weighted_quantile(values: FloatArray, weights: FloatArray, share: float) -> float:
-    order = np.argsort(values)
-    reached = np.cumsum(weights[order])
-    return float(values[order][min(int(np.searchsorted(reached, share * reached[-1])), len(values) - 1)])

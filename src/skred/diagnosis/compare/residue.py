@@ -16,7 +16,7 @@ from itertools import batched
 import numpy as np
 
 from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.discrepancy.fit import Free, fit_profile
+from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, knots, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.physics.mechanisms.spec import Group
@@ -74,6 +74,6 @@ def _fit_beside(base: Base, curve: Curve, kind: Kind) -> Profile | None:
     values = np.append(curve.strengths[top], np.zeros(len(knots(base.setting))))
     near = values, curve.fits[top].start
     try:
-        return fit_profile(wide, kind, near, free=[Free(curve.scale, curve.added.either_sign)])
+        return fit_profile(wide, kind, near, beside=curve)
     except np.linalg.LinAlgError:
         return None

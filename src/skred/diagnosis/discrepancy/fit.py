@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from skred.diagnosis.discrepancy.climb import climb, expanded_at
 from skred.diagnosis.discrepancy.explored import (
     Expansion,
     ExploredPriors,
+    laplace,
     occam_penalty,
     prior_penalty,
 )
@@ -43,19 +43,12 @@ _PRIORS_AGAIN = 4
 """The same where a fit to all avalanches is at hand: those close to its prior, and those that lead then."""
 
 
-class Free(NamedTuple):
-    """Prior of a strength that is fitted beside a force: its scale, and whether it may be negative."""
-
-    scale: float
-    either_sign: bool
-
-
 def fit_profile(
     base: Base,
     kind: Kind,
     near: Start | None = None,
     again: Prior | None = None,
-    free: Sequence[Free] = (),
+    beside: Curve | None = None,
 ) -> Profile:
     """Fit the profile by Gauss-Newton steps around the events' modes; evidence by quadrature at the maximum.
 
@@ -70,19 +63,20 @@ def fit_profile(
     again : Prior, optional
         Under which to climb first: `near` is what was found for it by all of some avalanches, of which the
         base has a part. Fewer priors are climbed under then, and from one start each.
-    free : sequence of Free, optional
-        Priors of strengths of the base's last directions, if these are to be fitted too: the evidence is that
-        of both against neither then.
+    beside : Curve, optional
+        Of the base's last direction, if its strength is to be fitted too: the first of all values, with its
+        own prior. The evidence is that of both against neither then.
     """
     at = knots(base.setting)
     # Nothing like everything else, so that what is left of integration errors is the same there.
-    none = np.zeros(len(free) + len(at))
+    n_beside = 0 if beside is None else 1
+    none = np.zeros(n_beside + len(at))
     starts = [expanded_at(base, kind, at, none, base.fit.start)]
     height = starts[0].fit.found.log_evidence
     if near is not None:
         starts.append(expanded_at(base, kind, at, *near))
     shares = priors_of(kind, at)
-    covers = {prior: _with_free([one.scale for one in free], prior.cover(at)) for prior in shares}
+    covers = {prior: _with_one_more(beside, prior.cover(at)) for prior in shares}
     explored = ExploredPriors(height, shares, covers)
     if again is None:
         waiting, maximum_under, most = _first(kind, starts[-1], explored), _maximum_under, _PRIORS_TRIED
@@ -94,23 +88,23 @@ def fit_profile(
         explored.add(prior, maximum_under(base, kind, at, begin, covers[prior]))
         waiting = waiting or explored.open
     prior = max(explored.maxima, key=explored.factor)
-    maximum = explored.maxima[prior]
-    cover = np.linalg.inv(maximum.information + np.linalg.inv(covers[prior]))
-    factor = explored.log_factor
-    for value, variance, one in zip(maximum.values, np.diag(cover), free, strict=False):
-        if not one.either_sign:  # a half-normal prior is twice the normal one, above nil alone
-            factor += math.log(max(math.erfc(-value / math.sqrt(2.0 * variance)), 1e-300))
-    cover, values = 0.5 * (cover + cover.T)[len(free) :, len(free) :], maximum.values[len(free) :]
-    gain, modes = maximum.fit.found.log_evidence - height, () if free else explored.modes
-    return Profile(kind, prior, at, values, cover, factor, gain, maximum.fit, modes)
+    fit, (values, cover) = explored.maxima[prior].fit, explored.approximation(prior)[-2:]
+    factor, modes = explored.log_factor, explored.modes
+    if beside is not None:
+        modes = ()  # of both together, and so of no force by itself
+        if not beside.added.either_sign:  # a half-normal prior is twice the normal one, above nil alone
+            factor += math.log(max(math.erfc(-values[0] / math.sqrt(2.0 * cover[0, 0])), 1e-300))
+    gain, values, cover = fit.found.log_evidence - height, values[n_beside:], cover[n_beside:, n_beside:]
+    return Profile(kind, prior, at, values, cover, factor, gain, fit, modes)
 
 
-def _with_free(scales: Sequence[float], cover: FloatArray) -> FloatArray:
-    """Covariance of strengths that are free and of a profile's values; not scipy's, see `comparison`."""
-    n = len(scales)
-    found = np.zeros((n + len(cover),) * 2)
-    found[:n, :n], found[n:, n:] = np.diag(np.square(scales)), cover
-    return found
+def _with_one_more(beside: Curve | None, cover: FloatArray) -> FloatArray:
+    """Covariance of a profile's values, and of the strength beside it before them if there is one."""
+    if beside is None:
+        return cover
+    wider = np.pad(cover, ((1, 0), (1, 0)))
+    wider[0, 0] = beside.scale**2
+    return wider
 
 
 def mode_at(base: Base, profile: Profile, values: FloatArray) -> Mode:
@@ -120,8 +114,8 @@ def mode_at(base: Base, profile: Profile, values: FloatArray) -> Mode:
     cover = max(densities, key=lambda prior: densities[prior][0]).cover(at)
     begin = expanded_at(base, kind, at, values, profile.fit.start)
     maximum = climb(base, kind, at, begin, cover)
-    left = np.linalg.inv(maximum.information + np.linalg.inv(cover))
-    return Mode(maximum.values, 0.5 * (left + left.T))
+    there = laplace(maximum, profile.fit.found.log_evidence, cover)
+    return Mode(there.values, there.covariance)
 
 
 def _highest(maxima: Sequence[Expansion], cover: FloatArray) -> Expansion:

@@ -181,13 +181,10 @@ class Curve:
     def moments(self) -> tuple[float, float]:
         """Posterior mean and standard deviation of the strength, if the mechanism is there."""
         strengths, log_density = self.fine()
-        width = np.diff(strengths)
-        weights = (
-            np.exp(log_density - log_density.max()) * 0.5 * (np.append(width, 0.0) + np.insert(width, 0, 0.0))
-        )
-        weights /= weights.sum()
-        mean = float(weights @ strengths)
-        return mean, math.sqrt(max(float(weights @ (strengths - mean) ** 2), 0.0))
+        density = np.exp(log_density - log_density.max())
+        density /= np.trapezoid(density, strengths)
+        mean = float(np.trapezoid(density * strengths, strengths))
+        return mean, math.sqrt(float(np.trapezoid(density * (strengths - mean) ** 2, strengths)))
 
 
 def curve_near(base: Base, near: Curve, shape: Shape) -> Curve:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from skred.diagnosis.evidence.covariates import standard_of
 from skred.errors import InputError
+from skred.inference.added_terms import contributions_with
 from skred.inference.hierarchical.problem import HierarchicalProblem
-from skred.physics.geometry import WEAKENING_SPEED_M_S
 from skred.physics.kernel.columns import Column
 from skred.physics.kernel.fronts import front_speeds, simulate, simulate_with_jacobian
-from skred.physics.kernel.inputs import Contributions, make_contributions
+from skred.physics.kernel.inputs import Contributions
 from skred.physics.law import Law
 from skred.physics.laws import check_library
 from skred.physics.mechanisms.spec import Direction, Setting
@@ -103,10 +103,6 @@ class Extension:
             If two of them weaken with different speed scales: the kernel has one.
         """
         base = self.problem.contributions(self.law.mechanisms)
-        columns = [base.columns] + [
-            np.array([int(c) for c in d.columns]) for d in self.directions if d.columns
-        ]
-        profiles = [base.profiles] + [d.profiles for d in self.directions if d.columns]
         speeds = {d.weakening_speed for d in self.directions if d.weakening_speed is not None}
         if Column.WEAKENING in base.columns:
             speeds.add(base.weakening_speed)
@@ -114,21 +110,32 @@ class Extension:
             raise InputError(
                 f"friction that falls with speed has the scales {sorted(speeds)} m/s: a law can have one"
             )
-        return make_contributions(
-            np.concatenate(columns).astype(np.int64),
-            np.ascontiguousarray(np.concatenate(profiles)),
-            float(speeds.pop() if speeds else WEAKENING_SPEED_M_S),
-        )
+        return contributions_with(base, self.directions)
 
     @cached_property
     def _owner(self) -> IntArray:
         """Which added mechanism each added column belongs to."""
         return np.repeat(np.arange(len(self.directions)), [len(d.columns) for d in self.directions])
 
-    def _inputs(
+    def inputs(
         self, events: IntArray, points: FloatArray, strengths: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Strengths of all columns, releases and the speeds there, and factors of the readings."""
+        """What the kernel is given for each row, and what its readings are multiplied by.
+
+        Parameters
+        ----------
+        events : (n,) integer array
+        points : (n, n_base + 1) array
+        strengths : (n, n_directions) array
+
+        Returns
+        -------
+        rows : (n, n_columns) array
+            Strengths of the base and of all columns that are added.
+        releases, speeds : (n,) arrays, m and m/s
+        factors : (n, n_sensors + 1) array
+            Or a single row, where no reading is off.
+        """
         releases, n = self.problem.releases, self.n_base
         place = releases.mean[events] + releases.sd[events] * points[:, -1]
         rows = np.empty((len(events), n + len(self._owner)))
@@ -159,7 +166,7 @@ class Extension:
         strengths : (n_directions,) or (n, n_directions) array
         """
         given = np.broadcast_to(strengths, (len(events), len(self.directions)))
-        rows, releases, begin, factors = self._inputs(events, points, given)
+        rows, releases, begin, factors = self.inputs(events, points, given)
         path, sensors = self.problem.path, self.problem.sensors
         readings: FloatArray = simulate(rows, releases, path, self.contributions, sensors, begin)
         return readings * factors
@@ -167,7 +174,7 @@ class Extension:
     def speeds(self, points: FloatArray, strengths: FloatArray) -> FloatArray:
         """Front speed of each event at the cells' edges [m/s], (n_events, n_cells + 1), at one point each."""
         given = np.broadcast_to(strengths, (len(points), len(self.directions)))
-        rows, releases, begin, _ = self._inputs(np.arange(len(points)), points, given)
+        rows, releases, begin, _ = self.inputs(np.arange(len(points)), points, given)
         return front_speeds(rows, releases, self.problem.path, self.contributions, begin)
 
     def tangents(
@@ -182,7 +189,7 @@ class Extension:
         by_strengths : (n, n_sensors + 1, n_directions) array
         """
         given = np.broadcast_to(strengths, (len(events), len(self.directions)))
-        rows, releases, begin, factors = self._inputs(events, points, given)
+        rows, releases, begin, factors = self.inputs(events, points, given)
         noted = self.problem.releases
         by_speed = bool(noted.speed_sd.any())
         path, sensors = self.problem.path, self.problem.sensors

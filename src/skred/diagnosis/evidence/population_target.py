@@ -226,15 +226,6 @@ def log_targets(psis, n, log_scale, first, points, log_weights):  # type: ignore
     return result
 
 
-@compiled()
-def log_priors(psis, n, log_scale):  # type: ignore[no-untyped-def]
-    """`log_prior` of populations at coordinates (n_psis, size)."""
-    result = np.empty(len(psis))
-    for k in range(len(psis)):
-        result[k] = log_prior(psis[k], n, log_scale)
-    return result
-
-
 def log_correlation_constant(n: int) -> float:
     """Of the prior of the partial correlations: (1 + r) / 2 is Beta(shape, shape)."""
     total = 0.0

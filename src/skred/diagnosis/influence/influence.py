@@ -237,9 +237,11 @@ def _kinds(base: Base) -> list[tuple[str, str | None, BoolArray]]:
     readings, campaign = base.rows.readings, base.problem.campaign
     observed = readings.observed
     speeds = observed & readings.is_velocity
-    stops, stop_sd = _stops(base)
     first, last = sensor_ends(base.problem)
-    near = speeds & (np.abs(0.5 * (first + last) - stops[:, None]) <= stop_sd[:, None])
+    # Stops that are recorded, one column for each sensor of the runout, with their standard deviations.
+    stops = np.where(observed & ~readings.is_velocity, readings.values, np.nan)
+    off = np.abs(0.5 * (first + last)[:, None] - stops[:, None])
+    near = speeds & (off <= readings.sd(np.arange(len(stops)), readings.values)[:, None]).any(axis=2)
     kinds: list[tuple[str, str | None, BoolArray]] = [
         ("zeros", None, speeds & (readings.values == 0.0)),
         ("near a stop", None, near),
@@ -249,16 +251,3 @@ def _kinds(base: Base) -> list[tuple[str, str | None, BoolArray]]:
         own[:, j] = observed[:, j] | readings.bounded[:, j]
         kinds.append(("sensor", sensor, own))
     return [one for one in kinds if one[2].any()]
-
-
-def _stops(base: Base) -> tuple[FloatArray, FloatArray]:
-    """Each avalanche's recorded stop [m] and its standard deviation; NaN where none is recorded."""
-    readings = base.rows.readings
-    n = len(readings.values)
-    stops, sd = np.full(n, np.nan), np.full(n, np.nan)
-    noise = readings.sd(np.arange(n), readings.values)
-    for j, sensor in enumerate(base.problem.campaign.sensors):
-        if sensor.is_runout:
-            seen = readings.observed[:, j]
-            stops[seen], sd[seen] = readings.values[seen, j], noise[seen, j]
-    return stops, sd

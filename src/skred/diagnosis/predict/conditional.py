@@ -26,7 +26,7 @@ from skred.diagnosis.predict.event_proposal import Sample, sample
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.inference.error_model import ErrorModel, EventReadings
 from skred.inference.hierarchical.problem import HierarchicalProblem
-from skred.inference.intervals import INTERVAL_PROBABILITY
+from skred.inference.intervals import ENDS
 from skred.inference.reading_density import log_likelihoods
 from skred.parallel.threads import side_by_side
 
@@ -224,7 +224,6 @@ def _summary(x: FloatArray, weights: FloatArray, value: float) -> tuple[float, f
     order = np.argsort(x)
     x, weights = x[order], weights[order]
     below = np.cumsum(weights)
-    tail = 0.5 * (1.0 - INTERVAL_PROBABILITY)
-    low, high = np.interp([tail, 1.0 - tail], below - 0.5 * weights, x)
+    low, high = np.interp(ENDS, below - 0.5 * weights, x)
     apart = np.sum(weights * x * (2.0 * below - weights - 1.0))
     return float(weights @ x), float(low), float(high), float(weights @ np.abs(x - value) - apart)

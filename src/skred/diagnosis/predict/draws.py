@@ -22,6 +22,7 @@ from skred.diagnosis.evidence.predictive import Predicted, predict_event
 from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.population import population_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.hierarchical.rough_population import moments_of
 from skred.inference.leave_one_out import Samples
 from skred.parallel.threads import side_by_side
 
@@ -63,8 +64,8 @@ class Draws(NamedTuple):
     @property
     def typical(self) -> Population:
         """One population for all draws, as wide as they are together."""
-        covariance = self.covariances.mean(axis=0) + np.atleast_2d(np.cov(self.means.T, bias=True))
-        return Population(self.means.mean(axis=0)[None], covariance[None])
+        mean, covariance = moments_of(self.means, self.factors)
+        return Population(mean[None], covariance[None])
 
 
 class LeftOut(NamedTuple):

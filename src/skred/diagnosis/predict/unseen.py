@@ -16,17 +16,16 @@ from scipy.special import logsumexp
 from skred.campaign import Campaign
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.discrepancy.profile import Kind, Profile, entering, spline_basis
-from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows, campaign_rows
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, Rows, campaign_rows
 from skred.diagnosis.evidence.covariates import Standard, standard_of
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of
 from skred.diagnosis.predict.draws import N_DRAWS, Draws, LeftOut, draws_of, modes_near
 from skred.diagnosis.predict.held_out import HeldOut
-from skred.diagnosis.tabulated.tables import exact_nodes
+from skred.diagnosis.tabulated.tables import exact_log_densities
 from skred.errors import InputError
 from skred.inference.calibrate import Calibration, posterior_of
 from skred.inference.error_model import ERROR_MODELS
-from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.hierarchical.releases import terrain_with_releases
 from skred.physics.law import Law
@@ -262,17 +261,14 @@ def log_densities(
         Quadrature points of an event for each draw.
     """
     typical, rng = draws.typical, np.random.default_rng([seed, 35])
-    population, n = Population(draws.means, draws.covariances), len(draws.means)
+    n = len(draws.means)
     likelihood = EventLikelihood(extension, rows, draws.strengths.mean(axis=0))
     start = modes_near(likelihood, typical, draws.so_many(N_DRAWS).points(1, rng)).points
     result = np.empty((n, len(start)))
     for event, near in enumerate(start):
         of_event = likelihood.take(np.array([event])).in_groups(draws.strengths)
         shifts = rng.random((n, len(near)))
-        nodes = exact_nodes(of_event, population, np.tile(near, (n, 1, 1)), budget, typical, shifts)
-        for k, mean in enumerate(draws.means):
-            first = nodes.first[k : k + 2]
-            result[k, event] = integrated_log_density(
-                mean[None], draws.factors[k], first, nodes.points, nodes.log_weights
-            )[0]
+        begin = np.tile(near, (n, 1, 1))
+        found = exact_log_densities(of_event, draws.means, draws.factors, begin, budget, typical, shifts)
+        result[:, event] = found[:, 0]
     return result

@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, Weighted, weighted_draws
+from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, weighted_draws
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.marginal import Evidence, curvatures, population_at
-from skred.diagnosis.evidence.population_target import NARROWEST, log_correlation_constant, log_priors
+from skred.diagnosis.evidence.population_target import NARROWEST, log_correlation_constant, log_prior
 from skred.diagnosis.tabulated.tables import Tables
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.between_events import BetweenEvents, components, from_unbounded
@@ -113,7 +113,7 @@ class BetweenTarget:
             *self.tables.arrays.values(),
         )  # fmt: skip
         of_events = np.logaddexp.reduce(densities + log_shares[:, :, None], axis=1)
-        total = of_events.sum(axis=1) + log_priors(psi[inside], n, self.base.log_scale)
+        total = of_events.sum(axis=1) + [log_prior(one, n, self.base.log_scale) for one in psi[inside]]
         result[inside] = np.nan_to_num(total + log_p[inside], nan=-np.inf) + log_correlation_constant(n)
         return result
 
@@ -134,12 +134,12 @@ def searched_evidence(target: BetweenTarget, near: Evidence) -> Way:
         start = [*near.psi, min(log_size + math.log(multiple), most), *([] if alone else [coordinate])]
         tops.append(_climbed(target, np.array(start)))
     top = max(tops, key=lambda x: float(target(x[None])[0]))
-    proposal = Mixture.on([Mode(top, _curvature(target, top))])
-    return _way(target, weighted_draws(target, proposal, np.random.default_rng([0, 71])))
+    return between_evidence(target, Mixture.on([Mode(top, _curvature(target, top))]))
 
 
-def _way(target: BetweenTarget, found: Weighted) -> Way:
-    """One way, from draws of its posterior."""
+def between_evidence(target: BetweenTarget, proposal: Mixture) -> Way:
+    """One way, from a proposal that may be by other tables."""
+    found = weighted_draws(target, proposal, np.random.default_rng([0, 72]))
     shares = found.shares
     psi, strengths, _, _ = target.split(found.draws)
     mean, middle = shares @ psi, float(shares @ strengths)
@@ -147,11 +147,6 @@ def _way(target: BetweenTarget, found: Weighted) -> Way:
     populations = Evidence(found.log_integral, mean, away.T @ (shares[:, None] * away))
     sd = math.sqrt(float(shares @ (strengths - middle) ** 2))
     return Way(populations, (middle, sd), found.proposal, target.tables.budget)
-
-
-def between_evidence(target: BetweenTarget, proposal: Mixture) -> Way:
-    """One way, from a proposal that may be by other tables."""
-    return _way(target, weighted_draws(target, proposal, np.random.default_rng([0, 72])))
 
 
 def _climbed(target: BetweenTarget, start: FloatArray) -> FloatArray:

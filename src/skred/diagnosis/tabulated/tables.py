@@ -16,6 +16,7 @@ from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.marginal import Evidence, population_at
 from skred.diagnosis.evidence.refit import MOST_NODES
 from skred.diagnosis.tabulated.coefficient_grid import Grid, Located, from_nothing
+from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.surface import Nodes
 from skred.parallel.threads import in_parts, side_by_side
 
@@ -123,21 +124,23 @@ def highest(likelihood: EventLikelihood, points: FloatArray, population: Populat
     return best
 
 
-def exact_nodes(
+def exact_log_densities(
     likelihood: EventLikelihood,
-    population: Population,
+    means: FloatArray,
+    factors: FloatArray,
     start: FloatArray,
     budget: Budget,
     reference: Population,
     shifts: FloatArray | None = None,
-) -> Nodes:
-    """Nodes at some strengths for some populations themselves, one group of rows for each.
+) -> FloatArray:
+    """Log densities of events by nodes for each of some populations themselves, (n_groups, n_rows).
 
     Parameters
     ----------
     likelihood : EventLikelihood
         One group of rows for each population.
-    population : Population
+    means, factors : (n_groups, n_base) and (n_groups, n_base, n_base) arrays
+        Populations: the mean, and the lower Cholesky factor of the covariance.
     start : (n_groups, n_rows, n_base + 1) array
         Points near the modes.
     reference : Population
@@ -145,8 +148,8 @@ def exact_nodes(
     shifts : (n_groups * n_rows, n_base + 1) array, optional
         As in `event_nodes`.
     """
-    n_rows = len(likelihood.rows.event)
-    at = start.reshape(n_rows, -1)
+    n_groups, n_rows, size = start.shape
+    population, at = Population(means, factors @ factors.transpose(0, 2, 1)), start.reshape(-1, size)
 
     def spread(part: slice) -> Spread:
         own = likelihood.part(part)
@@ -154,7 +157,13 @@ def exact_nodes(
         shifted = None if shifts is None else shifts[part]
         return event_nodes(own, population, modes, budget, reference, shifted)
 
-    return Spread.joined(side_by_side(spread, _lots(start.shape[0], start.shape[1], budget))).nodes
+    nodes = Spread.joined(side_by_side(spread, _lots(n_groups, n_rows, budget))).nodes
+    result = np.empty((n_groups, n_rows))
+    for k, (mean, factor) in enumerate(zip(means, factors, strict=True)):
+        first = nodes.first[k * n_rows : (k + 1) * n_rows + 1]
+        of_rows = np.tile(mean, (n_rows, 1))
+        result[k] = integrated_log_density(of_rows, factor, first, nodes.points, nodes.log_weights)
+    return result
 
 
 def _lots(n_groups: int, n_events: int, budget: Budget) -> list[slice]:

@@ -22,7 +22,7 @@ from skred.physics.mechanisms.stretches import equation_of
 
 def place_of(candidate: Candidate) -> dict[str, Any] | None:
     """Medians of both ends of a mechanism's stretch, and their 90 % intervals; None where it is not local."""
-    middle = candidate.stretch()
+    middle = candidate.ends(0.5)
     low, high = (candidate.ends(share) for share in ENDS)
     if middle is None or low is None or high is None:
         return None

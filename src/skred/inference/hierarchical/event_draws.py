@@ -54,6 +54,19 @@ def new_avalanches(
     problem: HierarchicalProblem, law: Law, samples: Mapping[str, Any], rng: np.random.Generator
 ) -> Avalanches:
     """A new avalanche from the release of each recorded one, for each draw of the population."""
+    points = new_points(problem, law, samples, rng)
+    return _from(problem, np.exp(points[..., :-1]), points[..., -1])
+
+
+def new_points(
+    problem: HierarchicalProblem, law: Law, samples: Mapping[str, Any], rng: np.random.Generator
+) -> FloatArray:
+    """The same as logarithms of the strengths and, last, the release's deviation in standard deviations.
+
+    Returns
+    -------
+    (n, n_events, n_strengths + 1) array
+    """
     means, factors = population_of(law, samples)
     n_events = problem.campaign.n_events
     noise = rng.standard_normal((len(means), n_events, means.shape[1]))
@@ -61,7 +74,7 @@ def new_avalanches(
     # Cut off at the same limits as in the likelihood.
     deviation = problem.releases.drawn(np.arange(n_events), rng.random((len(means), n_events)))
     # Where spreads are extremely wide a coefficient can exceed the largest number.
-    return _from(problem, np.exp(np.clip(logs, -_FARTHEST, _FARTHEST)), deviation)
+    return np.concatenate([np.clip(logs, -_FARTHEST, _FARTHEST), deviation[..., None]], axis=2)
 
 
 def _from(problem: HierarchicalProblem, strengths: FloatArray, deviation: FloatArray) -> Avalanches:
