@@ -17,6 +17,8 @@ from skred.inference.reading_density import log_likelihoods
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
+_STARTING_DAMPING = 1e-3
+"""Of the Levenberg-Marquardt steps, relative to the diagonal: nearly none."""
 _LOST = 20.0
 """Nats less than at best that the readings of a lost row have."""
 _ASIDE = np.multiply.outer((-1.0, 1.0), (0.01, 0.03, 0.08, 0.2, 0.5, 1.0)).ravel()
@@ -252,7 +254,7 @@ def _climbed(likelihood: EventLikelihood, start: FloatArray, population: Populat
     """Where damped Gauss-Newton steps from one place lead."""
     points, precision = start.copy(), population.precision[likelihood.rows.group]
     best = np.empty(len(points))
-    damping = np.zeros(len(points))  # relative to the diagonal (Levenberg-Marquardt): none at first
+    damping = np.full(len(points), _STARTING_DAMPING)
     active = np.arange(len(points))
     found: Modes | None = None
     for _ in range(n_steps):
