@@ -22,8 +22,6 @@ FloatArray = NDArray[np.float64]
 Samples = dict[str, FloatArray]
 REFIT_CHAINS, REFIT_DRAWS, REFIT_BURN = 4, 500, 100
 """Draws of models of one or two parameters; chains of more are longer."""
-_ADAPTATION = 500
-"""Draws in which proposals adapt to the posterior of all events, before any is left out."""
 _LONGER = 4
 """How many times as long chains are that are run once more, because they had not converged."""
 _BATCHES = 5
@@ -85,7 +83,9 @@ def exact_leave_one_out(
     left_out = list(range(len(events)) if which is None else which)
     rng = np.random.default_rng([seed, 2])
     start = DictToArrayBijection.map(model.initial_point()).data.astype(float)
-    step.adapt(start, _ADAPTATION, rng)
+    # Proposals adapt to the posterior of all events for as long as a chain is: 500 are too few for
+    # seven parameters, whose refits then converge only now and then.
+    step.adapt(start, _n_draws(start), rng)
     draws, densities = _refits(step, start, left_out, rng, 1)
     r_hat = _r_hat(draws)
     again = np.flatnonzero(~(r_hat <= R_HAT_LIMIT))
@@ -136,8 +136,13 @@ def _refit(
     weights = np.ones(step.n_terms)
     weights[number] = 0.0
     step.run(q, longer * REFIT_BURN, rng, weights)
-    draws, terms = step.run(q, longer * REFIT_DRAWS * max(1, (len(q) + 1) // 2), rng, weights)
+    draws, terms = step.run(q, longer * _n_draws(q), rng, weights)
     return draws, terms[:, number].copy()  # a view would keep the terms of all events
+
+
+def _n_draws(q: FloatArray) -> int:
+    """Draws of a chain, by the number of parameters."""
+    return REFIT_DRAWS * max(1, (len(q) + 1) // 2)
 
 
 def _r_hat(draws: FloatArray) -> FloatArray:
