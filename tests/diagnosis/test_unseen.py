@@ -123,7 +123,7 @@ def test_what_was_missing_predicts_unseen_avalanches_better(
     held = unseen(predictor_of(augmented), fresh)
     seen = np.asarray(fresh.status) == Status.OBSERVED
     assert_array_equal(np.isfinite(held.predicted.mean), seen)
-    assert 0.7 < held.covered[seen].mean() <= 1.0
+    assert 0.7 < held.predicted.covered(fresh.values, seen)[seen].mean() <= 1.0
 
 
 @pytest.mark.parametrize("strengths", [[[-0.05], [0.0], [0.08]], [[0.06], [0.06], [0.06]]])
