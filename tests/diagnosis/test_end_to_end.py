@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 from diagnosis_cases import BIAS, BIASED_GATE, gates_campaign, gates_diagnosis
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from skred.campaign import Status
 from skred.diagnosis.augment.reference import Reference
 from skred.diagnosis.augment.step import Augmented
 from skred.diagnosis.evidence.predictive import Predicted
 from skred.diagnosis.outcome import Diagnosis
-from skred.diagnosis.predict.held_out import HeldOut, errors, paired
+from skred.diagnosis.predict.held_out import HeldOut, elpd_difference, errors
 from skred.diagnosis.verdict.document import verdict
 from skred.diagnosis.verdict.report_facts import report_facts
 from skred.inference.error_model import ERROR_MODELS
@@ -129,8 +129,8 @@ def test_predictions_are_of_the_readings(clean: Diagnosis) -> None:
     for values in found.predicted:
         assert np.isfinite(values[seen]).all() and np.isnan(values[~seen]).all()
     inside = (problem.values >= found.predicted.low) & (problem.values <= found.predicted.high)
-    assert_array_equal(inside[seen], found.covered[seen] == 1.0)
-    assert np.isnan(found.covered[~seen]).all() and 0.6 < found.covered[seen].mean() <= 1.0
+    covered = errors(found, problem, "before")["coverage_90_before"]
+    assert covered == inside[seen].mean() and 0.6 < covered <= 1.0
     assert found.elpd == pytest.approx(found.pointwise.sum())
 
 
@@ -171,32 +171,34 @@ def test_before_and_after_stand_under_one_error_model(biased: Diagnosis, name: s
         assert found is few and f"under {name} errors failed" in cannot
 
 
-def held(pointwise: list[float], predicted: Any = None, covered: Any = None) -> HeldOut:
-    every = Predicted(predicted, predicted, predicted)
-    return HeldOut(np.array(pointwise), np.zeros(len(pointwise)), (), (), every, covered)
+def held(mean: np.ndarray, half_width: float) -> HeldOut:
+    n, predicted = len(mean), Predicted(mean, mean - half_width, mean + half_width)
+    return HeldOut(np.zeros(n), np.zeros(n), (), (), predicted)
 
 
-def test_paired_by_hand() -> None:
-    difference, se = paired(held([1.0, 2.0, 6.0]), held([0.0, 2.0, 4.0]))
-    assert difference == pytest.approx(3.0)
-    assert se == pytest.approx(np.sqrt(3.0) * 1.0)  # differences 1, 0, 2: standard deviation 1
+def test_elpd_difference_by_hand() -> None:
+    found = elpd_difference(np.array([1.0, 0.0, 2.0]))  # standard deviation 1
+    assert found == {"elpd_diff": pytest.approx(3.0), "elpd_se": pytest.approx(np.sqrt(3.0) * 1.0)}
+    assert elpd_difference(np.array([2.0])) == {"elpd_diff": 2.0, "elpd_se": None}
+    assert elpd_difference(None) == {"elpd_diff": None, "elpd_se": None}
 
 
 def test_errors_by_hand() -> None:
     campaign = gates_campaign(range(8), biased=False)
     problem = hierarchical_problem(campaign)
-    predicted, covered = np.array(campaign.values), np.full(campaign.values.shape, np.nan)
-    seen = np.asarray(campaign.status) == Status.OBSERVED
+    predicted, seen = np.array(campaign.values), np.asarray(campaign.status) == Status.OBSERVED
     predicted[:, :-1] += 3.0
     predicted[:, -1] -= 20.0
     first = np.flatnonzero(seen[:, 0])
-    predicted[first[0], 0] += 4.0  # 7 instead of 3
-    covered[seen] = 1.0
-    covered[first[0], 0] = 0.0
+    predicted[first[0], 0] += 400.0  # 403 instead of 3, and the only one farther off than 50
     n_speeds = int(seen[:, :-1].sum())
-    found = errors(held([0.0] * 8, predicted, covered), problem)
-    assert found["rmse_velocity"] == pytest.approx(np.sqrt((9.0 * (n_speeds - 1) + 49.0) / n_speeds))
-    assert found["rmse_runout"] == pytest.approx(20.0)
-    assert found["coverage_90"] == pytest.approx(1.0 - 1.0 / seen.sum())
-    nothing = errors(held([0.0] * 8, np.full_like(predicted, np.nan), np.full_like(covered, np.nan)), problem)
-    assert set(nothing.values()) == {None}
+    found = errors(held(predicted, 50.0), problem, "after")
+    assert found["rmse_velocity_after"] == pytest.approx(
+        np.sqrt((9.0 * (n_speeds - 1) + 403.0**2) / n_speeds)
+    )
+    assert found["rmse_runout_after"] == pytest.approx(20.0)
+    assert found["coverage_90_after"] == pytest.approx(1.0 - 1.0 / seen.sum())
+    status = np.full_like(campaign.status, Status.MISSING)
+    silent = replace(problem, campaign=replace(campaign, values=np.full(seen.shape, np.nan), status=status))
+    for nothing in (errors(held(predicted, 50.0), silent, "after"), errors(None, problem, "after")):
+        assert nothing == dict.fromkeys(found)

@@ -113,11 +113,12 @@ def test_a_predictor_s_profile_is_that_which_was_fitted(hidden: Base, added: Pro
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("kind", "-f", "no force profile"),
+        ("kind", "-f", "kind: found '-f'"),
         ("knots_m", [10.0, 5.0], "knots_m: expected two or more increasing"),
         ("knots_m", [1.0] * 1000, "at most"),
-        ("front_speed", [-1.0, 2.0], "none negative"),
-        ("front_speed", "fast", "expected a list"),
+        ("front_speed", [-1.0, 2.0], "greater than or equal to 0"),
+        ("front_speed", "fast", "front_speed: found 'fast': input should be a valid list"),
+        ("front_speed", [1.0], "front_speed: expected one for each edge_m"),
     ],
 )
 def test_a_profile_that_cannot_be_is_refused(key: str, value: Any, words: str) -> None:

@@ -123,7 +123,7 @@ def test_what_was_missing_predicts_unseen_avalanches_better(
     held = unseen(predictor_of(augmented), fresh)
     seen = np.asarray(fresh.status) == Status.OBSERVED
     assert_array_equal(np.isfinite(held.predicted.mean), seen)
-    assert 0.7 < held.covered[seen].mean() <= 1.0
+    assert 0.7 < held.predicted.covered(fresh.values, seen)[seen].mean() <= 1.0
 
 
 @pytest.mark.parametrize("strengths", [[[-0.05], [0.0], [0.08]], [[0.06], [0.06], [0.06]]])
@@ -246,14 +246,18 @@ IN_TERMS: list[tuple[int, str, Any]] = [
     (1, "standard", {"centre": 0.0, "scale": 1.0, "kinds": ["a"]}),
     (1, "standard", {"centre": 0.0, "scale": 1.0, "kinds": [], "logarithm": 1}), (1, "covariate", 3.0),
 ]  # fmt: skip
+NO_DRAWS: list[Any] = [
+    None, [], "x", 3, [[]], [[10**400], [1.0]], [[1e300], [1.0]], [[float("nan")], [1.0]], [[True], [1]],
+    [["1"], ["1"]], [[[1.0]], [[1.0]]], [1.0, 1.0], [[1.0], []], [[1.0], [1.0, 1.0]], [[1.0] * 99] * 2,
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("key", HOSTILE)
 def test_what_is_no_predictor_is_refused(key: str) -> None:
     assert from_dict(document()).law == "constant"
-    with pytest.raises(InputError):
+    with pytest.raises(InputError, match=key):
         from_dict(document() | {key: HOSTILE[key]})
-    with pytest.raises(InputError):
+    with pytest.raises(InputError, match=f"{key}: field required"):
         from_dict({name: value for name, value in document().items() if name != key})
 
 
@@ -265,10 +269,7 @@ def test_what_is_no_term_is_refused(number: int, key: str, value: Any) -> None:
         from_dict(damaged)
 
 
-@pytest.mark.parametrize(
-    "value",
-    [None, [], "x", 3, [[]], [[10**400], [1.0]], [[1e300], [1.0]], [[float("nan")], [1.0]], [[True], [1]]],
-)
+@pytest.mark.parametrize("value", NO_DRAWS)
 def test_means_must_be_draws(value: Any) -> None:
     with pytest.raises(InputError):
         from_dict(document() | {"means": value})

@@ -120,7 +120,6 @@ def held(problem: HierarchicalProblem, better: float) -> HeldOut:
     n = problem.campaign.n_events
     noise = rng.normal(0.0, 3.0, problem.values.shape)
     predicted = np.where(problem.observed, problem.values + noise, np.nan)
-    covered = np.where(problem.observed, 1.0, np.nan)
     pointwise = rng.normal(-12.0, 2.0, n) + better
     return HeldOut(
         pointwise,
@@ -128,7 +127,6 @@ def held(problem: HierarchicalProblem, better: float) -> HeldOut:
         problem.campaign.event_ids[:2],
         (),
         Predicted(predicted, predicted - 8.0, predicted + 8.0),
-        covered,
     )
 
 

@@ -18,16 +18,13 @@ from skred.campaign.parts import of_events, without_silent_sensors
 from skred.diagnosis.clock import Tell
 from skred.diagnosis.detect.too_little import too_little
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
-from skred.diagnosis.predict.held_out import errors
+from skred.diagnosis.predict.held_out import elpd_difference, errors
 from skred.diagnosis.predict.unseen import log_scores, problem_of, unseen
 from skred.diagnosis.verdict.predictors import predictors_of
 from skred.errors import InputError
 from skred.inference.hierarchical.problem import HierarchicalProblem
-from skred.inference.paired import sum_se
 
 FloatArray = NDArray[np.float64]
-_WHEN = ("before", "after")
-_ERRORS = ("rmse_velocity", "rmse_runout", "coverage_90")
 
 
 def set_aside(problem: HierarchicalProblem, n: int, seed: int) -> tuple[HierarchicalProblem, Campaign]:
@@ -56,24 +53,14 @@ def set_aside(problem: HierarchicalProblem, n: int, seed: int) -> tuple[Hierarch
 def open_locked(found: Outcome, locked: Campaign, seed: int) -> dict[str, Any]:
     """What locked avalanches make of a diagnosis; null where nothing was added, or calibrated at all."""
     document: dict[str, Any] = {"events": list(locked.event_ids)}
-    keys = ("log_score", *_ERRORS)
-    document |= {f"{key}_{when}": None for when in _WHEN for key in keys}
-    document |= {"elpd_diff": None, "elpd_se": None}
-    if isinstance(found, NotDiagnosed):
-        return document
-    predictors = [one for one in predictors_of(found) if one is not None]
-    problem, scored = problem_of(predictors[0], locked), [unseen(one, locked, seed) for one in predictors]
-    for when, one in zip(_WHEN, scored, strict=False):
-        numbers = {"log_score": one.pointwise.tolist(), **errors(one, problem)}
-        document |= {f"{key}_{when}": value for key, value in numbers.items()}
-    if len(scored) == 2:
-        document |= _difference(scored[1].pointwise - scored[0].pointwise)
-    return document
-
-
-def _difference(pairs: FloatArray) -> dict[str, float | None]:
-    """Sum of paired differences, and its standard error where there are several."""
-    return {"elpd_diff": float(pairs.sum()), "elpd_se": sum_se(pairs) if len(pairs) > 1 else None}
+    base, augmented = (None, None) if isinstance(found, NotDiagnosed) else predictors_of(found)
+    before, after = (None if one is None else unseen(one, locked, seed) for one in (base, augmented))
+    problem = found.problem if base is None else problem_of(base, locked)
+    for when, one in (("before", before), ("after", after)):
+        document[f"log_score_{when}"] = None if one is None else one.pointwise.tolist()
+        document |= errors(one, problem, when)
+    pairs = None if before is None or after is None else after.pointwise - before.pointwise
+    return document | elpd_difference(pairs)
 
 
 def folds_of(problem: HierarchicalProblem, k: int, seed: int) -> list[list[int]]:
@@ -122,7 +109,7 @@ def outer_folds(
         entry, difference = _fold(diagnose(others), of_events(problem.campaign, fold), seed)
         entries.append(entry)
         pairs.append(difference)
-    return {"k": k, "folds": entries, **_difference(np.concatenate(pairs))}
+    return {"k": k, "folds": entries, **elpd_difference(np.concatenate(pairs))}
 
 
 def _fold(found: Outcome, left_out: Campaign, seed: int) -> tuple[dict[str, Any], FloatArray]:

@@ -28,6 +28,31 @@ _DEGREES = 7.0
 """Degrees of freedom of the proposals: tails heavy enough to bound the weights."""
 
 
+def student(shape: tuple[int, ...], degrees: float, rng: np.random.Generator) -> FloatArray:
+    """Draws of a standard Student t density on the axes of the last dimension, (*shape)."""
+    normal = rng.standard_normal(shape)
+    normal /= np.sqrt(rng.chisquare(degrees, shape[:-1]) / degrees)[..., None]
+    return normal
+
+
+def log_student(
+    squares: FloatArray, size: int, degrees: float, log_scale: float | FloatArray = 0.0
+) -> FloatArray:
+    """Log of a Student t density in `size` dimensions, as far off as these squares of its scale say.
+
+    Parameters
+    ----------
+    squares : array
+        Of distances from its centre in units of its scale.
+    log_scale : float or array
+        Log determinant of the scale's factor; 0 of the standard density.
+    """
+    constant = gammaln(0.5 * (degrees + size)) - gammaln(0.5 * degrees)
+    constant -= 0.5 * size * math.log(degrees * math.pi)
+    found: FloatArray = constant - log_scale - 0.5 * (degrees + size) * np.log1p(squares / degrees)
+    return found
+
+
 class Mode(NamedTuple):
     """Where a density is.
 
@@ -73,8 +98,7 @@ class Mixture(NamedTuple):
         """Draws, (n, size); of each mode as many as its weight says."""
         steps = (np.arange(n) + rng.random()) / n
         of = np.searchsorted(np.cumsum(np.exp(self.log_weights)), steps).clip(max=len(self.means) - 1)
-        white = rng.standard_normal((n, self.means.shape[1]))
-        white /= np.sqrt(rng.chisquare(_DEGREES, n) / _DEGREES)[:, None]
+        white = student((n, self.means.shape[1]), _DEGREES, rng)
         return self.means[of] + np.einsum("nij,nj->ni", self._factors[of], white)
 
     def log_densities(self, draws: FloatArray) -> FloatArray:
@@ -82,11 +106,8 @@ class Mixture(NamedTuple):
         size, factors = self.means.shape[1], self._factors
         away = (draws - self.means[:, None]).transpose(0, 2, 1)
         squares = np.sum(np.linalg.solve(factors, away) ** 2, axis=1)
-        constant = float(gammaln(0.5 * (_DEGREES + size)) - gammaln(0.5 * _DEGREES))
-        constant -= 0.5 * size * math.log(_DEGREES * math.pi)
         scale = self.log_weights - np.log(np.einsum("kii->ki", factors)).sum(axis=1)
-        found: FloatArray = constant - 0.5 * (_DEGREES + size) * np.log1p(squares / _DEGREES)
-        return found + scale[:, None]
+        return log_student(squares, size, _DEGREES) + scale[:, None]
 
     def adapted(self, draws: FloatArray, shares: FloatArray) -> Mixture:
         """With weights, means and covariances that weighted draws call for, as far as so few can tell.

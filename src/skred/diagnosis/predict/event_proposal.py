@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
 
+from skred.diagnosis.evidence.adaptive_sampling import log_student, student
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population
 from skred.diagnosis.predict.draws import Draws, modes_near
 from skred.inference.joint_metropolis import DEGREES_OF_FREEDOM
@@ -143,24 +143,18 @@ def _parts(modes: Modes, strengths: FloatArray, draws: Draws) -> _Parts:
 def _drawn(parts: _Parts, each: int, rng: np.random.Generator) -> FloatArray:
     """Points around the centres, (n_draws, n_centres * each, n_axes)."""
     n, n_centres, n_axes = parts.centres.shape
-    normal = rng.standard_normal((n, n_centres, each, n_axes))
-    heavy = rng.chisquare(DEGREES_OF_FREEDOM, (n, n_centres, each)) / DEGREES_OF_FREEDOM
-    normal /= np.sqrt(heavy)[..., None]
-    points = parts.centres[:, :, None] + normal @ parts.factors.swapaxes(2, 3)
+    white = student((n, n_centres, each, n_axes), DEGREES_OF_FREEDOM, rng)
+    points = parts.centres[:, :, None] + white @ parts.factors.swapaxes(2, 3)
     return points.reshape(n, n_centres * each, n_axes)
 
 
 def _log_t(points: FloatArray, parts: _Parts) -> FloatArray:
     """Log density of points around each centre, (n_draws, n_points, n_centres)."""
-    n_axes, degrees = points.shape[2], DEGREES_OF_FREEDOM
     whiten = np.linalg.inv(parts.factors)
     off = points[:, :, None] - parts.centres[:, None]
     squares = (np.einsum("ncij,npcj->npci", whiten, off) ** 2).sum(axis=3)
-    constant = gammaln(0.5 * (degrees + n_axes)) - gammaln(0.5 * degrees)
-    constant -= 0.5 * n_axes * np.log(degrees * np.pi)
     scale = np.log(np.einsum("ncii->nci", parts.factors)).sum(axis=2)
-    found: FloatArray = constant - scale[:, None] - 0.5 * (degrees + n_axes) * np.log1p(squares / degrees)
-    return found
+    return log_student(squares, points.shape[2], DEGREES_OF_FREEDOM, scale[:, None])
 
 
 def _log_population(points: FloatArray, draws: Draws) -> FloatArray:

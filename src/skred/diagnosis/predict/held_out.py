@@ -17,6 +17,7 @@ from skred.diagnosis.predict.draws import N_DRAWS, LeftOut, draws_of, prediction
 from skred.inference.calibrate import Calibration, posterior_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.leave_one_out import Samples, exact_leave_one_out, samples_of
+from skred.inference.paired import sum_se
 
 FloatArray = NDArray[np.float64]
 K_LIMIT = 0.7
@@ -40,8 +41,6 @@ class HeldOut:
         Those of them whose refit did not converge.
     predicted : Predicted
         Of each reading, (n_events, n_sensors); NaN where there is none.
-    covered : (n_events, n_sensors) array
-        1 where the central 90 % of the predictions hold the reading, NaN where there is none.
     others : tuple of LeftOut
         What the others say of each event.
     """
@@ -51,7 +50,6 @@ class HeldOut:
     refitted: tuple[str, ...]
     not_converged: tuple[str, ...]
     predicted: Predicted
-    covered: FloatArray
     others: tuple[LeftOut, ...] = field(default=(), repr=False)
 
     @classmethod
@@ -65,11 +63,9 @@ class HeldOut:
         not_converged: tuple[str, ...] = (),
     ) -> HeldOut:
         """With the predictions that the others make; nothing was reweighted where there is no Pareto k."""
-        readings, found = others[0].extension.problem.readings, predictions(others, seed)
-        seen = readings.observed
+        predicted = predictions(others, seed).where(others[0].extension.problem.observed)
         k = np.zeros(len(pointwise)) if pareto_k is None else pareto_k
-        predicted, covered = found.where(seen), found.covered(readings.values, seen)
-        return cls(pointwise, k, refitted, not_converged, predicted, covered, tuple(others))
+        return cls(pointwise, k, refitted, not_converged, predicted, tuple(others))
 
     @property
     def elpd(self) -> float:
@@ -145,25 +141,41 @@ def _others(
     return tuple(parts)
 
 
-def errors(found: HeldOut, problem: HierarchicalProblem) -> dict[str, float | None]:
-    """Root mean square error of speeds [m/s] and runouts [m], and coverage of the 90 % intervals."""
-    velocity = problem.readings.is_velocity
-    difference = np.where(problem.observed, found.predicted.mean - problem.values, np.nan)
+def errors(found: HeldOut | None, problem: HierarchicalProblem, when: str) -> dict[str, float | None]:
+    """Root mean square error of speeds [m/s] and runouts [m], and coverage of the 90 % intervals.
+
+    Parameters
+    ----------
+    found : HeldOut or None
+        None where there are no predictions: no error is a number then.
+    when : {"before", "after"}
+        What was added; the keys end with it.
+    """
+    keys = [f"{name}_{when}" for name in ("rmse_velocity", "rmse_runout", "coverage_90")]
+    if found is None:
+        return dict.fromkeys(keys)
+    velocity, predicted = problem.readings.is_velocity, found.predicted
+    difference = np.where(problem.observed, predicted.mean - problem.values, np.nan)
 
     def rms(columns: NDArray[np.bool_]) -> float | None:
         chosen = difference[:, columns]
         chosen = chosen[np.isfinite(chosen)]
         return float(np.sqrt(np.mean(chosen**2))) if chosen.size else None
 
-    known = found.covered[np.isfinite(found.covered)]
-    return {
-        "rmse_velocity": rms(velocity),
-        "rmse_runout": rms(~velocity),
-        "coverage_90": float(known.mean()) if known.size else None,
-    }
+    covered = predicted.covered(problem.values, problem.observed)
+    known = covered[np.isfinite(covered)]
+    coverage = float(known.mean()) if known.size else None
+    return dict(zip(keys, (rms(velocity), rms(~velocity), coverage), strict=True))
 
 
-def paired(after: HeldOut, before: HeldOut) -> tuple[float, float]:
-    """Difference of the log scores and its standard error, from paired differences per event."""
-    difference = after.pointwise - before.pointwise
-    return float(difference.sum()), float(np.sqrt(len(difference)) * difference.std(ddof=1))
+def elpd_difference(pairs: FloatArray | None) -> dict[str, float | None]:
+    """Sum over events of paired differences of log scores, and its standard error where there are several.
+
+    Parameters
+    ----------
+    pairs : (n_events,) array or None
+        After less before; None where nothing was added.
+    """
+    if pairs is None:
+        return {"elpd_diff": None, "elpd_se": None}
+    return {"elpd_diff": float(pairs.sum()), "elpd_se": sum_se(pairs) if len(pairs) > 1 else None}

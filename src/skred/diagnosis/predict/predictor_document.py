@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from skred.campaign.cells import LARGEST_NUMBER
+from skred.campaign.problems import shown
 from skred.diagnosis.detect.detectability import NO_LIMIT
 from skred.diagnosis.discrepancy.profile import AMPLITUDES, KINDS, MOST_KNOTS
 from skred.diagnosis.evidence.covariates import Standard
@@ -19,11 +22,100 @@ from skred.inference.error_model import ERROR_MODELS
 from skred.physics.law import Law
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
-from skred.physics.mechanisms.spec import Mechanism, Shape
+from skred.physics.mechanisms.spec import Shape
 
 FloatArray = NDArray[np.float64]
 MOST_ROWS, MOST_PARTS = 10_000, 8
 """Of a document: draws or places, and terms or constants of a term. Many times what is ever written."""
+_KINDS = {kind.equation: kind for kind in KINDS}
+
+
+def _not_blank(text: str) -> str:
+    if not text.strip():
+        raise ValueError("expected text that is not blank")
+    return text
+
+
+def _increasing(places: list[float]) -> list[float]:
+    if len(places) < 2 or any(last <= first for first, last in pairwise(places)):
+        raise ValueError("expected two or more increasing places")
+    return places
+
+
+_Text = Annotated[str, AfterValidator(_not_blank)]
+_Finite = Annotated[float, Field(allow_inf_nan=False, ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]
+_Positive = Annotated[_Finite, Field(gt=0.0)]
+_NotNegative = Annotated[_Finite, Field(ge=0.0)]
+_Exponent = Annotated[float, Field(allow_inf_nan=False, ge=-FARTHEST, le=FARTHEST)]
+_Several = Field(max_length=MOST_PARTS + MOST_KNOTS, fail_fast=True)
+"""Of one draw: more than any law, and all that is added to it, have."""
+_Many = Field(min_length=1, max_length=MOST_ROWS, fail_fast=True)
+_Exponents = Annotated[list[_Exponent], _Several]
+
+
+class _Part(BaseModel):
+    """Numbers are numbers here, and text is text; keys that are not known are left alone."""
+
+    model_config = ConfigDict(strict=True, frozen=True)
+
+
+class _Standard(_Part):
+    centre: _Finite
+    scale: Annotated[_Finite, Field(gt=1e-12)]
+    kinds: list[str]
+    logarithm: bool = False  # not there in those of before
+
+    @model_validator(mode="after")
+    def _of_numbers_or_of_two_kinds(self) -> Self:
+        if len(self.kinds) not in (0, 2):
+            raise ValueError("kinds: expected two texts or none")
+        if self.logarithm and self.kinds:
+            raise ValueError("logarithm: expected false for a text")
+        return self
+
+
+class _Term(_Part):
+    mechanism: _Text
+    s_from_m: _Finite | None = None
+    s_to_m: _Finite | None = None
+    covariate: _Text | None = None
+    sensor: _Text | None = None
+    constants: Annotated[dict[str, _Positive], Field(max_length=MOST_PARTS)] = Field(default_factory=dict)
+    standard: _Standard | None = None
+
+    @model_validator(mode="after")
+    def _one_stretch(self) -> Self:
+        ends = [place for place in (self.s_from_m, self.s_to_m) if place is not None]
+        if ends and not (len(ends) == 2 and ends[0] < ends[1]):
+            raise ValueError("expected s_from_m below s_to_m, or neither")
+        return self
+
+
+class _Profile(_Part):
+    kind: Literal[tuple(_KINDS)]  # type: ignore[valid-type]
+    # Below 0 where terrain goes on above the track's first point.
+    knots_m: Annotated[list[_Finite], Field(max_length=MOST_KNOTS), AfterValidator(_increasing)]
+    edge_m: Annotated[list[_Finite], _Many, AfterValidator(_increasing)]
+    front_speed: Annotated[list[_NotNegative], _Many]
+
+    @model_validator(mode="after")
+    def _speed_everywhere(self) -> Self:
+        if len(self.front_speed) != len(self.edge_m):
+            raise ValueError("front_speed: expected one for each edge_m")
+        return self
+
+
+class _Document(_Part):
+    format: Literal[FORMAT]  # type: ignore[valid-type]
+    law: _Text
+    error_model: Literal[tuple(ERROR_MODELS)]  # type: ignore[valid-type]
+    place_sd_m: _Positive
+    smoothing_m: Annotated[_NotNegative, Field(le=1000.0)]
+    means: Annotated[list[_Exponents], _Many]
+    factors: Annotated[list[Annotated[list[_Exponents], _Several]], _Many]
+    terms: Annotated[list[_Term], Field(max_length=MOST_PARTS)]
+    strengths: Annotated[list[Annotated[list[_Finite], _Several]], _Many]
+    profile: _Profile | None = None
 
 
 def as_dict(predictor: Predictor) -> dict[str, Any]:
@@ -72,54 +164,56 @@ def from_dict(document: Any) -> Predictor:
     InputError
         If it is not what `as_dict` gives, or names laws, error models or mechanisms that are not there.
     """
-    known = _mapping(document, "predictor")
-    if known.get("format") != FORMAT:
-        raise InputError(f"predictor: expected format {FORMAT}, found {known.get('format')!r:.40}")
-    law = load_law(_text(known, "law"))
-    error_model = _text(known, "error_model")
-    if error_model not in ERROR_MODELS:
-        raise InputError(
-            f"predictor: no error model {error_model!r:.40}; there are: {', '.join(ERROR_MODELS)}"
-        )
-    entries = known.get("terms")
-    if not isinstance(entries, list) or len(entries) > MOST_PARTS:
-        raise InputError(f"predictor: terms: expected a list of at most {MOST_PARTS}")
-    terms = tuple(_term(_mapping(entry, "terms"), law) for entry in entries)
-    n = len(law.mechanisms)
-    means = _numbers(known, "means", (n,), FARTHEST)
-    factors = _numbers(known, "factors", (n, n), FARTHEST)
-    profile = None if known.get("profile") is None else _profile(_mapping(known["profile"], "profile"))
-    scales = _scales(terms, profile)
-    strengths = _numbers(known, "strengths", (len(scales),), LARGEST_NUMBER)
+    try:
+        known = _Document.model_validate(document)
+    except ValidationError as error:
+        raise InputError(_told(error)) from None
+    law, entry = load_law(known.law), known.profile
+    terms = tuple(_term(one, law) for one in known.terms)
+    profile = None
+    if entry is not None:
+        places = np.array(entry.knots_m), np.array(entry.edge_m)
+        profile = ProfileTerm(_KINDS[entry.kind], *places, np.array(entry.front_speed))
+    n, scales = len(law.mechanisms), _scales(terms, profile)
+    means = _draws(known.means, "means", n)
+    factors = _draws(known.factors, "factors", n, n)
+    strengths = _draws(known.strengths, "strengths", len(scales))
     _check_draws(means, factors, strengths, scales)
-    place = _number(known, "place_sd_m")
-    smoothing = _number(known, "smoothing_m", 1000.0)
-    if not place > 0.0 or smoothing < 0.0:
-        raise InputError("predictor: place_sd_m must be positive, smoothing_m not negative")
-    return Predictor(law.id, error_model, place, smoothing, means, factors, terms, strengths, profile)
+    place, smoothing = known.place_sd_m, known.smoothing_m
+    return Predictor(law.id, known.error_model, place, smoothing, means, factors, terms, strengths, profile)
 
 
-def _profile(entry: Mapping[str, Any]) -> ProfileTerm:
-    name = _text(entry, "kind")
-    kind = next((one for one in KINDS if one.equation == name), None)
-    if kind is None:
-        raise InputError(
-            f"predictor: no force profile {name!r:.40}; there are: {', '.join(one.equation for one in KINDS)}"
-        )
-    knots = _places(entry, "knots_m", MOST_KNOTS)
-    edge = _places(entry, "edge_m", MOST_ROWS)
-    speed = _column(entry, "front_speed", MOST_ROWS)
-    if len(speed) != len(edge) or np.any(speed < 0.0):
-        raise InputError("predictor: front_speed: expected one for each edge_m, none negative")
-    return ProfileTerm(kind, knots, edge, speed)
+def _told(error: ValidationError) -> str:
+    """The first thing that pydantic found, in one line."""
+    details = error.errors(include_url=False)[0]
+    key = shown(".".join(("predictor", *map(str, details["loc"]))), 200)
+    found = details["input"]
+    told = "" if isinstance(found, dict | list) else f"found {found!r:.40}: "
+    # Which class of this file it could be an instance of is nothing to a reader.
+    message = details["msg"].removeprefix("Value error, ").split(" or instance of ")[0]
+    return f"{key}: {told}{message[:1].lower()}{message[1:]}"
 
 
-def _places(document: Mapping[str, Any], key: str, most: int) -> FloatArray:
-    """Increasing places [m], two or more; below 0 where terrain goes on above the track's first point."""
-    places = _column(document, key, most)
-    if len(places) < 2 or np.any(np.diff(places) <= 0.0):
-        raise InputError(f"predictor: {key}: expected two or more increasing places")
-    return places
+def _term(entry: _Term, law: Law) -> Term:
+    name = entry.mechanism
+    mechanism = mechanisms().get(name)
+    if mechanism is None or mechanism.added is None:
+        raise InputError(f"predictor: no mechanism {name!r:.40} that could be added to a law")
+    if not mechanism.added.joins(tuple(one.id for one in law.mechanisms)):
+        raise InputError(f"predictor: {law.id} has {name} already")
+    constants = tuple(entry.constants.items())
+    shape = Shape(entry.s_from_m, entry.s_to_m, entry.covariate, entry.sensor, constants)
+    by = entry.standard
+    standard = None if by is None else Standard(by.centre, by.scale, tuple(by.kinds), by.logarithm)
+    return Term(name, shape, standard)
+
+
+def _draws(rows: Sequence[Any], key: str, *shape: int) -> FloatArray:
+    """Draws as an array, (n_draws, *shape)."""
+    try:
+        return np.array(rows, dtype=float).reshape(len(rows), *shape)
+    except ValueError as error:
+        raise InputError(f"predictor: {key}: expected {shape} numbers in each draw") from error
 
 
 def _scales(terms: Sequence[Term], profile: ProfileTerm | None) -> list[tuple[str, float]]:
@@ -146,99 +240,3 @@ def _check_draws(
     for (name, scale), drawn in zip(scales, strengths.T, strict=True):
         if np.abs(drawn).max() > NO_LIMIT * scale:
             raise InputError(f"predictor: strengths of {name}: beyond all that is physical")
-
-
-def _term(entry: Mapping[str, Any], law: Law) -> Term:
-    name = _text(entry, "mechanism")
-    mechanism = mechanisms().get(name)
-    if mechanism is None or mechanism.added is None:
-        raise InputError(f"predictor: no mechanism {name!r:.40} that could be added to a law")
-    if not mechanism.added.joins(tuple(one.id for one in law.mechanisms)):
-        raise InputError(f"predictor: {law.id} has {name} already")
-    return Term(name, _shape(entry, mechanism), _standard(entry))
-
-
-def _shape(entry: Mapping[str, Any], mechanism: Mechanism) -> Shape:
-    ends = [None if entry.get(key) is None else _number(entry, key) for key in ("s_from_m", "s_to_m")]
-    first, last = ends
-    if (first is None) != (last is None) or (first is not None and last is not None and not first < last):
-        raise InputError(f"predictor: {mechanism.id}: expected s_from_m below s_to_m, or neither")
-    constants = _mapping(entry.get("constants", {}), "constants")
-    if len(constants) > MOST_PARTS:
-        raise InputError(f"predictor: {mechanism.id}: more than {MOST_PARTS} constants")
-    pairs = tuple((name, _number(constants, name)) for name in constants)
-    if any(not value > 0.0 for _, value in pairs):
-        raise InputError(f"predictor: {mechanism.id}: constants must be positive")
-    covariate, sensor = (
-        None if entry.get(key) is None else _text(entry, key) for key in ("covariate", "sensor")
-    )
-    return Shape(first, last, covariate, sensor, pairs)
-
-
-def _standard(entry: Mapping[str, Any]) -> Standard | None:
-    if entry.get("standard") is None:
-        return None
-    standard = _mapping(entry["standard"], "standard")
-    kinds = standard.get("kinds")
-    if not isinstance(kinds, list) or len(kinds) not in (0, 2) or not all(isinstance(k, str) for k in kinds):
-        raise InputError("predictor: standard: kinds: expected two texts or none")
-    centre = _number(standard, "centre")
-    scale = _number(standard, "scale")
-    if not scale > 1e-12:
-        raise InputError("predictor: standard: scale must be positive")
-    logarithm = standard.get("logarithm", False)  # not there in those of before
-    if not isinstance(logarithm, bool) or (logarithm and kinds):
-        raise InputError("predictor: standard: logarithm: expected true or false, and false for a text")
-    return Standard(centre, scale, tuple(kinds), logarithm)
-
-
-def _mapping(value: Any, where: str) -> Mapping[str, Any]:
-    if not isinstance(value, dict) or not all(isinstance(key, str) for key in value):
-        raise InputError(f"{where}: expected an object, found {type(value).__name__}")
-    return value
-
-
-def _text(document: Mapping[str, Any], key: str) -> str:
-    value = document.get(key)
-    if not isinstance(value, str) or not value.strip():
-        raise InputError(f"predictor: {key}: expected text, found {value!r:.40}")
-    return value
-
-
-def _number(document: Mapping[str, Any], key: str, largest: float = LARGEST_NUMBER) -> float:
-    value = document.get(key)
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise InputError(f"predictor: {key}: expected a number, found {value!r:.40}")
-    if not abs(value) <= largest:  # also where it is not a number
-        raise InputError(f"predictor: {key}: expected at most {largest:g} in size, found {value!r:.40}")
-    return float(value)
-
-
-def _column(document: Mapping[str, Any], key: str, most: int) -> FloatArray:
-    """A list of numbers."""
-    value = document.get(key)
-    if not isinstance(value, list) or len(value) > most:
-        raise InputError(f"predictor: {key}: expected a list of at most {most} numbers")
-    return np.array([_number({key: one}, key) for one in value], dtype=float)
-
-
-def _numbers(document: Mapping[str, Any], key: str, shape: tuple[int, ...], largest: float) -> FloatArray:
-    """Draws as an array, (n_draws, *shape)."""
-    expected = f"predictor: {key}: expected 1 to {MOST_ROWS} draws of {shape} finite numbers"
-    value = document.get(key)
-    if not isinstance(value, list) or not 1 <= len(value) <= MOST_ROWS or not _plain(value, 1 + len(shape)):
-        raise InputError(expected)
-    try:
-        array = np.array(value, dtype=float).reshape(len(value), *shape)
-    except (ValueError, TypeError, OverflowError) as error:
-        raise InputError(expected) from error
-    if not (np.isfinite(array).all() and np.abs(array).max(initial=0.0) <= largest):
-        raise InputError(expected)
-    return array
-
-
-def _plain(value: Any, depth: int) -> bool:
-    """Whether these are lists of numbers, so deep and no deeper."""
-    if depth == 0:
-        return isinstance(value, (int, float)) and not isinstance(value, bool)
-    return isinstance(value, list) and all(_plain(item, depth - 1) for item in value)

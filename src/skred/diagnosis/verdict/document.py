@@ -14,7 +14,7 @@ from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER
 from skred.diagnosis.influence.influence import Influence
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
-from skred.diagnosis.predict.held_out import HeldOut, errors, paired
+from skred.diagnosis.predict.held_out import HeldOut, elpd_difference, errors
 from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.conditional import conditional_document
 from skred.diagnosis.verdict.mechanisms import added_document, candidate_documents, work_documents
@@ -48,7 +48,7 @@ def _told_nothing(found: Outcome) -> dict[str, Any]:
         "indistinguishable": [],
         **dict.fromkeys(_OF_THE_NAMED),
         "evidence": dict.fromkeys(("elpd_diff", "elpd_se", "log_bayes_factor", "p_value")),
-        "held_out": _held_out(None, None, found.problem),
+        "held_out": _held_out(found.problem, None, None),
         "detection_limits": {},
         "next_sensor": None,
         "diagnostics": _diagnostics([found.calibration] if found.calibration is not None else [], []),
@@ -63,7 +63,7 @@ def _told(found: Diagnosis) -> dict[str, Any]:
         "probability": found.comparison.probability,
         "indistinguishable": list(found.decision.tied),
         "evidence": _evidence(found),
-        "held_out": _held_out(found.before, found.after, found.problem),
+        "held_out": _held_out(found.problem, found.before, found.after),
         "detection_limits": _detection_limits(found.table),
         "next_sensor": next_sensor(found),
         "diagnostics": _diagnostics(
@@ -86,22 +86,16 @@ def _evidence(found: Diagnosis) -> dict[str, float | None]:
     factor = found.comparison.log_odds
     if found.steps:
         factor = found.comparison.log_factors[found.steps[0].candidate.mechanism.id]
-    difference, se = (None, None) if found.after is None else paired(found.after, found.before)
+    pairs = None if found.after is None else found.after.pointwise - found.before.pointwise
     return {
-        "elpd_diff": difference,
-        "elpd_se": se,
+        **elpd_difference(pairs),
         "log_bayes_factor": factor,
         "p_value": found.check.p_value,
     }
 
 
-def _held_out(before: HeldOut | None, after: HeldOut | None, problem: HierarchicalProblem) -> dict[str, Any]:
-    keys = ("rmse_velocity", "rmse_runout", "coverage_90")
-    result: dict[str, Any] = {"unit": "event"}
-    for when, one in (("before", before), ("after", after)):
-        values = errors(one, problem) if one is not None else dict.fromkeys(keys)
-        result |= {f"{key}_{when}": values[key] for key in keys}
-    return result
+def _held_out(problem: HierarchicalProblem, before: HeldOut | None, after: HeldOut | None) -> dict[str, Any]:
+    return {"unit": "event", **errors(before, problem, "before"), **errors(after, problem, "after")}
 
 
 def _detection_limits(table: Identifiability) -> dict[str, Any]:
