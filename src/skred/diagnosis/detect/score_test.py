@@ -20,13 +20,7 @@ from scipy.special import log_ndtr
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, entering, knots, priors_of, spline_basis
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population, Rows, look_around
 from skred.diagnosis.evidence.extension import Extension
-from skred.diagnosis.evidence.linear_mixed_model import (
-    MeanPrior,
-    Scores,
-    efficient_scores,
-    mean_prior,
-    without,
-)
+from skred.diagnosis.evidence.linear_mixed_model import MeanPrior, Scores, efficient_scores, mean_prior
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.kernel.columns import Column
@@ -151,8 +145,8 @@ class ScoreTest:
 
     def scores(self, rows: Rows, points: FloatArray, population: Population) -> Scores:
         """Efficient scores of all directions at the events' modes."""
-        scores = efficient_scores(self.around(rows, points), rows, population, self.prior)
-        return without(scores, len(self.directions))
+        n_in = len(self.directions)
+        return efficient_scores(self.around(rows, points), rows, population, self.prior, n_in)
 
     def around(self, rows: Rows, points: FloatArray) -> Modes:
         """Tangents by all directions at the events' modes."""
