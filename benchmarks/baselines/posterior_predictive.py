@@ -78,14 +78,14 @@ def populations(fit: QuickFit, rng: np.random.Generator, n: int) -> tuple[FloatA
 def corrected_p(fit: QuickFit, seed: int) -> float:
     """The smallest corrected p-value of a campaign."""
     rng = np.random.default_rng([seed, 31])
-    covariates = np.array(list(fit.score_test.setting.covariates.values()))
+    covariates = np.array(list(fit.score_test.base.setting.covariates.values()))
     covariates = covariates.reshape(-1, fit.problem.campaign.n_events)
     readings = fit.problem.readings
     seen = statistics(readings.values[None], readings.observed[None], covariates)[0]
     simulated = []
     for _ in range(_REPLICAS // _BATCH):
         means, factors = populations(fit, rng, _BATCH)
-        made, _ = bootstrap_campaigns(fit.score_test.extension, np.zeros(0), means, factors, rng)
+        made, _ = bootstrap_campaigns(fit.score_test.base.extended(), np.zeros(0), means, factors, rng)
         shape = (_BATCH, *readings.values.shape)
         values, observed = made.readings.values.reshape(shape), made.readings.observed.reshape(shape)
         simulated.append(statistics(values, observed, covariates))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from skred.campaign import Campaign
 from skred.diagnosis.detect.score_test import ScoreTest
+from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import (
     EventLikelihood,
     Modes,
@@ -17,13 +18,14 @@ from skred.diagnosis.evidence.conditional_map import (
     campaign_rows,
     event_modes,
 )
-from skred.diagnosis.evidence.extension import setting_of
+from skred.diagnosis.evidence.extension import extended, setting_of
 from skred.diagnosis.evidence.linear_mixed_model import (
     Scores,
     fit_population,
     mean_prior,
     starting_population,
 )
+from skred.diagnosis.evidence.refit import Fit, unfitted
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
 from skred.physics.law import Law
 from skred.physics.laws import load_law
@@ -66,16 +68,17 @@ class QuickFit:
 def quick_fit(campaign: Campaign, base_law: str) -> QuickFit:
     """Fit the base law by expectation-maximisation around the events' modes."""
     problem, law = hierarchical_problem(campaign), load_law(base_law)
-    score_test = ScoreTest(problem, law, setting_of(problem, law))
-    rows = campaign_rows(score_test.extension)
-    likelihood = EventLikelihood(score_test.extension, rows, np.zeros(0))
+    extension = extended(problem, law)
+    rows = campaign_rows(extension)
+    likelihood = EventLikelihood(extension, rows, np.zeros(0))
     points = np.zeros((campaign.n_events, len(law.mechanisms) + 1))
     points[:, :-1] = np.log(starting_coefficients(problem, law, own=True))
     # Each event near its own readings: from a common start some stay where their front stops too early.
     start = Population(np.median(points[:, :-1], axis=0)[None], starting_population(law).covariance)
     population, points = fit_population(likelihood, mean_prior(law), (start, points))
     modes = event_modes(likelihood, points, population)
-    return QuickFit(problem, law, score_test, rows, population, modes)
+    base = Base(problem, law, setting_of(problem, law), rows, Fit(unfitted(population), modes.points))
+    return QuickFit(problem, law, ScoreTest(base), rows, population, modes)
 
 
 def stretch_of(shape: Shape) -> Stretch | None:

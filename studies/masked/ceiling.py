@@ -59,7 +59,7 @@ def found_in(number: int) -> dict[str, Any] | None:
     if found is None:
         return None
     base, _ = found
-    score_test = ScoreTest(base.problem, base.law, base.setting)
+    score_test = ScoreTest(base)
     information = score_test.scores(base.rows, base.fit.points, base.population).information[0]
     rng = np.random.default_rng(number)
     alarms = {arm: _alarms(score_test, information, allowed, rng) for arm, allowed in ARMS.items()}

@@ -10,7 +10,6 @@ import numpy as np
 
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.campaign.parts import of_events
-from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.diagnose import diagnose
 from skred.diagnosis.effort import Effort
 from skred.diagnosis.evidence.coefficient import Base, fit_base
@@ -84,10 +83,6 @@ def gates_diagnosis(*, biased: bool) -> Diagnosis:
     found = diagnose(problem, load_law("constant"), settings, effort)
     assert isinstance(found, Diagnosis)
     return found
-
-
-def score_test_of(base: Base) -> ScoreTest:
-    return ScoreTest(base.problem, base.law, base.setting)
 
 
 @cache

@@ -51,7 +51,7 @@ def assert_refused(document: dict[str, Any], words: str) -> None:
 
 def outcome(base: Base) -> tuple[str, tuple[str, ...]]:
     """ScoreTest, comparison, place and rule without the sampler."""
-    score_test = ScoreTest(base.problem, base.law, base.setting)
+    score_test = ScoreTest(base)
     scores = score_test.scores(base.rows, base.fit.points, base.population)
     assert np.isfinite(score_test.statistic(scores)).all()
     for row in told(score_test, scores):

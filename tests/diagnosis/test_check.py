@@ -18,7 +18,7 @@ from skred.diagnosis.evidence.coefficient import Base
 def test_one_shape_estimates_the_evidence_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
     """On average over the draws, whatever the linear model promises."""
     base = sparse_base()
-    placed = [one for one in ScoreTest(base.problem, base.law, base.setting).placed_mechanisms][:4]
+    placed = [one for one in ScoreTest(base).placed_mechanisms][:4]
     true = dict(zip(map(id, (one.shape for one in placed)), (3.0, -1.0, 0.5, 2.0), strict=True))
 
     class Known:
@@ -59,7 +59,7 @@ def test_what_reaches_the_recordings_is_computed_again(monkeypatch: pytest.Monke
 
 def test_evidence_of_one_shape_is_that_of_a_comparison() -> None:
     base = sparse_base()
-    test = ScoreTest(base.problem, base.law, base.setting)
+    test = ScoreTest(base)
     one = next(one for one in test.placed_mechanisms if one.mechanism.id == "viscous_drag")
     linear = LinearFactors([one], np.zeros((1, 1)), np.zeros(1), 0.0)
     fitted, beside = by_fronts.drawn(base, linear, np.random.default_rng(1))

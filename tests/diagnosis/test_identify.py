@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_cases import base_of, first_events, score_test_of, trial, with_sensors
+from diagnosis_cases import base_of, first_events, trial, with_sensors
 
 from skred.campaign.parts import of_events
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
@@ -29,7 +29,7 @@ def base() -> Base:
 
 @pytest.fixture(scope="module")
 def table(base: Base) -> dict[str, Detectability]:
-    score_test = score_test_of(base)
+    score_test = ScoreTest(base)
     scores = score_test.scores(base.rows, base.fit.points, base.population)
     return {row.mechanism.id: row for row in told(score_test, scores)}
 
@@ -89,8 +89,8 @@ def test_more_events_tell_more(base: Base, table: dict[str, Detectability]) -> N
     four = of_events(campaign, list(range(campaign.n_events)) * 4)
     events = tuple(replace(event, id=f"{event.id} {k}") for k, event in enumerate(four.events))
     problem = replace(base.problem, campaign=replace(four, events=events))
-    score_test = ScoreTest(problem, base.law, setting_of(problem, base.law))
-    rows = campaign_rows(score_test.extension)
+    score_test = ScoreTest(replace(base, problem=problem, setting=setting_of(problem, base.law)))
+    rows = campaign_rows(score_test.base.extended())
     scores = score_test.scores(rows, np.tile(base.fit.points, (4, 1)), base.population)
     for row in told(score_test, scores):
         before = table[row.mechanism.id]
@@ -100,8 +100,8 @@ def test_more_events_tell_more(base: Base, table: dict[str, Detectability]) -> N
 
 
 def test_an_extra_sensor_never_tells_less(base: Base, table: dict[str, Detectability]) -> None:
-    score_test = score_test_of(base)
-    places, scores = extra_sensors(score_test, base.fit.points, base.population)
+    score_test = ScoreTest(base)
+    places, scores = extra_sensors(base)
     before = {name: row for name, row in table.items()}
     power = mean_power(list(table.values()))
     assert len(places) == len(scores) and np.all(np.diff(places) > 0.0)

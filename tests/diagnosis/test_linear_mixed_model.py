@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from diagnosis_cases import score_test_of, sparse_base
+from diagnosis_cases import sparse_base
 from numpy.testing import assert_allclose
 
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
+from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population, Rows
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import (
@@ -15,7 +16,6 @@ from skred.diagnosis.evidence.linear_mixed_model import (
     efficient_scores,
     fit_population,
     mean_prior,
-    without,
 )
 from skred.inference.error_model import ERROR_MODELS, EventReadings
 
@@ -106,7 +106,7 @@ def test_efficient_scores_are_generalised_least_squares(n: int, n_groups: int) -
 @pytest.mark.parametrize("n_free", [1, 2])
 def test_what_is_in_already_takes_its_share(n_free: int) -> None:
     inputs = random_inputs(2, 2, seed=5)
-    found = without(efficient_scores(*inputs), n_free)
+    found = efficient_scores(*inputs, n_free)
     for group in range(2):
         score, information = dense(*inputs, group, n_free)
         assert_allclose(found.score[group], score, rtol=1e-7, atol=1e-9)
@@ -147,12 +147,12 @@ def test_population_of_simulated_campaigns_is_recovered() -> None:
 
 def test_order_of_events_does_not_matter() -> None:
     base = sparse_base()
-    score_test = score_test_of(base)
+    score_test = ScoreTest(base)
     order = np.random.default_rng(2).permutation(len(base.rows.event))
     turned = base.rows._replace(event=base.rows.event[order], readings=base.rows.readings.take(order))
     found = []
     for rows, points in ((base.rows, base.fit.points), (turned, base.fit.points[order])):
-        likelihood = EventLikelihood(score_test.extension, rows, np.zeros(0))
+        likelihood = EventLikelihood(base.extended(), rows, np.zeros(0))
         population, modes = fit_population(likelihood, score_test.prior, (base.population, points))
         found.append(score_test.statistic(score_test.scores(rows, modes, population))[0])
     assert_allclose(found[1], found[0], atol=1e-6)

@@ -102,14 +102,14 @@ def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_o
     log_odds : float
         Of anything against nothing.
     """
-    test = ScoreTest(base.problem, base.law, base.setting, base.directions, base.strengths)
+    test = ScoreTest(base)
 
     def by_fronts(refitted: _Refitted, first: int) -> Iterator[float]:
         groups = range(len(refitted.log_odds))
         rngs = [np.random.default_rng([seed, 22, first + group]) for group in groups]
         campaigns = zip(*map(refitted.one, groups), strict=True)
         with worker_pool() as pool:  # those that nobody waits for any more are not begun
-            yield from pool.map(partial(log_odds_by_fronts, base, test, log_odds), *campaigns, rngs)
+            yield from pool.map(partial(log_odds_by_fronts, test, log_odds), *campaigns, rngs)
 
     most = FEWEST_CLEAN if _OF_A_CLAIM < log_odds < _RARE else _FEW
     return BootstrapTest(log_odds, _until_clear(test, draws, seed, log_odds, most, by_fronts))
@@ -125,7 +125,7 @@ def linear_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, mos
     most : int
         Campaigns simulated at most; as many draws at least.
     """
-    test = ScoreTest(base.problem, base.law, base.setting, base.directions, base.strengths)
+    test = ScoreTest(base)
     statistic = float(_refitted(test, base.rows, base.fit.start).log_odds[0])
     simulated = _until_clear(test, draws, seed, statistic, most, lambda refitted, first: refitted.log_odds)
     return BootstrapTest(statistic, simulated)
@@ -174,13 +174,13 @@ def _simulated(
 ) -> tuple[Rows, tuple[Population, FloatArray]]:
     """Clean campaigns from some of the draws, and where to begin refitting them."""
     means, factors = draws[0][batch], draws[1][batch]
-    rows, points = bootstrap_campaigns(test.extension, test.strengths, means, factors, rng)
+    rows, points = bootstrap_campaigns(test.base.extended(), test.base.strengths, means, factors, rng)
     return rows, (Population(means.copy(), np.einsum("gij,gkj->gik", factors, factors)), points)
 
 
 def _refitted(test: ScoreTest, rows: Rows, start: tuple[Population, FloatArray]) -> _Refitted:
     """Populations and events refitted."""
-    likelihood = EventLikelihood(test.extension, rows, test.strengths)
+    likelihood = EventLikelihood(test.base.extended(), rows, test.base.strengths)
     population, points = fit_population(likelihood, test.prior, start)
     scores = test.scores(rows, points, population)
     return _Refitted(rows, population, points, scores, test.statistic(scores))

@@ -31,7 +31,6 @@ FloatArray = NDArray[np.float64]
 
 
 def log_odds_by_fronts(
-    base: Base,
     score_test: ScoreTest,
     reach: float,
     rows: Rows,
@@ -43,8 +42,8 @@ def log_odds_by_fronts(
 
     Parameters
     ----------
-    base : Base
-        The law that it was simulated from.
+    score_test : ScoreTest
+        Of the law that it was simulated from.
     reach : float
         The odds to compare with.
     rows : Rows
@@ -54,6 +53,7 @@ def log_odds_by_fronts(
     scores : Scores
         Of one group.
     """
+    base = score_test.base
     fit = refit(base.extended(), rows, base.strengths[None, :], start, Rounds(USUAL))[0]
     simulated = replace(base, rows=rows, fit=fit)
     of_id = {name: drawn(simulated, one, rng) for name, one in score_test.by_id(scores).items()}

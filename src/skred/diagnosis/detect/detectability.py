@@ -18,8 +18,9 @@ from scipy.special import ndtr, ndtri
 from skred.campaign import Sensor, Status
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.coefficient import Base
-from skred.diagnosis.evidence.conditional_map import Modes, Population, campaign_rows
-from skred.diagnosis.evidence.linear_mixed_model import Scores, efficient_scores
+from skred.diagnosis.evidence.conditional_map import Modes, campaign_rows
+from skred.diagnosis.evidence.extension import extended
+from skred.diagnosis.evidence.linear_mixed_model import Scores
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import INTERVAL_PROBABILITY
 from skred.physics.mechanisms import mechanisms
@@ -113,10 +114,10 @@ class Identifiability:
 
 def identify(base: Base) -> Identifiability:
     """What the recordings can tell around a fitted law."""
-    score_test = ScoreTest(base.problem, base.law, base.setting)
+    score_test = ScoreTest(base)
     scores = score_test.scores(base.rows, base.fit.points, base.population)
     table = told(score_test, scores)
-    places, with_each = extra_sensors(score_test, base.fit.points, base.population)
+    places, with_each = extra_sensors(base)
     power = mean_power(table)
     powers = [mean_power(told(score_test, one)) for one in with_each]
     best = int(np.argmax(powers))
@@ -185,23 +186,21 @@ def places_of_a_sensor(problem: HierarchicalProblem, recorded_m: tuple[float, fl
     return np.linspace(low, min(last, problem.terrain.length_m - 1.0), _PLACES)
 
 
-def extra_sensors(
-    score_test: ScoreTest, points: FloatArray, population: Population
-) -> tuple[FloatArray, list[Scores]]:
+def extra_sensors(base: Base) -> tuple[FloatArray, list[Scores]]:
     """Places for one more velocity sensor, and the information with each."""
-    places = places_of_a_sensor(score_test.problem, score_test.setting.recorded_m)
-    problem = with_sensors(score_test.problem, places)
+    places = places_of_a_sensor(base.problem, base.setting.recorded_m)
+    problem = with_sensors(base.problem, places)
     setting = replace(
-        score_test.setting,
+        base.setting,
         sensors=tuple(problem.campaign.sensor_ids),
-        velocities=(*score_test.setting.velocities, *[False] * len(places)),
+        velocities=(*base.setting.velocities, *[False] * len(places)),
     )
-    wide = replace(score_test, problem=problem, setting=setting)
-    rows = campaign_rows(wide.extension)
-    around = wide.around(rows, points)
-    columns = range(score_test.problem.campaign.n_sensors, problem.campaign.n_sensors)
+    rows = campaign_rows(extended(problem, base.law))
+    wide = ScoreTest(replace(base, problem=problem, setting=setting, rows=rows))
+    around = wide.around(rows, base.fit.points)
+    columns = range(base.problem.campaign.n_sensors, problem.campaign.n_sensors)
     return places, [
-        efficient_scores(_also_reading(around, problem, column), rows, population, wide.prior)
+        wide.scores_around(_also_reading(around, problem, column), rows, base.population)
         for column in columns
     ]
 

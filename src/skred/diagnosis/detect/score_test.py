@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -18,19 +18,12 @@ from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, entering, knots, priors_of, spline_basis
+from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population, Rows, look_around
 from skred.diagnosis.evidence.extension import Extension
-from skred.diagnosis.evidence.linear_mixed_model import (
-    MeanPrior,
-    Scores,
-    efficient_scores,
-    mean_prior,
-    without,
-)
+from skred.diagnosis.evidence.linear_mixed_model import MeanPrior, Scores, efficient_scores, mean_prior
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds
-from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.kernel.columns import Column
-from skred.physics.law import Law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import can_join, direction_of, shapes_of
 from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
@@ -92,35 +85,28 @@ class ScoreTest:
 
     Attributes
     ----------
-    problem : HierarchicalProblem
-    law : Law
-    setting : Setting
-    directions : tuple of Direction
-        Already in, with `strengths`; their share is taken from everything else.
-    strengths : (n_directions,) array
+    base : Base
+        The law. What is in it already has its share of everything else.
     """
 
-    problem: HierarchicalProblem
-    law: Law
-    setting: Setting
-    directions: tuple[Direction, ...] = ()
-    strengths: FloatArray = field(default_factory=lambda: np.empty(0))
+    base: Base
 
     @cached_property
     def placed_mechanisms(self) -> list[PlacedMechanism]:
         """The candidates, those that enter with U last."""
-        return sorted(placed_mechanisms(self.setting), key=lambda candidate: candidate.with_speed)
+        return sorted(placed_mechanisms(self.base.setting), key=lambda candidate: candidate.with_speed)
 
     @cached_property
     def knots_m(self) -> FloatArray:
         """Places of the knots of the force not in the list [m]."""
-        return knots(self.setting)
+        return knots(self.base.setting)
 
     @cached_property
     def _parts(self) -> list[Extension]:
         """Extensions whose directions follow each other: candidates, profiles; then candidates with U."""
-        basis = spline_basis(self.setting.terrain, self.knots_m)
-        profiles = [entering(self.setting, kind, row) for kind in KINDS for row in basis]
+        setting = self.base.setting
+        basis = spline_basis(setting.terrain, self.knots_m)
+        profiles = [entering(setting, kind, row) for kind in KINDS for row in basis]
         plain = [c.direction for c in self.placed_mechanisms if not c.with_speed]
         parts = [[*plain, *profiles]]
         by_scale: dict[float | None, list[Direction]] = {}
@@ -128,39 +114,37 @@ class ScoreTest:
             if candidate.with_speed:
                 by_scale.setdefault(candidate.direction.weakening_speed, []).append(candidate.direction)
         parts += list(by_scale.values())
-        return [Extension(self.problem, self.law, (*self.directions, *part)) for part in parts]
-
-    @property
-    def extension(self) -> Extension:
-        """The law itself."""
-        return Extension(self.problem, self.law, self.directions)
+        return [self.base.extended(*part) for part in parts]
 
     @cached_property
     def order(self) -> NDArray[np.int64]:
         """Where each candidate's direction is, over all parts."""
         position: dict[int, int] = {}
         for part in self._parts:
-            for direction in part.directions[len(self.directions) :]:
+            for direction in part.directions[len(self.base.directions) :]:
                 position[id(direction)] = len(position)
         return np.array([position[id(candidate.direction)] for candidate in self.placed_mechanisms])
 
     @cached_property
     def prior(self) -> MeanPrior:
         """Prior of the population's mean."""
-        return mean_prior(self.law)
+        return mean_prior(self.base.law)
 
     def scores(self, rows: Rows, points: FloatArray, population: Population) -> Scores:
         """Efficient scores of all directions at the events' modes."""
-        scores = efficient_scores(self.around(rows, points), rows, population, self.prior)
-        return without(scores, len(self.directions))
+        return self.scores_around(self.around(rows, points), rows, population)
+
+    def scores_around(self, around: Modes, rows: Rows, population: Population) -> Scores:
+        """The same from the tangents there."""
+        return efficient_scores(around, rows, population, self.prior, len(self.base.directions))
 
     def around(self, rows: Rows, points: FloatArray) -> Modes:
         """Tangents by all directions at the events' modes."""
         around: list[Modes] = []
-        n_in = len(self.directions)
+        n_in = len(self.base.directions)
         for part in self._parts:
             strengths = np.zeros(len(part.directions))
-            strengths[:n_in] = self.strengths
+            strengths[:n_in] = self.base.strengths
             around.append(look_around(EventLikelihood(part, rows, strengths), points))
         changes = [part.by_strengths[:, :, 0 if k == 0 else n_in :] for k, part in enumerate(around)]
         by_strengths = np.concatenate(changes, axis=2)

@@ -97,33 +97,77 @@ def _products(rows: Rows, first: FloatArray, second: FloatArray) -> FloatArray:
     return one.transpose(0, 2, 1) @ other
 
 
-def efficient_scores(modes: Modes, rows: Rows, population: Population, prior: MeanPrior) -> Scores:
-    """Efficient scores and information of the directions of the modes."""
-    n = population.mean.shape[1]
-    precision = population.precision[rows.group]
-    information = modes.information
+class NormalEquations(NamedTuple):
+    """Those of the population's means and of what is added, by group, the events' points integrated out.
+
+    Attributes
+    ----------
+    score : (n_groups, n_base + n_added) array
+    information : (n_groups, n_base + n_added, n_base + n_added) array
+    along : (n_rows, n_base + 1) array
+        What each event's point moves by itself.
+    by_both : (n_rows, n_base + 1, n_base + n_added) array
+        What it moves with means and what is added.
+    """
+
+    score: FloatArray
+    information: FloatArray
+    along: FloatArray
+    by_both: FloatArray
+
+
+def _normal_equations(
+    modes: Modes, rows: Rows, population: Population, prior: MeanPrior
+) -> NormalEquations:
+    """Of means and of the directions of the modes, in the linear model around these."""
+    n, added = population.mean.shape[1], modes.by_strengths
+    precision, deviation = population.precision[rows.group], deviations(modes.points, rows, population)
+    information, weighted = modes.information, modes.weighed(added)
     cover = np.linalg.inv(information + precision)
-    deviation = deviations(modes.points, rows, population)
-    # Weighted residuals about the population's mean.
-    pull = modes.slope + modes.weighed(modes.by_points @ deviation[:, :, None])[:, :, 0]
-    weighted = modes.weighed(modes.by_strengths)
-    mixed = np.einsum("rij,rik->rjk", modes.by_points, weighted, optimize=True)
-    at_points = np.einsum("rij,ri->rj", modes.by_points, pull)
-    score = np.einsum("rij,ri->rj", modes.by_strengths, pull)
-    shrunk = np.einsum("rij,rjk->rik", cover, mixed, optimize=True)
-    score = score - np.einsum("rji,rj->ri", shrunk, at_points)
-    of_mean = at_points - np.einsum("rij,rjk,rk->ri", information, cover, at_points, optimize=True)
-    mean_info = information - np.einsum("rij,rjk,rkl->ril", information, cover, information, optimize=True)
-    cross = mixed - np.einsum("rij,rjk->rik", information, shrunk, optimize=True)
-    mean_total = _by_group(rows, mean_info[:, :n, :n]) + np.diag(prior.sd**-2.0)
-    mean_score = _by_group(rows, of_mean[:, :n]) + (prior.mean - population.mean) / prior.sd**2
-    crossed = _by_group(rows, cross[:, :n])
-    solved = np.linalg.solve(mean_total, crossed)
-    result = _by_group(rows, score) - np.einsum("gji,gj->gi", solved, mean_score)
-    left = _products(rows, modes.by_strengths, weighted) - _products(rows, mixed, shrunk)
-    efficient = left - np.einsum("gji,gjk->gik", crossed, solved, optimize=True)
-    raw = _by_group(rows, np.einsum("rij,rij->rj", modes.by_strengths, weighted))
-    return Scores(result, efficient, raw)
+    mixed = modes.by_points.transpose(0, 2, 1) @ weighted
+    by_means, by_added = cover @ precision[:, :, :n], -cover @ mixed
+    slope = np.einsum("rij,ri->rj", modes.by_points, modes.slope)
+    pull = slope - np.einsum("rij,rj->ri", precision, deviation)
+    # Of means as products, for a difference from the precision has few digits left where spreads are narrow.
+    of_means = np.einsum("rij,ri->rj", by_means, slope + np.einsum("rij,rj->ri", information, deviation))
+    of_added = np.einsum("rij,ri->rj", added, modes.slope) + np.einsum("rij,ri->rj", by_added, pull)
+    score = _by_group(rows, np.concatenate([of_means, of_added], axis=1))
+    score[:, :n] += (prior.mean - population.mean) / prior.sd**2
+    own = _products(rows, by_means, information[:, :, :n]) + np.diag(prior.sd**-2.0)
+    crossed = _products(rows, by_means, mixed)
+    left = _products(rows, added, weighted) + _products(rows, mixed, by_added)
+    total = np.block([[own, crossed], [crossed.transpose(0, 2, 1), left]])
+    along = np.einsum("rij,rj->ri", cover, pull)
+    return NormalEquations(score, total, along, np.concatenate([by_means, by_added], axis=2))
+
+
+def _left(score: FloatArray, information: FloatArray, n_first: int) -> tuple[FloatArray, FloatArray]:
+    """Score and information of the others once the first ones have had their share."""
+    first, rest = slice(0, n_first), slice(n_first, None)
+    own, crossed = information[:, first, first], information[:, first, rest]
+    # Their units differ, so each has its own; one of which nothing is known takes nothing.
+    least = np.maximum(1e-12 * _diagonal(own), 1e-300)
+    solved = np.linalg.solve(own + least[:, :, None] * np.eye(n_first), crossed)
+    return (
+        score[:, rest] - np.einsum("gij,gi->gj", solved, score[:, first]),
+        information[:, rest, rest] - crossed.transpose(0, 2, 1) @ solved,
+    )
+
+
+def efficient_scores(
+    modes: Modes, rows: Rows, population: Population, prior: MeanPrior, n_in: int = 0
+) -> Scores:
+    """Efficient scores and information of the directions of the modes.
+
+    Parameters
+    ----------
+    n_in : int
+        Directions, the first, that are in already and free: they have their share too.
+    """
+    of_all, added = _normal_equations(modes, rows, population, prior), modes.by_strengths[:, :, n_in:]
+    score, information = _left(of_all.score, of_all.information, population.mean.shape[1] + n_in)
+    raw = _by_group(rows, np.einsum("rij,rij->rj", added, modes.weighed(added)))
+    return Scores(score, information, raw)
 
 
 class JointStep(NamedTuple):
@@ -135,31 +179,23 @@ class JointStep(NamedTuple):
     strength : (n_groups,) array
     sd : (n_groups,) array
         Of the coefficient, everything else free.
-    information : (n_groups, n_base + 1, n_base + 1) array
-        About means and coefficient, the points integrated out.
-    score : (n_groups, n_base + 1) array
-    along : (n_rows, n_base + 1) array
-        What each event's point moves by itself.
-    by_both : (n_rows, n_base + 1, n_base + 1) array
-        What it moves with means and coefficient.
+    equations : NormalEquations
+        Which it solves.
     """
 
     mean: FloatArray
     strength: FloatArray
     sd: FloatArray
-    information: FloatArray
-    score: FloatArray
-    along: FloatArray
-    by_both: FloatArray
+    equations: NormalEquations
 
     def held(self, groups: IntArray, strength: FloatArray) -> JointStep:
         """With the coefficient's step given in some groups, the means' as that asks for."""
         if len(groups) == 0:
             return self
-        n = self.mean.shape[1]
+        n, score, information = self.mean.shape[1], self.equations.score, self.equations.information
         mean, changed = self.mean.copy(), self.strength.copy()
-        left = self.score[groups, :n] - self.information[groups, :n, n] * strength[groups, None]
-        mean[groups] = np.linalg.solve(self.information[groups, :n, :n], left[:, :, None])[:, :, 0]
+        left = score[groups, :n] - information[groups, :n, n] * strength[groups, None]
+        mean[groups] = np.linalg.solve(information[groups, :n, :n], left[:, :, None])[:, :, 0]
         changed[groups] = strength[groups]
         return self._replace(mean=mean, strength=changed)
 
@@ -169,7 +205,7 @@ class JointStep(NamedTuple):
         None by more than 1, a factor e, with the whole step: tangents say nothing of what is farther.
         """
         both = np.column_stack([self.mean, self.strength])[rows.group]
-        whole = self.along + np.einsum("rij,rj->ri", self.by_both, both)
+        whole = self.equations.along + np.einsum("rij,rj->ri", self.equations.by_both, both)
         size = np.maximum(np.abs(whole).max(axis=1, keepdims=True), 1.0)
         return share * whole / size
 
@@ -192,49 +228,13 @@ def joint_step(
         Of its normal prior about 0.
     """
     n = population.mean.shape[1]
-    of_points = population.precision[rows.group]
-    deviation = deviations(modes.points, rows, population)
-    added = modes.by_strengths[:, :, -1:]
-    weighted = modes.weighed(added)
-    pull = np.einsum("rij,ri->rj", modes.by_points, modes.slope)
-    pull -= np.einsum("rij,rj->ri", of_points, deviation)
-    cover = np.linalg.inv(modes.information + of_points)
-    # Second derivatives by points and by (means, coefficient); the release has no mean.
-    mixed = np.concatenate([-of_points[:, :, :n], modes.by_points.transpose(0, 2, 1) @ weighted], axis=2)
-    own = np.zeros((len(mixed), n + 1, n + 1))
-    own[:, :n, :n] = of_points[:, :n, :n]
-    own[:, n:, n:] = added.transpose(0, 2, 1) @ weighted
-    score = np.concatenate(
-        [
-            np.einsum("rij,rj->ri", of_points[:, :n, :n], deviation[:, :n]),
-            np.einsum("rij,ri->rj", added, modes.slope),
-        ],
-        axis=1,
-    )
-    follow = cover @ mixed
-    information = _by_group(rows, own - mixed.transpose(0, 2, 1) @ follow)
-    total = _by_group(rows, score - np.einsum("rij,ri->rj", follow, pull))
-    information += np.diag(np.append(prior.sd**-2.0, precision))
-    total += np.column_stack([(prior.mean - population.mean) / prior.sd**2, -precision * strengths])
-    step = np.linalg.solve(information, total[:, :, None])[:, :, 0]
-    sd = np.sqrt(np.linalg.inv(information)[:, n, n])
-    along = np.einsum("rij,rj->ri", cover, pull)
-    return JointStep(step[:, :n], step[:, n], sd, information, total, along, -follow)
-
-
-def without(scores: Scores, n_first: int) -> Scores:
-    """Scores after the first directions, which are in already and free, have had their share too."""
-    if n_first == 0:
-        return scores
-    first, rest = slice(0, n_first), slice(n_first, None)
-    own = scores.information[:, first, first]
-    crossed = scores.information[:, first, rest]
-    solved = np.linalg.solve(own + 1e-12 * np.eye(n_first) * own.max(), crossed)
-    return Scores(
-        scores.score[:, rest] - np.einsum("gij,gi->gj", solved, scores.score[:, first]),
-        scores.information[:, rest, rest] - np.einsum("gij,gik->gjk", crossed, solved),
-        scores.raw[:, rest],
-    )
+    last = modes._replace(by_strengths=modes.by_strengths[:, :, -1:])
+    equations = _normal_equations(last, rows, population, prior)
+    equations.score[:, n] -= precision * strengths
+    equations.information[:, n, n] += precision
+    step = np.linalg.solve(equations.information, equations.score[:, :, None])[:, :, 0]
+    sd = np.sqrt(np.linalg.inv(equations.information)[:, n, n])
+    return JointStep(step[:, :n], step[:, n], sd, equations)
 
 
 def fit_population(
