@@ -116,9 +116,7 @@ class NormalEquations(NamedTuple):
     by_both: FloatArray
 
 
-def _normal_equations(
-    modes: Modes, rows: Rows, population: Population, prior: MeanPrior
-) -> NormalEquations:
+def _normal_equations(modes: Modes, rows: Rows, population: Population, prior: MeanPrior) -> NormalEquations:
     """Of means and of the directions of the modes, in the linear model around these."""
     n, added = population.mean.shape[1], modes.by_strengths
     precision, deviation = population.precision[rows.group], deviations(modes.points, rows, population)
