@@ -39,7 +39,7 @@ from skred.inference.reading_density import log_likelihoods
 from skred.inference.sampling import SamplerSettings
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
-from skred.physics.mechanisms.placed import direction_of
+from skred.physics.mechanisms.placed import direction_of, placed
 
 COMMON, SPREAD, SOME = BetweenEvents
 RYGGFONN = read_campaign(find_campaign("ryggfonn"))
@@ -51,7 +51,7 @@ def stretch_curve(base: Base, mechanism_id: str = "segment_friction") -> Curve:
     assert mechanism.added is not None
     first = next(one for one in mechanism.added.shapes(base.setting) if one.s_from_m is not None)
     shape = replace(first, s_from_m=STRETCH[0], s_to_m=STRETCH[1])
-    return curve_near(base, curve(base, mechanism, shape), shape)
+    return curve_near(base, curve(base, placed(mechanism, base.setting, shape)), shape)
 
 
 def made_campaign(law_id: str, mean: list[float], sd: list[float], own: np.ndarray, seed: int) -> Campaign:
@@ -115,9 +115,7 @@ def dense_log_evidence(base: Base, found: Curve, way: BetweenEvents) -> float:
     prior = halfnorm.logpdf(np.exp(means), scale=scale) + means + np.log(width)
     of_spread = lognorm.logpdf(spreads, TAU_LOG_SD, scale=TAU_MEDIAN) + np.log(np.gradient(spreads))
     population = prior[:, None] + of_spread
-    assert found.mechanism.added is not None
-    scale = found.mechanism.added.scale_of(found.shape)
-    density = norm.logpdf(strengths, 0.0, scale) + (0.0 if found.mechanism.added.either_sign else np.log(2.0))
+    density = norm.logpdf(strengths, 0.0, found.scale) + (0.0 if found.added.either_sign else np.log(2.0))
     width = np.full(len(strengths), strengths[1])
     width[[0, -1]] *= 0.5
     of_strength = density + np.log(width)
@@ -159,7 +157,7 @@ def test_a_base_law_with_the_term_has_the_same_evidence() -> None:
     drag = mechanisms()["turbulent_drag"]
     assert drag.added is not None
     shape = drag.added.shapes(coulomb.setting)[0]
-    found = curve_near(coulomb, curve(coulomb, drag, shape), shape)
+    found = curve_near(coulomb, curve(coulomb, placed(drag, coulomb.setting, shape)), shape)
     ways = finer(coulomb, found, searched(coulomb, found))
     common = ways[COMMON].populations.log_evidence
     differ = ways[SPREAD].populations.log_evidence - coulomb.fit.found.log_evidence
@@ -242,7 +240,7 @@ def test_gains_share_the_prior() -> None:
 
 
 def test_only_physics_of_track_and_stretch_may_differ() -> None:
-    differ = {name for name, one in mechanisms().items() if may_differ(one)}
+    differ = {name for name, one in mechanisms().items() if one.added is not None and may_differ(one)}
     assert {"segment_drag", "segment_friction", "obstacle", "turbulent_drag"} <= differ
     assert not differ & {"sensor_bias", "release_offset", "covariate_friction"}
 

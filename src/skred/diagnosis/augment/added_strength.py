@@ -22,30 +22,24 @@ from skred.inference.between_events import (
     variable,
 )
 from skred.physics.law import Parameter
-from skred.physics.mechanisms.spec import Added, Direction, Mechanism, Shape
+from skred.physics.mechanisms.placed import PlacedMechanism
 
 FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class AddedStrength:
+class AddedStrength(PlacedMechanism):
     """A mechanism of one shape that is added, its strength free.
 
     Attributes
     ----------
     name : str
         Of the parameter: the strength's own, numbered if two of a kind are added.
-    mechanism : Mechanism
-    shape : Shape
-    direction : Direction
     between : BetweenEvents
         How it differs between avalanches.
     """
 
     name: str
-    mechanism: Mechanism
-    shape: Shape
-    direction: Direction
     between: BetweenEvents = BetweenEvents.COMMON
 
     @property
@@ -64,17 +58,6 @@ class AddedStrength:
         ends = self.between.parameter
         return f"{self.name}_{ends}" if ends else ""
 
-    @property
-    def added(self) -> Added:
-        """How the mechanism joins a law."""
-        assert self.mechanism.added is not None
-        return self.mechanism.added
-
-    @property
-    def scale(self) -> float:
-        """Scale of the prior: half-normal, or normal where either sign may be."""
-        return self.added.scale_of(self.shape)
-
 
 def added_strengths(curves: Sequence[Curve], way: BetweenEvents) -> tuple[AddedStrength, ...]:
     """Of some curves, in which avalanches differ alike; numbered where two have the same name."""
@@ -84,7 +67,7 @@ def added_strengths(curves: Sequence[Curve], way: BetweenEvents) -> tuple[AddedS
         name = curve.mechanism.strength.name
         count[name] += 1
         own = name if count[name] == 1 else f"{name}_{count[name]}"
-        added.append(AddedStrength(own, curve.mechanism, curve.shape, curve.direction, way))
+        added.append(AddedStrength(curve.mechanism, curve.shape, curve.direction, own, way))
     return tuple(added)
 
 
