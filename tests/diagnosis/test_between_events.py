@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from scipy.special import logsumexp
 from scipy.stats import beta, halfnorm, lognorm, norm
 
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
-from skred.diagnosis.augment.added_strength import components_of, new_rows
+from skred.diagnosis.augment.added_strength import added_strengths, components_of, new_rows
 from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.augment.coefficient import multiples_of_events
 from skred.diagnosis.compare.between import finer, may_differ, searched
@@ -245,23 +244,20 @@ def test_only_physics_of_track_and_stretch_may_differ() -> None:
     assert not differ & {"sensor_bias", "release_offset", "covariate_friction"}
 
 
-def test_of_two_both_are_components(few: tuple[Base, Curve]) -> None:
-    """Each pair is a component; what avalanches to come have is drawn for each of them."""
+def test_what_avalanches_to_come_have_is_drawn_for_each(few: tuple[Base, Curve]) -> None:
+    added = added_strengths([few[1]], SOME)
+    samples = {"segment_friction": np.full(500, 2.0), "segment_friction_share": np.full(500, 0.3)}
+    rows = new_rows(added, samples, np.random.default_rng(1), 8)
+    assert rows.shape == (500, 8, 1) and set(np.unique(rows)) == {0.0, 2.0}
+    assert abs((rows > 0.0).mean() - 0.3) < 0.03
+
+
+def test_avalanches_differ_in_none_of_two(few: tuple[Base, Curve]) -> None:
     base, found = few
-    problem = augmented_problem(base, [found], SOME)
-    (one,) = problem.added
-    other: Any = replace(one, name="other", between=SPREAD)
-    samples = {
-        "segment_friction": np.full(500, 2.0),
-        "segment_friction_share": np.full(500, 0.3),
-        "other": np.full(500, 1.0),
-        "other_spread": np.full(500, 0.4),
-    }
-    own, log_shares = components_of([one, other], samples)
-    assert own.shape == (500, 50, 2)
-    assert_allclose(np.exp(log_shares).sum(axis=1), 1.0)
-    rows = new_rows([one, other], samples, np.random.default_rng(1), 8)
-    assert rows.shape == (500, 8, 2)
-    assert abs((rows[..., 0] > 0.0).mean() - 0.3) < 0.03
+    added = added_strengths([found, found], COMMON)
+    samples = {"segment_friction": np.full(5, 2.0), "segment_friction_2": np.full(5, 1.0)}
+    own, log_shares = components_of(added, samples)
+    assert_allclose(own, np.tile([2.0, 1.0], (5, 1, 1)))
+    assert_allclose(log_shares, np.zeros((5, 1)))
     with pytest.raises(ValueError, match="differ in none"):
         augmented_problem(base, [found, found], SOME)
