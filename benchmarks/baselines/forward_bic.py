@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skred.campaign import Campaign
-from skred.diagnosis.detect.score_test import PlacedMechanism
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, log_joint, look_around
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import MeanPrior, fit_population, mean_prior
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
+from skred.physics.mechanisms.placed import PlacedMechanism
 
 from .common import Answer, Stretch, is_dense, weighed
 from .quick_fit import QuickFit, quick_fit, stretch_of
@@ -65,8 +65,7 @@ def _log_prior(population: Population, prior: MeanPrior) -> FloatArray:
 
 def gain(fit: QuickFit, candidate: PlacedMechanism) -> float:
     """How much a candidate raises the penalised log likelihood at its best strength."""
-    added = candidate.mechanism.added
-    assert added is not None
+    added = candidate.added
     grid = added.scale * np.array(_GRID)
     strengths = np.concatenate([[0.0], grid, -grid]) if added.either_sign else np.append(0.0, grid)
     strengths = np.sort(strengths)

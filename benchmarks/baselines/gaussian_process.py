@@ -116,8 +116,6 @@ def similarities(fit: QuickFit, seen: FloatArray, expected: FloatArray) -> dict[
     cosine = np.where(size > 1e-6, expected @ seen / np.maximum(size, 1e-300), 0.0)
     found: dict[str, float] = {}
     for one, value in zip(fit.score_test.placed_mechanisms, cosine, strict=True):
-        added = one.mechanism.added
-        assert added is not None
-        similar = abs(float(value)) if added.either_sign else float(value)
+        similar = abs(float(value)) if one.added.either_sign else float(value)
         found[one.mechanism.id] = max(found.get(one.mechanism.id, -1.0), similar)
     return found

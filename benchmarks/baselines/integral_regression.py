@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from skred.campaign import Campaign
-from skred.diagnosis.detect.score_test import PlacedMechanism, placed_mechanisms
+from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.evidence.extension import setting_of
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
 from skred.physics.kernel.columns import GRAVITY
 from skred.physics.law import Law
 from skred.physics.laws import load_law
+from skred.physics.mechanisms.placed import PlacedMechanism
 from skred.physics.mechanisms.spec import Direction, Setting
 
 from .common import Answer, Stretch, is_dense, weighed
@@ -215,10 +216,10 @@ def log_factors(made: Regression) -> tuple[list[PlacedMechanism], FloatArray]:
     todo = placed_mechanisms(made.setting)
     n_base = made.x.shape[2] - 1
     of = products(made.x, made.y, made.columns([one.direction for one in todo]))
-    scales = np.array([one.mechanism.added.scale for one in todo])  # type: ignore[union-attr]
+    scales = np.array([one.added.scale for one in todo])
     fits, null = fit_each(of, scales, n_base), base_fit(made)
     found = fits.log_evidence - null.log_evidence[0]
-    signed = np.array([not one.mechanism.added.either_sign for one in todo])  # type: ignore[union-attr]
+    signed = np.array([not one.added.either_sign for one in todo])
     found = found + np.where(signed, fits.log_positive, 0.0)
     return todo, found
 

@@ -106,9 +106,7 @@ class PosteriorPredictive:
         largest: dict[str, float] = {}
         best, stretch = -np.inf, None
         for one, value in zip(fit.score_test.placed_mechanisms, z, strict=True):
-            added = one.mechanism.added
-            assert added is not None
-            size = abs(float(value)) if added.either_sign else float(value)
+            size = abs(float(value)) if one.added.either_sign else float(value)
             largest[one.mechanism.id] = max(largest.get(one.mechanism.id, -np.inf), size)
             if size > best:
                 best, stretch = size, stretch_of(one.shape)

@@ -20,13 +20,14 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_smoothing_spline
 
 from skred.campaign import Campaign
-from skred.diagnosis.detect.score_test import PlacedMechanism, placed_mechanisms
+from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.prior_odds import NOTHING, prior_odds
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
 from skred.physics.kernel.columns import GRAVITY
 from skred.physics.law import Law
 from skred.physics.laws import load_law
+from skred.physics.mechanisms.placed import PlacedMechanism
 from skred.physics.mechanisms.spec import Direction
 
 from .common import Answer, Stretch, decided, is_dense, possible
@@ -152,7 +153,7 @@ def library(
     chosen: list[int] = []
     for name in dict.fromkeys(one.mechanism.id for one in todo):
         own = [k for k, one in enumerate(todo) if one.mechanism.id == name]
-        sided = [along[k] if not todo[k].mechanism.added.either_sign else abs(along[k]) for k in own]  # type: ignore[union-attr]
+        sided = [along[k] if not todo[k].added.either_sign else abs(along[k]) for k in own]
         best = np.argsort(-np.array(sided))[:_PLACES]
         chosen += [own[k] for k in best if sided[k] > 0.0]
     return chosen, added[:, chosen] / np.maximum(norm[chosen], 1e-300) * np.sqrt(len(target))

@@ -14,7 +14,7 @@ from benchmarks.reference.lattice import population_envelope
 from skred.diagnosis.evidence.extension import extended, setting_of, typical_speed
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.law import Law
-from skred.physics.mechanisms.placed import direction_of
+from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Mechanism, Setting, Shape
 from skred.physics.mechanisms.stretches import shares
 
@@ -92,14 +92,12 @@ def reference_factor(
         Live points of the nested sampling that checks it; 0 for none.
     """
     started = time.process_time()
-    added = mechanism.added
-    assert added is not None
     nothing = plain.at(0.0)
     found: list[tuple[Reference, Curve]] = []
     for number, shape in enumerate(shapes):
-        direction = direction_of(mechanism, setting, shape)
-        one = Reference(plain.problem, plain.law, direction, plain.seed + 1000 * (number + 1))
-        found.append((one, curve(one, nothing, added.scale_of(shape), added.either_sign)))
+        missing = placed(mechanism, setting, shape)
+        one = Reference(plain.problem, plain.law, missing.direction, plain.seed + 1000 * (number + 1))
+        found.append((one, curve(one, nothing, missing.scale, missing.added.either_sign)))
     factors = np.array([one.log_bayes_factor for _, one in found]) + np.log(shares(list(shapes)))
     total = float(np.logaddexp.reduce(factors))
     tops = [float(one.coefficients[int(np.argmax(one.log_evidence))]) for _, one in found]

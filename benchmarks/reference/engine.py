@@ -16,6 +16,7 @@ from skred.diagnosis.evidence.linear_mixed_model import mean_prior
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.hierarchical.rough_population import rough_population
 from skred.physics.law import Law
+from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Mechanism, Shape
 
 ERRORS = "robust"
@@ -37,7 +38,7 @@ def engine_log_bayes_factor(base: Base, mechanism: Mechanism, shapes: Sequence[S
     Screened, the leading shapes computed anew, and then with more quadrature points, as a comparison does; no
     shape is parted.
     """
-    parts = screened_parts([curve(base, mechanism, one) for one in shapes])
+    parts = screened_parts([curve(base, placed(mechanism, base.setting, one)) for one in shapes])
     while todo := [k for k in leading(parts) if parts[k].level == 0]:
         for k in todo:
             (parts[k],) = parts[k].parted([curve_near(base, parts[k].curve, parts[k].curve.shape)])

@@ -24,9 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.commit import commit
-from skred.diagnosis.detect.score_test import PlacedMechanism, ScoreTest
+from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.linear_mixed_model import Scores
 from skred.diagnosis.limits import LIMIT
+from skred.physics.mechanisms.placed import PlacedMechanism
 from skred.physics.mechanisms.spec import Group
 from skred.physics.mechanisms.stretches import is_opposed
 from skred.simulator.masked import MASKED
@@ -105,9 +106,7 @@ def _one_of(
     """Direction of a candidate, of any mechanism, that a strength within reason gives the signal-to-noise."""
     by_mechanism: dict[str, list[int]] = {}
     for one, direction in zip(score_test.placed_mechanisms, score_test.order, strict=True):
-        added = one.mechanism.added
-        assert added is not None
-        most = STRONGEST * added.scale_of(one.shape) * math.sqrt(max(information[direction, direction], 0.0))
+        most = STRONGEST * one.scale * math.sqrt(max(information[direction, direction], 0.0))
         if allowed(one) and most > snr:
             by_mechanism.setdefault(one.mechanism.id, []).append(int(direction))
     if not by_mechanism:

@@ -19,6 +19,7 @@ import numpy as np
 from skred.diagnosis.evidence.coefficient import Base, curve_at, curve_near
 from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Shape
 from skred.physics.mechanisms.stretches import U_1, U_2
 from skred.prove.scorecard import DIAGNOSIS
@@ -52,10 +53,10 @@ def _at(base: Base, name: str, place: tuple[float, float], factor: float) -> flo
     """Log Bayes factor of a mechanism on a stretch, opposed at a multiple of the typical speed."""
     # The prior as it was in those diagnoses, not three times as wide.
     mechanism = mechanisms()[name]
-    assert mechanism.added is not None
     speeds = factor * np.interp(place, base.setting.terrain.edge_s_m, base.setting.front_speed)
     shape = Shape(*place, constants=((U_1, float(speeds[0])), (U_2, float(speeds[1]))))
-    rough = curve_at(base, mechanism, shape, mechanism.added.scale * np.array(STRENGTHS), USUAL)
+    candidate = placed(mechanism, base.setting, shape)
+    rough = curve_at(base, candidate, candidate.added.scale * np.array(STRENGTHS), USUAL)
     return curve_near(base, rough, shape).log_bayes_factor
 
 

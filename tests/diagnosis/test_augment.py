@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
-from skred.diagnosis.augment.add import Adding, add_mechanisms
+import pytest
+
+from skred.diagnosis.augment import add
 from skred.diagnosis.augment.step import NotAugmented
 from skred.diagnosis.clock import Clock
 from skred.diagnosis.effort import Effort, Run
@@ -13,53 +16,58 @@ from skred.inference.between_events import BetweenEvents
 from skred.inference.sampling import SamplerSettings
 
 BASE: Any = SimpleNamespace(law=SimpleNamespace(id="pcm"), problem=None, plain=lambda: None)
+Added = Callable[..., Any]
 
 
 def compared(**shares: float) -> Any:
     """A comparison with these probabilities."""
     ways = (BetweenEvents.COMMON,)
     candidates = {name: SimpleNamespace(best=name, likely_ways=ways, ways=None) for name in shares}
-    under_errors = SimpleNamespace(base=BASE, candidates=candidates)
+    under_errors = SimpleNamespace(error_model="robust", base=BASE, candidates=candidates)
     return SimpleNamespace(probability=shares, leading=lambda name: under_errors, log_odds=3.0)
 
 
-class MadeUp(Adding):
-    """Adding with made-up p-values of the checks, second comparison, and which calibrations converge."""
-
-    def __init__(self, p_values: list[float], second: Any, passed: tuple[bool, ...], reference: Any) -> None:
-        super().__init__(reference, Run(SamplerSettings(), Effort(), Clock(lambda line: None)))
-        self.p_values, self.second, self.gates = iter(p_values), second, iter(passed)
-
-    def calibrated(self, base: Any, chosen: Any, way: Any, ways: Any) -> Any:
-        return SimpleNamespace(gate=SimpleNamespace(passed=next(self.gates), problems=("r-hat",)))
-
-    def checked(self, base: Any, calibration: Any, chosen: Any) -> Any:
-        p_value = next(self.p_values)
-        check = SimpleNamespace(p_value=p_value, fired=p_value <= 0.01)
-        return SimpleNamespace(check=check, base=BASE)
-
-    def compared(self, base: Any) -> Any:
-        return self.second
+def calibration(passed: bool) -> Any:
+    return SimpleNamespace(gate=SimpleNamespace(passed=passed, problems=("r-hat",)))
 
 
-def added(
-    p_values: list[float],
-    second: Any,
-    passed: tuple[bool, ...] = (True, True),
-    same_errors: str = "",
-) -> Any:
-    """What becomes of an obstacle that a first comparison is sure of."""
-    reference: Any = SimpleNamespace(begin=lambda problem: None, on=lambda problem: ("base", same_errors))
-    first = compared(nothing=0.0, unlisted=0.0, obstacle=1.0)
-    return add_mechanisms(BASE, first, ("obstacle",), MadeUp(p_values, second, passed, reference))
+@pytest.fixture
+def added(monkeypatch: pytest.MonkeyPatch) -> Added:
+    """What becomes of an obstacle that a first comparison is sure of.
+
+    The checks' p-values, the second comparison, and which calibrations converge are made up.
+    """
+
+    def found(
+        p_values: list[float],
+        second: Any,
+        passed: tuple[bool, ...] = (True, True),
+        same_errors: bool = True,
+    ) -> Any:
+        left, gates = iter(p_values), iter(passed)
+
+        def checked(*given: Any) -> Any:
+            p_value = next(left)
+            return SimpleNamespace(p_value=p_value, fired=p_value <= 0.01), BASE
+
+        monkeypatch.setattr(add, "augmented_problem", lambda *given: None)
+        monkeypatch.setattr(add, "calibrate_surely", lambda *given: calibration(next(gates)))
+        monkeypatch.setattr(add, "check_again", checked)
+        monkeypatch.setattr(add, "compare", lambda base: second)
+        monkeypatch.setattr(add, "reference", lambda own, problem: lambda: calibration(same_errors))
+        first = compared(nothing=0.0, unlisted=0.0, obstacle=1.0)
+        run = Run(SamplerSettings(), Effort(), Clock(lambda line: None))
+        return add.add_mechanisms(BASE, first, ("obstacle",), calibration(True), run)
+
+    return found
 
 
-def test_without_an_alarm_nothing_more_is_looked_for() -> None:
+def test_without_an_alarm_nothing_more_is_looked_for(added: Added) -> None:
     found = added([0.02], compared(nothing=0.0, unlisted=0.0, segment_drag=1.0))
-    assert len(found.steps) == 1 and found.reference == "base" and found.left is None
+    assert len(found.steps) == 1 and found.reference.gate.passed and found.left is None
 
 
-def test_after_an_alarm_the_comparison_has_to_be_sure() -> None:
+def test_after_an_alarm_the_comparison_has_to_be_sure(added: Added) -> None:
     sure = compared(nothing=0.005, unlisted=0.0, segment_drag=0.995)
     found = added([0.01, 0.5], sure)
     assert [step.candidate.best for step in found.steps] == ["obstacle", "segment_drag"]
@@ -69,13 +77,13 @@ def test_after_an_alarm_the_comparison_has_to_be_sure() -> None:
     assert len(found.steps) == 1 and found.left.comparison is unsure and not found.left.reason
 
 
-def test_a_second_comparison_without_a_name_is_kept() -> None:
+def test_a_second_comparison_without_a_name_is_kept(added: Added) -> None:
     unlisted = compared(nothing=0.001, unlisted=0.999, segment_drag=0.0)
     found = added([0.005], unlisted)
     assert len(found.steps) == 1 and found.left.comparison is unlisted
 
 
-def test_a_second_one_that_does_not_converge_is_told() -> None:
+def test_a_second_one_that_does_not_converge_is_told(added: Added) -> None:
     sure = compared(nothing=0.001, unlisted=0.0, segment_drag=0.999)
     found = added([0.005], sure, (True, False))
     assert len(found.steps) == 1 and found.left.comparison is sure and "r-hat" in found.left.reason
@@ -83,6 +91,19 @@ def test_a_second_one_that_does_not_converge_is_told() -> None:
     assert isinstance(found, NotAugmented) and "r-hat" in found.reason and found.left is None
 
 
-def test_without_the_base_law_under_the_same_errors_nothing_is_added() -> None:
-    found = added([0.3], compared(nothing=1.0, unlisted=0.0), same_errors="it did not converge")
-    assert isinstance(found, NotAugmented) and found.reason == "it did not converge"
+def test_what_cannot_be_sampled_where_avalanches_differ_is_in_common(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    gates = iter((False, True))
+    monkeypatch.setattr(add, "augmented_problem", lambda *given: None)
+    monkeypatch.setattr(add, "calibrate_surely", lambda *given: calibration(next(gates)))
+    candidate: Any = SimpleNamespace(likely_ways=(BetweenEvents.SOME,), ways=None)
+    curve: Any = "obstacle"
+    found, way = add.calibrated(BASE, candidate, [curve], SamplerSettings())
+    assert found.gate.passed and way is BetweenEvents.COMMON
+
+
+def test_without_the_base_law_under_the_same_errors_nothing_is_added(added: Added) -> None:
+    found = added([0.3], compared(nothing=1.0, unlisted=0.0), same_errors=False)
+    assert isinstance(found, NotAugmented)
+    assert found.reason == "the gate of pcm under robust errors failed: r-hat"

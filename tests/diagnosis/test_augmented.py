@@ -40,6 +40,7 @@ from skred.inference.reading_density import log_likelihoods
 from skred.inference.sampling import SamplerSettings
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Shape
 
 CAMPAIGN = read_campaign(find_campaign("ryggfonn"))
@@ -83,7 +84,7 @@ def curve_of(base: Base, mechanism_id: str) -> Curve:
     mechanism = mechanisms()[mechanism_id]
     assert mechanism.added is not None
     shape = mechanism.added.shapes(base.setting)[0]
-    return curve_near(base, curve(base, mechanism, shape), shape)
+    return curve_near(base, curve(base, placed(mechanism, base.setting, shape)), shape)
 
 
 @pytest.fixture(scope="module")

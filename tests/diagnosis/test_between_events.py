@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from scipy.special import logsumexp
 from scipy.stats import beta, halfnorm, lognorm, norm
 
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
-from skred.diagnosis.augment.added_strength import components_of, new_rows
+from skred.diagnosis.augment.added_strength import added_strengths, components_of, new_rows
 from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.augment.coefficient import multiples_of_events
 from skred.diagnosis.compare.between import finer, may_differ, searched
@@ -39,7 +38,7 @@ from skred.inference.reading_density import log_likelihoods
 from skred.inference.sampling import SamplerSettings
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
-from skred.physics.mechanisms.placed import direction_of
+from skred.physics.mechanisms.placed import direction_of, placed
 
 COMMON, SPREAD, SOME = BetweenEvents
 RYGGFONN = read_campaign(find_campaign("ryggfonn"))
@@ -51,7 +50,7 @@ def stretch_curve(base: Base, mechanism_id: str = "segment_friction") -> Curve:
     assert mechanism.added is not None
     first = next(one for one in mechanism.added.shapes(base.setting) if one.s_from_m is not None)
     shape = replace(first, s_from_m=STRETCH[0], s_to_m=STRETCH[1])
-    return curve_near(base, curve(base, mechanism, shape), shape)
+    return curve_near(base, curve(base, placed(mechanism, base.setting, shape)), shape)
 
 
 def made_campaign(law_id: str, mean: list[float], sd: list[float], own: np.ndarray, seed: int) -> Campaign:
@@ -115,9 +114,7 @@ def dense_log_evidence(base: Base, found: Curve, way: BetweenEvents) -> float:
     prior = halfnorm.logpdf(np.exp(means), scale=scale) + means + np.log(width)
     of_spread = lognorm.logpdf(spreads, TAU_LOG_SD, scale=TAU_MEDIAN) + np.log(np.gradient(spreads))
     population = prior[:, None] + of_spread
-    assert found.mechanism.added is not None
-    scale = found.mechanism.added.scale_of(found.shape)
-    density = norm.logpdf(strengths, 0.0, scale) + (0.0 if found.mechanism.added.either_sign else np.log(2.0))
+    density = norm.logpdf(strengths, 0.0, found.scale) + (0.0 if found.added.either_sign else np.log(2.0))
     width = np.full(len(strengths), strengths[1])
     width[[0, -1]] *= 0.5
     of_strength = density + np.log(width)
@@ -159,7 +156,7 @@ def test_a_base_law_with_the_term_has_the_same_evidence() -> None:
     drag = mechanisms()["turbulent_drag"]
     assert drag.added is not None
     shape = drag.added.shapes(coulomb.setting)[0]
-    found = curve_near(coulomb, curve(coulomb, drag, shape), shape)
+    found = curve_near(coulomb, curve(coulomb, placed(drag, coulomb.setting, shape)), shape)
     ways = finer(coulomb, found, searched(coulomb, found))
     common = ways[COMMON].populations.log_evidence
     differ = ways[SPREAD].populations.log_evidence - coulomb.fit.found.log_evidence
@@ -242,28 +239,25 @@ def test_gains_share_the_prior() -> None:
 
 
 def test_only_physics_of_track_and_stretch_may_differ() -> None:
-    differ = {name for name, one in mechanisms().items() if may_differ(one)}
+    differ = {name for name, one in mechanisms().items() if one.added is not None and may_differ(one)}
     assert {"segment_drag", "segment_friction", "obstacle", "turbulent_drag"} <= differ
     assert not differ & {"sensor_bias", "release_offset", "covariate_friction"}
 
 
-def test_of_two_both_are_components(few: tuple[Base, Curve]) -> None:
-    """Each pair is a component; what avalanches to come have is drawn for each of them."""
+def test_what_avalanches_to_come_have_is_drawn_for_each(few: tuple[Base, Curve]) -> None:
+    added = added_strengths([few[1]], SOME)
+    samples = {"segment_friction": np.full(500, 2.0), "segment_friction_share": np.full(500, 0.3)}
+    rows = new_rows(added, samples, np.random.default_rng(1), 8)
+    assert rows.shape == (500, 8, 1) and set(np.unique(rows)) == {0.0, 2.0}
+    assert abs((rows > 0.0).mean() - 0.3) < 0.03
+
+
+def test_avalanches_differ_in_none_of_two(few: tuple[Base, Curve]) -> None:
     base, found = few
-    problem = augmented_problem(base, [found], SOME)
-    (one,) = problem.added
-    other: Any = replace(one, name="other", between=SPREAD)
-    samples = {
-        "segment_friction": np.full(500, 2.0),
-        "segment_friction_share": np.full(500, 0.3),
-        "other": np.full(500, 1.0),
-        "other_spread": np.full(500, 0.4),
-    }
-    own, log_shares = components_of([one, other], samples)
-    assert own.shape == (500, 50, 2)
-    assert_allclose(np.exp(log_shares).sum(axis=1), 1.0)
-    rows = new_rows([one, other], samples, np.random.default_rng(1), 8)
-    assert rows.shape == (500, 8, 2)
-    assert abs((rows[..., 0] > 0.0).mean() - 0.3) < 0.03
+    added = added_strengths([found, found], COMMON)
+    samples = {"segment_friction": np.full(5, 2.0), "segment_friction_2": np.full(5, 1.0)}
+    own, log_shares = components_of(added, samples)
+    assert_allclose(own, np.tile([2.0, 1.0], (5, 1, 1)))
+    assert_allclose(log_shares, np.zeros((5, 1)))
     with pytest.raises(ValueError, match="differ in none"):
         augmented_problem(base, [found, found], SOME)

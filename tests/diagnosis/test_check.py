@@ -25,7 +25,7 @@ def test_one_shape_estimates_the_evidence_of_all(monkeypatch: pytest.MonkeyPatch
         def __init__(self, shape: Any) -> None:
             self.log_bayes_factor = true[id(shape)]
 
-    monkeypatch.setattr(by_fronts, "curve", lambda base, mechanism, shape: Known(shape))
+    monkeypatch.setattr(by_fronts, "curve", lambda base, candidate: Known(candidate.shape))
     shares = np.array([0.1, 0.4, 0.3, 0.2])
     linear = LinearFactors(placed, np.array([[-2.0, 4.0, 0.0, 1.0]]), np.log(shares), -1.5)
     rng = np.random.default_rng(0)
@@ -64,4 +64,4 @@ def test_evidence_of_one_shape_is_that_of_a_comparison() -> None:
     linear = LinearFactors([one], np.zeros((1, 1)), np.zeros(1), 0.0)
     fitted, beside = by_fronts.drawn(base, linear, np.random.default_rng(1))
     assert beside == pytest.approx(0.0)
-    assert fitted.log_bayes_factor == curve(base, one.mechanism, one.shape).log_bayes_factor
+    assert fitted.log_bayes_factor == curve(base, one).log_bayes_factor

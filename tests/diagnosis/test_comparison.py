@@ -22,6 +22,7 @@ from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.refit import Rounds, refit
 from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Direction, Shape
 
 
@@ -35,11 +36,10 @@ def base() -> Base:
 @pytest.mark.parametrize("name", ["turbulent_drag", "viscous_drag", "sensor_bias"])
 def test_second_look_against_many_nodes_on_a_dense_grid(base: Base, name: str) -> None:
     job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == name)
-    found = curve_near(base, curve(base, job.mechanism, job.shape), job.shape)
-    assert job.mechanism.added is not None
-    reach = job.mechanism.added.scale * np.linspace(0.0, 3.5, 24)
-    grid = np.concatenate([-reach[:0:-1], reach]) if job.mechanism.added.either_sign else reach
-    exact = curve_at(base, job.mechanism, job.shape, grid, FINE)
+    found = curve_near(base, curve(base, job), job.shape)
+    reach = job.added.scale * np.linspace(0.0, 3.5, 24)
+    grid = np.concatenate([-reach[:0:-1], reach]) if job.added.either_sign else reach
+    exact = curve_at(base, job, grid, FINE)
     assert found.log_bayes_factor == pytest.approx(exact.log_bayes_factor, abs=0.4)
     mean, sd = exact.moments
     assert abs(found.moments[0] - mean) < 0.25 * sd
@@ -48,7 +48,7 @@ def test_second_look_against_many_nodes_on_a_dense_grid(base: Base, name: str) -
 def test_screening_finds_what_is_missing(base: Base) -> None:
     for job in placed_mechanisms(base.setting):
         if job.mechanism.id in ("turbulent_drag", "viscous_drag"):
-            assert curve(base, job.mechanism, job.shape).log_bayes_factor > 5.0
+            assert curve(base, job).log_bayes_factor > 5.0
 
 
 @pytest.mark.slow
@@ -56,7 +56,7 @@ def test_screening_promises_nothing_in_a_clean_campaign() -> None:
     """Along tangents friction on many a stretch would have five nats here, where fronts stop."""
     base = base_of(trial(990001, "sparse", "nothing", "pcm").campaign, "pcm")
     friction = [one for one in placed_mechanisms(base.setting) if one.mechanism.id == "segment_friction"]
-    found = [curve(base, one.mechanism, one.shape) for one in friction]
+    found = [curve(base, one) for one in friction]
     assert len(found) > 15
     assert max(one.log_evidence.max() for one in found) < 2.0
     assert all(one.log_evidence[one.strengths == 0.0][0] == 0.0 for one in found)
@@ -65,10 +65,8 @@ def test_screening_promises_nothing_in_a_clean_campaign() -> None:
 def test_a_curve_goes_on_where_its_posterior_would_be_cut(base: Base) -> None:
     """Begun at strengths far too small, it comes to what it is from all strengths."""
     job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == "viscous_drag")
-    assert job.mechanism.added is not None
-    scale = job.mechanism.added.scale_of(job.shape)
-    whole = curve_at(base, job.mechanism, job.shape, scale * np.linspace(0.05, 4.5, 60), USUAL)
-    start = curve_at(base, job.mechanism, job.shape, scale * np.array([0.01, 0.02, 0.03]), USUAL)
+    whole = curve_at(base, job, job.scale * np.linspace(0.05, 4.5, 60), USUAL)
+    start = curve_at(base, job, job.scale * np.array([0.01, 0.02, 0.03]), USUAL)
     assert start.is_cut and not whole.is_cut
     near = curve_near(base, start, job.shape)
     assert not near.is_cut
@@ -78,7 +76,7 @@ def test_a_curve_goes_on_where_its_posterior_would_be_cut(base: Base) -> None:
 
 def test_only_what_leads_is_computed_again(base: Base) -> None:
     job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == "turbulent_drag")
-    one = curve_near(base, curve(base, job.mechanism, job.shape), job.shape)
+    one = curve_near(base, curve(base, job), job.shape)
     drag = {"turbulent_drag": Candidate(job.mechanism, (one,), np.zeros(1))}
     with ThreadPoolExecutor(1) as pool:
         looked, behind = (
@@ -95,7 +93,7 @@ def test_screening_finds_what_ends_outliers() -> None:
     base = ryggfonn_base("coulomb")
     drag = mechanisms()["velocity_weakening"]
     assert drag.added is not None
-    found = [curve(base, drag, shape) for shape in drag.added.shapes(base.setting)]
+    found = [curve(base, placed(drag, base.setting, shape)) for shape in drag.added.shapes(base.setting)]
     assert max(one.log_bayes_factor for one in found) > 30.0
 
 
@@ -173,7 +171,7 @@ def test_under_another_error_model_each_mechanism_is_looked_at_until_the_rest_is
 
     def before(*heights: float) -> list[Curve]:
         return [
-            replace(made(one.mechanism.id, 0.0, height), shape=one.shape)
+            replace(made(one.mechanism.id, 0.0, height), shape=one.shape, direction=one.direction)
             for one, height in zip(places, heights, strict=True)
         ]
 
@@ -327,12 +325,10 @@ def test_screening_has_what_a_grid_over_the_prior_has() -> None:
         one for one in placed_mechanisms(base.setting) if one.mechanism.id in ("segment_friction", "obstacle")
     ]
     for job in local[::9]:
-        added = job.mechanism.added
-        assert added is not None
-        grid = added.scale_of(job.shape) * np.array([0.1, 0.2, 0.4, 0.6, 0.9, 1.2, 1.7, 2.2, 3.5])
-        grid = np.append(-grid[::-1], grid) if added.either_sign else grid
-        whole = curve_at(base, job.mechanism, job.shape, grid, SCREENING)
-        found = curve(base, job.mechanism, job.shape)
+        grid = job.scale * np.array([0.1, 0.2, 0.4, 0.6, 0.9, 1.2, 1.7, 2.2, 3.5])
+        grid = np.append(-grid[::-1], grid) if job.added.either_sign else grid
+        whole = curve_at(base, job, grid, SCREENING)
+        found = curve(base, job)
         assert found.log_bayes_factor == pytest.approx(whole.log_bayes_factor, abs=0.3)
 
 
@@ -353,11 +349,10 @@ def test_nothing_is_the_same_whatever_is_not_added() -> None:
 def test_refits_of_few_points_at_a_time_are_the_same(base: Base, monkeypatch: pytest.MonkeyPatch) -> None:
     """Groups one by one, as of campaigns of a thousand avalanches."""
     job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == "turbulent_drag")
-    assert job.mechanism.added is not None
-    strengths = job.mechanism.added.scale * np.array([0.3, 0.6, 1.2])
-    whole = curve_at(base, job.mechanism, job.shape, strengths, USUAL)
+    strengths = job.added.scale * np.array([0.3, 0.6, 1.2])
+    whole = curve_at(base, job, strengths, USUAL)
     monkeypatch.setattr(refits, "MOST_NODES", 1)
-    parts = curve_at(base, job.mechanism, job.shape, strengths, USUAL)
+    parts = curve_at(base, job, strengths, USUAL)
     assert parts.log_evidence == pytest.approx(whole.log_evidence, abs=1e-8)
 
 
@@ -365,10 +360,9 @@ def test_screening_sees_strengths_far_below_the_grid() -> None:
     """Many recordings tell a drag of a tenth of its prior's scale; the grid begins at a fifth."""
     base = base_of(trial(1031, "dense", "turbulent_drag", "constant", 9.5).campaign, "constant")
     job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == "turbulent_drag")
-    rough = curve(base, job.mechanism, job.shape)
+    rough = curve(base, job)
     settled = curve_near(base, rough, job.shape)
-    assert job.mechanism.added is not None
-    assert 0.0 < settled.moments[0] < 0.2 * job.mechanism.added.scale
+    assert 0.0 < settled.moments[0] < 0.2 * job.added.scale
     assert settled.log_bayes_factor > 20.0
     assert rough.log_bayes_factor == pytest.approx(settled.log_bayes_factor, abs=5.0)
 

@@ -34,6 +34,7 @@ from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.extension import extended
 from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Shape
 
 
@@ -209,7 +210,7 @@ def test_profile_is_found_from_a_listed_mechanism_where_nothing_is_too_far(error
     A smooth profile can do what a force on one stretch does, with some loss at its edges.
     """
     base = base_of(read_campaign(find_campaign("ryggfonn")), "coulomb", errors)
-    listed = curve(base, mechanisms()[id_], Shape(1600.0, 1700.0))
+    listed = curve(base, placed(mechanisms()[id_], base.setting, Shape(1600.0, 1700.0)))
     kind = next(kind for kind in KINDS if alike(kind, listed))
     from_nothing = fit_profile(base, kind)
     from_listed = fit_profile(base, kind, as_profile(base, kind, listed))
@@ -265,7 +266,8 @@ def test_push_and_pull_beside_each_other_are_of_no_listed_shape(base: Base) -> N
     assert profile.prior.length_m < 200.0
     friction = mechanisms()["segment_friction"]
     places = [(centre - 120.0, centre), (centre, centre + 120.0)]
-    best = max(curve(changed, friction, Shape(*place)).log_bayes_factor for place in places)
+    listed = [curve(changed, placed(friction, changed.setting, Shape(*place))) for place in places]
+    best = max(one.log_bayes_factor for one in listed)
     assert profile.log_bayes_factor > best + 2.0
 
 

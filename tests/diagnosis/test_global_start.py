@@ -21,7 +21,7 @@ from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.global_start import global_starts
 from skred.diagnosis.evidence.linear_mixed_model import joint_step, mean_prior
 from skred.physics.mechanisms import mechanisms
-from skred.physics.mechanisms.placed import direction_of
+from skred.physics.mechanisms.placed import direction_of, placed
 from skred.physics.mechanisms.spec import Shape
 
 DRAG = 2.4e-4
@@ -39,7 +39,7 @@ def base() -> Base:
 
 def test_a_drag_that_friction_has_absorbed_is_found(base: Base) -> None:
     """Friction has to fall to a third for it: no derivative at nil, no refit at a fixed drag gets there."""
-    found = curve(base, mechanisms()["turbulent_drag"], Shape())
+    found = curve(base, placed(mechanisms()["turbulent_drag"], base.setting, Shape()))
     mean, sd = found.moments
     assert found.log_bayes_factor > 30.0
     assert abs(mean - DRAG) < 4.0 * sd and sd < 0.2 * DRAG
@@ -55,7 +55,7 @@ def test_all_starts_lead_to_one_maximum(base: Base) -> None:
 
 def test_nothing_is_found_where_nothing_is() -> None:
     base = base_of(rolling(1e-8, friction=0.02, n_events=12), "coulomb")
-    found = curve(base, mechanisms()["turbulent_drag"], Shape())
+    found = curve(base, placed(mechanisms()["turbulent_drag"], base.setting, Shape()))
     assert found.log_bayes_factor < 1.0
 
 

@@ -11,12 +11,13 @@ from diagnosis_cases import base_of, first_events, trial, with_sensors
 from skred.campaign.parts import of_events
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
 from skred.diagnosis.detect.detectability import LIMIT_Z, Detectability, extra_sensors, mean_power, told
-from skred.diagnosis.detect.score_test import PlacedMechanism, ScoreTest, placed_mechanisms
+from skred.diagnosis.detect.score_test import ScoreTest, placed_mechanisms
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, campaign_rows, look_around
 from skred.diagnosis.evidence.extension import extended, setting_of
 from skred.diagnosis.evidence.linear_mixed_model import efficient_scores, fit_population, mean_prior
 from skred.inference.error_model import ERROR_MODELS
+from skred.physics.mechanisms.placed import PlacedMechanism
 
 NONE = np.zeros(0)
 

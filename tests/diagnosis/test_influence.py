@@ -23,6 +23,7 @@ from skred.diagnosis.predict.held_out import held_out
 from skred.inference.calibrate import calibrate
 from skred.inference.sampling import SamplerSettings
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Shape
 
 DRAG = mechanisms()["turbulent_drag"]
@@ -33,7 +34,7 @@ ENOUGH = math.log(99.0)
 def drag_in(campaign: Campaign) -> tuple[Comparison, Curve]:
     """A comparison that has drag along the track alone."""
     base = base_of(campaign, "coulomb")
-    found = curve_near(base, curve(base, DRAG, Shape()), Shape())
+    found = curve_near(base, curve(base, placed(DRAG, base.setting, Shape())), Shape())
     candidates = {DRAG.id: Candidate(DRAG, (found,), np.zeros(1))}
     under_errors = ComparisonUnderErrors("robust", base, candidates, [], [found])
     return Comparison((under_errors,), prior_odds([DRAG]), {"robust": 0.0}), found

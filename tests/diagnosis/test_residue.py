@@ -23,6 +23,7 @@ from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_evidence_of
 from skred.diagnosis.discrepancy.sampled_evidence import sampled
 from skred.diagnosis.evidence.coefficient import Base, curve_at, curve_near
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Shape
 
 DRAG = mechanisms()["turbulent_drag"]
@@ -31,7 +32,7 @@ DRAG = mechanisms()["turbulent_drag"]
 def fitted(campaign: Campaign) -> tuple[Base, Candidate, list[Profile]]:
     """The base law, drag along the track, and the force that is not in the list."""
     base = base_of(campaign, "coulomb")
-    found = curve_near(base, curve(base, DRAG, Shape()), Shape())
+    found = curve_near(base, curve(base, placed(DRAG, base.setting, Shape())), Shape())
     candidate = Candidate(DRAG, (found,), np.zeros(1))
     return base, candidate, [*map(partial(free_force, base, candidates={DRAG.id: candidate}), KINDS)]
 
@@ -72,7 +73,7 @@ def test_evidence_of_both_is_that_of_the_force_at_each_strength_of_the_mechanism
         laplace = with_residues(base, {DRAG.id: drag}, profiles, pool)
         one = recomputed(base, laplace, profiles, pool)[0][DRAG.id]
         for strength in strengths:
-            along = curve_at(base, DRAG, Shape(), np.array([strength]), known=known)
+            along = curve_at(base, drag.best, np.array([strength]), known=known)
             known = known | along.known
             near = along.nearest(strength)
             held = replace(base, directions=(along.direction,), strengths=np.array([strength]), fit=near)

@@ -18,6 +18,7 @@ from skred.diagnosis.tabulated.tables import build_tables
 from skred.parallel.processes import helpers
 from skred.parallel.threads import in_parts, side_by_side, threads
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import placed
 
 
 @pytest.mark.parametrize(("said", "n"), [("3", 3), ("1", 1), ("0", None), ("many", None), ("", None)])
@@ -70,7 +71,7 @@ def test_tables_are_the_same_in_threads(monkeypatch: pytest.MonkeyPatch) -> None
     mechanism = mechanisms()["viscous_drag"]
     assert mechanism.added is not None
     shape = mechanism.added.shapes(base.setting)[0]
-    near = curve_near(base, curve(base, mechanism, shape), shape)
+    near = curve_near(base, curve(base, placed(mechanism, base.setting, shape)), shape)
     extension = extended(base.problem, base.law, (near.direction,))
     found = []
     for said in ("1", "3"):

@@ -41,6 +41,7 @@ from skred.inference.sampling import SamplerSettings
 from skred.physics.kernel.columns import Column
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Shape
 from skred.physics.mechanisms.stretches import U_1, U_2
 
@@ -73,7 +74,7 @@ def augmented(base: Calibration) -> Calibration:
     fitted = fit_base(problem, base.law, typical(population_draws(base, 200, 0)))
     mechanism = mechanisms()["sensor_bias"]
     shape = Shape(sensor=biased().sensors[GATE].id)
-    found = curve_at(fitted, mechanism, shape, np.linspace(-0.3, 0.6, 10))
+    found = curve_at(fitted, placed(mechanism, fitted.setting, shape), np.linspace(-0.3, 0.6, 10))
     return calibrate(augmented_problem(fitted, [found]), base.law, SETTINGS)
 
 

@@ -255,7 +255,7 @@ def _steps(problem, comparison, names, clean, *, second):
         candidate = its_comparison.under_each[0].candidates[name]
         best = candidate.best
         strength = best.mechanism.strength.name
-        added += (AddedStrength(strength, best.mechanism, best.shape, Direction()),)
+        added += (AddedStrength(best.mechanism, best.shape, Direction(), strength),)
         steps.append(
             Step(
                 candidate, tuple(tied), its_comparison, calibration(problem, added), BootstrapTest(0.1, clean)

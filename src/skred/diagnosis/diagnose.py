@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from skred.diagnosis.augment.add import Adding, add_mechanisms
+from skred.diagnosis.augment.add import add_mechanisms
 from skred.diagnosis.augment.problem import as_diagnosed
-from skred.diagnosis.augment.reference import Reference
 from skred.diagnosis.augment.step import Augmented, NotAugmented
 from skred.diagnosis.check.bootstrap_test import odds_test
 from skred.diagnosis.check.decision import Decision, decide
@@ -83,8 +82,7 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
 
     finding: Finding = None
     if decision.names:
-        adding = Adding(Reference(calibration), run)
-        finding = add_mechanisms(base, comparison, decision.names, adding)
+        finding = add_mechanisms(base, comparison, decision.names, calibration, run)
     if isinstance(finding, NotAugmented):
         decision = Decision("cannot_tell", ())
     if decision.verdict == "unexplained":

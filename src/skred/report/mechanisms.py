@@ -9,7 +9,7 @@ import numpy as np
 
 from skred.errors import InputError
 from skred.physics.mechanisms import library, mechanisms
-from skred.physics.mechanisms.placed import can_join, direction_of, parts_of, shapes_of
+from skred.physics.mechanisms.placed import added_of, can_join, direction_of, parts_of, shapes_of
 from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism, Setting, Shape
 from skred.physics.mechanisms.stretches import OPPOSED_SCALES, ends_of, is_opposed
 from skred.physics.plugins import OWN_PACKAGE
@@ -86,8 +86,7 @@ def same_term(mechanism: Mechanism) -> list[str]:
 
 def looked_for(mechanism: Mechanism) -> str:
     """The shapes that it is looked for in, in words; read off its shapes on a made-up track."""
-    assert mechanism.added is not None
-    setting = _example(mechanism.added.needs)
+    setting = _example(added_of(mechanism).needs)
     try:
         shapes = shapes_of(mechanism, setting)
         if not shapes:
@@ -112,8 +111,7 @@ def looked_for(mechanism: Mechanism) -> str:
 
 def _where(mechanism: Mechanism, setting: Setting, shapes: Sequence[Shape]) -> str:
     """What the shapes name: stretches, sensors, covariates, or nothing."""
-    added = mechanism.added
-    assert added is not None
+    added = added_of(mechanism)
     match added.bound_to:
         case BoundTo.PLACE:
             lengths = sorted({round(last - first) for first, last in map(ends_of, shapes)})

@@ -22,30 +22,24 @@ from skred.inference.between_events import (
     variable,
 )
 from skred.physics.law import Parameter
-from skred.physics.mechanisms.spec import Added, Direction, Mechanism, Shape
+from skred.physics.mechanisms.placed import PlacedMechanism
 
 FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class AddedStrength:
+class AddedStrength(PlacedMechanism):
     """A mechanism of one shape that is added, its strength free.
 
     Attributes
     ----------
     name : str
         Of the parameter: the strength's own, numbered if two of a kind are added.
-    mechanism : Mechanism
-    shape : Shape
-    direction : Direction
     between : BetweenEvents
         How it differs between avalanches.
     """
 
     name: str
-    mechanism: Mechanism
-    shape: Shape
-    direction: Direction
     between: BetweenEvents = BetweenEvents.COMMON
 
     @property
@@ -64,17 +58,6 @@ class AddedStrength:
         ends = self.between.parameter
         return f"{self.name}_{ends}" if ends else ""
 
-    @property
-    def added(self) -> Added:
-        """How the mechanism joins a law."""
-        assert self.mechanism.added is not None
-        return self.mechanism.added
-
-    @property
-    def scale(self) -> float:
-        """Scale of the prior: half-normal, or normal where either sign may be."""
-        return self.added.scale_of(self.shape)
-
 
 def added_strengths(curves: Sequence[Curve], way: BetweenEvents) -> tuple[AddedStrength, ...]:
     """Of some curves, in which avalanches differ alike; numbered where two have the same name."""
@@ -84,7 +67,7 @@ def added_strengths(curves: Sequence[Curve], way: BetweenEvents) -> tuple[AddedS
         name = curve.mechanism.strength.name
         count[name] += 1
         own = name if count[name] == 1 else f"{name}_{count[name]}"
-        added.append(AddedStrength(own, curve.mechanism, curve.shape, curve.direction, way))
+        added.append(AddedStrength(curve.mechanism, curve.shape, curve.direction, own, way))
     return tuple(added)
 
 
@@ -120,23 +103,16 @@ def components_of(
 ) -> tuple[FloatArray, FloatArray]:
     """Added strengths that avalanches may have, (n, n_components, n_added), and log shares that have each.
 
-    Where nothing differs between avalanches there is one component; of two that do, each pair is one.
+    Where nothing differs between avalanches there is one component; they can differ only in what is added by
+    itself.
 
     Parameters
     ----------
     samples : mapping
         Arrays by name of parameter, n values each.
     """
-    n = len(np.ravel(samples[added[0].name]))
-    own, log_shares = np.empty((n, 1, 0)), np.zeros((n, 1))
-    for one in added:
-        more, shares = components(one.between, *_given(one, samples))
-        first, second = own.shape[1], more.shape[1]
-        both = np.empty((n, first, second, own.shape[2] + 1))
-        both[..., :-1], both[..., -1] = own[:, :, None], more[:, None]
-        own = both.reshape(n, first * second, -1)
-        log_shares = (log_shares[:, :, None] + shares[:, None]).reshape(n, -1)
-    return own, log_shares
+    own, log_shares = zip(*(components(one.between, *_given(one, samples)) for one in added), strict=True)
+    return np.stack(own, axis=2), log_shares[0]
 
 
 def symbolic_components_of(added: Sequence[AddedStrength], strengths: Sequence[Any]) -> tuple[Any, Any]:
@@ -147,12 +123,8 @@ def symbolic_components_of(added: Sequence[AddedStrength], strengths: Sequence[A
         symbolic_components(one.between, strength, variable(one.between, one.between_name))
         for one, strength in zip(added, strengths, strict=True)
     ]
-    own, log_shares = parts[0][0][:, None], parts[0][1]
-    for more, shares in parts[1:]:
-        first, second = own.shape[0], more.shape[0]
-        own = pt.concatenate([pt.repeat(own, second, axis=0), pt.tile(more, first)[:, None]], axis=1)
-        log_shares = pt.repeat(log_shares, second) + pt.tile(shares, first)
-    return own, log_shares
+    own, log_shares = zip(*parts, strict=True)
+    return pt.stack(own, axis=1), log_shares[0]
 
 
 def new_rows(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from skred.diagnosis.augment.coefficient import augmented_of, multiples_of_events
 from skred.diagnosis.check.bootstrap_test import BootstrapTest, linear_test
@@ -13,25 +13,10 @@ from skred.diagnosis.evidence.population_draws import population_draws, typical
 from skred.inference.calibrate import Calibration, posterior_of
 
 
-@dataclass(frozen=True, eq=False)
-class Again:
-    """A law with mechanisms added, asked once more.
-
-    Attributes
-    ----------
-    check : BootstrapTest
-        Whether anything is wrong with it, by the linear model.
-    base : Base
-        That law, its added strengths held at their means, each avalanche's own where they differ: for another
-        comparison.
-    """
-
-    check: BootstrapTest
-    base: Base
-
-
-def check_again(base: Base, calibration: Calibration, chosen: Sequence[Curve], run: Run) -> Again:
-    """The bootstrap test of the augmented law.
+def check_again(
+    base: Base, calibration: Calibration, chosen: Sequence[Curve], run: Run
+) -> tuple[BootstrapTest, Base]:
+    """Ask a law with mechanisms added once more.
 
     Parameters
     ----------
@@ -39,6 +24,14 @@ def check_again(base: Base, calibration: Calibration, chosen: Sequence[Curve], r
         The law that the last mechanism was added to.
     calibration : Calibration
         Of the law with all that were chosen.
+
+    Returns
+    -------
+    check : BootstrapTest
+        Whether anything is wrong with it, by the linear model.
+    base : Base
+        That law, its added strengths held at their means, each avalanche's own where they differ: for another
+        comparison.
     """
     own = multiples_of_events(calibration)
     directions = tuple(one.direction for one in chosen)
@@ -51,4 +44,4 @@ def check_again(base: Base, calibration: Calibration, chosen: Sequence[Curve], r
     everywhere = [one.mechanism.id for one in chosen if one.shape.place_m is None]
     setting = replace(again.setting, base=(*base.setting.base, *everywhere))
     again = replace(again, setting=setting)
-    return Again(linear_test(again, draws, run.seed + 1, run.effort.replicas), again)
+    return linear_test(again, draws, run.seed + 1, run.effort.replicas), again

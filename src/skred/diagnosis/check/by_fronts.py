@@ -75,9 +75,5 @@ def drawn(base: Base, linear: LinearFactors, rng: np.random.Generator) -> tuple[
     log_chance = np.logaddexp(log_prior, log_posterior) - math.log(2.0)
     k = int(rng.choice(len(log_chance), p=np.exp(log_chance)))
     candidate = linear.candidates[k]
-    fitted = (
-        fit_profile(base, candidate)
-        if isinstance(candidate, Kind)
-        else curve(base, candidate.mechanism, candidate.shape)
-    )
+    fitted = fit_profile(base, candidate) if isinstance(candidate, Kind) else curve(base, candidate)
     return fitted, linear.log_odds + float(log_prior[k] - log_chance[k])

@@ -22,6 +22,7 @@ from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.diagnosis.tabulated.between_evidence import BetweenTarget, between_evidence, searched_evidence
 from skred.diagnosis.tabulated.tables import wide_tables
 from skred.inference.between_events import PRIOR, BetweenEvents
+from skred.physics.mechanisms.placed import added_of
 from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism
 
 SEARCH = Budget(64, 64, 128, 1.5, 1.8)
@@ -30,12 +31,8 @@ SEARCH = Budget(64, 64, 128, 1.5, 1.8)
 
 def may_differ(mechanism: Mechanism) -> bool:
     """Whether avalanches may differ in a mechanism's strength: physics, and not by a property they have."""
-    added = mechanism.added
-    return (
-        mechanism.group is Group.PHYSICS
-        and added is not None
-        and added.bound_to in (BoundTo.PLACE, BoundTo.TRACK)
-    )
+    bound_to = added_of(mechanism).bound_to
+    return mechanism.group is Group.PHYSICS and bound_to in (BoundTo.PLACE, BoundTo.TRACK)
 
 
 def with_ways(

@@ -76,6 +76,6 @@ def computed_again(base: Base, curve: Curve) -> tuple[float, float]:
     The error is that at the curve's maximum and that of nothing.
     """
     strengths = curve.strengths[curve.strengths != 0.0]
-    fine = curve_at(base, curve.mechanism, curve.shape, strengths, FINE, curve.known, sampled=True)
+    fine = curve_at(base, curve, strengths, FINE, curve.known, sampled=True)
     most, nothing = int(np.argmax(fine.log_evidence)), int(np.searchsorted(fine.strengths, 0.0))
     return fine.log_bayes_factor, math.hypot(*(fine.fits[k].found.error for k in {most, nothing}))

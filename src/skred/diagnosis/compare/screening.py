@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import numpy as np
 
@@ -13,30 +14,28 @@ from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
 from skred.diagnosis.evidence.event_quadrature import SCREENING
 from skred.diagnosis.evidence.global_start import first_strengths, global_starts
 from skred.diagnosis.evidence.tolerance import COUNTS
-from skred.physics.mechanisms.placed import added_of, direction_of
-from skred.physics.mechanisms.spec import Mechanism, Shape
+from skred.physics.mechanisms.placed import PlacedMechanism
 
 Tell = Callable[[int, int], None]
 _ABOUT = (-2.0, 0.0, 2.0)
 """Strengths about a global start, in its standard deviations."""
 
 
-def curve(base: Base, mechanism: Mechanism, shape: Shape) -> Curve:
+def curve(base: Base, candidate: PlacedMechanism) -> Curve:
     """Evidence along the strength of a mechanism: where global climbs begin, and about where they lead.
 
     Many recordings tell strengths far below the prior's scale, or far beyond what a refit from the base law
     reaches; strengths over the prior alone would miss where the evidence is.
     """
-    added = added_of(mechanism)
-    scale = added.scale_of(shape)
-    extension = base.extended(direction_of(mechanism, base.setting, shape))
-    starts = global_starts(extension, base.rows, base.strengths, base.fit.start, scale, added.either_sign)
+    scale, either_sign = candidate.scale, candidate.added.either_sign
+    extension = base.extended(candidate.direction)
+    starts = global_starts(extension, base.rows, base.strengths, base.fit.start, scale, either_sign)
     begin = {0.0: base.fit} | {one.strength: one.fit for one in starts if one.strength != 0.0}
     about = np.array([one.strength + one.sd * by for one in starts for by in _ABOUT])
-    strengths = np.append(first_strengths(scale, added.either_sign), about)
-    if not added.either_sign:
+    strengths = np.append(first_strengths(scale, either_sign), about)
+    if not either_sign:
         strengths = strengths[strengths > 0.0]
-    return curve_at(base, mechanism, shape, np.unique(strengths), SCREENING, begin=begin)
+    return curve_at(base, candidate, np.unique(strengths), SCREENING, begin=begin)
 
 
 def screened(
@@ -57,16 +56,13 @@ def screened(
     before : sequence of Curve, optional
         Screened under another error model: the candidates. Those that cannot count are returned as they are.
     """
-    todo = [(one.mechanism, one.shape) for one in before or placed_mechanisms(base.setting)]
+    todo: Sequence[PlacedMechanism] = before or placed_mechanisms(base.setting)
     curves, looked = dict(enumerate(before)), set[int]()
-
-    def look(number: int) -> Curve:
-        mechanism, shape = todo[number]
-        return curve(base, mechanism, shape)
 
     while jobs := sorted(set(_that_count(curves) if curves else range(len(todo))) - looked):
         looked |= set(jobs)
-        for done, (number, one) in enumerate(zip(jobs, pool.map(look, jobs), strict=True), start=1):
+        found = pool.map(partial(curve, base), [todo[number] for number in jobs])
+        for done, (number, one) in enumerate(zip(jobs, found, strict=True), start=1):
             curves[number] = one
             tell(len(todo) - len(jobs) + done, len(todo))
     return [curves[number] for number in range(len(todo))]

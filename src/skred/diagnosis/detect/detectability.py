@@ -25,7 +25,8 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import INTERVAL_PROBABILITY
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.library import built_in
-from skred.physics.mechanisms.spec import Added, Group, Mechanism
+from skred.physics.mechanisms.placed import added_of
+from skred.physics.mechanisms.spec import Group, Mechanism
 
 FloatArray = NDArray[np.float64]
 LIMIT_Z = 2.85
@@ -79,7 +80,7 @@ class Detectability:
             "limit": limit,
             "best_limit": best,
             "best_stretch_m": self.limit_m,
-            "relevant": _added(self.mechanism).relevant,
+            "relevant": added_of(self.mechanism).relevant,
             "unit": self.mechanism.strength.unit,
             "power": self.power,
             "alike": list(self.alike),
@@ -143,7 +144,7 @@ def told(score_test: ScoreTest, scores: Scores) -> list[Detectability]:
     """One row for each mechanism."""
     _, (information,), (raw,) = score_test.of_candidates(scores)
     placed, order = score_test.placed_mechanisms, score_test.order
-    scales = np.array([_added(one.mechanism).scale for one in placed])
+    scales = np.array([one.added.scale for one in placed])
     z, at = limit_z(len(mechanisms())), ndtri(INTERVAL_PROBABILITY)
     own = np.sqrt(information)
     cosine = np.abs(scores.information[0][np.ix_(order, order)]) / np.outer(own, own)
@@ -166,16 +167,11 @@ def told(score_test: ScoreTest, scores: Scores) -> list[Detectability]:
                 float(limits[typical]),
                 float(limits[best]),
                 stretch,
-                float(np.mean(ndtr(own[members] * _added(mechanism).relevant - z))),
+                float(np.mean(ndtr(own[members] * added_of(mechanism).relevant - z))),
                 tuple(sorted(set(ids[look_alike[best]].tolist()) - {name})),
             )
         )
     return table
-
-
-def _added(mechanism: Mechanism) -> Added:
-    assert mechanism.added is not None
-    return mechanism.added
 
 
 def places_of_a_sensor(problem: HierarchicalProblem, recorded_m: tuple[float, float]) -> FloatArray:

@@ -23,27 +23,12 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Pop
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.linear_mixed_model import MeanPrior, Scores, efficient_scores, mean_prior
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds
-from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms import mechanisms
-from skred.physics.mechanisms.placed import can_join, direction_of, shapes_of
-from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
+from skred.physics.mechanisms.placed import PlacedMechanism, can_join, placed, shapes_of
+from skred.physics.mechanisms.spec import Direction, Setting
 from skred.physics.mechanisms.stretches import shares
 
 FloatArray = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class PlacedMechanism:
-    """A mechanism of one shape that could be missing."""
-
-    mechanism: Mechanism
-    shape: Shape
-    direction: Direction
-
-    @property
-    def with_speed(self) -> bool:
-        """Whether it enters with U itself: its fronts take the kernel four times as long as others."""
-        return bool({Column.LINEAR, Column.WEAKENING} & set(self.direction.columns))
 
 
 def placed_mechanisms(setting: Setting) -> list[PlacedMechanism]:
@@ -51,7 +36,7 @@ def placed_mechanisms(setting: Setting) -> list[PlacedMechanism]:
     could = [one for one in mechanisms().values() if can_join(one, setting.base)]
     shapes = {one.id: shapes_of(one, setting) for one in could}
     return [
-        PlacedMechanism(one, shape, direction_of(one, setting, shape))
+        placed(one, setting, shape)
         for one in could
         for shape in shapes[one.id]
         if shape not in shapes.get(one.same_term_as, ())

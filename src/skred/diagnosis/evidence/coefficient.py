@@ -32,8 +32,8 @@ from skred.diagnosis.evidence.tolerance import COUNTS, MOST_ROUNDS
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.hierarchical.surface import Nodes
 from skred.physics.law import Law
-from skred.physics.mechanisms.placed import added_of, direction_of
-from skred.physics.mechanisms.spec import Added, Direction, Mechanism, Setting, Shape
+from skred.physics.mechanisms.placed import PlacedMechanism, placed
+from skred.physics.mechanisms.spec import Direction, Setting, Shape
 
 FloatArray = NDArray[np.float64]
 _NEAR = (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0)
@@ -103,7 +103,7 @@ class Base:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class Curve(PlacedMechanism):
     """Evidence along the strength of one mechanism of one shape.
 
     Attributes
@@ -116,22 +116,9 @@ class Curve:
         One for each strength.
     """
 
-    mechanism: Mechanism
-    shape: Shape
-    direction: Direction
     strengths: FloatArray
     log_evidence: FloatArray
     fits: tuple[Fit, ...]
-
-    @property
-    def added(self) -> Added:
-        """How the mechanism is added."""
-        return added_of(self.mechanism)
-
-    @property
-    def scale(self) -> float:
-        """Scale of the strength's prior."""
-        return self.added.scale_of(self.shape)
 
     def nearest(self, strength: float) -> Fit:
         """The fit at the strength closest to one."""
@@ -195,10 +182,11 @@ def curve_near(base: Base, near: Curve, shape: Shape) -> Curve:
     near : Curve
         Of the same mechanism and nearly the same shape.
     """
-    least = _SMALLEST * near.added.scale_of(shape)
+    candidate = placed(near.mechanism, base.setting, shape)
+    least = _SMALLEST * candidate.scale
     for _ in range(MOST_ROUNDS):
         before = near.moments
-        near = curve_at(base, near.mechanism, shape, _strengths_near(near), USUAL, near.known)
+        near = curve_at(base, candidate, _strengths_near(near), USUAL, near.known)
         after = near.moments
         sd = max(before[1], least), max(after[1], least)
         settled = abs(after[0] - before[0]) < sd[0] and 0.5 < sd[1] / sd[0] < 2.0
@@ -219,8 +207,7 @@ def _strengths_near(near: Curve) -> FloatArray:
 
 def curve_at(
     base: Base,
-    mechanism: Mechanism,
-    shape: Shape,
+    candidate: PlacedMechanism,
     strengths: FloatArray,
     budget: Budget = USUAL,
     known: Mapping[float, Fit] | None = None,
@@ -240,19 +227,18 @@ def curve_at(
     sampled : bool
         Whether the evidence is computed by importance sampling; else by Laplace's formula.
     """
-    direction = direction_of(mechanism, base.setting, shape)
-    strengths = np.sort(strengths[np.abs(strengths) > _SMALLEST * added_of(mechanism).scale_of(shape)])
+    strengths = np.sort(strengths[np.abs(strengths) > _SMALLEST * candidate.scale])
     fits = known or begin
     near = None if fits is None else [_closest(fits, strength) for strength in strengths]
     rounds = Rounds(budget, FIRST, sampled=sampled) if known is None else Rounds(budget, None, 1, sampled)
     given = base.given(strengths)
-    found = refit(base.extended(direction), base.rows, given, base.fit.start, rounds, near)
+    found = refit(base.extended(candidate.direction), base.rows, given, base.fit.start, rounds, near)
     place = int(np.searchsorted(strengths, 0.0))
     found.insert(place, base.with_nothing(budget, sampled=sampled))
     strengths = np.insert(strengths, place, 0.0)
     heights = np.array([fit.found.log_evidence for fit in found])
     heights = np.nan_to_num(heights - heights[place], nan=-1e3, neginf=-1e3)
-    return Curve(mechanism, shape, direction, strengths, heights, tuple(found))
+    return Curve(candidate.mechanism, candidate.shape, candidate.direction, strengths, heights, tuple(found))
 
 
 def _closest(fits: Mapping[float, Fit], strength: float) -> Fit:

@@ -186,7 +186,7 @@ def _by_mechanism(candidate: Candidate, base: Base, part: _Part) -> float:
     for k in np.flatnonzero(factors > factors.max() - DECIDES_NOTHING):
         curve = candidate.curves[k]
         known = {strength: part.fit(fit) for strength, fit in curve.known.items()}
-        one = curve_at(rest, curve.mechanism, curve.shape, curve.strengths, USUAL, known)
+        one = curve_at(rest, curve, curve.strengths, USUAL, known)
         found.append((candidate.log_weights[k] + one.log_bayes_factor, one))
     in_common = float(np.logaddexp.reduce([factor for factor, _ in found]))
     if candidate.ways is None:

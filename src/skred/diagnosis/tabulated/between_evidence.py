@@ -82,13 +82,8 @@ class BetweenTarget:
     def split(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Populations, strengths, parameters, and log priors of the last two, from coordinates (n, size)."""
         n_psi = self.base.fit.found.psi.size
-        added = self.curve.mechanism.added
-        assert added is not None
-        scale = added.scale_of(self.curve.shape)
         size = np.exp(np.minimum(x[:, n_psi], 50.0))
-        log_p = -0.5 * (size / scale) ** 2 - 0.5 * math.log(2.0 * math.pi * scale**2) + x[:, n_psi]
-        if not added.either_sign:
-            log_p = log_p + math.log(2.0)
+        log_p = self.curve.log_prior(size, self.curve.scale) + x[:, n_psi]
         log_p = np.where(size <= abs(self.farthest), log_p, -np.inf)
         if self.kind is BetweenEvents.COMMON:
             parameter = np.zeros(len(x))

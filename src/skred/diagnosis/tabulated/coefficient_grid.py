@@ -15,7 +15,6 @@ from skred.diagnosis.evidence.marginal import Evidence
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 from skred.diagnosis.evidence.tolerance import MOST_ROUNDS
 from skred.parallel.threads import in_parts, side_by_side
-from skred.physics.mechanisms.spec import Added
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -112,9 +111,9 @@ class Located(NamedTuple):
 
 def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located:
     """Put a grid where curves have the strengths, and move its ends until it covers their posterior."""
-    scale = np.array([_prior(curve).scale_of(curve.shape) for curve in curves])
+    scale = np.array([curve.scale for curve in curves])
     high, slack = _MOST_SCALES * scale, 1e-9 * scale
-    low = np.where([_prior(curve).either_sign for curve in curves], -high, 0.0)
+    low = np.where([curve.added.either_sign for curve in curves], -high, 0.0)
     mean, sd = (np.array(values) for values in zip(*(curve.moments for curve in curves), strict=True))
     factor, ends = np.diag(np.clip(sd, 0.01 * scale, scale)), np.full(len(curves), _REACH)
     grid = _grid(mean, factor, (-ends, ends), (low, high))
@@ -161,7 +160,7 @@ def from_nothing(curve: Curve, found: Evidence, mean: float, sd: float) -> Locat
     """
     common, common_sd = curve.moments
     reach = _FARTHEST * (abs(common) + common_sd)
-    farthest = math.copysign(min(reach, _MOST_SCALES * _prior(curve).scale_of(curve.shape)), common)
+    farthest = math.copysign(min(reach, _MOST_SCALES * curve.scale), common)
     size = TABLES[1]
     grid = Grid(np.zeros(1), np.array([[farthest / (size - 1)]]), np.array([size]))
     fits = [Fit(found, curve.nearest(float(strength)).points) for strength in grid.points[:, 0]]
@@ -180,12 +179,6 @@ def _fitted(base: Base, extension: Extension, added: FloatArray, near: Sequence[
         fit if np.isfinite(fit.found.psi).all() and np.isfinite(fit.found.covariance).all() else before
         for fit, before in zip(fits, near, strict=True)
     ]
-
-
-def _prior(curve: Curve) -> Added:
-    added = curve.mechanism.added
-    assert added is not None
-    return added
 
 
 def _grid(

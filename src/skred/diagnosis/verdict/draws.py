@@ -14,7 +14,7 @@ from skred.inference.added_terms import GROUP, AddedTerm, added_group
 from skred.inference.hierarchical.population import POPULATION, population_group
 from skred.inference.intervals import ENDS
 from skred.inference.recorded_data import recorded_groups
-from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism, Shape
+from skred.physics.mechanisms.spec import BoundTo, Group, Shape
 
 FORCE = "a force that is in no list"
 
@@ -54,7 +54,7 @@ def augmented_draws(found: Diagnosis) -> xr.DataTree:
             one.mechanism.id,
             one.mechanism.title,
             one.mechanism.group,
-            _bound_to(one.mechanism),
+            one.added.bound_to,
             one.shape,
             one.direction,
             one.between,
@@ -64,11 +64,6 @@ def augmented_draws(found: Diagnosis) -> xr.DataTree:
     ]
     groups = {path: node.to_dataset() for path, node in calibration.tree.subtree_with_keys}
     return xr.DataTree.from_dict({**groups, GROUP: group.merge(added_group(terms))})
-
-
-def _bound_to(mechanism: Mechanism) -> BoundTo:
-    assert mechanism.added is not None
-    return mechanism.added.bound_to
 
 
 def profile_draws(found: Diagnosis, law: ProfileLaw) -> xr.DataTree:

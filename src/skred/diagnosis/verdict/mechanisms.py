@@ -16,6 +16,7 @@ from skred.diagnosis.evidence.covariates import standard_of
 from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.verdict.between import between_document, ways_document
 from skred.inference.intervals import ENDS
+from skred.physics.mechanisms.placed import added_of
 from skred.physics.mechanisms.spec import Mechanism
 from skred.physics.mechanisms.stretches import equation_of
 
@@ -67,8 +68,7 @@ def added_document(found: Diagnosis, number: int) -> dict[str, Any]:
 
 def kind_of(mechanism: Mechanism) -> dict[str, str]:
     """What a mechanism says is wrong and what it is bound to: a reader need not know its id."""
-    assert mechanism.added is not None
-    return {"group": str(mechanism.group), "bound_to": str(mechanism.added.bound_to)}
+    return {"group": str(mechanism.group), "bound_to": str(added_of(mechanism).bound_to)}
 
 
 def work_documents(location: Location) -> list[dict[str, Any]]:

@@ -32,6 +32,7 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import PRACTICAL_DIFFERENCE, interval
 from skred.physics.law import Law
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import added_of
 from skred.physics.mechanisms.spec import Mechanism, Shape
 from skred.physics.mechanisms.stretches import is_opposed
 
@@ -149,13 +150,13 @@ def _mechanisms(found: Diagnosis) -> dict[str, Any]:
         UNLISTED: {"title": "a force that is not in the list", "kind": "unlisted"},
     }
     for name, mechanism in listed.items():
-        facts[name] = _mechanism(mechanism)
-        if mechanism.added is not None:
-            facts[name]["prior"] = {
-                "kind": "normal" if mechanism.added.either_sign else "half-normal",
-                "scale": mechanism.added.scale,
-                "reason": mechanism.added.reason,
-            }
+        added = added_of(mechanism)
+        prior = {
+            "kind": "normal" if added.either_sign else "half-normal",
+            "scale": added.scale,
+            "reason": added.reason,
+        }
+        facts[name] = _mechanism(mechanism) | {"prior": prior}
     return facts
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,6 +13,43 @@ from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.library import library
 from skred.physics.mechanisms.spec import Added, BoundTo, Direction, Mechanism, Setting, Shape
 from skred.physics.plugins import OWN_PACKAGE, in_a_line
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedMechanism:
+    """A mechanism of one shape, as it can be added to a law on a campaign.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+    shape : Shape
+    direction : Direction
+        What one unit of it changes there.
+    """
+
+    mechanism: Mechanism
+    shape: Shape
+    direction: Direction
+
+    @property
+    def added(self) -> Added:
+        """How the mechanism is added."""
+        return added_of(self.mechanism)
+
+    @property
+    def scale(self) -> float:
+        """Scale of the strength's prior: half-normal, or normal where either sign may be."""
+        return self.added.scale_of(self.shape)
+
+    @property
+    def with_speed(self) -> bool:
+        """Whether it enters with U itself: its fronts take the kernel four times as long as others."""
+        return bool({Column.LINEAR, Column.WEAKENING} & set(self.direction.columns))
+
+
+def placed(mechanism: Mechanism, setting: Setting, shape: Shape) -> PlacedMechanism:
+    """A mechanism on a campaign; raises as `shapes_of`."""
+    return PlacedMechanism(mechanism, shape, direction_of(mechanism, setting, shape))
 
 
 def can_join(mechanism: Mechanism, base: tuple[str, ...]) -> bool:
