@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from skred.campaign.records import Campaign, Event, FloatArray, Sensor, Status, Track
+from skred.arrays import FloatArray
+from skred.campaign.records import Campaign, Event, Sensor, Status, Track
 
 NATURAL_CROWN_S_M = 1940.0
 # Where the crown is looked for on the surveyed track; beyond, the profile climbs the opposite slope.

@@ -12,7 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-FloatArray = NDArray[np.float64]
+from skred.arrays import FloatArray
+
 Covariate = float | str | None
 Quantity = Literal["front_velocity", "runout"]
 Origin = Literal["measured", "simulated"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.errors import InputError
 from skred.inference.added_terms import AddedTerm, added_terms, contributions_with
 from skred.physics.geometry import contributions_of, path_of
@@ -17,7 +17,6 @@ from skred.physics.terrain import Terrain
 from skred.report.explore.panel import NotShownError
 from skred.report.explore.run import Run
 
-FloatArray = NDArray[np.float64]
 _MOST_CURVES, _MOST_DRAWS = 1200, 16
 """Curves of a run, and draws of an event."""
 
@@ -78,7 +77,7 @@ def _law(run: Run) -> Law:
     return law
 
 
-def _chosen(n_chains: int, n_draws: int, n_events: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _chosen(n_chains: int, n_draws: int, n_events: int) -> tuple[IntArray, IntArray]:
     """Chain and draw of evenly chosen draws."""
     n = max(3, min(_MOST_DRAWS, _MOST_CURVES // max(1, n_events)))
     flat = np.unique(np.linspace(0, n_chains * n_draws - 1, n).astype(int))

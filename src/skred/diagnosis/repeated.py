@@ -11,8 +11,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.campaign import Campaign
 from skred.campaign.parts import of_events, without_silent_sensors
 from skred.diagnosis.clock import Tell
@@ -23,8 +23,6 @@ from skred.diagnosis.predict.unseen import log_scores, problem_of, unseen
 from skred.diagnosis.verdict.predictors import predictors_of
 from skred.errors import InputError
 from skred.inference.hierarchical.problem import HierarchicalProblem
-
-FloatArray = NDArray[np.float64]
 
 
 def set_aside(problem: HierarchicalProblem, n: int, seed: int) -> tuple[HierarchicalProblem, Campaign]:

@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from skred.inference.between_events import BetweenEvents
 from skred.physics.kernel.columns import Column
@@ -24,7 +23,6 @@ from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import BoundTo, Direction, Group, Setting, Shape
 from skred.physics.terrain import Terrain
 
-FloatArray = NDArray[np.float64]
 GROUP = "added"
 """Name of the group."""
 

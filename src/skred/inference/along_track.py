@@ -6,15 +6,14 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from skred.arrays import FloatArray
 from skred.inference.hierarchical.population import population_of
 from skred.inference.problem import Problem
 from skred.inference.results import chain_and_draw, draws_by_name
 from skred.physics.law import Law
 
-FloatArray = NDArray[np.float64]
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Ends of the central 90 and 50 % bands, and the median: what the figures along the track draw."""
 _MOST_RESPONSES, _MOST_AVALANCHES = 400, 1000

@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import ndtr, ndtri
 
-FloatArray = NDArray[np.float64]
+from skred.arrays import FloatArray
 
 BETA_SLOPE_DEG = 10.0
 """Slope [degrees] that marks the beta point."""

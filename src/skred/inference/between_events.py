@@ -11,10 +11,11 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import expit
 
-FloatArray = NDArray[np.float64]
+from skred.arrays import FloatArray
+
 SPREAD_MEDIAN, SPREAD_LOG_SD = 0.4, 0.6
 """Median of the prior of the sd of log strengths, and sd of its logarithm: an effect that differs by less
 than a tenth is in common for all that recordings tell, and one that differs tenfold is present in some."""

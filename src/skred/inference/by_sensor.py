@@ -12,11 +12,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.inference.problem import Problem
 
-FloatArray = NDArray[np.float64]
 JOINT = "recordings"
 """Of the group log_likelihood: all readings of an avalanche together."""
 _TAKEN = frozenset(("chain", "draw", "event", "sensor", JOINT))
@@ -40,7 +39,7 @@ class SensorReadings(NamedTuple):
     name: str
     dim: str
     column: int
-    events: NDArray[np.int64]
+    events: IntArray
     attributes: dict[str, str]
 
 

@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import arviz_stats as az
-import numpy as np
 import pymc as pm
 import xarray as xr
-from numpy.typing import NDArray
 
 import skred.inference.hierarchical.results  # noqa: F401 - registers what it says of readings
 import skred.inference.pooled.results  # noqa: F401 - likewise
+from skred.arrays import FloatArray
 from skred.inference.along_track import with_along_track
 from skred.inference.gate import Gate, check_gate
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY, interval
@@ -28,7 +27,6 @@ from skred.inference.sampling import SamplerSettings, sample_posterior, sample_p
 from skred.output import write_json
 from skred.physics.law import Law, Parameter
 
-FloatArray = NDArray[np.float64]
 MORE, LONGER = 4, 2
 """Factor on the number of draws in each further attempt, and the number of such attempts."""
 

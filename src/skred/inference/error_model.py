@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray, IntArray
 from skred.campaign import Campaign, Status
 
-FloatArray = NDArray[np.float64]
 DEFAULT_ERRORS = "robust"
 OUTLIER_FACTOR = 6.0
 """How much wider than its stated error an outlying reading scatters."""
@@ -65,7 +64,7 @@ class ErrorModel:
         self,
         predictions: FloatArray,
         sd: FloatArray,
-        is_velocity: NDArray[np.bool_],
+        is_velocity: BoolArray,
         rng: np.random.Generator,
     ) -> FloatArray:
         """Readings of avalanches, with errors.
@@ -161,11 +160,11 @@ class EventReadings(NamedTuple):
     """
 
     values: FloatArray
-    observed: NDArray[np.bool_]
+    observed: BoolArray
     stated_sd: FloatArray
     relative_sd: FloatArray
     absolute_sd: FloatArray
-    is_velocity: NDArray[np.bool_]
+    is_velocity: BoolArray
     reached: FloatArray
     not_reached: FloatArray
     place_sd: float
@@ -173,16 +172,16 @@ class EventReadings(NamedTuple):
     most: FloatArray
 
     @property
-    def bounded(self) -> NDArray[np.bool_]:
+    def bounded(self) -> BoolArray:
         """Of which readings bounds are all that is known, (n_events, n_sensors)."""
         return np.isfinite(self.least) | np.isfinite(self.most)
 
-    def take(self, events: NDArray[np.int64]) -> EventReadings:
+    def take(self, events: IntArray) -> EventReadings:
         """Those of some events, in this order, perhaps repeated."""
         own = ("values", "observed", "stated_sd", "least", "most", "reached", "not_reached")
         return self._replace(**{name: getattr(self, name)[events] for name in own})
 
-    def sd(self, event: int | NDArray[np.int64], predictions: FloatArray) -> FloatArray:
+    def sd(self, event: int | IntArray, predictions: FloatArray) -> FloatArray:
         """Stated standard deviations of events' readings: their own where they state one, else the sensor's.
 
         Parameters

@@ -16,13 +16,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.campaign import Status
 from skred.inference.intervals import INTERVAL_PROBABILITY
 from skred.inference.problem import Problem
 
-FloatArray = NDArray[np.float64]
 FIT_LEVEL = 0.01
 """Probability, at most, that a right model is said to miss anywhere. It is the level of the bootstrap test of
 a diagnosis, so that both alarm equally rarely."""
@@ -131,7 +130,7 @@ def sensor_fits(problem: Problem, predicted: FloatArray) -> list[SensorFit]:
     ]
 
 
-def adjusted_p_values(recorded: FloatArray, predicted: FloatArray, testable: NDArray[np.bool_]) -> FloatArray:
+def adjusted_p_values(recorded: FloatArray, predicted: FloatArray, testable: BoolArray) -> FloatArray:
     """P-values of statistics, adjusted for how many there are; 1 where one is not testable.
 
     Parameters
@@ -233,13 +232,13 @@ def _p(row: dict[str, Any], what: str) -> float:
     return 1.0 if value is None else float(value)
 
 
-def _recorded(problem: Problem) -> tuple[FloatArray, NDArray[np.bool_]]:
+def _recorded(problem: Problem) -> tuple[FloatArray, BoolArray]:
     """Readings, 0 where the front did not come, and of which it is known what they are."""
     known = problem.observed | problem.not_reached
     return np.where(problem.observed, problem.campaign.values, 0.0), known
 
 
-def _moments(readings: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
+def _moments(readings: FloatArray, known: BoolArray) -> FloatArray:
     """Mean and standard deviation over known events, (..., n_events, n_sensors) to (..., 2, n_sensors)."""
     n = known.sum(axis=0)
     mean = readings.sum(axis=-2, where=known) / np.maximum(n, 1)
@@ -247,7 +246,7 @@ def _moments(readings: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
     return np.stack([mean, np.sqrt(squares / np.maximum(n - 1, 1))], axis=-2)
 
 
-def _inside(recorded: FloatArray, predicted: FloatArray, known: NDArray[np.bool_]) -> FloatArray:
+def _inside(recorded: FloatArray, predicted: FloatArray, known: BoolArray) -> FloatArray:
     """Share of each sensor's readings inside the central interval of the predicted ones."""
     tail = 0.5 * (1.0 - INTERVAL_PROBABILITY)
     low, high = np.quantile(predicted, [tail, 1.0 - tail], axis=0)

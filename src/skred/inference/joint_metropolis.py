@@ -19,16 +19,15 @@ import numpy as np
 import pymc as pm
 import pytensor.tensor as pt
 from numba import typeof, types
-from numpy.typing import NDArray
 from pymc.blocking import RaveledVars
 from pymc.pytensorf import compile as compile_pytensor
 from pymc.pytensorf import join_nonshared_inputs
 from pymc.step_methods.metropolis import MetropolisState
 from pymc.step_methods.state import dataclass_state
 
+from skred.arrays import FloatArray
 from skred.parallel.compile_cache import compiled, inner
 
-FloatArray = NDArray[np.float64]
 MOVES_PER_DRAW = 4
 """Moves between two draws that are kept, half of them jumps. Draws after fewer moves are nearly copies."""
 DEGREES_OF_FREEDOM = 6.0

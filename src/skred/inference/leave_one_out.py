@@ -10,15 +10,14 @@ import numpy as np
 import pymc as pm
 import pytensor.tensor as pt
 import xarray as xr
-from numpy.typing import NDArray
 from pymc.blocking import DictToArrayBijection
 from scipy.special import logsumexp
 
+from skred.arrays import FloatArray
 from skred.inference.gate import R_HAT_LIMIT
 from skred.inference.joint_metropolis import JointMetropolis
 from skred.parallel.threads import side_by_side
 
-FloatArray = NDArray[np.float64]
 Samples = dict[str, FloatArray]
 REFIT_CHAINS, REFIT_DRAWS, REFIT_BURN = 4, 500, 100
 """Draws of models of one or two parameters; chains of more are longer."""

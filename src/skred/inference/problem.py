@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.campaign import Campaign, Status
 from skred.physics.geometry import contributions_of, path_of
 from skred.physics.kernel.fronts import front_speeds
@@ -19,8 +19,6 @@ from skred.physics.kernel.inputs import Contributions, Path
 from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
 from skred.physics.terrain import Terrain
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,12 +85,12 @@ class Problem(ABC):
         return np.where(self.observed, self.campaign.values, np.nan)
 
     @cached_property
-    def observed(self) -> NDArray[np.bool_]:
+    def observed(self) -> BoolArray:
         """Where there is a reading, (n_events, n_sensors)."""
         return np.asarray(self.campaign.status == Status.OBSERVED)
 
     @cached_property
-    def not_reached(self) -> NDArray[np.bool_]:
+    def not_reached(self) -> BoolArray:
         """Where the front stopped above the sensor, (n_events, n_sensors)."""
         return np.asarray(self.campaign.status == Status.NOT_REACHED)
 

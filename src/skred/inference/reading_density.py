@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.inference.bounds import fill_log_bounds
 from skred.inference.error_model import OUTLIER_FACTOR, Errors, EventReadings
 from skred.inference.reading_table import (
@@ -23,8 +23,6 @@ from skred.inference.reading_table import (
 )
 from skred.parallel.compile_cache import compiled, inner
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 _SQRT_HALF = math.sqrt(0.5)
 _LEAST = 1e-300

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.documents import TREE_FORMAT
 from skred.inference.by_sensor import joint_terms
 from skred.inference.gate import Gate
@@ -24,7 +24,6 @@ from skred.inference.sampling import SamplerSettings
 from skred.output import write_bytes
 from skred.physics.law import Law, Parameter, parameter_of
 
-FloatArray = NDArray[np.float64]
 FORMAT = TREE_FORMAT
 """Of the files with trees; figures are made from no other."""
 _PACKAGES = ("skred", "pymc", "pytensor", "arviz", "numba", "numpy", "scipy", "xarray")

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from skred.campaign import Campaign, Event, Sensor, Status, Track
 from skred.documents import AGAIN, opened_tree
@@ -24,8 +23,6 @@ from skred.inference.sampling import SamplerSettings
 from skred.physics.law import Law
 from skred.physics.laws import load_law
 from skred.physics.terrain import Terrain, build_terrain
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,12 +7,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.inference.paired import paired_difference
 
-FloatArray = NDArray[np.float64]
 _NONE = 1e-9
 """A difference of elpd that is none [nats]."""
 _SCHEMES = {"exact": "elpd", "loo": "elpd", "waic": "elpd", "evidence": "mean"}
@@ -96,18 +95,14 @@ def rival(best: Sequence[float], other: Sequence[float], events: Sequence[str]) 
     }
 
 
-def _reversed_without(
-    lead: FloatArray, strongest: NDArray[np.int64], events: Sequence[str]
-) -> list[str] | None:
+def _reversed_without(lead: FloatArray, strongest: IntArray, events: Sequence[str]) -> list[str] | None:
     """The smallest set whose removal turns the sign: the largest terms, as few as do."""
     left = lead.sum() - np.cumsum(lead[strongest])
     turned = np.flatnonzero(left[:-1] < -_NONE)  # one avalanche at least is left
     return [events[k] for k in strongest[: turned[0] + 1]] if len(turned) else None
 
 
-def _counts_not_without(
-    lead: FloatArray, strongest: NDArray[np.int64], events: Sequence[str]
-) -> list[str] | None:
+def _counts_not_without(lead: FloatArray, strongest: IntArray, events: Sequence[str]) -> list[str] | None:
     for n in range(1, len(lead) - 1):
         kept = np.delete(lead, strongest[:n])
         if kept.sum() <= 0.0 or not paired_difference(kept, np.zeros_like(kept)).practical:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.physics.kernel.inputs import (
     FRONT_VELOCITY,
     RUNOUT,
@@ -19,7 +19,6 @@ from skred.physics.kernel.inputs import (
 from skred.physics.mechanisms.spec import Mechanism
 from skred.physics.terrain import Terrain
 
-FloatArray = NDArray[np.float64]
 WEAKENING_SPEED_M_S = 8.0
 """Speed scale of weakening friction where a law does not set its own [m/s]."""
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.errors import InputError
-
-FloatArray = NDArray[np.float64]
 
 SMOOTHING_M = 10.0
 """Default smoothing length [m] of a usual path; results of laws with curvature depend on it."""

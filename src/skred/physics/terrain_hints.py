@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.campaign import Campaign, Problem, Track
 from skred.physics.terrain import Terrain
 
-FloatArray = NDArray[np.float64]
 TRACK = "track.csv"
 MOST_LONGER = 0.01
 """Share by which the given polyline may be longer than the smoothed track: more is noise of the survey."""

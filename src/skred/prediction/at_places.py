@@ -6,14 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.inference.intervals import INTERVAL_PROBABILITY
 from skred.prediction.fronts import NewFronts
 from skred.prediction.probabilities import SHARES
 from skred.prediction.wanted import Wanted, impact_pressure_kpa
 
-FloatArray = NDArray[np.float64]
 _LEAST_ARRIVALS = 16
 """Avalanches of a population that must come for a quantile of those that do."""
 _LEAST_LARGEST_KPA = 1.0

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.recorded_data import recorded_groups
 from skred.inference.results import save
@@ -16,7 +16,6 @@ from skred.output import write_json, write_text
 from skred.prediction.places_table import BYTE_ORDER_MARK, places_table
 from skred.prediction.probabilities import PARTS
 
-FloatArray = NDArray[np.float64]
 TABLES = ("exceedance.csv", "runout.csv", "uncertainty.csv")
 AT_TABLE = "places.csv"
 FILES = (*TABLES, AT_TABLE, "prediction.nc", "prediction.json")

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from skred.arrays import FloatArray, IntArray
 from skred.inference.hierarchical.releases import Releases
 from skred.physics.geometry import path_of, sensor_table
 from skred.physics.kernel.columns import GRAVITY
@@ -21,7 +22,6 @@ from skred.physics.kernel.fronts import simulate
 from skred.physics.terrain import Terrain
 from skred.prediction.terms import Motion
 
-FloatArray = NDArray[np.float64]
 SPEED_STEP_M_S = 0.5
 """Speeds are counted in steps: exact for probabilities of exceeding a multiple of it."""
 HALVES = 2
@@ -58,7 +58,7 @@ class NewFronts(NamedTuple):
 
     places: FloatArray
     exceeding: NDArray[np.uint16]
-    exceeding_by_half: NDArray[np.int64]
+    exceeding_by_half: IntArray
     passing: FloatArray
     total: FloatArray
     square: FloatArray
@@ -139,7 +139,7 @@ def new_fronts(
     return NewFronts(places, *counted, passing, total, square, runout, drawn.place, speeds_kept)
 
 
-def _faster(speeds: FloatArray, n_steps: int) -> NDArray[np.int64]:
+def _faster(speeds: FloatArray, n_steps: int) -> IntArray:
     """Number of avalanches faster than each step, (n_avalanches, n_places) to (n_places, n_steps)."""
     n_places = speeds.shape[1]
     step = np.minimum(np.ceil(speeds / SPEED_STEP_M_S).astype(np.int64), n_steps - 1)
@@ -158,7 +158,7 @@ class _Drawn(NamedTuple):
     """Standard normal variables (n_avalanches, n_strengths), number of the release, place and speed there."""
 
     normal: FloatArray
-    event: NDArray[np.int64]
+    event: IntArray
     place: FloatArray
     speed: FloatArray
 
@@ -193,7 +193,7 @@ def _draws(
     return _Drawn(ndtri(points[:, :n_strengths]), event, *begin)
 
 
-def _chosen(uniform: FloatArray, n: int, weights: FloatArray | None) -> NDArray[np.int64]:
+def _chosen(uniform: FloatArray, n: int, weights: FloatArray | None) -> IntArray:
     """One of n, by weights or each as likely."""
     if weights is None:
         return (uniform * n).astype(np.int64)

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.inference.added_terms import AddedTerm
 from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.population import POPULATION, population_of
@@ -37,7 +37,6 @@ from skred.prediction.terms import moved
 from skred.prediction.track import PredictionTrack, prediction_track
 from skred.prediction.wanted import AVALANCHES, Wanted
 
-FloatArray = NDArray[np.float64]
 Tell = Callable[[str], None]
 _STEPS_M = (1.0, 2.0, 5.0, 10.0, 20.0, 25.0, 50.0, 100.0, 200.0, 500.0)
 _MOST_STEPS = 150
@@ -229,7 +228,7 @@ def _plain_error(error: Mapping[str, Any]) -> dict[str, Any]:
 
 def _populations(
     problem: HierarchicalProblem, law: Law, tree: xr.DataTree, most: int
-) -> tuple[tuple[FloatArray, FloatArray], NDArray[np.int64]]:
+) -> tuple[tuple[FloatArray, FloatArray], IntArray]:
     """Means and factors of evenly thinned draws, and their numbers, chain after chain."""
     if POPULATION in tree.children:
         group = tree[POPULATION].to_dataset()
@@ -240,7 +239,7 @@ def _populations(
     return population_of(law, {name: values[chosen] for name, values in samples.items()}), chosen
 
 
-def _evenly(size: int, most: int) -> NDArray[np.int64]:
+def _evenly(size: int, most: int) -> IntArray:
     return np.unique(np.linspace(0, size - 1, min(size, most)).astype(np.int64))
 
 

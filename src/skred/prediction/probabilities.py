@@ -8,11 +8,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.inference.intervals import INTERVAL_PROBABILITY
 from skred.prediction.fronts import SPEED_STEP_M_S, NewFronts
 from skred.prediction.reading_errors import ReadingError
 
-FloatArray = NDArray[np.float64]
 SPEEDS_M_S = (1.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0, 80.0, 100.0)
 """Speeds whose probability of exceedance is given, as far as they occur."""
 SHARES = (0.5, 0.1, 0.01)

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.campaign import Campaign, Status
 from skred.inference.error_model import ErrorModel
-
-FloatArray = NDArray[np.float64]
 
 
 class ReadingError(NamedTuple):

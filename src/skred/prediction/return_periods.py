@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.inference.intervals import INTERVAL_PROBABILITY
-
-FloatArray = NDArray[np.float64]
 
 
 def runouts_once_in(

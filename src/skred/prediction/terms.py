@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.inference.added_terms import GROUP, AddedTerm, contributions_with
 from skred.inference.between_events import BetweenEvents, own_multiples
 from skred.inference.hierarchical.releases import Releases
@@ -19,9 +19,6 @@ from skred.physics.law import Law
 from skred.physics.mechanisms.spec import BoundTo, Direction, Group
 from skred.physics.terrain import Terrain
 from skred.prediction.track import PredictionTrack
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.campaign import CampaignError, Problem, Track
 from skred.campaign.problems import SHOWN_CHARACTERS
 from skred.campaign.reading import TRACK
@@ -22,7 +22,6 @@ from skred.inference.hierarchical.releases import Releases
 from skred.physics.terrain import Terrain, build_terrain
 from skred.prediction.track_origin import track_origin
 
-FloatArray = NDArray[np.float64]
 Scenarios = Sequence[tuple[float, float]]
 """Releases [m] with their weights."""
 

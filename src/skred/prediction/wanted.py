@@ -13,12 +13,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import gamma
 
+from skred.arrays import FloatArray
 from skred.errors import InputError
 
-FloatArray = NDArray[np.float64]
 DENSITY_KG_M3 = (100.0, 300.0)
 """Range of the density of flowing dry snow: from the denser fluidised fronts to a dense core."""
 DRAG_COEFFICIENT = (1.0, 2.0)

@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp, ndtri
 from scipy.stats import qmc
 
+from skred.arrays import FloatArray
 from skred.simulator.effects import Hidden
 from skred.simulator.fitting import (
     Population,
@@ -31,7 +31,6 @@ from skred.simulator.fitting import (
     updated,
 )
 
-FloatArray = NDArray[np.float64]
 NODES, FINAL_NODES = 128, 384
 """For each event: while a strength is sought, and for what is recorded."""
 FIRST_ROUND = ((0.15, 1.0), (0.15, 2.5), (0.2, 1.2))

@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.simulator.forces import TERM_WIDTH, Kind
 
-FloatArray = NDArray[np.float64]
 Target = Literal["force", "friction", "sensor", "release"]
 Weigh = Callable[[np.random.Generator, Mapping[str, FloatArray], int], FloatArray]
 """Weights of further avalanches, from their covariates and their number."""

@@ -9,13 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.simulator.effects import Hidden
 from skred.simulator.readings import PARAMETERS, Sensors, read
 from skred.simulator.terrain import Ground
 
-FloatArray = NDArray[np.float64]
 STEP_LOG = 4e-3
 """Step of a difference in the log of a parameter: wide, because a speed just above a stop is steep."""
 STEP_M = 2.0
@@ -56,7 +55,7 @@ class Setting:
     release_sd_m: float
     relative_sd: FloatArray
     absolute_sd: FloatArray
-    recorded: NDArray[np.bool_]
+    recorded: BoolArray
     usual: FloatArray
     prior_events: float = PRIOR_EVENTS
 
@@ -71,7 +70,7 @@ class Target:
     """Readings to be fitted, which speed sensors were reached, and standard deviations."""
 
     values: FloatArray
-    reached: NDArray[np.bool_]
+    reached: BoolArray
     sd: FloatArray
 
 
@@ -110,9 +109,7 @@ class Modes:
     population: Population
 
 
-def predict(
-    setting: Setting, theta: FloatArray, hidden: Hidden | None
-) -> tuple[FloatArray, NDArray[np.bool_]]:
+def predict(setting: Setting, theta: FloatArray, hidden: Hidden | None) -> tuple[FloatArray, BoolArray]:
     """Readings of fronts with these latent parameters, and whether each sensor was reached.
 
     `theta` may hold several rows for each event, all of the first event's first.

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import IntArray
 from skred.campaign import Campaign
 from skred.simulator.effects import Effect, hidden_of
 from skred.simulator.fitting import predict
@@ -24,7 +24,6 @@ from skred.simulator.scene import (
 )
 from skred.simulator.strength import Truth, plausible_readings
 
-FloatArray = NDArray[np.float64]
 N_FRESH = 12
 _STREAM = 20_912
 _AT_ONCE, _MOST_DRAWS = 4, 50
@@ -121,7 +120,7 @@ def _draw(rng: np.random.Generator, truth: Truth, n: int) -> tuple[Scene, list[E
     return further, [replace(e, weight=e.weigh(rng, further.covariates, n)) for e in truth.effects]
 
 
-def _some(scene: Scene, chosen: NDArray[np.int64]) -> Scene:
+def _some(scene: Scene, chosen: IntArray) -> Scene:
     """Some avalanches of a scene."""
     setting = scene.setting
     return replace(

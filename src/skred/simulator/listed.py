@@ -10,13 +10,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.simulator.effects import Effect, force_row
 from skred.simulator.forces import Kind
 from skred.simulator.scene import Scene
 
-FloatArray = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, Scene], Effect]
 
 

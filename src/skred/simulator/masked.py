@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter1d
 
+from skred.arrays import FloatArray
 from skred.simulator.effects import Effect
 from skred.simulator.listed import LISTED
 from skred.simulator.readings import Sensors, read
@@ -20,7 +20,6 @@ from skred.simulator.scene import Scene, with_reference_speed
 from skred.simulator.strength import Truth, assemble, with_strength
 from skred.simulator.terrain import GRID_M, cubics_of
 
-FloatArray = NDArray[np.float64]
 MASKED = ("segment_drag", "entrainment", "covariate_friction")
 LARGEST_MEAN = 1.0
 """Mean residual of a sensor over its standard error that counts as none."""

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.campaign import Campaign, Event, Sensor, Status, Track
 from skred.campaign.order_rules import LARGEST_SDS
 from skred.simulator.fitting import predict
 from skred.simulator.strength import Truth
 
-FloatArray = NDArray[np.float64]
 NASTY = ("heavy_tails", "correlated_errors", "odd_event", "outlying_readings")
 HEAVY_TAIL_SCALE = 0.8
 """Of Student's t with three degrees of freedom: its standard deviation is 1.4 times the stated one."""

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.simulator.forces import TERM_WIDTH
 from skred.simulator.march import fronts
 from skred.simulator.terrain import GRID_M, Ground
 
-FloatArray = NDArray[np.float64]
 TOLERANCE = 1e-6
 """Relative tolerance of a step."""
 
@@ -55,7 +54,7 @@ class Readings:
     """
 
     values: FloatArray
-    reached: NDArray[np.bool_]
+    reached: BoolArray
     peak_m_s: FloatArray
 
 

@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.simulator.fitting import Setting
 from skred.simulator.readings import PARAMETERS, Sensors, read
 from skred.simulator.terrain import Ground, draw_ground
 
-FloatArray = NDArray[np.float64]
 TrialKind = Literal["sparse", "dense"]
 
 RANGES: dict[str, tuple[tuple[float, float], ...]] = {
@@ -159,7 +158,7 @@ def _errors(rng: np.random.Generator, kind: TrialKind, n_speeds: int) -> tuple[F
     return np.append(np.full(n_speeds, relative), 0.0), np.append(np.full(n_speeds, absolute), runout)
 
 
-def draw_recorded(rng: np.random.Generator, n_events: int, n_speeds: int) -> NDArray[np.bool_]:
+def draw_recorded(rng: np.random.Generator, n_events: int, n_speeds: int) -> BoolArray:
     """Which readings there are; every event has at least one speed and one more reading."""
     share = np.append(np.full(n_speeds, rng.uniform(0.02, 0.12)), rng.uniform(0.0, 0.08))
     recorded = rng.random((n_events, n_speeds + 1)) >= share
@@ -217,7 +216,7 @@ def runs_plausibly(scene: Scene, theta: FloatArray) -> bool:
     return bool(each.all() and np.mean(runout > scene.place(0.75)) > 0.7)
 
 
-def plausible_runs(scene: Scene, theta: FloatArray) -> tuple[NDArray[np.bool_], FloatArray]:
+def plausible_runs(scene: Scene, theta: FloatArray) -> tuple[BoolArray, FloatArray]:
     """Which fronts of the base law stay on the track, stop not high up, and are not far too fast; runouts."""
     setting, k = scene.setting, len(scene.median)
     deviation = scene.release_scores * setting.release_sd_m

@@ -6,15 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.simulator.detectability import FINAL_NODES, NODES, Detectability, Fit, detectability, fit
 from skred.simulator.effects import Effect, Hidden, hidden_of
 from skred.simulator.fitting import predict, target_of
 from skred.simulator.readings import Sensors, read
 from skred.simulator.scene import TAIL_M, Scene
 
-FloatArray = NDArray[np.float64]
 _NO_SENSORS = Sensors(np.zeros(0), np.zeros(0))
 FACTORS = (0.25, 1.8)
 """How far the base friction may be chosen anew."""
@@ -110,7 +109,7 @@ def _is_plausible(scene: Scene, theta: FloatArray, hidden: Hidden) -> bool:
     )
 
 
-def plausible_readings(scene: Scene, values: FloatArray) -> NDArray[np.bool_]:
+def plausible_readings(scene: Scene, values: FloatArray) -> BoolArray:
     """Which fronts stay on the track, start at all and are not far too fast, from their exact readings."""
     runout = values[:, -1]
     moves = (runout > scene.nominal_release_m + 30.0) & (values[:, :-1].max(axis=1) < 75.0)

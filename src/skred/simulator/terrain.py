@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.ndimage import gaussian_filter1d
 
-FloatArray = NDArray[np.float64]
+from skred.arrays import FloatArray
+
 GRID_M = 5.0
 """Spacing of the tables along the track [m]."""
 

@@ -7,14 +7,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.simulator.effects import Effect, force_row
 from skred.simulator.forces import Kind
 from skred.simulator.listed import Draw, draw_stretch, even
 from skred.simulator.scene import Scene
-
-FloatArray = NDArray[np.float64]
 
 
 def _unlisted(

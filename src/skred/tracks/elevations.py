@@ -10,15 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.campaign.problems import shown
 from skred.errors import InputError
 
 if TYPE_CHECKING:
     from pyproj import CRS
 
-FloatArray = NDArray[np.float64]
 DRIVERS = {".tif": "GTiff", ".tiff": "GTiff", ".asc": "AAIGrid"}
 """What is read, by the end of the file's name. Others, such as virtual rasters, may lead to anywhere."""
 LOWEST_M, HIGHEST_M = -500.0, 9000.0
@@ -106,7 +105,7 @@ class Elevations:
         inverse = self._to_cell
         return by_column * inverse.a + by_row * inverse.d, by_column * inverse.b + by_row * inverse.e
 
-    def contains(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
+    def contains(self, x: FloatArray, y: FloatArray) -> BoolArray:
         """Whether places lie between the centres of the raster's cells."""
         column, row = self._cell(x, y)
         return (column >= 0) & (column <= self._columns - 1) & (row >= 0) & (row <= self._rows - 1)

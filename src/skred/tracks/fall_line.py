@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.tracks.plan import Plan
 
-FloatArray = NDArray[np.float64]
 STEP = 0.25
 """Length of a step, in cells."""
 FLATTEST = 1e-3

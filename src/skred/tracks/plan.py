@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.errors import InputError
 
-FloatArray = NDArray[np.float64]
 MOST_POINTS = 100_000
 
 

@@ -7,15 +7,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.campaign.track_rules import STEEPEST_DEG
 from skred.errors import InputError
 from skred.physics.terrain import SMOOTHING_M, USUAL_PATH_M, default_smoothing, smoothed_slopes
 from skred.tracks.elevations import Elevations
 from skred.tracks.plan import Plan
 
-FloatArray = NDArray[np.float64]
 _SHOWN_STRETCHES = 3
 _STEP = 0.1
 """Length of the stretches by which slopes are averaged, in smoothing lengths."""
@@ -51,7 +50,7 @@ def sampled(elevations: Elevations, plan: Plan) -> FloatArray:
     )
 
 
-def _stretches(bad: NDArray[np.bool_], off: NDArray[np.bool_], plan: Plan) -> Iterator[str]:
+def _stretches(bad: BoolArray, off: BoolArray, plan: Plan) -> Iterator[str]:
     """Stretches without elevations in words, in the order of the line."""
     along = plan.along
     kind = np.where(bad, np.where(off, 2, 1), 0)

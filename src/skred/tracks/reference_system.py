@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.campaign.problems import shown
 from skred.errors import InputError
 from skred.tracks.elevations import Elevations
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from skred.tracks.lines import MapLine
 
-FloatArray = NDArray[np.float64]
 _SMALLEST_CELL_M = 0.02
 """Terrain models of avalanche paths have larger cells, if they are in metres."""
 LARGEST_SCALE_ERROR = 0.01

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.campaign.problems import shown
 from skred.tracks.features import Feature, read_features
 from skred.tracks.plan import Plan
@@ -16,8 +16,6 @@ from skred.tracks.reference_system import moved_into
 
 if TYPE_CHECKING:
     from pyproj import CRS
-
-FloatArray = NDArray[np.float64]
 
 
 def releases_on(plan: Plan, s_m: FloatArray, crs: CRS | None, files: Iterable[Path]) -> list[dict[str, Any]]:

@@ -10,6 +10,7 @@ from bokeh.models import BoxAnnotation, CDSView, ColumnDataSource, IndexFilter
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.campaign import Status
 from skred.dashboard.fronts import EventSpeeds, event_speeds
 from skred.dashboard.reading import Given
@@ -30,7 +31,6 @@ from skred.report.explore.run import Run, shown
 from skred.report.shared.recordings import Recordings
 from skred.report.shared.style import GREY
 
-FloatArray = NDArray[np.float64]
 Curve = NDArray[np.float32]
 _MOST_EDGES = 100
 _CHOICE = Markup(

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.evidence.coefficient import Curve
 from skred.inference.between_events import (
     BetweenEvents,
@@ -23,8 +23,6 @@ from skred.inference.between_events import (
 )
 from skred.physics.law import Parameter
 from skred.physics.mechanisms.placed import PlacedMechanism
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.augment.added_strength import components_of
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.compare.candidate import Strength
 from skred.inference.calibrate import Calibration, posterior_of
 
-FloatArray = NDArray[np.float64]
 _DRAWS = 400
 """Draws that say what each avalanche has of what is added: probabilities to a hundredth or two."""
 

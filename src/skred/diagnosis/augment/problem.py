@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.augment.added_strength import (
     AddedStrength,
     components_of,
@@ -39,7 +39,6 @@ from skred.physics.kernel.fronts import front_speeds
 from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
 
-FloatArray = NDArray[np.float64]
 CLAIM_LIMIT = 0.0455
 """Largest error of the log likelihood per event in a diagnosis, in nats, at the worst of some draws: one nat
 for 22 events.

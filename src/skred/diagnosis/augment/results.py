@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.augment.added_strength import AddedStrength, components_of, new_rows
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.inference.hierarchical.event_density import draw_nodes
@@ -26,8 +26,6 @@ from skred.physics.geometry import sensor_table
 from skred.physics.kernel.fronts import simulate
 from skred.physics.law import Law
 from skred.physics.mechanisms.stretches import equation_of
-
-FloatArray = NDArray[np.float64]
 
 
 @predictive.register

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.campaign import Status
 from skred.diagnosis.evidence.conditional_map import Rows
 from skred.diagnosis.evidence.extension import Extension
 from skred.inference.error_model import EventReadings
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.kernel.inputs import VELOCITY_TO_STOP
-
-FloatArray = NDArray[np.float64]
 
 
 def bootstrap_campaigns(
@@ -55,7 +53,7 @@ def bootstrap_campaigns(
 
 def _read(
     problem: HierarchicalProblem,
-    event: NDArray[np.int64],
+    event: IntArray,
     predictions: FloatArray,
     rng: np.random.Generator,
 ) -> EventReadings:

@@ -17,8 +17,8 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
 from skred.diagnosis.check.by_fronts import log_odds_by_fronts
 from skred.diagnosis.detect.score_test import ScoreTest
@@ -28,7 +28,6 @@ from skred.diagnosis.evidence.linear_mixed_model import Scores, fit_population
 from skred.diagnosis.limits import FEWEST_CLEAN, LIMIT, NOTHING_AT_MOST
 from skred.parallel.processes import worker_pool
 
-FloatArray = NDArray[np.float64]
 _ENOUGH_ABOVE = 4
 """Clean campaigns at least as odd after which sampling stops: p is known to half of itself then."""
 _BATCH = 25

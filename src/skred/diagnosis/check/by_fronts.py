@@ -14,8 +14,8 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.compare.recomputed import computed_again
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.detect.score_test import LinearFactors, ScoreTest
@@ -26,8 +26,6 @@ from skred.diagnosis.evidence.conditional_map import Population, Rows
 from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.linear_mixed_model import Scores
 from skred.diagnosis.evidence.refit import Rounds, refit
-
-FloatArray = NDArray[np.float64]
 
 
 def log_odds_by_fronts(

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.evidence.coefficient import Curve
 from skred.diagnosis.tabulated.between_evidence import Way
 from skred.inference.between_events import PRIOR, BetweenEvents
@@ -17,7 +17,6 @@ from skred.inference.intervals import LEFT_OUT
 from skred.physics.mechanisms.spec import Group, Mechanism
 from skred.physics.mechanisms.stretches import is_opposed
 
-FloatArray = NDArray[np.float64]
 FORM = 0.3
 """Relative standard deviation of a physical strength for the form of its term: edges, exponents, supply that
 real forces have otherwise. Set on 28 opened trials, whose true forms differ on purpose: 90 % intervals held

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.compare.between import with_ways
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.recomputed import recomputed
@@ -42,7 +42,6 @@ from skred.inference.error_model import DEFAULT_ERRORS, ERROR_MODELS
 from skred.parallel.processes import worker_pool
 from skred.parallel.threads import side_by_side
 
-FloatArray = NDArray[np.float64]
 ERROR_SHARES = {"robust": 0.55, "student": 0.15, "correlated": 0.15, "scaled": 0.15}
 """Prior probability of each error model in the comparison."""
 

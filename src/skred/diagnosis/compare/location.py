@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
 from skred.diagnosis.discrepancy.profile import Kind, Profile, most_probable, spline_basis
 from skred.diagnosis.evidence.coefficient import Base
@@ -15,7 +15,6 @@ from skred.inference.intervals import INTERVAL_PROBABILITY
 from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.stretches import is_opposed
 
-FloatArray = NDArray[np.float64]
 _DRAWS = 4000
 """Draws of the profile for the band: its factor is then known to about a hundredth."""
 _STANDS_OUT = 1.5
@@ -92,7 +91,7 @@ def location_of(comparison: Comparison, name: str | None) -> Location:
     return locate(under_errors, is_opposed(named.best.shape))
 
 
-def _per_unit(kind: Kind, squares: FloatArray, here: NDArray[np.bool_]) -> FloatArray:
+def _per_unit(kind: Kind, squares: FloatArray, here: BoolArray) -> FloatArray:
     """Retardation [m s-2] in each cell for one unit of a profile, (n_cells,)."""
     fronts = np.maximum(here.sum(axis=0), 1)
     typical: FloatArray = squares.sum(axis=0) / fronts

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
+from skred.arrays import FloatArray
 from skred.campaign import Sensor, Status
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.coefficient import Base
@@ -28,7 +28,6 @@ from skred.physics.mechanisms.library import built_in
 from skred.physics.mechanisms.placed import added_of
 from skred.physics.mechanisms.spec import Group, Mechanism
 
-FloatArray = NDArray[np.float64]
 LIMIT_Z = 2.85
 """Score above which a mechanism counts as seen: the largest of as many as are built in is above it in about 3
 of a hundred clean campaigns."""

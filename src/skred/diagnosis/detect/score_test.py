@@ -14,9 +14,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
+from skred.arrays import FloatArray, IntArray
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, entering, knots, priors_of, spline_basis
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population, Rows, look_around
@@ -27,8 +27,6 @@ from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import PlacedMechanism, can_join, placed, shapes_of
 from skred.physics.mechanisms.spec import Direction, Setting
 from skred.physics.mechanisms.stretches import shares
-
-FloatArray = NDArray[np.float64]
 
 
 def placed_mechanisms(setting: Setting) -> list[PlacedMechanism]:
@@ -102,7 +100,7 @@ class ScoreTest:
         return [self.base.extended(*part) for part in parts]
 
     @cached_property
-    def order(self) -> NDArray[np.int64]:
+    def order(self) -> IntArray:
         """Where each candidate's direction is, over all parts."""
         position: dict[int, int] = {}
         for part in self._parts:

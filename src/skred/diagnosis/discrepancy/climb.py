@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.discrepancy.explored import Expansion, prior_penalty
 from skred.diagnosis.discrepancy.profile import Kind, combined, knot_by_knot
 from skred.diagnosis.evidence.coefficient import Base
@@ -18,8 +18,6 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population
 from skred.diagnosis.evidence.linear_mixed_model import efficient_scores, mean_prior
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 from skred.diagnosis.evidence.tolerance import ARRIVED, MOST_ROUNDS, STEP_SHARES
-
-FloatArray = NDArray[np.float64]
 
 
 def expanded_at(

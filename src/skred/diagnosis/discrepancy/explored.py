@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.discrepancy.profile import Prior
 from skred.diagnosis.evidence.adaptive_sampling import Mode
 from skred.diagnosis.evidence.refit import Fit
 from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

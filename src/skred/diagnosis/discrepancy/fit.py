@@ -10,8 +10,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.discrepancy.climb import climb, expanded_at
 from skred.diagnosis.discrepancy.explored import (
     Expansion,
@@ -35,7 +35,6 @@ from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
 
-FloatArray = NDArray[np.float64]
 Start = tuple[FloatArray, tuple[Population, FloatArray]]
 _PRIORS_TRIED = 12
 """Priors climbed under at most, which bounds the time; climbs end before where those left hold little."""

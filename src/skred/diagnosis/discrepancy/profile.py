@@ -17,9 +17,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import multivariate_normal
 
+from skred.arrays import FloatArray
 from skred.diagnosis.evidence.adaptive_sampling import Mode
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.extension import Extension
@@ -28,8 +28,6 @@ from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import Direction, Setting
 from skred.physics.mechanisms.stretches import OPPOSED_SCALES, OPPOSED_SHARE, is_opposed
 from skred.physics.terrain import Terrain
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.discrepancy.fit import mode_at
 from skred.diagnosis.discrepancy.profile import KINDS, Profile, knot_by_knot, log_prior_densities
 from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, weighted_draws
@@ -23,7 +23,6 @@ from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.refit import Rounds, refit
 from skred.diagnosis.evidence.tolerance import STANDARD_ERROR
 
-FloatArray = NDArray[np.float64]
 _AT_ONCE = 32
 """Draws fitted together."""
 

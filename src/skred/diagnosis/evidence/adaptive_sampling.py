@@ -14,12 +14,11 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln
 
+from skred.arrays import FloatArray
 from skred.diagnosis.evidence.tolerance import MOST_ROUNDS, STANDARD_ERROR
 
-FloatArray = NDArray[np.float64]
 DRAWS = 200
 """Draws of a turn, where a density takes no time."""
 _ODD = 0.1

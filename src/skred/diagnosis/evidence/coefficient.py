@@ -12,9 +12,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import Akima1DInterpolator
 
+from skred.arrays import FloatArray
 from skred.diagnosis.evidence.conditional_map import (
     EventLikelihood,
     Population,
@@ -35,7 +35,6 @@ from skred.physics.law import Law
 from skred.physics.mechanisms.placed import PlacedMechanism, placed
 from skred.physics.mechanisms.spec import Direction, Setting, Shape
 
-FloatArray = NDArray[np.float64]
 _NEAR = (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0)
 """Strengths around what was found before, in its standard deviations: a normal posterior has fallen by eight
 nats at the ends, more than `COUNTS`."""

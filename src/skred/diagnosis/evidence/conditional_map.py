@@ -6,17 +6,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray, IntArray
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.score_information import reading_slopes
 from skred.diagnosis.evidence.tolerance import ARRIVED, DECIDES_NOTHING
 from skred.inference.error_model import Errors, EventReadings
 from skred.inference.reading_density import log_likelihoods
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
 _STARTING_DAMPING = 1e-3
 """Of the Levenberg-Marquardt steps, relative to the diagonal: nearly none."""
 _LOST = 20.0

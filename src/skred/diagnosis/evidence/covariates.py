@@ -11,12 +11,11 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import skew
 
+from skred.arrays import FloatArray
 from skred.campaign import Event
 
-FloatArray = NDArray[np.float64]
 _LEAST_KNOWN = 4
 """Events whose covariate is known, below which it is left out."""
 

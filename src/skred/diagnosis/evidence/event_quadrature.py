@@ -15,17 +15,16 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
+from skred.arrays import FloatArray
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population, Rows
 from skred.diagnosis.evidence.line_quadrature import line_nodes
 from skred.inference.hierarchical.surface import Nodes
 from skred.inference.reading_density import log_likelihoods
 from skred.parallel.compile_cache import compiled
 
-FloatArray = NDArray[np.float64]
 _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 
 

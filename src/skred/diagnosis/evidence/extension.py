@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.diagnosis.evidence.covariates import standard_of
 from skred.errors import InputError
 from skred.inference.added_terms import contributions_with
@@ -19,9 +19,6 @@ from skred.physics.kernel.inputs import Contributions
 from skred.physics.law import Law
 from skred.physics.laws import check_library
 from skred.physics.mechanisms.spec import Direction, Setting
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 def setting_of(problem: HierarchicalProblem, law: Law, front_speed: FloatArray | None = None) -> Setting:

@@ -14,8 +14,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.diagnosis.evidence.conditional_map import (
     EventLikelihood,
     Modes,
@@ -37,8 +37,6 @@ from skred.diagnosis.evidence.refit import Fit, unfitted
 from skred.diagnosis.evidence.tolerance import ARRIVED, STEP_SHARES
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 STARTS = (0.0, 0.3, 1.2)
 """Where climbs begin, in scales of the prior: nil, and either side of its median (0.67)."""
 _ROUNDS = 15

@@ -12,11 +12,10 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.parallel.compile_cache import compiled, inner
 
-FloatArray = NDArray[np.float64]
 _PER_ROOT = 5.0
 """Nodes on a line for the root of as many others: their error falls with the square of the number."""
 _REACH = 3.0

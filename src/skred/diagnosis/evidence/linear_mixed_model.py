@@ -13,8 +13,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.diagnosis.evidence.conditional_map import (
     EventLikelihood,
     Modes,
@@ -32,9 +32,6 @@ from skred.inference.hierarchical.rough_population import (
     STARTING_SPREAD,
 )
 from skred.physics.law import Law
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 
 class MeanPrior(NamedTuple):

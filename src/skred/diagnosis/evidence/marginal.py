@@ -9,8 +9,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.evidence.adaptive_sampling import DRAWS, Mixture, Mode, Weighted, weighted_draws
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.population_target import (
@@ -24,7 +24,6 @@ from skred.diagnosis.evidence.population_target import (
 from skred.diagnosis.evidence.tolerance import STANDARD_ERROR
 from skred.inference.hierarchical.surface import Nodes
 
-FloatArray = NDArray[np.float64]
 _LOG_2PI = math.log(2.0 * math.pi)
 _RESAMPLED_FROM = 4
 """Draws of a turn for each population that is kept: so many that resampling repeats few."""

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.inference.calibrate import Calibration, posterior_of
 from skred.inference.hierarchical.population import population_of
-
-FloatArray = NDArray[np.float64]
 
 
 def population_draws(calibration: Calibration, n: int, seed: int) -> tuple[FloatArray, FloatArray]:

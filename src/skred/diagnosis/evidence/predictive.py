@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.diagnosis.evidence.extension import Extension
 from skred.inference.intervals import ENDS
-
-FloatArray = NDArray[np.float64]
 
 
 class Predicted(NamedTuple):
@@ -28,11 +26,11 @@ class Predicted(NamedTuple):
     low: FloatArray
     high: FloatArray
 
-    def where(self, seen: NDArray[np.bool_]) -> Predicted:
+    def where(self, seen: BoolArray) -> Predicted:
         """The same, NaN where nothing was seen."""
         return Predicted(*(np.where(seen, values, np.nan) for values in self))
 
-    def covered(self, values: FloatArray, seen: NDArray[np.bool_]) -> FloatArray:
+    def covered(self, values: FloatArray, seen: BoolArray) -> FloatArray:
         """1 where the central 90 % of the predictions hold the reading, else 0, NaN where none was seen."""
         return np.where(seen, (values >= self.low) & (values <= self.high), np.nan)
 

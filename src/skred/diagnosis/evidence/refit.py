@@ -7,8 +7,8 @@ from itertools import batched
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows, event_modes
 from skred.diagnosis.evidence.event_quadrature import USUAL, Budget, Spread, event_nodes
 from skred.diagnosis.evidence.extension import Extension
@@ -22,7 +22,6 @@ from skred.diagnosis.evidence.marginal import (
 )
 from skred.diagnosis.evidence.tolerance import MOST_ROUNDS
 
-FloatArray = NDArray[np.float64]
 MOST_NODES = 200_000
 """Quadrature points in memory together, but for those of one group at least: some hundred megabytes."""
 _FAR = 0.5

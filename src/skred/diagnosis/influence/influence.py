@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray, IntArray
 from skred.diagnosis.compare.between import or_none, searched
 from skred.diagnosis.compare.candidate import Candidate, gains_of, log_gain
 from skred.diagnosis.compare.comparison import Comparison
@@ -30,8 +30,6 @@ from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
 from skred.diagnosis.predict.conditional import sensor_ends
 from skred.parallel.processes import worker_pool
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 MOST = 1.0 / 3.0
 """Share of the avalanches that an answer may hang on and be said to be carried by few: more is not few."""
 
@@ -201,7 +199,7 @@ def _by_profile(profile: Profile, base: Base, part: _Part) -> float:
     return fit_profile(part.base(base), profile.kind, near, profile.prior).log_bayes_factor
 
 
-def _first_left_out(order: NDArray[np.int64], many: int) -> _Part:
+def _first_left_out(order: IntArray, many: int) -> _Part:
     """The recordings without the first avalanches of an order."""
     return _Part(~np.isin(np.arange(len(order)), order[:many]))
 

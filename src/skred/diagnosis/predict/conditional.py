@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray, IntArray
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Rows
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.predict.draws import Draws, LeftOut
@@ -30,9 +30,6 @@ from skred.inference.intervals import ENDS
 from skred.inference.reading_density import log_likelihoods
 from skred.parallel.threads import side_by_side
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
 ENOUGH = 100.0
 """Effective draws below which an avalanche is drawn again around what was missed, and it is told."""
 _POINTS = (4, 16, 16)

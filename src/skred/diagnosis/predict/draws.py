@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.diagnosis.augment.added_strength import new_rows
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.conditional_map import (
@@ -26,7 +26,6 @@ from skred.inference.hierarchical.rough_population import moments_of
 from skred.inference.leave_one_out import Samples
 from skred.parallel.threads import side_by_side
 
-FloatArray = NDArray[np.float64]
 N_DRAWS = 200
 """Populations that every prediction is made of: few enough to be written beside an answer."""
 _FRONTS = 1200
@@ -40,7 +39,7 @@ class Draws(NamedTuple):
     factors: FloatArray
     strengths: FloatArray
 
-    def take(self, chosen: NDArray[np.int64]) -> Draws:
+    def take(self, chosen: IntArray) -> Draws:
         """Some of them, perhaps repeated."""
         return Draws(*(values[chosen] for values in self))
 

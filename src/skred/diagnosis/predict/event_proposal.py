@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.diagnosis.evidence.adaptive_sampling import log_student, student
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population
 from skred.diagnosis.predict.draws import Draws, modes_near
 from skred.inference.joint_metropolis import DEGREES_OF_FREEDOM
 from skred.inference.reading_density import log_likelihoods
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 _CENTRES = 6
 """Sets of readings that points are drawn around, at most: the time goes with their square."""
 

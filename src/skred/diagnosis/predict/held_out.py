@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from arviz_stats.base import array_stats
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from skred.arrays import BoolArray, FloatArray
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.predictive import Predicted
@@ -19,7 +19,6 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.leave_one_out import Samples, exact_leave_one_out, samples_of
 from skred.inference.paired import sum_se
 
-FloatArray = NDArray[np.float64]
 K_LIMIT = 0.7
 """Pareto k above which importance sampling is not trusted: Vehtari and others, 2024,
 https://jmlr.org/papers/v25/19-556.html."""
@@ -157,7 +156,7 @@ def errors(found: HeldOut | None, problem: HierarchicalProblem, when: str) -> di
     velocity, predicted = problem.readings.is_velocity, found.predicted
     difference = np.where(problem.observed, predicted.mean - problem.values, np.nan)
 
-    def rms(columns: NDArray[np.bool_]) -> float | None:
+    def rms(columns: BoolArray) -> float | None:
         chosen = difference[:, columns]
         chosen = chosen[np.isfinite(chosen)]
         return float(np.sqrt(np.mean(chosen**2))) if chosen.size else None

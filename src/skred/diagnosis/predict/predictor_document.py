@@ -7,9 +7,9 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from skred.arrays import FloatArray
 from skred.campaign.cells import LARGEST_NUMBER
 from skred.campaign.problems import shown
 from skred.diagnosis.detect.detectability import NO_LIMIT
@@ -24,7 +24,6 @@ from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Shape
 
-FloatArray = NDArray[np.float64]
 MOST_ROWS, MOST_PARTS = 10_000, 8
 """Of a document: draws or places, and terms or constants of a term. Many times what is ever written."""
 _KINDS = {kind.equation: kind for kind in KINDS}

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.diagnosis.check.bootstrap_test import BootstrapTest, linear_test
 from skred.diagnosis.compare.comparison import ComparisonUnderErrors
 from skred.diagnosis.discrepancy.fit import fit_profile
@@ -32,8 +32,6 @@ from skred.diagnosis.predict.unseen import log_densities
 from skred.parallel.processes import worker_pool
 from skred.parallel.threads import side_by_side
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 _PARTS = 24
 """Parts that are left out one after the other, of more avalanches than that: each leaves nearly all others,
 and a refit to these takes as much longer as they are more."""

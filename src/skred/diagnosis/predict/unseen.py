@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from skred.arrays import FloatArray
 from skred.campaign import Campaign
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.discrepancy.profile import Kind, Profile, entering, spline_basis
@@ -35,7 +35,6 @@ from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Direction, Setting, Shape
 from skred.physics.terrain import build_terrain
 
-FloatArray = NDArray[np.float64]
 NODES = Budget(32, 32, 0, 1.5, 1.8)
 """Quadrature points of an event for each draw; their errors average out over the draws. None are adapted:
 where those go depends on the others' weights, and few of them are too low in the mean

@@ -13,9 +13,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from skred.arrays import FloatArray
 from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, weighted_draws
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import Budget
@@ -25,7 +25,6 @@ from skred.diagnosis.tabulated.tables import Tables
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.between_events import BetweenEvents, components, from_unbounded
 
-FloatArray = NDArray[np.float64]
 _STARTS: dict[BetweenEvents, tuple[tuple[float, float], ...]] = {
     BetweenEvents.COMMON: ((1.0, 0.0),),
     BetweenEvents.SPREAD: ((1.0, -1.6), (1.0, -0.3)),

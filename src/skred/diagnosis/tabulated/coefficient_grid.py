@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.marginal import Evidence
@@ -16,8 +16,6 @@ from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 from skred.diagnosis.evidence.tolerance import MOST_ROUNDS
 from skred.parallel.threads import in_parts, side_by_side
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 TABLES = {1: 13, 2: 8}
 """Strengths along each axis of the tables, between which cubic polynomials go, by the number of axes."""
 _MOST_SCALES = 4.5

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, event_modes, log_joint
 from skred.diagnosis.evidence.event_quadrature import Budget, Spread, event_nodes
@@ -19,8 +19,6 @@ from skred.diagnosis.tabulated.coefficient_grid import Grid, Located, from_nothi
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.surface import Nodes
 from skred.parallel.threads import in_parts, side_by_side
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

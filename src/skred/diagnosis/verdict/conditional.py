@@ -7,15 +7,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.predict.conditional import ENOUGH, BeforeAfter, Conditional
 from skred.diagnosis.verdict.given_above import gain_of, given_above
 from skred.inference.hierarchical.problem import HierarchicalProblem
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 def conditional_document(found: Diagnosis) -> dict[str, Any] | None:

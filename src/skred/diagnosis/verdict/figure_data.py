@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from skred.arrays import FloatArray
 from skred.diagnosis.augment.coefficient import augmented_of
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison
@@ -26,7 +26,6 @@ from skred.inference.recorded_data import recorded_groups
 from skred.inference.results import FORMAT
 from skred.physics.mechanisms.stretches import is_opposed
 
-FloatArray = NDArray[np.float64]
 PRIOR_SCALES = np.geomspace(0.1, 10.0, 13)
 """Scales of a strength's prior, relative to the one used, at which the Bayes factor is given."""
 _READING = {"units": "m s-1; m for the runout"}

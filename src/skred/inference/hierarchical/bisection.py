@@ -8,17 +8,15 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from skred.arrays import BoolArray, FloatArray, IntArray
 from skred.inference.error_model import Errors, EventReadings
 from skred.inference.hierarchical.releases import Releases
 from skred.inference.reading_density import assess, log_likelihoods
 from skred.physics.kernel.fronts import simulate
 from skred.physics.kernel.inputs import Contributions, Path
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 _GAUSS = 0.5 / math.sqrt(3.0)
 """Distance of the two Gauss-Legendre nodes from the middle of a box, in its widths."""
 RELEASE_REACH = 4.0
@@ -122,7 +120,7 @@ class _Boxes(NamedTuple):
     width: FloatArray
     predictions: FloatArray
 
-    def take(self, rows: NDArray[np.bool_]) -> _Boxes:
+    def take(self, rows: BoolArray) -> _Boxes:
         """Some of them."""
         return _Boxes(self.event[rows], self.low[rows], self.width[rows], self.predictions[rows])
 

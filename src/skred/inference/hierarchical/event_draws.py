@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.inference.hierarchical.event_density import draw_nodes
 from skred.inference.hierarchical.population import population_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.law import Law
 
-FloatArray = NDArray[np.float64]
 _FARTHEST = 230.0
 """Largest absolute logarithm of a coefficient; powers of it stay finite."""
 
@@ -94,7 +93,7 @@ def fronts_of(problem: HierarchicalProblem, law: Law, avalanches: Avalanches) ->
 
 def read_with_errors(
     problem: HierarchicalProblem, fronts: FloatArray, rng: np.random.Generator
-) -> tuple[FloatArray, NDArray[np.bool_]]:
+) -> tuple[FloatArray, BoolArray]:
     """Readings that the instruments would record of fronts.
 
     Parameters

@@ -14,13 +14,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
 
-FloatArray = NDArray[np.float64]
 POPULATION = "population"
 """Name of a group of populations, where they are not computed from parameters."""
 LKJ_SHAPE = 2.0

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.campaign import Campaign
 from skred.inference.error_model import (
     DEFAULT_ERRORS,
@@ -45,7 +45,6 @@ from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
 from skred.physics.terrain import build_terrain
 
-FloatArray = NDArray[np.float64]
 _BELOW_SCALE, _ABOVE_SCALE = 6.0, 7.0
 """Range in which a coefficient is looked for, below and above the log of its prior's scale.
 

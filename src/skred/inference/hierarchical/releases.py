@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
+from skred.arrays import BoolArray, FloatArray, IntArray
 from skred.campaign import Event
 from skred.physics.terrain import Terrain
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 _ABOVE = 4.0
 """Standard deviations above its noted place up to which a release may be, where the track begins there."""
 _LEAST_SD = 1e-12
@@ -45,7 +43,7 @@ class Releases(NamedTuple):
     speed_sd: FloatArray
 
     @property
-    def uncertain(self) -> NDArray[np.bool_]:
+    def uncertain(self) -> BoolArray:
         """Of which something is not known, (n_events,)."""
         return (self.sd > 0.0) | (self.speed_sd > 0.0)
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.inference.by_sensor import predicted_by_sensor
 from skred.inference.fit import fit_entries
 from skred.inference.hierarchical.event_draws import (
@@ -21,7 +21,6 @@ from skred.inference.intervals import interval
 from skred.inference.results import chain_and_draw, draws_by_name, predictive, summary
 from skred.physics.law import Law
 
-FloatArray = NDArray[np.float64]
 MOST_AVALANCHES = 200_000
 """Most avalanches kept, draws times events; with more, draws are thinned."""
 _READING = {"units": "m s-1; m for the runout"}
@@ -168,7 +167,7 @@ def new_avalanche_rows(problem: HierarchicalProblem, tree: xr.DataTree) -> list[
     return rows
 
 
-def _share(came: NDArray[np.bool_], known: NDArray[np.bool_]) -> float | None:
+def _share(came: BoolArray, known: BoolArray) -> float | None:
     """Share of events that came, of those for which it is known."""
     return float(came.sum() / known.sum()) if known.any() else None
 

@@ -9,12 +9,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.inference.hierarchical.bisection import Envelope
 from skred.inference.hierarchical.surface import Surfaces
 
-FloatArray = NDArray[np.float64]
 SPREAD_MEDIAN, SPREAD_LOG_SD = 0.13, 0.6
 """Prior of a population's standard deviation of a strength's logarithm: log-normal."""
 _SEARCH, _ITERATIONS, _ENOUGH = 30, 300, 1e-4
@@ -128,7 +127,7 @@ def moments_of(means: FloatArray, factors: FloatArray) -> tuple[FloatArray, Floa
 
 
 def _weights(
-    surfaces: Surfaces, event: NDArray[np.int64], points: FloatArray, mean: FloatArray, covariance: FloatArray
+    surfaces: Surfaces, event: IntArray, points: FloatArray, mean: FloatArray, covariance: FloatArray
 ) -> FloatArray:
     """Posterior weight of each patch within its event."""
     z = np.linalg.solve(np.linalg.cholesky(covariance), (points - mean).T)
@@ -159,7 +158,7 @@ def _spreads(moment: FloatArray, n_events: int) -> tuple[FloatArray, FloatArray]
 
 
 def _own_variance(
-    points: FloatArray, weight: FloatArray, within: FloatArray, event: NDArray[np.int64], n_events: int
+    points: FloatArray, weight: FloatArray, within: FloatArray, event: IntArray, n_events: int
 ) -> FloatArray:
     """Posterior variance of each event's own logarithms, (n_events, n_strengths)."""
     own = np.empty((n_events, points.shape[1]))

@@ -23,8 +23,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.inference.hierarchical.bisection import (
     RELEASE_REACH,
     Bisection,
@@ -34,8 +34,6 @@ from skred.inference.hierarchical.bisection import (
     stagger,
 )
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 _EVENTS_AT_ONCE = 16
 """Events that are resolved together, between two reports of progress."""
 _FIRST_WIDTH = 0.5

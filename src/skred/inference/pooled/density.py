@@ -11,14 +11,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import roots_legendre
 
+from skred.arrays import BoolArray, FloatArray, IntArray
 from skred.inference.bounds import log_density, log_inside
 from skred.parallel.compile_cache import compiled, inner
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 MAX_NOT_REACHED = 4
 """Censored readings that an event may have; each beyond the first multiplies the work by the nodes."""
 
@@ -56,12 +54,12 @@ class PooledArrays(NamedTuple):
         sign x.
     """
 
-    release_of_event: NDArray[np.int64]
+    release_of_event: IntArray
     readings: FloatArray
     whiten: FloatArray
     constant: FloatArray
-    n_stopped: NDArray[np.int64]
-    stopped: NDArray[np.int64]
+    n_stopped: IntArray
+    stopped: IntArray
     regression: FloatArray
     conditional: FloatArray
     sign: FloatArray
@@ -73,7 +71,7 @@ def pooled_arrays(
     values: FloatArray,
     observed: BoolArray,
     not_reached: BoolArray,
-    release_of_event: NDArray[np.int64],
+    release_of_event: IntArray,
     covariance: FloatArray,
     least: FloatArray | None = None,
     most: FloatArray | None = None,

@@ -12,10 +12,10 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import log_ndtr, logsumexp, ndtri_exp
 
-FloatArray = NDArray[np.float64]
+from skred.arrays import FloatArray
 
 NODES = {1: 1, 2: 160, 3: 64, 4: 32}
 """Nodes per integrated coordinate; the last coordinate is always integrated in closed form."""

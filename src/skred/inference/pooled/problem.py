@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray, IntArray
 from skred.campaign import Campaign, Status
 from skred.inference.pooled.density import PooledArrays, pooled_arrays, pooled_log_density
 from skred.inference.pooled.recordings_covariance import recordings_covariance
@@ -19,8 +19,6 @@ from skred.physics.kernel.fronts import simulate
 from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
 from skred.physics.terrain import build_terrain
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +40,7 @@ class PooledProblem(Problem):
     likelihood = "pooled"
 
     @cached_property
-    def _unique_releases(self) -> tuple[FloatArray, NDArray[np.int64]]:
+    def _unique_releases(self) -> tuple[FloatArray, IntArray]:
         """Place and speed of the different releases, (n_releases, 2), and which each event has."""
         begin = [(event.release_s_m, event.release_speed_m_s or 0.0) for event in self.campaign.events]
         releases, of_event = np.unique(np.array(begin, dtype=float), axis=0, return_inverse=True)
@@ -59,7 +57,7 @@ class PooledProblem(Problem):
         return self._unique_releases[0][:, 1]
 
     @property
-    def release_of_event(self) -> NDArray[np.int64]:
+    def release_of_event(self) -> IntArray:
         """Which of `releases` each event starts from."""
         return self._unique_releases[1]
 

@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from skred.arrays import BoolArray, FloatArray
 from skred.inference.pooled.orthant import log_orthant_probability, truncate
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 TOLERANCE = 1e-9
 """Largest last change of any mean or covariance, in standard deviations of the sensors."""

@@ -7,16 +7,14 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.inference.by_sensor import predicted_by_sensor
 from skred.inference.fit import fit_entries
 from skred.inference.intervals import interval
 from skred.inference.pooled.problem import PooledProblem
 from skred.inference.results import chain_and_draw, predictive, summary
 from skred.physics.law import Law
-
-FloatArray = NDArray[np.float64]
 
 
 @predictive.register

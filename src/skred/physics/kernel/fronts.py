@@ -7,8 +7,8 @@ strength enters and with which profile along the track (see `columns.py` for the
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.parallel.compile_cache import compiled, inner
 from skred.physics.kernel.columns import Column
 from skred.physics.kernel.inputs import Contributions, Path, cell_of, spans_of
@@ -17,7 +17,6 @@ from skred.physics.kernel.march_abreast import ABREAST, cells_alike, march_abrea
 from skred.physics.kernel.reading import read, read_tangents
 from skred.physics.kernel.scaled_ground import scale_ground
 
-FloatArray = NDArray[np.float64]
 _N_COLUMNS = len(Column)
 
 

@@ -7,12 +7,11 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.physics.kernel.columns import Column
 from skred.physics.terrain import Terrain
 
-FloatArray = NDArray[np.float64]
 Profile = Callable[[Terrain], FloatArray]
 """Contribution per unit of a coefficient to a column of the kernel's table, (n_cells,)."""
 

@@ -12,13 +12,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
 from skred.physics.terrain import Terrain
 
-FloatArray = NDArray[np.float64]
 STRETCHES_M = (75.0, 200.0, 500.0)
 """Lengths of the stretches that are looked at [m]."""
 _STEP_IN_LENGTHS = 0.4

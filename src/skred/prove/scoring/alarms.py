@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import expit
 
+from skred.arrays import FloatArray
 from skred.prove.scoring.answers import Pair, within
 from skred.prove.scoring.intervals import SEED, interval_of, share, upper_limit
 from skred.prove.scoring.standards import SNR_BINS
 
-FloatArray = NDArray[np.float64]
 AT = (5.5, 7.0)
 """Signal-to-noise at which detection is asked for."""
 _CURVE = np.linspace(2.0, 13.0, 45)

@@ -10,11 +10,10 @@ from functools import cache
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import binomtest
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from skred.arrays import FloatArray, IntArray
+
 LEVEL = 0.95
 SEED = 20_911
 """Of everything drawn for an interval, so that the same answers give the same scorecard."""

@@ -13,14 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray, IntArray
 from skred.prove.scoring.answers import NOTHING, UNLISTED, Pair
 from skred.prove.scoring.intervals import SEED, interval_of, mean
 from skred.prove.scoring.probability import log_score
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 _RESAMPLES = 500
 _LEAST = float("-inf")
 """Score of an answer that failed or states none."""
@@ -141,7 +139,7 @@ def _difference(one: Side, other: Side, hits: str, decided: str = "") -> dict[st
     if n_nulls == 0 or n_listed == 0:
         return dict.fromkeys(("ours", "theirs", "difference", "low", "high"))
 
-    def shares(nulls: NDArray[np.int64], listed: NDArray[np.int64]) -> tuple[float, float]:
+    def shares(nulls: IntArray, listed: IntArray) -> tuple[float, float]:
         alarms = int(one.null_alarm[nulls].sum())
         found = []
         for side in (one, other):

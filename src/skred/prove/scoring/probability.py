@@ -11,13 +11,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray, IntArray
 from skred.prove.scoring.answers import Pair
 from skred.prove.scoring.intervals import SEED, interval_of, mean, resamples, share
 from skred.prove.scoring.standards import LOG_SCORE_FLOOR
 
-FloatArray = NDArray[np.float64]
 N_BINS = 10
 _SIMULATIONS = 2000
 _RESAMPLES = 500
@@ -55,20 +54,20 @@ def _of_truth(pair: Pair) -> float:
     return float(sum(pair.probability.get(name, 0.0) for name in pair.probable_ids))
 
 
-def _top(pair: Pair) -> tuple[FloatArray, NDArray[np.bool_]]:
+def _top(pair: Pair) -> tuple[FloatArray, BoolArray]:
     """The largest probability, and whether its id is the truth."""
     name = max(pair.probability, key=lambda one: pair.probability[one])
     return np.array([pair.probability[name]]), np.array([name in pair.probable_ids])
 
 
-def _every(pair: Pair) -> tuple[FloatArray, NDArray[np.bool_]]:
+def _every(pair: Pair) -> tuple[FloatArray, BoolArray]:
     """The probability of each id and of the truth, and whether it is the truth."""
     names = sorted(set(pair.probability) | pair.probable_ids)
     stated = np.array([pair.probability.get(name, 0.0) for name in names])
     return stated, np.array([name in pair.probable_ids for name in names])
 
 
-Case = tuple[FloatArray, NDArray[np.bool_]]
+Case = tuple[FloatArray, BoolArray]
 
 
 def _reliability(cases: Sequence[Case]) -> dict[str, Any]:
@@ -101,12 +100,12 @@ def _reliability(cases: Sequence[Case]) -> dict[str, Any]:
     }
 
 
-def bin_of(stated: FloatArray) -> NDArray[np.int64]:
+def bin_of(stated: FloatArray) -> IntArray:
     """Number of the bin of each probability; 1 belongs to the last."""
     return np.clip((stated * N_BINS).astype(np.int64), 0, N_BINS - 1)
 
 
-def _bins(stated: FloatArray, true: NDArray[np.bool_]) -> list[dict[str, Any]]:
+def _bins(stated: FloatArray, true: BoolArray) -> list[dict[str, Any]]:
     number = bin_of(stated)
     rows = []
     for k in range(N_BINS):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.report.shared.labels import figure_text
 from skred.report.shared.law import law_of
 from skred.report.shared.recordings import recordings_of
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from skred.report.shared.recordings import Recordings
-
-FloatArray = NDArray[np.float64]
 
 
 @styled

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.report.shared.draws import INTERVAL, chains_of, density, gate_text, interval
 from skred.report.shared.labels import (
     figure_text,
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from skred.physics.law import Parameter
     from skred.report.shared.law import CalibratedLaw
 
-FloatArray = NDArray[np.float64]
 _MAX_TRACE_POINTS = 1500
 _RANK_BINS = 20
 _MAX_JOINT = 5

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.report.calibration.predictive import recorded_marks
 from skred.report.shared.draws import (
     NewAvalanche,
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-FloatArray = NDArray[np.float64]
 _SHOWN = (0.002, 0.998)
 """Quantiles of the new avalanches that a panel reaches to at least."""
 

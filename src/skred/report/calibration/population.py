@@ -7,8 +7,8 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.report.shared.draws import (
     INTERVAL,
     chains_of,
@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     from skred.physics.law import Parameter
     from skred.report.shared.law import CalibratedLaw
 
-FloatArray = NDArray[np.float64]
 _LOG_BEYOND = 6.0
 """Axes over a larger ratio than this are logarithmic."""
 _MAX_NAMED_EVENTS = 60

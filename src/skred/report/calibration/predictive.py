@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.report.shared.draws import (
     SensorDraws,
     density,
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-FloatArray = NDArray[np.float64]
 _PREDICTIVE = "predicted reading of a new avalanche (mean response, Sigma)"
 _RESPONSE_HEIGHT = 1.25
 """Peak of the mean response over that of the predictive distribution, in the drawing."""

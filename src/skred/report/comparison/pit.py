@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.report.comparison.parts import styles
 from skred.report.shared.document import Document, get, listed, ranked
 from skred.report.shared.draws import MAX_SENSORS, left_out
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FloatArray = NDArray[np.float64]
 _LEAST = 5
 """Readings below which nothing can be seen."""
 _MIDDLE = (0.05, 0.95)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.report.shared import document as doc
 from skred.report.shared.labels import figure_text, name_text, printable, unit_text
 from skred.report.shared.marks import mark
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 _MOST_STYLES = 6
 """Sensors of speed that have a style of their own; more are put together by where they are."""
 _FARTHEST = 0.25

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.report.diagnosis.words import AFTER, BEFORE
 from skred.report.shared.labels import figure_text, unit_text
 from skred.report.shared.marks import mark
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FloatArray = NDArray[np.float64]
 Band = tuple[FloatArray, FloatArray, FloatArray]
 """Mean, and 5 % and 95 % quantiles."""
 _MOST_NAMED = 60
@@ -63,7 +62,7 @@ def left_out_figure(tree: xr.DataTree) -> Figure:
 def _tell(
     axes: Axes,
     recordings: Recordings,
-    columns: NDArray[np.bool_],
+    columns: BoolArray,
     bands: tuple[Band, Band | None],
     zero: float,
     unit: str,
@@ -87,9 +86,7 @@ def _tell(
     mark(axes, values, last[0], words, [recordings.event_ids[event] for event, _ in places])
 
 
-def _predicted(
-    tree: xr.DataTree, when: str, columns: NDArray[np.bool_], seen: NDArray[np.bool_], zero: float
-) -> Band:
+def _predicted(tree: xr.DataTree, when: str, columns: BoolArray, seen: BoolArray, zero: float) -> Band:
     """Predictions of the readings of some sensors, one after the other."""
     held = tree["held_out"].to_dataset().sel(when=when)
     mean, low, high = (

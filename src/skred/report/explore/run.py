@@ -11,13 +11,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from skred.report.explore.plain_json import plain_json
 from skred.report.shared.labels import shortened, symbol_text, unit_text
 from skred.report.shared.recordings import Recordings, recordings_of
 
-FloatArray = NDArray[np.float64]
 MOST_PARAMETERS = 12
 """Parameters shown at a time: each has panels of its own."""
 MOST_SENSORS = 12

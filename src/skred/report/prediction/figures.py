@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from skred.arrays import FloatArray
 from skred.report.prediction.axis import probability_axis
 from skred.report.prediction.table import prediction_table
 from skred.report.shared.document import get
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from skred.report.shared.recordings import Recordings
 
 __all__ = ["FIGURES", "prediction_figure", "prediction_table", "uncertainty_figure"]
-FloatArray = NDArray[np.float64]
 _DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (1.5, 1.5)))
 _LEAST_SHOWN, _FLOOR = 0.002, 0.0005
 """Lowest probability shown, and what stands for 0 on a logarithmic axis."""

@@ -8,9 +8,9 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from skred.arrays import FloatArray
+
 PAPER, DARK_PAPER = "#ffffff", "#14171a"
 """What figures and pages stand on, in light and in dark."""
 _ENOUGH = 4.6

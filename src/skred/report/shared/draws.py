@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from skred.arrays import FloatArray
 from skred.report.shared.labels import figure_text, unit_text
 from skred.report.shared.style import tint
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from skred.campaign import Sensor
     from skred.report.shared.recordings import Recordings
 
-FloatArray = NDArray[np.float64]
 
 INTERVAL = 0.9
 """Probability of the equal-tailed intervals in the figures."""

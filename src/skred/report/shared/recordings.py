@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.arrays import BoolArray, FloatArray
 from skred.campaign import Sensor, Status
 from skred.campaign.records import Quantity
 
 if TYPE_CHECKING:
     import xarray as xr
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,27 +61,27 @@ class Recordings:
         return len(self.sensors)
 
     @cached_property
-    def observed(self) -> NDArray[np.bool_]:
+    def observed(self) -> BoolArray:
         """Where there is a reading, (n_events, n_sensors)."""
         return np.asarray(self.status == Status.OBSERVED)
 
     @cached_property
-    def not_reached(self) -> NDArray[np.bool_]:
+    def not_reached(self) -> BoolArray:
         """Where the front stopped above the sensor, (n_events, n_sensors)."""
         return np.asarray(self.status == Status.NOT_REACHED)
 
     @cached_property
-    def bounded(self) -> NDArray[np.bool_]:
+    def bounded(self) -> BoolArray:
         """Of which readings only bounds are known, (n_events, n_sensors)."""
         return np.asarray(self.status >= Status.AT_LEAST)
 
     @cached_property
-    def missing(self) -> NDArray[np.bool_]:
+    def missing(self) -> BoolArray:
         """Of which readings nothing is known, (n_events, n_sensors)."""
         return np.asarray(self.status == Status.MISSING)
 
     @property
-    def is_runout(self) -> NDArray[np.bool_]:
+    def is_runout(self) -> BoolArray:
         """Which sensors record where an avalanche stopped, (n_sensors,)."""
         return np.array([sensor.is_runout for sensor in self.sensors], dtype=bool)
 
