@@ -113,6 +113,14 @@ def test_what_is_in_already_takes_its_share(n_free: int) -> None:
         assert_allclose(found.information[group], information, rtol=1e-7, atol=1e-9)
 
 
+def test_units_of_what_is_in_already_do_not_matter() -> None:
+    modes, *others = random_inputs(2, 2, seed=5)
+    in_units = modes._replace(by_strengths=modes.by_strengths * np.array([1e8, 1.0, 1.0]))
+    found, expected = (efficient_scores(one, *others, 2) for one in (in_units, modes))
+    assert_allclose(found.score, expected.score, rtol=1e-9)
+    assert_allclose(found.information, expected.information, rtol=1e-9)
+
+
 def test_score_of_the_mean_itself_is_nil() -> None:
     """A direction that acts like the population's mean has hardly any information left with a wide prior."""
     modes, rows, population, prior = random_inputs(2, 1, seed=8)
