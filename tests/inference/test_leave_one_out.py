@@ -8,9 +8,11 @@ from typing import Any
 
 import arviz as az
 import numpy as np
+import pymc as pm
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from skred.inference.joint_metropolis import JointMetropolis
 from skred.inference.leave_one_out import REFIT_DRAWS, ExactLoo, exact_leave_one_out, samples_of
 
 
@@ -82,6 +84,31 @@ class ChainsApart:
     ) -> tuple[np.ndarray, np.ndarray]:
         far = 5.0 * next(self.chains) if weights[0] == 0.0 and n < self.until else 0.0
         return far + rng.standard_normal((n, len(q))), np.zeros((n, self.n_terms))
+
+
+class Timed(JointMetropolis):
+    """Remembers how long its chains were."""
+
+    lengths: tuple[int, ...] = ()
+
+    def run(self, q: Any, n_draws: int, *others: Any) -> Any:
+        self.lengths += (n_draws,)
+        return super().run(q, n_draws, *others)
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_many_parameters_are_adapted_to_for_longer(seed: int) -> None:
+    """Seven, of unlike scales: no refit is run again for longer, as both are where 500 draws adapt to them."""
+    rng, scales = np.random.default_rng(0), np.logspace(-2.0, 0.0, 7)
+    design, values = rng.standard_normal((12, 7)), rng.standard_normal(12)
+    with pm.Model() as model:
+        free = [pm.Normal(f"x{k}", 0.0, scale) for k, scale in enumerate(scales)]
+        mean = pm.math.dot(design, pm.math.stack(free) / scales)
+        pm.Normal("recordings", mean, 0.5, observed=values)
+    step = Timed(model=model, pointwise="recordings")
+    names = [f"e{k}" for k in range(12)]
+    result = exact_leave_one_out(model, step, names, seed, which=[0])
+    assert result.failed == () and max(step.lengths) == 4 * REFIT_DRAWS
 
 
 def test_a_refit_that_does_not_converge_is_named(calibration: Any) -> None:
