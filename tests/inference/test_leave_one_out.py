@@ -98,7 +98,7 @@ class Timed(JointMetropolis):
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_many_parameters_are_adapted_to_for_longer(seed: int) -> None:
-    """Seven, of unlike scales: no refit is run again for longer, as both are after 500 draws of adaptation."""
+    """Seven, of unlike scales: no refit is run again for longer, as both are after 500 draws."""
     rng, scales = np.random.default_rng(0), np.logspace(-2.0, 0.0, 7)
     design, values = rng.standard_normal((12, 7)), rng.standard_normal(12)
     with pm.Model() as model:
