@@ -143,12 +143,10 @@ class ScoreTest:
         score, information, _ = self.of_candidates(scores)
         result = np.empty_like(score)
         for k, candidate in enumerate(self.placed_mechanisms):
-            added = candidate.mechanism.added
-            assert added is not None
-            scale = added.scale_of(candidate.shape)
+            scale = candidate.scale
             precision = information[:, k] + scale**-2.0
             result[:, k] = 0.5 * score[:, k] ** 2 / precision - 0.5 * np.log(scale**2 * precision)
-            if not added.either_sign:
+            if not candidate.added.either_sign:
                 result[:, k] += math.log(2.0) + log_ndtr(score[:, k] / np.sqrt(precision))
         return result
 
