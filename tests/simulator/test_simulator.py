@@ -16,7 +16,8 @@ from skred.simulator.forces import GRAVITY, Kind, acceleration
 from skred.simulator.readings import PARAMETERS, Sensors, law_table, read
 from skred.simulator.terrain import FAMILIES, GRID_M, Ground, draw_ground, make_ground
 
-ALLOWED = {"campaign", "errors", "simulator", "parallel"}
+ALLOWED = {"arrays", "campaign", "errors", "simulator", "parallel"}
+"""Of arrays only names in annotations."""
 
 
 def plane(degrees: float, length_m: float = 3000.0) -> Ground:
