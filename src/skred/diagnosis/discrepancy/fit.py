@@ -66,9 +66,8 @@ def fit_profile(
         Of the base's last direction, if its strength is to be fitted too: the first of all values, with its
         own prior. The evidence is that of both against neither then.
     """
-    at = knots(base.setting)
+    at, n_beside = knots(base.setting), 0 if beside is None else 1
     # Nothing like everything else, so that what is left of integration errors is the same there.
-    n_beside = 0 if beside is None else 1
     none = np.zeros(n_beside + len(at))
     starts = [expanded_at(base, kind, at, none, base.fit.start)]
     height = starts[0].fit.found.log_evidence
@@ -87,8 +86,8 @@ def fit_profile(
         explored.add(prior, maximum_under(base, kind, at, begin, covers[prior]))
         waiting = waiting or explored.open
     prior = max(explored.maxima, key=explored.factor)
-    fit, (values, cover) = explored.maxima[prior].fit, explored.approximation(prior)[-2:]
-    factor, modes = explored.log_factor, explored.modes
+    fit, there = explored.maxima[prior].fit, explored.approximation(prior)
+    values, cover, factor, modes = there.values, there.covariance, explored.log_factor, explored.modes
     if beside is not None:
         modes = ()  # of both together, and so of no force by itself
         if not beside.added.either_sign:  # a half-normal prior is twice the normal one, above nil alone
