@@ -27,8 +27,8 @@ def compared(**shares: float) -> Any:
     return SimpleNamespace(probability=shares, leading=lambda name: under_errors, log_odds=3.0)
 
 
-def calibration(passed: bool) -> Any:
-    return SimpleNamespace(gate=SimpleNamespace(passed=passed, problems=("r-hat",)))
+def calibration(passed: bool, of: str = "augmented") -> Any:
+    return SimpleNamespace(gate=SimpleNamespace(passed=passed, problems=("r-hat",)), of=of)
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def added(monkeypatch: pytest.MonkeyPatch) -> Added:
         monkeypatch.setattr(add, "calibrate_surely", lambda *given: calibration(next(gates)))
         monkeypatch.setattr(add, "check_again", checked)
         monkeypatch.setattr(add, "compare", lambda base: second)
-        monkeypatch.setattr(add, "reference", lambda own, problem: lambda: calibration(same_errors))
+        monkeypatch.setattr(add, "reference", lambda own, problem: lambda: calibration(same_errors, "base"))
         first = compared(nothing=0.0, unlisted=0.0, obstacle=1.0)
         run = Run(SamplerSettings(), Effort(), Clock(lambda line: None))
         return add.add_mechanisms(BASE, first, ("obstacle",), calibration(True), run)
@@ -64,7 +64,7 @@ def added(monkeypatch: pytest.MonkeyPatch) -> Added:
 
 def test_without_an_alarm_nothing_more_is_looked_for(added: Added) -> None:
     found = added([0.02], compared(nothing=0.0, unlisted=0.0, segment_drag=1.0))
-    assert len(found.steps) == 1 and found.reference.gate.passed and found.left is None
+    assert len(found.steps) == 1 and found.reference.of == "base" and found.left is None
 
 
 def test_after_an_alarm_the_comparison_has_to_be_sure(added: Added) -> None:
