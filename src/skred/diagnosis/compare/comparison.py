@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -21,7 +22,7 @@ from skred.arrays import FloatArray
 from skred.diagnosis.compare.between import with_ways
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.recomputed import recomputed
-from skred.diagnosis.compare.refinement import refine
+from skred.diagnosis.compare.refinement import candidates_of, refine, screened_parts
 from skred.diagnosis.compare.residue import with_residues
 from skred.diagnosis.compare.screening import Tell, screened
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
@@ -34,7 +35,7 @@ from skred.diagnosis.evidence.conditional_map import (
     event_modes,
     log_joint,
 )
-from skred.diagnosis.evidence.event_quadrature import FINE, SCREENING, USUAL, event_nodes
+from skred.diagnosis.evidence.event_quadrature import FINE, USUAL, event_nodes
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, log_odds, prior_odds, stated
 from skred.diagnosis.evidence.refit import Rounds, refit
 from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING
@@ -52,6 +53,8 @@ class ComparisonUnderErrors:
 
     Attributes
     ----------
+    profiles : list of Profile
+        The force not in the list, of each kind; none under an error model that cannot count.
     screened : list of Curve
         One for each candidate of the mechanisms compared; that under another error model where it cannot
         count.
@@ -77,10 +80,10 @@ class ComparisonUnderErrors:
     def errors(self) -> dict[str, float | None]:
         """Standard error of each id's log Bayes factor, in nats; None where it was not sampled."""
         found = {name: one.error for name, one in self.candidates.items()}
-        return found | {UNLISTED: most_probable(self.profiles).error}
+        return found | ({UNLISTED: most_probable(self.profiles).error} if self.profiles else {})
 
     def _factors(self, found: dict[str, float]) -> dict[str, float]:
-        return found | {UNLISTED: log_evidence_of(self.profiles), NOTHING: 0.0}
+        return found | ({UNLISTED: log_evidence_of(self.profiles)} if self.profiles else {}) | {NOTHING: 0.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,21 +152,18 @@ def compare(base: Base, tell: Tell = lambda done, of: None) -> Comparison:
     heights = {name: one.fit.found.log_evidence for name, one in bases.items()}
     height = {name: math.log(ERROR_SHARES[name]) + heights[name] for name in bases}
     preferred = max(height, key=lambda name: height[name])
-    chosen = [DEFAULT_ERRORS]
-    if height[preferred] > height[DEFAULT_ERRORS] + DECIDES_NOTHING:
-        chosen.insert(0, preferred)
-    under_each = [_under_errors(chosen[0], bases[chosen[0]], tell)]
-    for name in chosen[1:]:
-        before, behind = under_each[0].screened, height[preferred] - height[name]
-        if behind > COUNTS:
-            before = worth_comparing(before, behind)
-        if before:
-            best = max(under_each[0].log_factors.values()) + behind
-            under_each.append(_under_errors(name, bases[name], tell, before, best))
+    with worker_pool() as pool:
+        curves = {preferred: screened(bases[preferred], pool, tell)}
+        ahead = height[preferred] - height[DEFAULT_ERRORS]
+        if ahead > DECIDES_NOTHING:
+            before = curves[preferred] if ahead <= COUNTS else worth_comparing(curves[preferred], ahead)
+            if before:
+                curves[DEFAULT_ERRORS] = screened(bases[DEFAULT_ERRORS], pool, tell, before)
+        under = _under_each({name: bases[name] for name in curves}, curves, height, pool)
     # The evidence of an error model that is left out counts for nothing and everything alike.
-    listed = [candidate.mechanism for candidate in under_each[0].candidates.values()]
-    evidence = {under_errors.error_model: heights[under_errors.error_model] for under_errors in under_each}
-    return Comparison(tuple(under_each), prior_odds(listed), evidence)
+    listed = [candidate.mechanism for candidate in under[preferred].candidates.values()]
+    evidence = {name: heights[name] for name in under}
+    return Comparison(tuple(under[name] for name in curves), prior_odds(listed), evidence)
 
 
 def with_errors(base: Base, error_model: str) -> Base:
@@ -209,28 +209,54 @@ def _better_modes(likelihood: EventLikelihood, population: Population, points: F
     return np.where((heights[1] > heights[0] + DECIDES_NOTHING)[:, None], again, points)
 
 
-def _under_errors(
-    error_model: str, base: Base, tell: Tell, before: Sequence[Curve] = (), best: float = -math.inf
-) -> ComparisonUnderErrors:
-    """The comparison under one error model.
+def _under_each(
+    bases: Mapping[str, Base],
+    curves: Mapping[str, list[Curve]],
+    height: Mapping[str, float],
+    pool: ThreadPoolExecutor,
+) -> dict[str, ComparisonUnderErrors]:
+    """The comparison under each error model, that of the highest candidate first.
+
+    Without an effect that is there readings look like outliers: an error model that the base law prefers by
+    far can be far behind with the effect in. Such a one stays as it was screened.
 
     Parameters
     ----------
-    before : sequence of Curve, optional
-        Screened under another one: the mechanisms that are compared.
-    best : float, optional
-        The most that a candidate has under that, in nats above nothing under this one.
+    curves : mapping
+        Screened under each error model.
+    height : mapping
+        Log of each one's prior probability and of the base law's evidence under it.
     """
-    for budget in (SCREENING, USUAL):  # before every worker does it once more
-        base.with_nothing(budget)
-    with worker_pool() as pool:
-        curves = screened(base, pool, tell, before)
-        candidates = refine(base.setting, curves, partial(curve_near, base), pool, best)
-        fitted = pool.map(partial(free_force, base, candidates=candidates), KINDS)  # and meanwhile:
-        candidates = with_ways(base, candidates, pool, best)
-        profiles = list(fitted)
-        candidates = with_residues(base, candidates, profiles, pool)
-        candidates, profiles = recomputed(base, candidates, profiles, pool, best)
+    best = {name: max(0.0, *(one.log_bayes_factor for one in curves[name])) for name in curves}
+    top = max(height[name] + best[name] for name in curves)
+    found, reached = dict[str, ComparisonUnderErrors](), -math.inf
+    for name in sorted(curves, key=lambda name: -height[name] - best[name]):
+        if height[name] + best[name] > top - COUNTS:
+            found[name] = _under_errors(name, bases[name], curves[name], pool, reached - height[name])
+            reached = max(reached, height[name] + max(found[name].log_factors.values()))
+        else:
+            candidates = candidates_of(screened_parts(curves[name]))
+            found[name] = ComparisonUnderErrors(name, bases[name], candidates, [], curves[name])
+    return found
+
+
+def _under_errors(
+    error_model: str, base: Base, curves: list[Curve], pool: ThreadPoolExecutor, best: float
+) -> ComparisonUnderErrors:
+    """The comparison under one error model, from what was screened under it.
+
+    Parameters
+    ----------
+    best : float
+        The most that a candidate has under another error model, in nats above nothing under this one.
+    """
+    base.with_nothing(USUAL)  # before every worker does it once more
+    candidates = refine(base.setting, curves, partial(curve_near, base), pool, best)
+    fitted = pool.map(partial(free_force, base, candidates=candidates), KINDS)  # and meanwhile:
+    candidates = with_ways(base, candidates, pool, best)
+    profiles = list(fitted)
+    candidates = with_residues(base, candidates, profiles, pool)
+    candidates, profiles = recomputed(base, candidates, profiles, pool, best)
     return ComparisonUnderErrors(error_model, base, candidates, profiles, curves)
 
 

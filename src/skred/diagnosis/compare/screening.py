@@ -58,7 +58,7 @@ def screened(
     """
     todo: Sequence[PlacedMechanism] = before or placed_mechanisms(base.setting)
     curves, looked = dict(enumerate(before)), set[int]()
-
+    base.with_nothing(SCREENING)  # before every worker does it once more
     while jobs := sorted(set(_that_count(curves) if curves else range(len(todo))) - looked):
         looked |= set(jobs)
         found = pool.map(partial(curve, base), [todo[number] for number in jobs])
