@@ -215,10 +215,11 @@ def _under_each(
     height: Mapping[str, float],
     pool: ThreadPoolExecutor,
 ) -> dict[str, ComparisonUnderErrors]:
-    """The comparison under each error model, that of the highest candidate first.
+    """The comparison under each error model, first under that of the highest candidate.
 
     Without an effect that is there readings look like outliers: an error model that the base law prefers by
-    far can be far behind with the effect in. Such a one stays as it was screened.
+    far can be far behind with the effect in. One that cannot count with what leads in stays as it was
+    screened.
 
     Parameters
     ----------
@@ -227,21 +228,29 @@ def _under_each(
     height : mapping
         Log of each one's prior probability and of the base law's evidence under it.
     """
-    best = {name: max(0.0, *(one.log_bayes_factor for one in curves[name])) for name in curves}
-    top = max(height[name] + best[name] for name in curves)
-    found, reached = dict[str, ComparisonUnderErrors](), -math.inf
-    for name in sorted(curves, key=lambda name: -height[name] - best[name]):
-        if height[name] + best[name] > top - COUNTS:
-            found[name] = _under_errors(name, bases[name], curves[name], pool, reached - height[name])
-            reached = max(reached, height[name] + max(found[name].log_factors.values()))
-        else:
+    top = {name: height[name] + _most(curves[name]) for name in curves}
+    first = max(top, key=lambda name: top[name])
+    found = {first: _under_errors(first, bases[first], curves[first], pool)}
+    leads = max(found[first].candidates.values(), key=lambda one: one.log_bayes_factor).best
+    reached = height[first] + max(found[first].log_factors.values())
+    for name in curves.keys() - found.keys():
+        there = curve_near(bases[name], leads, leads.shape)  # places were screened coarsely
+        behind = height[first] + _most([leads]) - max(top[name], height[name] + _most([there]))
+        if behind > COUNTS:
             candidates = candidates_of(screened_parts(curves[name]))
             found[name] = ComparisonUnderErrors(name, bases[name], candidates, [], curves[name])
+        else:
+            found[name] = _under_errors(name, bases[name], curves[name], pool, reached - height[name])
     return found
 
 
+def _most(curves: Sequence[Curve]) -> float:
+    """The highest log Bayes factor, or that of nothing."""
+    return max(0.0, *(one.log_bayes_factor for one in curves))
+
+
 def _under_errors(
-    error_model: str, base: Base, curves: list[Curve], pool: ThreadPoolExecutor, best: float
+    error_model: str, base: Base, curves: list[Curve], pool: ThreadPoolExecutor, best: float = -math.inf
 ) -> ComparisonUnderErrors:
     """The comparison under one error model, from what was screened under it.
 
