@@ -42,7 +42,7 @@ def test_there_are_no_threads_within_threads(monkeypatch: pytest.MonkeyPatch) ->
     assert threads() == 3
 
 
-@pytest.mark.parametrize("by", ["linear model", "fronts"])
+@pytest.mark.parametrize("by", ["linear model", pytest.param("fronts", marks=pytest.mark.slow)])
 def test_the_check_is_the_same_in_threads(by: str, monkeypatch: pytest.MonkeyPatch) -> None:
     base = sparse_base()
     n = len(base.law.mechanisms)

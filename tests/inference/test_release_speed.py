@@ -93,7 +93,7 @@ def by_quadrature(problem: HierarchicalProblem, event: int, median: float, sprea
     return float(np.log(quad(lambda z: inner(z) * norm.pdf(z), -5.0, 5.0, epsrel=1e-5, limit=60)[0]))
 
 
-@pytest.mark.parametrize("speed_sd", [None, 0.8])
+@pytest.mark.parametrize("speed_sd", [None, pytest.param(0.8, marks=pytest.mark.slow)])
 def test_the_hierarchical_likelihood_is_that_of_the_references_fronts(speed_sd: float | None) -> None:
     problem = problem_of(speed_sd=speed_sd) if speed_sd else problem_of()
     samples = {"dry_friction": [MEDIAN], "dry_friction_spread": [0.1]}

@@ -203,6 +203,7 @@ def test_uncertain_releases_of_a_law_of_one_strength() -> None:
     assert np.abs(differences(problem, "coulomb", AROUND["coulomb"], 2000, 60)).max() < TOLERANCE
 
 
+@pytest.mark.slow
 def test_uncertain_releases_of_a_law_of_two_strengths() -> None:
     campaign = pick(["19970417"], release_s_m=40.0, release_sd_m=15.0)
     problem = hierarchical_problem(campaign)

@@ -118,6 +118,7 @@ def test_a_hierarchical_one_has_a_forest_of_avalanches(tmp_path):
     assert any(len(one) == len(medians) and np.allclose(one, medians, rtol=1e-5) for one in drawn)
 
 
+@pytest.mark.slow
 def test_the_same_draws_make_the_same_page(tree, tmp_path):
     (_, first), (_, second) = of_calibration(tree, tmp_path), of_calibration(tree, tmp_path)
     assert first == second

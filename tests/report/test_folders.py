@@ -43,7 +43,10 @@ def write_comparison(folder, document, made, problem, where=""):
         save(as_saved(made(problem, law), law, problem), place / "posterior.nc")
 
 
-@pytest.mark.parametrize("kind", ["cannot", "tie", "unexplained"])
+SLOW = [pytest.param(kind, marks=pytest.mark.slow) for kind in ("tie", "unexplained")]
+
+
+@pytest.mark.parametrize("kind", ["cannot", *SLOW])
 def test_a_diagnosis_is_reported_the_same_again(kind, tmp_path, capsys):
     write_documents(kind, tmp_path)
     written = write_reports(tmp_path)
