@@ -29,8 +29,8 @@ def diagnosis() -> str:
 `python -m benchmarks.diagnose_time --json benchmarks/results/diagnose_time.json`: `skred diagnose` by the
 clock, everything compiled, both cores free, loading packages included: seconds until its verdict is written,
 and until report and figures are. Asked: 40 s on 22 avalanches at 4 sensors, 60 s on 15 with 40 gates, 5
-minutes on 200 sparse ones and 25 on 1000, and at most 4 GB. The machine is not as fast every day: by the
-same code times differed by a third and more, so compare rows of one commit only.
+minutes on 200 sparse ones and 25 on 1000, and at most 4 GB. The machine is not as fast every
+day: compare rows of one commit only.
 
 | campaign | base law | recordings | verdict [s] | report [s] | CPU [s] | memory [GB] | verdict | commit |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |

@@ -132,7 +132,7 @@ def searched_evidence(target: BetweenTarget, near: Evidence) -> Way:
 
 
 def between_evidence(target: BetweenTarget, proposal: Mixture, seed: int = 72) -> Way:
-    """One way, from a proposal that may be by other tables; a second look has draws of its own (`seed`)."""
+    """One way, from a proposal that may be by other tables; `seed` is of its draws."""
     found = weighted_draws(target, proposal, np.random.default_rng([0, seed]))
     shares = found.shares
     psi, strengths, _, _ = target.split(found.draws)
