@@ -182,10 +182,12 @@ def curve_near(base: Base, near: Curve, shape: Shape) -> Curve:
         Of the same mechanism and nearly the same shape.
     """
     candidate = placed(near.mechanism, base.setting, shape)
-    least = _SMALLEST * candidate.scale
+    least, wider = _SMALLEST * candidate.scale, 1.0
     for _ in range(MOST_ROUNDS):
         before = near.moments
-        near = curve_at(base, candidate, _strengths_near(near), USUAL, near.known)
+        # On a slope that goes on a curve's own standard deviation says little of how far.
+        wider = 2.0 * wider if near.is_cut else 1.0
+        near = curve_at(base, candidate, _strengths_near(near, wider), USUAL, near.known)
         after = near.moments
         sd = max(before[1], least), max(after[1], least)
         settled = abs(after[0] - before[0]) < sd[0] and 0.5 < sd[1] / sd[0] < 2.0
@@ -194,10 +196,10 @@ def curve_near(base: Base, near: Curve, shape: Shape) -> Curve:
     return near
 
 
-def _strengths_near(near: Curve) -> FloatArray:
-    """Strengths around the mean of a curve, without 0."""
+def _strengths_near(near: Curve, wider: float) -> FloatArray:
+    """Strengths around the mean of a curve, without 0, so many times as far apart as it says."""
     mean, sd = near.moments
-    sd = max(sd, _SMALLEST * near.scale) * (2.0 if near.is_cut else 1.0)
+    sd = wider * max(sd, _SMALLEST * near.scale)
     strengths = mean + sd * np.array(_NEAR)
     if abs(mean) > 2.0 * abs(_NEAR[0]) * sd:  # nothing between 0 and there otherwise
         strengths = np.append(strengths, 0.5 * (mean - math.copysign(abs(_NEAR[0]) * sd, mean)))

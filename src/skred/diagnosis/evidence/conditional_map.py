@@ -175,7 +175,11 @@ class EventLikelihood:
 
     def at(self, points: FloatArray) -> FloatArray:
         """Log likelihood of each row at its point, (n_rows, n_base + 1) to (n_rows,)."""
-        return self.of(self.extension.predict(self.rows.event, points, self.strengths))
+        return self.of(self.predict(points))
+
+    def predict(self, points: FloatArray) -> FloatArray:
+        """What each row's front does at its point, (n_rows, n_base + 1) to (n_rows, n_columns)."""
+        return self.extension.predict(self.rows.event, points, self.strengths)
 
     def of(self, predictions: FloatArray) -> FloatArray:
         """Log likelihood of each row given what its front does, (n_rows, n_columns) to (n_rows,)."""
@@ -239,7 +243,7 @@ def event_modes(
     start : (n_rows, n_base + 1) array
     """
     found = _climbed(likelihood, start, population, n_steps)
-    lost = _lost(likelihood.rows, found.predictions)
+    lost = lost_rows(likelihood.rows, found.predictions)
     if len(lost):
         points, gained = _aside(likelihood.take(lost), found.points[lost], population)
         moved = lost[gained]
@@ -287,7 +291,7 @@ def _climbed(likelihood: EventLikelihood, start: FloatArray, population: Populat
     return found._replace(points=points)
 
 
-def _lost(rows: Rows, predictions: FloatArray) -> IntArray:
+def lost_rows(rows: Rows, predictions: FloatArray) -> IntArray:
     """Rows whose readings would be much likelier if they, and the range of the stop, were as predicted."""
     readings, at = rows.readings, np.arange(len(predictions))
     met = predictions.copy()

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import batched
 from typing import NamedTuple
 
 import numpy as np
 
 from skred.arrays import FloatArray
-from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows, event_modes
+from skred.diagnosis.evidence.conditional_map import (
+    EventLikelihood,
+    Population,
+    Rows,
+    deviations,
+    event_modes,
+    lost_rows,
+)
 from skred.diagnosis.evidence.event_quadrature import USUAL, Budget, Spread, event_nodes
 from skred.diagnosis.evidence.extension import Extension
-from skred.diagnosis.evidence.linear_mixed_model import median_log_scale
+from skred.diagnosis.evidence.linear_mixed_model import median_log_scale, most_probable_covariance
 from skred.diagnosis.evidence.marginal import (
     Evidence,
     coordinates,
@@ -21,6 +29,8 @@ from skred.diagnosis.evidence.marginal import (
     population_at,
 )
 from skred.diagnosis.evidence.tolerance import MOST_ROUNDS
+from skred.inference.hierarchical.rough_population import STARTING_SPREAD
+from skred.inference.hierarchical.surface import Nodes
 
 MOST_NODES = 200_000
 """Quadrature points in memory together, but for those of one group at least: some hundred megabytes."""
@@ -102,23 +112,83 @@ def refit(
         at_once, moved = max(MOST_NODES // (n_events * spent.total), 1), list[int]()
         for some in map(list, batched(active, at_once)):
             likelihood = EventLikelihood(extension, rows, np.empty(0)).in_groups(strengths[some])
-            population = population_at(np.stack([state[k].found.psi for k in some]), n)
-            points = np.concatenate([state[k].points for k in some])
-            modes = event_modes(likelihood, points, population, n_steps=6)
-            spread = event_nodes(likelihood, population, modes, spent, start[0])
-            of_each = (np.split(values, len(some)) for values in (*spread, modes.points))
-            for k, nodes_at, log_weights, own in zip(some, *of_each, strict=True):
-                nodes, before = Spread(nodes_at, log_weights).nodes, state[k].found.psi
-                found = evidence(nodes, log_scale, before)
-                if number + 1 < rounds.least or _moved(before, found.psi, n):
+            begin = [state[k] for k in some]
+            found, spread = _round(likelihood, begin, spent, start[0])
+            if number == 0:
+                _lead_on(likelihood, found, spread, spent, start[0])
+            for k, before, after, nodes in zip(some, begin, found, spread, strict=True):
+                if number + 1 < rounds.least or _moved(before.found.psi, after.found.psi, n):
                     moved.append(k)
                 if rounds.sampled and (k not in moved or number + 1 == MOST_ROUNDS):
-                    found = importance_evidence(nodes, log_scale, found)
-                state[k] = Fit(found, own)
+                    sampled = importance_evidence(nodes, log_scale, after.found)
+                    after = after._replace(found=sampled)
+                state[k] = after
         active = moved
         if not active:
             break
     return state
+
+
+def _round(
+    likelihood: EventLikelihood, begin: Sequence[Fit], budget: Budget, reference: Population
+) -> tuple[list[Fit], list[Nodes]]:
+    """One round of a refit: the events' modes, quadrature points around them, the population by these.
+
+    Parameters
+    ----------
+    likelihood : EventLikelihood
+        Of as many groups of rows as there are fits.
+    """
+    n, n_groups = begin[0].points.shape[1] - 1, len(begin)
+    log_scale = median_log_scale(likelihood.extension.law)
+    population = population_at(np.stack([fit.found.psi for fit in begin]), n)
+    points = np.concatenate([fit.points for fit in begin])
+    modes = event_modes(likelihood, points, population, n_steps=6)
+    spread = event_nodes(likelihood, population, modes, budget, reference)
+    nodes = [Spread(*part).nodes for part in zip(*(np.split(one, n_groups) for one in spread), strict=True)]
+    found = [evidence(one, log_scale, fit.found.psi) for one, fit in zip(nodes, begin, strict=True)]
+    of_each = np.split(modes.points, n_groups)
+    return [Fit(*one) for one in zip(found, of_each, strict=True)], nodes
+
+
+def _lead_on(
+    likelihood: EventLikelihood,
+    fits: list[Fit],
+    nodes: list[Nodes],
+    budget: Budget,
+    reference: Population,
+) -> None:
+    """Begin once more where fronts are far from their readings, with the populations that events ask for.
+
+    From a narrow population that is far off no event gets away by itself, and it does not follow. So events
+    first get modes of their own, under a wide one. Where that is better, it replaces fits and nodes.
+    """
+    n_rows, rows = len(fits[0].points), likelihood.rows
+    predictions = likelihood.predict(np.concatenate([fit.points for fit in fits]))
+    lost = np.unique(rows.group[lost_rows(rows, predictions)])
+    if not len(lost):
+        return
+    part = likelihood.take((n_rows * lost[:, None] + np.arange(n_rows)).ravel())
+    group = np.repeat(np.arange(len(lost)), n_rows)
+    part = replace(part, rows=part.rows._replace(group=group))
+    again = _round(part, _asked_for(part, [fits[k] for k in lost]), budget, reference)
+    for k, fit, of_fit in zip(lost, *again, strict=True):
+        if fit.found.log_evidence > fits[k].found.log_evidence:
+            fits[k], nodes[k] = fit, of_fit
+
+
+def _asked_for(likelihood: EventLikelihood, fits: Sequence[Fit]) -> list[Fit]:
+    """The populations that events ask for, whose modes are those under a wide one around each fit's."""
+    rows, n = likelihood.rows, fits[0].points.shape[1] - 1
+    wide = population_at(np.stack([fit.found.psi for fit in fits]), n)
+    wide = wide._replace(covariance=wide.covariance + STARTING_SPREAD**2 * np.eye(n))
+    modes = event_modes(likelihood, np.concatenate([fit.points for fit in fits]), wide)
+    points = np.split(modes.points, len(fits))
+    own = Population(np.array([one[:, :n].mean(axis=0) for one in points]), wide.covariance)
+    cover = np.linalg.inv(modes.information + wide.precision[rows.group])[:, :n, :n]
+    covariance = most_probable_covariance(rows, deviations(modes.points, rows, own)[:, :n], cover)
+    groups = own._replace(covariance=covariance).groups
+    return [Fit(unfitted(one), its_own) for one, its_own in zip(groups, points, strict=True)]
 
 
 def unfitted(population: Population) -> Evidence:

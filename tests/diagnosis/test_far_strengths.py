@@ -1,0 +1,39 @@
+"""Strengths far from what the base law's fit is near: refits get there, and curves go on to a maximum."""
+
+from __future__ import annotations
+
+import numpy as np
+from diagnosis_cases import base_of, ryggfonn_base
+
+from skred.diagnosis.compare.screening import curve
+from skred.diagnosis.evidence.coefficient import curve_at, curve_near
+from skred.diagnosis.evidence.event_quadrature import USUAL
+from skred.diagnosis.evidence.refit import Rounds, refit
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import placed
+from skred.physics.mechanisms.spec import Shape
+from skred.simulator.draw import draw_trial
+
+
+def test_refits_far_from_the_base_law_end_where_small_steps_do() -> None:
+    """A narrow population lets no event go: 23 000 nats were lost at a strength that readings ask for."""
+    base = base_of(draw_trial(1374178000, kind="sparse", hidden="listed").campaign, "constant")
+    candidate = placed(mechanisms()["coulomb_friction"], base.setting, Shape())
+    steps = np.linspace(0.01, 0.33, 17)
+    at_once = curve_at(base, candidate, steps).log_evidence[1:]
+    extension, fit, one_by_one = base.extended(candidate.direction), base.fit, list[float]()
+    for strength in steps:
+        given = base.given(np.array([[strength]]))
+        (fit,) = refit(extension, base.rows, given, base.fit.start, Rounds(), [fit])
+        one_by_one.append(fit.found.log_evidence)
+    nothing = base.with_nothing(USUAL).found.log_evidence
+    np.testing.assert_allclose(at_once, np.array(one_by_one) - nothing, atol=0.4)
+    assert at_once[-1] > 8.0
+
+
+def test_a_curve_goes_on_to_a_maximum_far_away() -> None:
+    """By as many of its own standard deviations each time it ended on the slope, nats below the maximum."""
+    base = ryggfonn_base("coulomb")
+    shape = Shape(s_from_m=1599.0, s_to_m=1674.0)
+    found = curve_near(base, curve(base, placed(mechanisms()["segment_drag"], base.setting, shape)), shape)
+    assert not found.is_cut and 0 < np.argmax(found.log_evidence) < len(found.strengths) - 1
