@@ -16,7 +16,7 @@ from skred.simulator.draw import draw_trial
 
 
 def test_refits_far_from_the_base_law_end_where_small_steps_do() -> None:
-    """A narrow population lets no event go: 23 000 nats were lost at a strength that readings ask for."""
+    """A narrow population lets no event go: 22 000 nats were lost at strengths that readings ask for."""
     base = base_of(draw_trial(1374178000, kind="sparse", hidden="listed").campaign, "constant")
     candidate = placed(mechanisms()["coulomb_friction"], base.setting, Shape())
     steps = np.linspace(0.01, 0.33, 17)
@@ -32,7 +32,7 @@ def test_refits_far_from_the_base_law_end_where_small_steps_do() -> None:
 
 
 def test_a_curve_goes_on_to_a_maximum_far_away() -> None:
-    """By as many of its own standard deviations each time it ended on the slope, nats below the maximum."""
+    """Steps of its own standard deviation, which is small on a slope, ended nats below the maximum."""
     base = ryggfonn_base("coulomb")
     shape = Shape(s_from_m=1599.0, s_to_m=1674.0)
     found = curve_near(base, curve(base, placed(mechanisms()["segment_drag"], base.setting, shape)), shape)
