@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from skred.arrays import FloatArray, IntArray
 from skred.diagnosis.evidence.coefficient import Base, Curve
@@ -101,10 +102,19 @@ class Located(NamedTuple):
     factor: FloatArray
 
     @property
+    def centres(self) -> FloatArray:
+        """Mean of the population at each strength, (n_tables, n_base)."""
+        return np.stack([fit.population.mean[0] for fit in self.fits])
+
+    @property
     def finer(self) -> Located:
-        """With half the steps between strengths, and at each the population of the nearest."""
+        """With half the steps between strengths of one, and populations between by cubic interpolation."""
         grid = Grid(self.grid.origin, 0.5 * self.grid.steps, 2 * self.grid.size - 1)
-        return self._replace(grid=grid, fits=[self.fits[k] for k in self.grid.nearest(grid.points)])
+        curve = CubicSpline(np.arange(len(self.fits)), np.stack([fit.found.psi for fit in self.fits]))
+        near = [self.fits[k] for k in self.grid.nearest(grid.points)]
+        psi = curve(0.5 * np.arange(len(near)))
+        fits = [fit._replace(found=fit.found._replace(psi=own)) for fit, own in zip(near, psi, strict=True)]
+        return self._replace(grid=grid, fits=fits)
 
 
 def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located:

@@ -51,7 +51,7 @@ class Tables:
     @property
     def arrays(self) -> dict[str, Any]:
         """What the compiled interpolation reads, by name."""
-        return {**self.grid._asdict(), **self.nodes._asdict()}
+        return {**self.grid._asdict(), "centres": self.located.centres, **self.nodes._asdict()}
 
 
 def build_tables(

@@ -2,6 +2,9 @@
 
 Tables stand on a regular grid of the added strengths, skewed where two go together. Between them the log
 density of each event is interpolated by cubic polynomials, along every axis through the four tables nearest.
+It bends least along the ridge, where the population follows what is added: a drag that friction has absorbed
+comes in while friction falls to a third. So each table is asked at the population moved by as much as the one
+that it was made around differs from those of its neighbours, interpolated in the same way.
 """
 
 from __future__ import annotations
@@ -37,13 +40,10 @@ def _cubic_weights(place, size, weights):  # type: ignore[no-untyped-def]
 
 
 @inner()
-def _interpolated(  # type: ignore[no-untyped-def]
-    own, known, at_tables, means, factor, origin, steps, size, first, points, log_weights, density
-):
-    """Fill the log density of each event that has some added strengths; tables asked for are kept."""
-    n_events, n_axes = density.size, own.size
-    least, most = np.full(n_events, np.inf), np.full(n_events, -np.inf)
-    weights, lowest = np.empty((n_axes, 4)), np.empty(n_axes, np.int64)
+def _neighbours(own, origin, steps, size):  # type: ignore[no-untyped-def]
+    """Numbers of the tables around some added strengths, their weights, and steps outside the grid."""
+    n_axes = own.size
+    along, lowest = np.empty((n_axes, 4)), np.empty(n_axes, np.int64)
     place, outside = np.empty(n_axes), 0.0
     for axis in range(n_axes):
         place[axis] = own[axis] - origin[axis]
@@ -53,23 +53,41 @@ def _interpolated(  # type: ignore[no-untyped-def]
     for axis in range(n_axes):
         inside = min(max(place[axis], 0.0), size[axis] - 1.0)
         outside += abs(place[axis] - inside)
-        lowest[axis] = _cubic_weights(inside, size[axis], weights[axis])
-    density[:] = 0.0
+        lowest[axis] = _cubic_weights(inside, size[axis], along[axis])
+    tables, weights = np.zeros(4**n_axes, np.int64), np.ones(4**n_axes)
     for corner in range(4**n_axes):
-        weight, table, rest = 1.0, 0, corner
+        rest = corner
         for axis in range(n_axes):
-            table = table * size[axis] + lowest[axis] + rest % 4
-            weight *= weights[axis, rest % 4]
+            tables[corner] = tables[corner] * size[axis] + lowest[axis] + rest % 4
+            weights[corner] *= along[axis, rest % 4]
             rest //= 4
-        if abs(weight) < 1e-12:
+    return tables, weights, outside
+
+
+@inner()
+def _interpolated(  # type: ignore[no-untyped-def]
+    own, known, at_tables, means, factor, origin, steps, size, centres, first, points, log_weights, density
+):
+    """Fill the log density of each event that has some added strengths; tables asked for are kept."""
+    n_events = density.size
+    least, most = np.full(n_events, np.inf), np.full(n_events, -np.inf)
+    tables, weights, outside = _neighbours(own, origin, steps, size)
+    centre = np.zeros(means.shape[1])
+    for corner in range(tables.size):
+        centre += weights[corner] * centres[tables[corner]]
+    density[:] = 0.0
+    for corner in range(tables.size):
+        if abs(weights[corner]) < 1e-12:
             continue
+        table = tables[corner]
         if not known[table]:
             of_table = first[table * n_events : (table + 1) * n_events + 1]
-            at_tables[table] = integrated_log_density(means, factor, of_table, points, log_weights)
+            moved = means + (centres[table] - centre)
+            at_tables[table] = integrated_log_density(moved, factor, of_table, points, log_weights)
             known[table] = True
         for event in range(n_events):
             there = at_tables[table, event]
-            density[event] += weight * there
+            density[event] += weights[corner] * there
             least[event] = min(least[event], there)
             most[event] = max(most[event], there)
     # Far from all nodes tables differ by hundreds, and polynomials through them overshoot.
@@ -80,21 +98,23 @@ def _interpolated(  # type: ignore[no-untyped-def]
 
 @inner()
 def _components(  # type: ignore[no-untyped-def]
-    means, factor, strengths, origin, steps, size, first, points, log_weights, densities
+    means, factor, strengths, origin, steps, size, centres, first, points, log_weights, densities
 ):
     """Fill the log density of each event with each of some added strengths, (n_components, n_events)."""
-    n_tables = (first.size - 1) // means.shape[0]
+    n_tables, one_centre = len(centres), np.all(centres == centres[0])
     known, at_tables = np.zeros(n_tables, np.bool_), np.empty((n_tables, means.shape[0]))
     for component in range(len(strengths)):
+        if not one_centre:
+            known[:] = False  # what was kept is of a population moved otherwise
         _interpolated(
-            strengths[component], known, at_tables, means, factor, origin, steps, size, first, points,
-            log_weights, densities[component],
+            strengths[component], known, at_tables, means, factor, origin, steps, size, centres, first,
+            points, log_weights, densities[component],
         )  # fmt: skip
 
 
 @compiled()
 def tabulated_log_density(  # type: ignore[no-untyped-def]
-    means, factor, strengths, log_shares, origin, steps, size, first, points, log_weights
+    means, factor, strengths, log_shares, origin, steps, size, centres, first, points, log_weights
 ):
     """Log likelihood of each event, its own strengths integrated over the population.
 
@@ -114,8 +134,10 @@ def tabulated_log_density(  # type: ignore[no-untyped-def]
         Lower triangular: each column is the step from table to table along an axis.
     size : (n_added,) integer array
         Tables along each axis, at least four.
+    centres : (n_tables, n_strengths) array
+        Population mean that each table was made around, the last axis of the tables running fastest.
     first : (n_tables * n_events + 1,) integer array
-        Where the nodes of each table's events begin, the last axis of the tables running fastest.
+        Where the nodes of each table's events begin.
     points : (n_strengths, n_nodes) array
     log_weights : (n_nodes,) array
 
@@ -126,7 +148,7 @@ def tabulated_log_density(  # type: ignore[no-untyped-def]
     """
     n_events, n_components = means.shape[0], log_shares.size
     densities = np.empty((n_components, n_events))
-    _components(means, factor, strengths, origin, steps, size, first, points, log_weights, densities)
+    _components(means, factor, strengths, origin, steps, size, centres, first, points, log_weights, densities)
     total = np.full(n_events, -np.inf)
     for component in range(n_components):
         for event in range(n_events):
@@ -136,7 +158,7 @@ def tabulated_log_density(  # type: ignore[no-untyped-def]
 
 @compiled()
 def tabulated_log_densities(  # type: ignore[no-untyped-def]
-    means, factors, strengths, n_events, origin, steps, size, first, points, log_weights
+    means, factors, strengths, n_events, origin, steps, size, centres, first, points, log_weights
 ):
     """Each event's log density with each component, for many draws: (n, n_components, n_events).
 
@@ -147,8 +169,9 @@ def tabulated_log_densities(  # type: ignore[no-untyped-def]
     for k in range(len(means)):
         of_event[:] = means[k]
         _components(
-            of_event, factors[k], strengths[k], origin, steps, size, first, points, log_weights, result[k]
-        )
+            of_event, factors[k], strengths[k], origin, steps, size, centres, first, points, log_weights,
+            result[k],
+        )  # fmt: skip
     return result
 
 
@@ -166,6 +189,7 @@ class TabulatedLogDensity(ArrayOp):
         ("origin", 1, "float64"),
         ("steps", 2, "float64"),
         ("size", 1, "int64"),
+        ("centres", 2, "float64"),
         ("first", 1, "int64"),
         ("points", 2, "float64"),
         ("log_weights", 1, "float64"),
@@ -197,10 +221,10 @@ class TabulatedLogDensity(ArrayOp):
 def _funcify(op: TabulatedLogDensity, node: Any = None, **kwargs: Any) -> Any:
     @numba_njit
     def tabulated_density(  # type: ignore[no-untyped-def]
-        means, factor, strengths, log_shares, origin, steps, size, first, points, log_weights
+        means, factor, strengths, log_shares, origin, steps, size, centres, first, points, log_weights
     ):
         return tabulated_log_density(
-            means, factor, strengths, log_shares, origin, steps, size, first, points, log_weights
+            means, factor, strengths, log_shares, origin, steps, size, centres, first, points, log_weights
         )
 
     return tabulated_density, cache_key(tabulated_log_density)
