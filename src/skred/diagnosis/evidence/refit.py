@@ -14,13 +14,12 @@ from skred.diagnosis.evidence.conditional_map import (
     EventLikelihood,
     Population,
     Rows,
-    deviations,
     event_modes,
     lost_rows,
 )
 from skred.diagnosis.evidence.event_quadrature import USUAL, Budget, Spread, event_nodes
 from skred.diagnosis.evidence.extension import Extension
-from skred.diagnosis.evidence.linear_mixed_model import median_log_scale, most_probable_covariance
+from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, median_log_scale
 from skred.diagnosis.evidence.marginal import (
     Evidence,
     coordinates,
@@ -160,8 +159,8 @@ def _lead_on(
 ) -> None:
     """Begin once more where fronts are far from their readings, with the populations that events ask for.
 
-    From a narrow population that is far off no event gets away by itself, and it does not follow. So events
-    first get modes of their own, under a wide one. Where that is better, it replaces fits and nodes.
+    From a narrow population that is far off no event gets away by itself, and it does not follow. So
+    populations are fitted from a wide one. Where that is better, it replaces fits and nodes.
     """
     n_rows, rows = len(fits[0].points), likelihood.rows
     predictions = likelihood.predict(np.concatenate([fit.points for fit in fits]))
@@ -178,17 +177,14 @@ def _lead_on(
 
 
 def _asked_for(likelihood: EventLikelihood, fits: Sequence[Fit]) -> list[Fit]:
-    """The populations that events ask for, whose modes are those under a wide one around each fit's."""
-    rows, n = likelihood.rows, fits[0].points.shape[1] - 1
+    """The populations that events ask for, fitted from a wide one around each fit's."""
+    n = fits[0].points.shape[1] - 1
     wide = population_at(np.stack([fit.found.psi for fit in fits]), n)
     wide = wide._replace(covariance=wide.covariance + STARTING_SPREAD**2 * np.eye(n))
-    modes = event_modes(likelihood, np.concatenate([fit.points for fit in fits]), wide)
-    points = np.split(modes.points, len(fits))
-    own = Population(np.array([one[:, :n].mean(axis=0) for one in points]), wide.covariance)
-    cover = np.linalg.inv(modes.information + wide.precision[rows.group])[:, :n, :n]
-    covariance = most_probable_covariance(rows, deviations(modes.points, rows, own)[:, :n], cover)
-    groups = own._replace(covariance=covariance).groups
-    return [Fit(unfitted(one), its_own) for one, its_own in zip(groups, points, strict=True)]
+    points = np.concatenate([fit.points for fit in fits])
+    found, points = fit_population(likelihood, mean_prior(likelihood.extension.law), (wide, points))
+    of_each = np.split(points, len(fits))
+    return [Fit(unfitted(one), own) for one, own in zip(found.groups, of_each, strict=True)]
 
 
 def unfitted(population: Population) -> Evidence:
