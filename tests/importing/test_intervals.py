@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import time
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +14,10 @@ from import_cases import COLUMNS, options, same, skred, wide_file, without_bound
 from small_campaign import TEXTS, write_texts
 
 from skred.campaign import Status, read_campaign
-from skred.campaign.cells import CellError
-from skred.importing.numbers import Notation
+from skred.campaign.cells import CellError, number
+from skred.campaign.problems import CampaignError
+from skred.importing.numbers import Notation, notation_of
+from skred.importing.questions import Unclear
 from skred.importing.readings import number_of
 
 
@@ -55,12 +59,26 @@ def test_decimal_commas_thousands_and_a_standard_deviation() -> None:
         ("12-18-20", "expected one number"),
         ("1e-5 to", "expected one number"),
         ("12 til", "'til' is no part of a number"),
-        ("1" + " " * 100_000 + "x", "'x' is no part of a number"),
     ],
 )
 def test_what_is_no_interval(cell: str, told: str) -> None:
     with pytest.raises(CellError, match=told):
         number_of(cell, Notation())
+
+
+@pytest.mark.parametrize(
+    "cell", ["1" + " " * 100_000 + "x", "1" + ",111" * 25_000 + "x", "1" * 100_000 + "-", "+-" * 50_000]
+)
+def test_a_long_cell_takes_no_time(cell: str) -> None:
+    """Patterns whose time grows with the square of a cell's length would take half a minute here."""
+    begun = time.process_time()
+    with pytest.raises(CellError):
+        number_of(cell, Notation())
+    with pytest.raises(CellError):
+        number(cell)
+    with contextlib.suppress(Unclear, CampaignError):
+        notation_of([(1, "speed", cell)], "speeds.csv", ";", (None, None), ("table",))
+    assert time.process_time() - begun < 2.0
 
 
 @given(st.floats(-900, 1e6), st.floats(-900, 1e6))

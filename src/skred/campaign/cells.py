@@ -14,7 +14,7 @@ NO_DATA = frozenset({-999.0, -9999.0, -99999.0, -999999.0, -32767.0, -32768.0, -
 STATUSES = ("observed", "not_reached", "missing", "at_least", "at_most", "between")
 """What can be known of a reading, in the order of `skred.campaign.records.Status`."""
 
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NUMBER = re.compile(r"[+-]?(\d+(?:\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+", re.ASCII)
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}([,' _\u00a0\u202f]\d{3})+(\.\d+)?", re.ASCII)
 _BOUND = re.compile(r"[<>≤≥]|(at|min|max|up to)\b", re.IGNORECASE)

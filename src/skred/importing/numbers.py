@@ -12,8 +12,12 @@ from skred.importing.sheet import TABLE, NumberText, Section
 THOUSANDS = (".", ",", "'", " ")
 _WITH_SIGN = re.compile(r"(?<![\w.,])\d*([.,])\d+(?![\d.,])")
 _LIKE_THOUSANDS = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
-_BOTH = {sign: re.compile(rf"\d{{1,3}}(?:[{other}]\d{{3}})+[{sign}]\d+") for sign, other in (".,", ",.")}
-_PLAIN = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_BOTH = {
+    # From a number's first digit on: from each digit it would take time that grows with the square of a cell.
+    sign: re.compile(rf"(?<![\d.,])\d+(?:[{other}]\d{{3}})+[{sign}]\d+")
+    for sign, other in (".,", ",.")
+}
+_PLAIN = re.compile(r"[+-]?(\d+(?:\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _EXPONENT = re.compile(r"(?<=\d)[eE](?=[+-]?\d)")
 _NO_PART = re.compile(r"[^\d\s.,'+-]")
 """What no number has, in any notation."""
