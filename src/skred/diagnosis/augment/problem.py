@@ -29,6 +29,7 @@ from skred.diagnosis.evidence.event_quadrature import FINE
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.tabulated.tables import Tables, build_tables, exact_log_densities
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
+from skred.inference.between_events import BetweenEvents
 from skred.inference.hierarchical.population import population_of, population_samples, population_variables
 from skred.inference.hierarchical.problem import CHECKED_EVENTS, COARSER, HierarchicalProblem
 from skred.inference.hierarchical.rough_population import moments_of
@@ -262,6 +263,9 @@ class AugmentedProblem(HierarchicalProblem):
         budget = old.budget.times(2)._replace(over_population=wide)
         # Of two strengths, half the steps are four times the tables.
         located = old.located.finer if len(self.added) == 1 else old.located
+        # Where avalanches differ one population is around all tables.
+        if self.added[0].between is BetweenEvents.COMMON:
+            located = located.refitted(self.base, self.extension)
         tables = build_tables(self.base, self.extension, located, budget, visited)
         return replace(self, tables=tables, refined=True)
 

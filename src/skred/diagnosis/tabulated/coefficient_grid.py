@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from skred.arrays import FloatArray, IntArray
 from skred.diagnosis.evidence.coefficient import Base, Curve
@@ -108,13 +107,13 @@ class Located(NamedTuple):
 
     @property
     def finer(self) -> Located:
-        """With half the steps between strengths of one, and populations between by cubic interpolation."""
+        """With half the steps between strengths, and at each the population of the nearest."""
         grid = Grid(self.grid.origin, 0.5 * self.grid.steps, 2 * self.grid.size - 1)
-        curve = CubicSpline(np.arange(len(self.fits)), np.stack([fit.found.psi for fit in self.fits]))
-        near = [self.fits[k] for k in self.grid.nearest(grid.points)]
-        psi = curve(0.5 * np.arange(len(near)))
-        fits = [fit._replace(found=fit.found._replace(psi=own)) for fit, own in zip(near, psi, strict=True)]
-        return self._replace(grid=grid, fits=fits)
+        return self._replace(grid=grid, fits=[self.fits[k] for k in self.grid.nearest(grid.points)])
+
+    def refitted(self, base: Base, extension: Extension) -> Located:
+        """With a population for each strength itself."""
+        return self._replace(fits=_fitted(base, extension, self.grid.points, self.fits))
 
 
 def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located:
