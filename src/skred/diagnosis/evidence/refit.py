@@ -112,10 +112,10 @@ def refit(
         for some in map(list, batched(active, at_once)):
             likelihood = EventLikelihood(extension, rows, np.empty(0)).in_groups(strengths[some])
             begin = [state[k] for k in some]
-            found, spread = _round(likelihood, begin, spent, start[0])
+            found = _round(likelihood, begin, spent, start[0])
             if number == 0:
-                _lead_on(likelihood, found, spread, spent, start[0])
-            for k, before, after, nodes in zip(some, begin, found, spread, strict=True):
+                found = _led_on(likelihood, found, spent, start[0])
+            for k, before, (after, nodes) in zip(some, begin, found, strict=True):
                 if number + 1 < rounds.least or _moved(before.found.psi, after.found.psi, n):
                     moved.append(k)
                 if rounds.sampled and (k not in moved or number + 1 == MOST_ROUNDS):
@@ -130,7 +130,7 @@ def refit(
 
 def _round(
     likelihood: EventLikelihood, begin: Sequence[Fit], budget: Budget, reference: Population
-) -> tuple[list[Fit], list[Nodes]]:
+) -> list[tuple[Fit, Nodes]]:
     """One round of a refit: the events' modes, quadrature points around them, the population by these.
 
     Parameters
@@ -146,34 +146,33 @@ def _round(
     spread = event_nodes(likelihood, population, modes, budget, reference)
     nodes = [Spread(*part).nodes for part in zip(*(np.split(one, n_groups) for one in spread), strict=True)]
     found = [evidence(one, log_scale, fit.found.psi) for one, fit in zip(nodes, begin, strict=True)]
-    of_each = np.split(modes.points, n_groups)
-    return [Fit(*one) for one in zip(found, of_each, strict=True)], nodes
+    fits = [Fit(*one) for one in zip(found, np.split(modes.points, n_groups), strict=True)]
+    return list(zip(fits, nodes, strict=True))
 
 
-def _lead_on(
+def _led_on(
     likelihood: EventLikelihood,
-    fits: list[Fit],
-    nodes: list[Nodes],
+    found: Sequence[tuple[Fit, Nodes]],
     budget: Budget,
     reference: Population,
-) -> None:
-    """Begin once more where fronts are far from their readings, with the populations that events ask for.
+) -> list[tuple[Fit, Nodes]]:
+    """Where fronts are far from their readings begun once more, with the populations that events ask for.
 
     From a narrow population that is far off no event gets away by itself, and it does not follow. So
-    populations are fitted from a wide one. Where that is better, it replaces fits and nodes.
+    populations are fitted from a wide one, and what has more evidence is kept.
     """
-    n_rows, rows = len(fits[0].points), likelihood.rows
-    predictions = likelihood.predict(np.concatenate([fit.points for fit in fits]))
-    lost = np.unique(rows.group[lost_rows(rows, predictions)])
+    rows, points = likelihood.rows, [fit.points for fit, _ in found]
+    lost = np.unique(rows.group[lost_rows(rows, likelihood.predict(np.concatenate(points)))])
+    best, n_rows = list(found), len(points[0])
     if not len(lost):
-        return
+        return best
     part = likelihood.take((n_rows * lost[:, None] + np.arange(n_rows)).ravel())
     group = np.repeat(np.arange(len(lost)), n_rows)
     part = replace(part, rows=part.rows._replace(group=group))
-    again = _round(part, _asked_for(part, [fits[k] for k in lost]), budget, reference)
-    for k, fit, of_fit in zip(lost, *again, strict=True):
-        if fit.found.log_evidence > fits[k].found.log_evidence:
-            fits[k], nodes[k] = fit, of_fit
+    again = _round(part, _asked_for(part, [found[k][0] for k in lost]), budget, reference)
+    for k, instead in zip(lost, again, strict=True):
+        best[k] = max(best[k], instead, key=lambda one: one[0].found.log_evidence)
+    return best
 
 
 def _asked_for(likelihood: EventLikelihood, fits: Sequence[Fit]) -> list[Fit]:
