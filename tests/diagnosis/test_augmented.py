@@ -324,11 +324,13 @@ def test_what_cannot_be_is_refused(base: Base, drag: Curve, problem: AugmentedPr
 
 
 def test_finer_tables_hold_the_old_ones(base: Base, drag: Curve) -> None:
-    """Half the steps, the same range, and populations of their own on a smooth curve with the old ones."""
+    """Half the steps, the same range, populations of the nearest; refitted, a smooth curve with the old."""
     old = locate(base, extended(base.problem, base.law, (drag.direction,)), [drag])
-    new = old.finer.refitted(base, extended(base.problem, base.law, (drag.direction,)))
+    new = old.finer
     assert_allclose(new.grid.points[::2], old.grid.points, rtol=1e-12)
     assert len(new.grid.points) == len(new.fits) == 2 * len(old.grid.points) - 1
+    assert all(one is other for one, other in zip(new.fits[::2], old.fits, strict=True))
+    new = new.refitted(base, extended(base.problem, base.law, (drag.direction,)))
     assert_allclose(new.centres[::2], old.centres, atol=1e-3)
     middle = (-old.centres[:-3] + 9.0 * old.centres[1:-2] + 9.0 * old.centres[2:-1] - old.centres[3:]) / 16.0
     assert_allclose(new.centres[3:-3:2], middle, atol=0.01)

@@ -42,7 +42,7 @@ def test_a_curve_goes_on_to_a_maximum_far_away() -> None:
 
 
 def test_tables_follow_the_population() -> None:
-    """The population is spreads away from that of the next table: asked alike, each event was 3 nats off."""
+    """The population is spreads away from that of the next table; at one for all, events are nats off."""
     base = base_of(draw_trial(1374178000, kind="sparse", hidden="listed").campaign, "constant")
     candidate = placed(mechanisms()["coulomb_friction"], base.setting, Shape())
     problem = augmented_problem(base, [curve_near(base, curve(base, candidate), Shape())])

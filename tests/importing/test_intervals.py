@@ -59,6 +59,7 @@ def test_decimal_commas_thousands_and_a_standard_deviation() -> None:
         ("12-18-20", "expected one number"),
         ("1e-5 to", "expected one number"),
         ("12 til", "'til' is no part of a number"),
+        ("1" + " " * 100_000 + "x", "'x' is no part of a number"),
     ],
 )
 def test_what_is_no_interval(cell: str, told: str) -> None:

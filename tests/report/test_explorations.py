@@ -148,7 +148,7 @@ def test_thinned_draws_are_told(tree, tmp_path):
     assert found["plot_pair"]["panels"][0]["note"] == "250 of the 500 draws of each chain."
 
 
-@pytest.mark.parametrize("n_draws", [1, 4])
+@pytest.mark.parametrize("n_draws", [1, 2, 4])
 def test_few_draws_are_no_reason_to_fail(tree, tmp_path, n_draws):
     few = changed(tree, lambda name, data: data.isel(draw=slice(n_draws)) if "draw" in data.sizes else data)
     found, html = of_calibration(few, tmp_path)

@@ -261,11 +261,13 @@ class AugmentedProblem(HierarchicalProblem):
         old = self.tables
         wide = old.budget.over_population * 2 ** math.ceil(math.log2(2 + n_chains))
         budget = old.budget.times(2)._replace(over_population=wide)
+        located = old.located
         # Of two strengths, half the steps are four times the tables.
-        located = old.located.finer if len(self.added) == 1 else old.located
-        # Where avalanches differ one population is around all tables.
-        if self.added[0].between is BetweenEvents.COMMON:
-            located = located.refitted(self.base, self.extension)
+        if len(self.added) == 1:
+            located = located.finer
+            # Where avalanches differ one population is around all tables.
+            if self.added[0].between is BetweenEvents.COMMON:
+                located = located.refitted(self.base, self.extension)
         tables = build_tables(self.base, self.extension, located, budget, visited)
         return replace(self, tables=tables, refined=True)
 
