@@ -74,7 +74,10 @@ def test_shapes_in_words(capsys: pytest.CaptureFixture[str]) -> None:
     assert (
         looked_for["obstacle"].startswith("stretches of 50 m") and "0.006 or 0.025" in looked_for["obstacle"]
     )
-    assert looked_for["velocity_weakening"] == "the whole track; U_c [m s-1] of 4, 8 or 15"
+    along_the_track = "the whole track, or from the first recording on"
+    assert looked_for["velocity_weakening"] == f"{along_the_track}; U_c [m s-1] of 4, 8 or 15"
+    assert looked_for["turbulent_drag"] == along_the_track
+    assert looked_for["centrifugal"] == "the whole track"
     assert "sensor" in looked_for["sensor_bias"] and "covariate" in looked_for["covariate_friction"]
     assert looked_for["release_offset"] == "all avalanches alike"
 

@@ -19,8 +19,16 @@ WAVE_M = 400.0
 """Length of the waves of the level ground, if there are any."""
 
 
-def speed(s: float, release: float, friction: float, drag: float, waves: float = 0.0) -> float:
-    """Front speed [m/s]: dv/ds = 2 g (sin(phi) - friction cos(phi)) - 2 drag v on ramp and level ground."""
+def speed(
+    s: float, release: float, friction: float, drag: float, waves: float = 0.0, lossless: bool = False
+) -> float:
+    """Front speed [m/s]: dv/ds = 2 g (sin(phi) - friction cos(phi)) - 2 drag v on ramp and level ground.
+
+    On a lossless ramp nothing retards: it is made up, to give bodies the speed that they came with.
+    """
+    if lossless:
+        v = 2.0 * G_M_S2 * np.sin(STEEP) * (RAMP_M - release)
+        return after_waves(v, s - RAMP_M, friction, drag, waves)
     end = G_M_S2 * (np.sin(STEEP) - friction * np.cos(STEEP)) / drag
     v = end * (1.0 - np.exp(-2.0 * drag * (RAMP_M - release)))
     return after_waves(v, s - RAMP_M, friction, drag, waves)
@@ -75,7 +83,12 @@ def entering(drag: float, waves: float, n_events: int = 14, seed: int = 2) -> Ca
 
 
 def rolling(
-    drag: float, n_events: int = 20, friction: float = 0.006, seed: int = 1, waves: float = 0.0
+    drag: float,
+    n_events: int = 20,
+    friction: float = 0.006,
+    seed: int = 1,
+    waves: float = 0.0,
+    lossless: bool = False,
 ) -> Campaign:
     """Runs of bodies whose friction and releases vary, read at six places to 0.1 m/s."""
     rng = np.random.default_rng(seed)
@@ -83,7 +96,7 @@ def rolling(
     releases = RELEASE_M + 2.0 * rng.standard_normal(n_events)
     values = np.array(
         [
-            [speed(s, release, mu, drag, waves) for s in PLACES_M]
+            [speed(s, release, mu, drag, waves, lossless) for s in PLACES_M]
             for mu, release in zip(frictions, releases, strict=True)
         ]
     )

@@ -64,7 +64,8 @@ class AddedTerm:
     @property
     def transfers(self) -> bool:
         """Whether it goes with avalanches to another track: physics that is bound to no place or sensor."""
-        return self.group is Group.PHYSICS and self.bound_to in (BoundTo.TRACK, BoundTo.COVARIATE)
+        alike = self.bound_to in (BoundTo.TRACK, BoundTo.COVARIATE) and self.shape.s_from_m is None
+        return self.group is Group.PHYSICS and alike
 
     def on(self, terrain: Terrain, base: tuple[str, ...]) -> Direction:
         """The same on another terrain.
@@ -75,7 +76,7 @@ class AddedTerm:
             If it does not transfer.
         """
         if not self.transfers:
-            raise ValueError(f"{self.mechanism} is bound to the {self.bound_to} of its own track")
+            raise ValueError(f"{self.mechanism} is bound to a place or an instrument of its own track")
         if self.bound_to is BoundTo.COVARIATE:
             return self.direction  # of the avalanches, whatever the ground
         empty = np.zeros(terrain.n_cells + 1)

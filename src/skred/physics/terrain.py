@@ -74,6 +74,12 @@ class Terrain:
         middle: FloatArray = 0.5 * (self.edge_s_m[1:] + self.edge_s_m[:-1])
         return middle
 
+    def share_between(self, s_from_m: float, s_to_m: float) -> FloatArray:
+        """Share of each cell that lies between two places [m], (n_cells,)."""
+        overlap = np.minimum(self.edge_s_m[1:], s_to_m) - np.maximum(self.edge_s_m[:-1], s_from_m)
+        share: FloatArray = np.clip(overlap / np.diff(self.edge_s_m), 0.0, 1.0)
+        return share
+
     @property
     def slope_rad(self) -> FloatArray:
         """Slope angle phi per cell [rad], downhill positive."""

@@ -125,7 +125,9 @@ def _where(mechanism: Mechanism, setting: Setting, shapes: Sequence[Shape]) -> s
             return "each covariate of the events that is a number, or a text of two kinds"
         case BoundTo.TRACK:
             moves = direction_of(mechanism, setting, shapes[0]).columns
-            return "the whole track" if moves else "all avalanches alike"
+            parts = any(shape.s_from_m is not None for shape in shapes)
+            where = "the whole track, or from the first recording on" if parts else "the whole track"
+            return where if moves else "all avalanches alike"
 
 
 def _example(covariates: Sequence[str]) -> Setting:

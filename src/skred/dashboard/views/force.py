@@ -58,7 +58,7 @@ def _added(run: Run) -> list[str]:
         elif sensor:
             said.append(f"Not drawn: {title}, added to the readings of {shown(sensor, 30)}.")
         else:
-            said.append(f"Not drawn: {title}, added along the whole track.")
+            said.append(f"Not drawn: {title}, added along the track.")
     if placed:
         said.insert(0, f"Orange: where {' and '.join(placed)} was added.")
     if doc.get(run.document, "profile"):

@@ -84,9 +84,9 @@ class _Term(_Part):
 
     @model_validator(mode="after")
     def _one_stretch(self) -> Self:
-        ends = [place for place in (self.s_from_m, self.s_to_m) if place is not None]
-        if ends and not (len(ends) == 2 and ends[0] < ends[1]):
-            raise ValueError("expected s_from_m below s_to_m, or neither")
+        first, last = self.s_from_m, self.s_to_m
+        if last is not None and (first is None or first >= last):
+            raise ValueError("expected s_from_m below s_to_m, or no s_to_m")
         return self
 
 

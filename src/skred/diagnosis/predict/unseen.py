@@ -232,8 +232,9 @@ def _direction(term: Term, problem: HierarchicalProblem, law: Law) -> Direction:
     campaign, shape = problem.campaign, term.shape
     if shape.sensor is not None and shape.sensor not in campaign.sensor_ids:
         raise InputError(f"{campaign.name}: has no sensor {shape.sensor!r}, which the predictor speaks of")
-    if shape.s_to_m is not None:
-        _check_on_track(shape.s_to_m, problem)
+    for place_m in (shape.s_from_m, shape.s_to_m):
+        if place_m is not None:
+            _check_on_track(place_m, problem)
     covariates: Mapping[str, FloatArray] = {}
     if shape.covariate is not None and term.standard is not None:
         values = term.standard.standardised(campaign.events, shape.covariate)

@@ -68,6 +68,14 @@ def _where(location: dict[str, float] | None) -> str:
     return f" between s = {location['s_from_m']:.0f} and {location['s_to_m']:.0f} m"
 
 
+def _acts(step: Step, location: dict[str, float] | None) -> str:
+    """Where what was added acts: on its stretch, or where along the track it begins if not at its top."""
+    shape = step.candidate.best.shape
+    if shape.s_from_m is None or shape.s_to_m is not None:
+        return _where(location)
+    return f" from s = {shape.s_from_m:.0f} m on, where the recordings begin"
+
+
 def _what(decision: Decision) -> str:
     """What is off, before the name that leads."""
     if decision.disputed:
@@ -83,9 +91,9 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     by_logarithm = ", by its logarithm" if standard is not None and standard["logarithm"] else ""
     about = f" ({subject}{by_logarithm})" if subject else ""
     sentences = [
-        f"{_what(found.decision)}: {_title(name)}{about}{_where(document['location'])}, with a probability of"
-        f" {percent(probability[name])} (nothing: {percent(probability[NOTHING])}; a force not in the list:"
-        f" {percent(probability[UNLISTED])}).",
+        f"{_what(found.decision)}: {_title(name)}{about}{_acts(found.steps[0], document['location'])}, with a"
+        f" probability of {percent(probability[name])} (nothing: {percent(probability[NOTHING])}; a force not"
+        f" in the list: {percent(probability[UNLISTED])}).",
         f"Its {strength['parameter'].replace('_', ' ')} is"
         f" {plus_minus(strength['mean'], strength['sd'], strength['unit'])}"
         f"{_in_percent(found, strength['mean'])}.",
@@ -100,7 +108,8 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     if len(document["mechanisms"]) > 1:
         second = document["mechanisms"][1]
         sentences.append(
-            f"Given that, a second one earned its place: {_title(second['id'])}{_where(second['location'])}."
+            f"Given that, a second one earned its place: {_title(second['id'])}"
+            f"{_acts(found.steps[1], second['location'])}."
         )
         sentences.append(_compensated(second["constants"]))
     sentences.append(improvement(document))

@@ -8,7 +8,7 @@ from skred.physics.mechanisms.spec import (
     along_the_track,
     everywhere,
     lacking,
-    one_shape,
+    whole_or_recorded,
 )
 
 MECHANISM = Mechanism(
@@ -32,7 +32,7 @@ MECHANISM = Mechanism(
         scale=0.8,
         reason="a shear strength of 200-300 Pa on a metre of snow of 300 kg/m3",
         direction=along_the_track(Column.CONSTANT, everywhere),
-        shapes=one_shape,
+        shapes=whole_or_recorded,
         joins=lacking("constant_retardation"),
     ),
 )

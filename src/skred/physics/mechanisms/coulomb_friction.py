@@ -15,7 +15,7 @@ from skred.physics.mechanisms.spec import (
     along_the_track,
     everywhere,
     lacking,
-    one_shape,
+    whole_or_recorded,
 )
 from skred.physics.terrain import Terrain
 
@@ -42,7 +42,7 @@ MECHANISM = Mechanism(
         scale=0.2,
         reason="an ordinary friction coefficient of snow is 0.15-0.4; part of it a base law may hold already",
         direction=along_the_track(Column.FRICTION, everywhere),
-        shapes=one_shape,
+        shapes=whole_or_recorded,
         joins=lacking("coulomb_friction", "coulomb_friction_without_curvature"),
     ),
 )

@@ -15,7 +15,6 @@ from skred.physics.mechanisms.spec import Added, BoundTo, Direction, Mechanism, 
 from skred.physics.mechanisms.stretches import (
     along_a_stretch,
     ends_of,
-    on_a_stretch,
     split_stretch,
     stretches,
     stretches_of_drag,
@@ -39,7 +38,7 @@ def _direction(setting: Setting, shape: Shape) -> Direction:
     if growth is None:
         return along_a_stretch(Column.QUADRATIC)(setting, shape)
     mass = np.interp(setting.terrain.middle_s_m, ends_of(shape), (1.0, growth))
-    return Direction((Column.QUADRATIC,), (on_a_stretch(setting.terrain, *ends_of(shape)) / mass)[None, :])
+    return Direction((Column.QUADRATIC,), (setting.terrain.share_between(*ends_of(shape)) / mass)[None, :])
 
 
 MECHANISM = Mechanism(

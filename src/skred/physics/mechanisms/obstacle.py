@@ -14,7 +14,6 @@ from skred.physics.mechanisms.spec import (
     Shape,
     Strength,
 )
-from skred.physics.mechanisms.stretches import on_a_stretch
 
 HALF_WIDTH_M = 25.0
 """Length of the climb and of the descent [m]."""
@@ -47,8 +46,8 @@ def _split(setting: Setting, shape: Shape, steps: float) -> tuple[Shape, ...]:
 def _direction(setting: Setting, shape: Shape) -> Direction:
     crown = shape.place_m
     assert crown is not None
-    climb = on_a_stretch(setting.terrain, crown - HALF_WIDTH_M, crown)
-    descent = on_a_stretch(setting.terrain, crown, crown + HALF_WIDTH_M)
+    climb = setting.terrain.share_between(crown - HALF_WIDTH_M, crown)
+    descent = setting.terrain.share_between(crown, crown + HALF_WIDTH_M)
     slope = GRAVITY / HALF_WIDTH_M
     loss = dict(shape.constants)[LOSS] / (4.0 * HALF_WIDTH_M)
     profiles = np.array([slope * (climb - descent), loss * (climb + descent)])

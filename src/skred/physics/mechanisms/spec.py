@@ -29,7 +29,7 @@ class BoundTo(StrEnum):
     """What an added mechanism is bound to; its shapes say to which one. Figures and verdict follow it."""
 
     TRACK = "track"
-    """Nothing in particular: it acts alike along the whole track and on all avalanches."""
+    """Nothing in particular: it acts on all avalanches along the track, or from a shape's `s_from_m` on."""
     PLACE = "place"
     """A stretch of the track: every shape has `s_from_m` and `s_to_m`."""
     SENSOR = "sensor"
@@ -113,7 +113,7 @@ class Shape:
     Attributes
     ----------
     s_from_m, s_to_m : float, optional
-        The stretch of one that is bound to a place [m].
+        The stretch of one that is bound to a place [m]. Without its end: from there on, along the track.
     covariate : str, optional
         The property of the avalanches that one bound to a covariate depends on.
     sensor : str, optional
@@ -294,11 +294,23 @@ def one_shape(setting: Setting) -> tuple[Shape, ...]:
     return (Shape(),)
 
 
+def whole_or_recorded(setting: Setting) -> tuple[Shape, ...]:
+    """Shapes of a mechanism that acts along the whole track, or from the first recording on.
+
+    Above that recordings tell no more than the speed that fronts come with. What they come through there may
+    be other ground, or no ground at all, as a slope that was made up to give them this speed; and a force in
+    no list is looked for where something was recorded.
+    """
+    return Shape(), Shape(s_from_m=setting.recorded_m[0])
+
+
 def along_the_track(column: Column, profile: Profile) -> Callable[[Setting, Shape], Direction]:
-    """Direction of a mechanism that enters one column with one profile."""
+    """Direction of a mechanism that enters one column with one profile, from where its shape begins on."""
 
     def direction(setting: Setting, shape: Shape) -> Direction:
-        return Direction((column,), profile(setting.terrain)[None, :])
+        begins = -np.inf if shape.s_from_m is None else shape.s_from_m
+        share = setting.terrain.share_between(begins, np.inf)
+        return Direction((column,), (share * profile(setting.terrain))[None, :])
 
     return direction
 

@@ -16,7 +16,6 @@ import numpy as np
 from skred.arrays import FloatArray
 from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import Direction, Mechanism, Setting, Shape
-from skred.physics.terrain import Terrain
 
 STRETCHES_M = (75.0, 200.0, 500.0)
 """Lengths of the stretches that are looked at [m]."""
@@ -40,14 +39,6 @@ _LEAST_SPEED = 5.0
 """Front speed [m/s] below which nothing is opposed: fronts are about to stop there."""
 
 
-def on_a_stretch(terrain: Terrain, s_from_m: float, s_to_m: float) -> FloatArray:
-    """Share of each cell that lies on a stretch, (n_cells,)."""
-    edge = terrain.edge_s_m
-    overlap = np.minimum(edge[1:], s_to_m) - np.maximum(edge[:-1], s_from_m)
-    share: FloatArray = np.clip(overlap / np.diff(edge), 0.0, 1.0)
-    return share
-
-
 def ends_of(shape: Shape) -> tuple[float, float]:
     """Where the stretch of a local mechanism begins and ends [m]."""
     assert shape.s_from_m is not None and shape.s_to_m is not None
@@ -58,7 +49,7 @@ def along_a_stretch(column: Column) -> Callable[[Setting, Shape], Direction]:
     """Direction of a mechanism that enters one column on the shape's stretch, and of what opposes it."""
 
     def direction(setting: Setting, shape: Shape) -> Direction:
-        share = on_a_stretch(setting.terrain, *ends_of(shape))
+        share = setting.terrain.share_between(*ends_of(shape))
         if not is_opposed(shape):
             return Direction((column,), share[None, :])
         return Direction((column, Column.CONSTANT), np.array([share, -share * _relief(setting, shape)]))
@@ -72,7 +63,9 @@ def is_opposed(shape: Shape) -> bool:
 
 
 def equation_of(mechanism: Mechanism, shape: Shape) -> str:
-    """A mechanism's term in the equation of motion, with what opposes it."""
+    """A mechanism's term in the equation of motion, with what opposes it and where it begins."""
+    if shape.s_from_m is not None and shape.s_to_m is None:
+        return f"{mechanism.equation} for s > {shape.s_from_m:.0f} m"
     return mechanism.equation.replace("U^2", "(U^2 - U_0^2)", 1) if is_opposed(shape) else mechanism.equation
 
 

@@ -8,7 +8,7 @@ from skred.physics.mechanisms.spec import (
     along_the_track,
     everywhere,
     lacking,
-    one_shape,
+    whole_or_recorded,
 )
 
 MECHANISM = Mechanism(
@@ -33,7 +33,7 @@ MECHANISM = Mechanism(
         scale=1.5e-3,
         reason="at 30 m/s the scale retards by 1.35 m/s2, as much as dry friction of 0.15",
         direction=along_the_track(Column.QUADRATIC, everywhere),
-        shapes=one_shape,
+        shapes=whole_or_recorded,
         joins=lacking("turbulent_drag"),
     ),
 )

@@ -1,5 +1,7 @@
 """Friction that falls with speed, in excess of its value at high speed."""
 
+from dataclasses import replace
+
 from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import (
     Added,
@@ -8,8 +10,10 @@ from skred.physics.mechanisms.spec import (
     Setting,
     Shape,
     Strength,
+    along_the_track,
     everywhere,
     lacking,
+    whole_or_recorded,
 )
 
 U_C = "U_c [m s-1]"
@@ -17,12 +21,13 @@ SPEEDS_M_S = (4.0, 8.0, 15.0)
 
 
 def _shapes(setting: Setting) -> tuple[Shape, ...]:
-    return tuple(Shape(constants=((U_C, speed),)) for speed in SPEEDS_M_S)
+    constants = [((U_C, speed),) for speed in SPEEDS_M_S]
+    return tuple(replace(shape, constants=one) for shape in whole_or_recorded(setting) for one in constants)
 
 
 def _direction(setting: Setting, shape: Shape) -> Direction:
-    profile = everywhere(setting.terrain)[None, :]
-    return Direction((Column.WEAKENING,), profile, weakening_speed=dict(shape.constants)[U_C])
+    direction = along_the_track(Column.WEAKENING, everywhere)(setting, shape)
+    return replace(direction, weakening_speed=dict(shape.constants)[U_C])
 
 
 MECHANISM = Mechanism(

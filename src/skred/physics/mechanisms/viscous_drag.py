@@ -8,7 +8,7 @@ from skred.physics.mechanisms.spec import (
     along_the_track,
     everywhere,
     lacking,
-    one_shape,
+    whole_or_recorded,
 )
 
 MECHANISM = Mechanism(
@@ -32,7 +32,7 @@ MECHANISM = Mechanism(
         scale=0.05,
         reason="at 30 m/s the scale retards by 1.5 m/s2, as much as dry friction of 0.17",
         direction=along_the_track(Column.LINEAR, everywhere),
-        shapes=one_shape,
+        shapes=whole_or_recorded,
         joins=lacking("viscous_drag"),
     ),
 )

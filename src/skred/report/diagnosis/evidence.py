@@ -127,6 +127,8 @@ def _shape_text(comparison: doc.Document, name: str) -> str:
     first, last = (doc.get(shape, key) for key in ("s_from_m", "s_to_m"))
     if is_number(first) and is_number(last):
         parts.append(f"s = {first:.0f} to {last:.0f} m")
+    elif is_number(first):
+        parts.append(f"from s = {first:.0f} m on")
     if doc.get(shape, "opposed"):
         parts.append("with a relief equal to it at about the typical speed")
     else:

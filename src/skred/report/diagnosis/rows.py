@@ -167,6 +167,8 @@ def _where(candidate: doc.Document | None) -> str:
     if stretch is not None:
         return f"{stretch[0]:.0f} to {stretch[1]:.0f}"
     shape = doc.get(candidate, "shape")
+    if is_number(begins := doc.get(shape, "s_from_m")):
+        return f"from {begins:.0f} on"
     return printable(doc.get(shape, "sensor") or doc.get(shape, "covariate") or "-")
 
 

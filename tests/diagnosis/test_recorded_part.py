@@ -1,0 +1,54 @@
+"""Terms along the track that begin at the first recording: above it there may be other ground, or none."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+from diagnosis_cases import base_of
+from rolling_cases import PLACES_M, rolling
+
+from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.comparison import free_force
+from skred.diagnosis.compare.refinement import candidates_of, screened_parts
+from skred.diagnosis.compare.screening import curve
+from skred.diagnosis.discrepancy.profile import KINDS, log_evidence_of
+from skred.diagnosis.evidence.coefficient import Base, curve_near
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import placed, shapes_of
+from skred.physics.mechanisms.spec import Shape
+from skred.physics.mechanisms.stretches import equation_of
+
+D = 2.4e-4
+DRAG = mechanisms()["turbulent_drag"]
+
+
+def drag_on(base: Base) -> Candidate:
+    """Drag along the track and from the first recording on, by the usual number of quadrature points."""
+    screened = [curve(base, placed(DRAG, base.setting, shape)) for shape in shapes_of(DRAG, base.setting)]
+    again = [curve_near(base, one, one.shape) for one in screened]
+    return candidates_of(screened_parts(again))[DRAG.id]
+
+
+def test_a_made_up_ramp_hides_no_drag() -> None:
+    """A ramp without losses gives the entry speed, as people write such runs: on it no drag acts."""
+    base = base_of(rolling(D, lossless=True), "coulomb")
+    drag = drag_on(base)
+    whole, recorded = drag.curves
+    assert whole.shape == Shape() and recorded.shape == Shape(s_from_m=PLACES_M[0])
+    assert recorded.log_bayes_factor > whole.log_bayes_factor + 5.0
+    mean, sd = recorded.moments
+    assert abs(mean - D) < 3.0 * sd and sd < 0.2 * D
+    force = log_evidence_of([*map(partial(free_force, base, candidates={DRAG.id: drag}), KINDS)])
+    assert drag.alone > force + 2.0 > whole.log_bayes_factor
+    assert drag.ends(0.5) is None  # it is bound to no stretch
+    assert equation_of(DRAG, drag.best.shape) == "-D U^2 for s > 140 m"
+
+
+def test_a_drag_that_acts_on_the_ramp_too_loses_no_more_than_the_prior() -> None:
+    base = base_of(rolling(D), "coulomb")
+    drag = drag_on(base)
+    whole, recorded = drag.curves
+    assert whole.log_bayes_factor > recorded.log_bayes_factor
+    assert drag.alone > whole.log_bayes_factor - np.log(2.0) - 1e-6
+    assert drag.best.shape == Shape()
