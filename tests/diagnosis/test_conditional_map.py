@@ -239,3 +239,16 @@ def test_a_front_at_the_edge_of_stopping_has_no_slope_without_end() -> None:
         steepest.append(float(np.sqrt(np.einsum("rii->ri", around.information).max())))
         np.linalg.inv(around.information + np.eye(3))
     assert 1e3 < max(steepest) < 1e5
+
+
+def test_friction_beyond_all_numbers_holds_fronts_at_their_release() -> None:
+    """Where nothing explains an event it is looked for in ever wider populations."""
+    base = sparse_base()
+    extension, points = from_the_mean(base)
+    points[:, 0] = 1000.0
+    likelihood = EventLikelihood(extension, base.rows, NONE)
+    predictions = extension.predict(base.rows.event, points, NONE)
+    velocities = [k for k, sensor in enumerate(base.problem.campaign.sensors) if not sensor.is_runout]
+    assert_allclose(predictions[:, velocities], 0.0)
+    assert_allclose(predictions[:, -1], base.problem.releases.mean)
+    assert np.isfinite(log_joint(likelihood, points, base.population)).all()

@@ -155,7 +155,7 @@ def told(score_test: ScoreTest, scores: Scores) -> list[Detectability]:
     for name in dict.fromkeys(ids.tolist()):
         members = np.flatnonzero(ids == name)
         in_order = members[np.argsort(information[members])]
-        typical, best = in_order[len(members) // 2], in_order[-1]
+        typical, best = in_order[(len(members) - 1) // 2], in_order[-1]
         mechanism, shape = placed[best].mechanism, placed[best].shape
         stretch = None if shape.s_from_m is None or shape.s_to_m is None else (shape.s_from_m, shape.s_to_m)
         kept = information[typical] / raw[typical] if seen[typical] else 0.0

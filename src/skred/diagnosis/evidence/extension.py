@@ -12,6 +12,7 @@ from skred.arrays import FloatArray, IntArray
 from skred.diagnosis.evidence.covariates import standard_of
 from skred.errors import InputError
 from skred.inference.added_terms import contributions_with
+from skred.inference.hierarchical.event_draws import FARTHEST
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.kernel.columns import Column
 from skred.physics.kernel.fronts import front_speeds, simulate, simulate_with_jacobian
@@ -149,7 +150,8 @@ class Extension:
             if direction.log_readings is not None:
                 reads = np.append(direction.log_readings, 0.0)
                 log_factor = log_factor + np.outer(strengths[:, k], reads)
-        rows[:, :n] = np.exp(rows[:, :n])
+        # An event that nothing explains may be looked for beyond all numbers.
+        rows[:, :n] = np.exp(np.minimum(rows[:, :n], FARTHEST))
         place = np.clip(place, releases.first, releases.length)
         return rows, place, releases.speeds(events, points[:, -1]), np.exp(log_factor)
 

@@ -68,12 +68,14 @@ def _where(location: dict[str, float] | None) -> str:
     return f" between s = {location['s_from_m']:.0f} and {location['s_to_m']:.0f} m"
 
 
-def _acts(step: Step, location: dict[str, float] | None) -> str:
-    """Where what was added acts: on its stretch, or where along the track it begins if not at its top."""
-    shape = step.candidate.best.shape
-    if shape.s_from_m is None or shape.s_to_m is not None:
-        return _where(location)
-    return f" from s = {shape.s_from_m:.0f} m on, where the recordings begin"
+def _entry(step: Step, entry: dict[str, Any]) -> str:
+    """What was added, the sensor or covariate it refers to, and where it acts."""
+    shape, subject = step.candidate.best.shape, entry["covariate"] or entry["sensor"]
+    by_logarithm = ", by its logarithm" if entry["standard"] and entry["standard"]["logarithm"] else ""
+    where = _where(entry["location"])
+    if shape.s_from_m is not None and shape.s_to_m is None:
+        where = f" from s = {shape.s_from_m:.0f} m on, where the recordings begin"
+    return f"{_title(entry['id'])}{f' ({subject}{by_logarithm})' if subject else ''}{where}"
 
 
 def _what(decision: Decision) -> str:
@@ -86,31 +88,24 @@ def _what(decision: Decision) -> str:
 def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     name, ties = document["mechanism"], document["indistinguishable"]
     strength, probability = document["strength"], document["probability"]
-    subject = document["covariate"] or document["sensor"]
-    standard = document["mechanisms"][0]["standard"]
-    by_logarithm = ", by its logarithm" if standard is not None and standard["logarithm"] else ""
-    about = f" ({subject}{by_logarithm})" if subject else ""
+    first, *others = document["mechanisms"]
     sentences = [
-        f"{_what(found.decision)}: {_title(name)}{about}{_acts(found.steps[0], document['location'])}, with a"
-        f" probability of {percent(probability[name])} (nothing: {percent(probability[NOTHING])}; a force not"
-        f" in the list: {percent(probability[UNLISTED])}).",
+        f"{_what(found.decision)}: {_entry(found.steps[0], first)}, with a probability of"
+        f" {percent(probability[name])} (nothing: {percent(probability[NOTHING])}; a force not in the list:"
+        f" {percent(probability[UNLISTED])}).",
         f"Its {strength['parameter'].replace('_', ' ')} is"
         f" {plus_minus(strength['mean'], strength['sd'], strength['unit'])}"
         f"{_in_percent(found, strength['mean'])}.",
         between_sentence(strength),
-        _compensated(document["mechanisms"][0]["constants"]),
+        _compensated(first["constants"]),
     ]
     if document["covariate"]:
         sentences.append("Associated with, not necessarily caused by.")
     if ties:
         sentences += [_tied(document), _split(found.steps[0], document)]
     sentences.append(_not_excluded(document))
-    if len(document["mechanisms"]) > 1:
-        second = document["mechanisms"][1]
-        sentences.append(
-            f"Given that, a second one earned its place: {_title(second['id'])}"
-            f"{_acts(found.steps[1], second['location'])}."
-        )
+    for step, second in zip(found.steps[1:], others, strict=True):
+        sentences.append(f"Given that, a second one earned its place: {_entry(step, second)}.")
         sentences.append(_compensated(second["constants"]))
     sentences.append(improvement(document))
     sentences.append(_still_fired(found.steps[-1].check))

@@ -13,7 +13,7 @@ from skred.inference.hierarchical.population import population_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.law import Law
 
-_FARTHEST = 230.0
+FARTHEST = 230.0
 """Largest absolute logarithm of a coefficient; powers of it stay finite."""
 
 
@@ -73,7 +73,7 @@ def new_points(
     # Cut off at the same limits as in the likelihood.
     deviation = problem.releases.drawn(np.arange(n_events), rng.random((len(means), n_events)))
     # Where spreads are extremely wide a coefficient can exceed the largest number.
-    return np.concatenate([np.clip(logs, -_FARTHEST, _FARTHEST), deviation[..., None]], axis=2)
+    return np.concatenate([np.clip(logs, -FARTHEST, FARTHEST), deviation[..., None]], axis=2)
 
 
 def _from(problem: HierarchicalProblem, strengths: FloatArray, deviation: FloatArray) -> Avalanches:
