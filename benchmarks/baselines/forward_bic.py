@@ -80,9 +80,10 @@ def gain(fit: QuickFit, candidate: PlacedMechanism) -> float:
 def free_numbers(candidate: PlacedMechanism) -> int:
     """Numbers that a candidate has chosen: its strength and what says where."""
     shape = candidate.shape
-    if shape.s_from_m is not None:
+    if shape.s_to_m is not None:
         return 3 if candidate.mechanism.id != "obstacle" else 2
-    return 1 if shape.sensor is None and shape.covariate is None and not shape.constants else 2
+    one_of_several = shape.sensor, shape.covariate, shape.s_from_m, *shape.constants
+    return 1 if all(what is None for what in one_of_several) else 2
 
 
 class ForwardBic:

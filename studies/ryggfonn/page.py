@@ -14,7 +14,10 @@ LAWS = {
     "coulomb": "Base M1, dry friction",
     "pcm": "Base M2, PCM",
     "constant": "Base M3, constant retardation",
+    "voellmy": "The Voellmy model: friction without curvature, and drag",
 }
+PUBLISHED = ("coulomb", "pcm", "constant")
+"""Those of the published calibration, whose diagnosis is repeated without some avalanches."""
 UNSEEN = "-unseen"
 """What the names of those cases end in that repeat the diagnosis without some avalanches."""
 _HEAD = """# Ryggfonn: what the block models leave out
@@ -116,7 +119,7 @@ def _carried(found: Found) -> str:
 def _added(row: Found) -> str:
     strength = row["strength"]
     size = f"{strength['mean']:.3g} ± {strength['sd']:.2g}{_UNITS[strength['unit']]}"
-    return f"{size}, {_where(row['location']) or 'along the whole track'}"
+    return f"{size}, {_where(row['location']) or 'along the track'}"
 
 
 def _before_after(held: Found, key: str, unit: str, digits: int) -> str:
@@ -130,7 +133,7 @@ def _under(one: Found) -> str:
 def _row(row: Found, probability: float) -> str:
     strength = row["strength"]
     unit = _UNITS[strength["unit"]]
-    where = _where(row["location"]) or row["covariate"] or row["sensor"] or "along the whole track"
+    where = _where(row["location"]) or row["covariate"] or row["sensor"] or "along the track"
     return (
         f"| `{row['id']}` | {row['log_bayes_factor']:.1f} | {_share(probability)} |"
         f" {strength['mean']:.3g} ± {strength['sd']:.2g}{unit} | {where} |\n"
@@ -329,7 +332,7 @@ without each avalanche.
 def _unseen(found: Mapping[str, Found]) -> str:
     """What the gain is on avalanches that did not choose what was let in."""
     rows, folds = [], []
-    for name in LAWS:
+    for name in PUBLISHED:
         usual, exact = found[name]["evidence"], found[name + UNSEEN]["evidence"]
         outer = found[name + UNSEEN]["outer_folds"]
         gains = " | ".join(_gain(one) for one in (usual, exact, outer))
@@ -342,10 +345,6 @@ def _unseen(found: Mapping[str, Found]) -> str:
             )
     k = found["pcm" + UNSEEN]["outer_folds"]["k"]
     return f"""## On avalanches that did not choose it
-
-The last two columns and the folds are results that were made before strengths could differ between
-avalanches, and before the terrain was smoothed along its arc length; delete `*-unseen.json` to have them
-made again.
 
 All avalanches chose what was added, and then judge it. So the whole diagnosis, its naming included, is
 repeated without each of {k} parts of them. Each part then judges what was added without it

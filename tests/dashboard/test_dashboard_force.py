@@ -33,7 +33,7 @@ def is_orange(panel: Panel) -> bool:
     ("kind", "told"),
     [
         ("segment_friction", "Orange: where another surface"),
-        ("constant_retardation", "added along the whole track"),
+        ("constant_retardation", "added along the track"),
         ("sensor", "added to the readings of"),
         ("unexplained", "but this force itself"),
         ("nothing", "Nothing was added."),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -43,6 +44,12 @@ def test_a_made_up_ramp_hides_no_drag() -> None:
     assert drag.alone > force + 2.0 > whole.log_bayes_factor
     assert drag.ends(0.5) is None  # it is bound to no stretch
     assert equation_of(DRAG, drag.best.shape) == "-D U^2 for s > 140 m"
+
+
+def test_where_no_speed_was_read_there_is_no_such_place() -> None:
+    base = base_of(rolling(D, n_events=6), "coulomb")
+    none = replace(base.setting, velocities=(False,) * len(base.setting.velocities))
+    assert shapes_of(DRAG, none) == (Shape(),) != shapes_of(DRAG, base.setting)
 
 
 def test_a_drag_that_acts_on_the_ramp_too_loses_no_more_than_the_prior() -> None:

@@ -158,6 +158,10 @@ CHANGES = "added=dict(direction=lambda setting, shape: Direction("
 WRONG = {
     "no place": ("BoundTo.PLACE", "not bound to place"),
     "a place too many": ("BoundTo.TRACK, added=dict(shapes=stretches)", "bound to place"),
+    "an end alone": (
+        "BoundTo.TRACK, added=dict(shapes=lambda s: (Shape(s_to_m=9.0),))",
+        "to begin somewhere",
+    ),
     "no such sensor": ("BoundTo.SENSOR, added=dict(shapes=lambda s: (Shape(sensor='z'),))", "sensor 'z'"),
     "no covariate": (
         "BoundTo.COVARIATE, added=dict(shapes=lambda s: (Shape(covariate='z'),))",

@@ -26,6 +26,7 @@ from skred.physics.laws import load_law
 from skred.physics.mechanisms.spec import Shape
 from skred.prediction.predict import Simulation, predict, prediction_of
 from skred.prediction.source import source_of
+from skred.prediction.statement import source_sentences
 from skred.prediction.track import prediction_track
 from skred.prediction.wanted import Wanted
 
@@ -124,6 +125,27 @@ def test_drag_added_to_coulomb_friction_is_pcm(
         np.testing.assert_allclose(augmented[name], pcm[name], atol=0.01)
     np.testing.assert_allclose(augmented["mean_speed"], pcm["mean_speed"], atol=0.5)
     assert json.loads(augmented.attrs["added"])[0]["used"] is True
+
+
+def test_what_begins_at_the_first_recording_acts_from_the_top_of_another_track(
+    problem: HierarchicalProblem, tmp_path: Path
+) -> None:
+    """On its own track from there on; where that would be on another one nothing says."""
+    whole, law = term_of(problem, "coulomb", "turbulent_drag"), load_law("coulomb")
+    later = term_of(problem, "coulomb", "turbulent_drag", Shape(s_from_m=800.0))
+    tree = tree_of(problem, "coulomb", [whole], [0.003])
+    for track in (prediction_track(problem), prediction_track(problem, plane(tmp_path))):
+        one, other = (
+            prediction_of(problem, law, tree, track, Simulation(20, 256), added=[term])
+            for term in (whole, later)
+        )
+        same = np.array_equal(one["runout_quantile"], other["runout_quantile"])
+        assert same is not track.is_own
+        (row,) = json.loads(other.attrs["added"])
+        assert (row["used"], row["place_m"], row["begins_m"]) == (True, None, 800.0)
+        made = {"from": None, "added": [row], "track": {"is_own": track.is_own}}
+        (told,) = source_sentences(made)
+        assert ("from s = 800 m on" if track.is_own else "along the whole track") in told
 
 
 def test_what_is_bound_to_a_place_stays_on_its_track(

@@ -25,8 +25,9 @@ from skred.diagnosis.verdict.document import verdict
 from skred.diagnosis.verdict.figure_data import figure_data
 from skred.diagnosis.verdict.hangs_on import hangs_on
 from skred.diagnosis.verdict.statement import statement
+from skred.diagnosis.words import percent
 from skred.physics.mechanisms.placed import direction_of
-from skred.physics.mechanisms.spec import Direction, Setting
+from skred.physics.mechanisms.spec import Direction, Setting, Shape
 from skred.physics.mechanisms.stretches import U_1, U_2
 from skred.report.diagnosis.report import render_diagnosis
 from skred.report.shared.draws import chains_of
@@ -97,6 +98,24 @@ def test_that_a_named_drag_is_compensated_is_told() -> None:
     document = verdict(with_finding(found, steps=(step,)))
     assert "it is compensated at about the typical speed (31 to 24 m/s)" in document["statement"]
     assert "(U^2 - U_0^2)" in document["equation"] and document["mechanisms"][0]["constants"][U_1] == 31.0
+
+
+def test_how_probably_what_is_named_begins_at_the_first_recording_is_told() -> None:
+    found = diagnosis("tie")
+    (step,) = found.steps
+    curves = tuple(replace(one, shape=Shape()) for one in step.candidate.curves)
+    before = replace(step, candidate=replace(step.candidate, curves=curves))
+    assert "else along the whole track" not in verdict(with_finding(found, steps=(before,)))["statement"]
+    best = int(np.argmax([one.log_bayes_factor for one in curves]))
+    later = tuple(
+        replace(one, shape=Shape(s_from_m=1100.0)) if k == best else one for k, one in enumerate(curves)
+    )
+    after = replace(step, candidate=replace(step.candidate, curves=later))
+    document = verdict(with_finding(found, steps=(after,)))
+    share = percent(float(after.candidate.shape_weights[best]))
+    told = f"With a probability of {share} it acts only from s = 1100 m on, where recordings begin;"
+    assert told in document["statement"]
+    assert document["location"] is None and document["equation"].endswith("for s > 1100 m")
 
 
 def fitted(candidate: Candidate, setting: Setting, points: FloatArray) -> Candidate:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -64,11 +64,10 @@ class AddedTerm:
     @property
     def transfers(self) -> bool:
         """Whether it goes with avalanches to another track: physics that is bound to no place or sensor."""
-        alike = self.bound_to in (BoundTo.TRACK, BoundTo.COVARIATE) and self.shape.s_from_m is None
-        return self.group is Group.PHYSICS and alike
+        return self.group is Group.PHYSICS and self.bound_to in (BoundTo.TRACK, BoundTo.COVARIATE)
 
     def on(self, terrain: Terrain, base: tuple[str, ...]) -> Direction:
-        """The same on another terrain.
+        """The same on another terrain; along all of it, as no recording says from where there.
 
         Raises
         ------
@@ -76,12 +75,12 @@ class AddedTerm:
             If it does not transfer.
         """
         if not self.transfers:
-            raise ValueError(f"{self.mechanism} is bound to a place or an instrument of its own track")
+            raise ValueError(f"{self.mechanism} is bound to the {self.bound_to} of its own track")
         if self.bound_to is BoundTo.COVARIATE:
             return self.direction  # of the avalanches, whatever the ground
         empty = np.zeros(terrain.n_cells + 1)
         setting = Setting(terrain, base, (0.0, terrain.length_m), (), (), {}, 0, empty)
-        return direction_of(mechanisms()[self.mechanism], setting, self.shape)
+        return direction_of(mechanisms()[self.mechanism], setting, replace(self.shape, s_from_m=None))
 
 
 def contributions_with(base: Contributions, directions: Sequence[Direction]) -> Contributions:

@@ -58,8 +58,11 @@ def source_sentences(document: dict[str, Any]) -> list[str]:
     for title, rows in apart.items():
         ends = [end for row in rows for end in row["place_m"] or ()]
         where = f" (s = {min(ends):.0f} to {max(ends):.0f} m)" if ends else ""
+        begins = rows[0].get("begins_m")
         if not rows[0]["used"]:
             told.append(f"Left out: {title}{where}: {rows[0]['why']}.")
+        elif begins is not None:
+            told.append(f"Used: {title}, {_from_where(begins, document['track']['is_own'])}.")
         elif ends:
             told.append(
                 f"Used: {title}{where}, at the most probable place; how uncertain the place is does not widen"
@@ -68,6 +71,16 @@ def source_sentences(document: dict[str, Any]) -> list[str]:
         if rows[0]["used"] and rows[0]["between_events"] != BetweenEvents.COMMON:
             told.append("Each new avalanche has its own strength of it, as those recorded differ.")
     return told
+
+
+def _from_where(begins_m: float, own_track: bool) -> str:
+    """Where a term acts that the recordings tell from one place of their track on."""
+    if own_track:
+        return f"from s = {begins_m:.0f} m on, where the recordings of the calibration begin"
+    return (
+        "along the whole track. On that of the calibration it acts from the first recording on; where that is"
+        " on another track is not known"
+    )
 
 
 def _distances(document: dict[str, Any]) -> list[str]:

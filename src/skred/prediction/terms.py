@@ -16,7 +16,7 @@ from skred.inference.hierarchical.releases import Releases
 from skred.physics.geometry import contributions_of
 from skred.physics.kernel.inputs import Contributions
 from skred.physics.law import Law
-from skred.physics.mechanisms.spec import BoundTo, Direction, Group, Shape
+from skred.physics.mechanisms.spec import BoundTo, Direction, Group
 from skred.physics.terrain import Terrain
 from skred.prediction.track import PredictionTrack
 
@@ -148,28 +148,22 @@ def added_rows(terms: Sequence[AddedTerm], track: PredictionTrack) -> list[dict[
     """For each term whether it is used on a track, and why not where it is left out."""
     rows = []
     for term in terms:
-        why = _left_out(term, track)
+        why, shape = _left_out(term, track), term.shape
+        place = None if shape.s_to_m is None else [shape.s_from_m, shape.s_to_m]
+        begins = shape.s_from_m if place is None else None  # along the track, and from there on
         rows.append(
             {
                 "mechanism": term.mechanism,
                 "title": term.title,
                 "parameter": term.name,
                 "between_events": str(term.between),
-                "place_m": _place_m(term.shape, track),
+                "place_m": place,
+                "begins_m": begins,
                 "used": not why,
                 "why": why,
             }
         )
     return rows
-
-
-def _place_m(shape: Shape, track: PredictionTrack) -> list[float] | None:
-    """Where a term of that shape acts on the campaign's own track [m]; None where not bound to a place."""
-    if shape.s_from_m is None:
-        return None
-    if shape.s_to_m is not None:
-        return [shape.s_from_m, shape.s_to_m]
-    return [shape.s_from_m, track.length_m] if track.is_own else None
 
 
 def _left_out(term: AddedTerm, track: PredictionTrack) -> str:

@@ -40,8 +40,8 @@ def check_again(
     strengths = augmented_of(calibration).added_rows(posterior_of(calibration)).mean(axis=0)
     draws = population_draws(calibration, run.effort.replicas, run.seed + 1)
     again = fit_base(base.problem, base.law, typical(draws), base.fit.points, directions, strengths)
-    # What acts alike everywhere cannot be missing a second time.
-    everywhere = [one.mechanism.id for one in chosen if one.shape.place_m is None]
-    setting = replace(again.setting, base=(*base.setting.base, *everywhere))
+    # What acts along the track cannot be missing from it a second time.
+    along_the_track = [one.mechanism.id for one in chosen if one.shape.place_m is None]
+    setting = replace(again.setting, base=(*base.setting.base, *along_the_track))
     again = replace(again, setting=setting)
     return linear_test(again, draws, run.seed + 1, run.effort.replicas), again

@@ -68,14 +68,24 @@ def _where(location: dict[str, float] | None) -> str:
     return f" between s = {location['s_from_m']:.0f} and {location['s_to_m']:.0f} m"
 
 
-def _entry(step: Step, entry: dict[str, Any]) -> str:
+def _entry(entry: dict[str, Any]) -> str:
     """What was added, the sensor or covariate it refers to, and where it acts."""
-    shape, subject = step.candidate.best.shape, entry["covariate"] or entry["sensor"]
-    by_logarithm = ", by its logarithm" if entry["standard"] and entry["standard"]["logarithm"] else ""
-    where = _where(entry["location"])
-    if shape.s_from_m is not None and shape.s_to_m is None:
-        where = f" from s = {shape.s_from_m:.0f} m on, where the recordings begin"
-    return f"{_title(entry['id'])}{f' ({subject}{by_logarithm})' if subject else ''}{where}"
+    subject, standard = entry["covariate"] or entry["sensor"], entry["standard"]
+    by_logarithm = ", by its logarithm" if standard is not None and standard["logarithm"] else ""
+    about = f" ({subject}{by_logarithm})" if subject else ""
+    return f"{_title(entry['id'])}{about}{_where(entry['location'])}"
+
+
+def _begins(step: Step) -> str:
+    """How probably what acts along the track begins at the first recording, if that is most probable."""
+    found = step.candidate
+    if found.best.shape.s_from_m is None or found.best.shape.s_to_m is not None:
+        return ""
+    later = [one.shape.s_from_m is not None for one in found.curves]
+    return (
+        f"With a probability of {percent(float(found.shape_weights[later].sum()))} it acts only from"
+        f" s = {found.best.shape.s_from_m:.0f} m on, where recordings begin; else along the whole track."
+    )
 
 
 def _what(decision: Decision) -> str:
@@ -90,12 +100,13 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     strength, probability = document["strength"], document["probability"]
     first, *others = document["mechanisms"]
     sentences = [
-        f"{_what(found.decision)}: {_entry(found.steps[0], first)}, with a probability of"
+        f"{_what(found.decision)}: {_entry(first)}, with a probability of"
         f" {percent(probability[name])} (nothing: {percent(probability[NOTHING])}; a force not in the list:"
         f" {percent(probability[UNLISTED])}).",
         f"Its {strength['parameter'].replace('_', ' ')} is"
         f" {plus_minus(strength['mean'], strength['sd'], strength['unit'])}"
         f"{_in_percent(found, strength['mean'])}.",
+        _begins(found.steps[0]),
         between_sentence(strength),
         _compensated(first["constants"]),
     ]
@@ -105,7 +116,8 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         sentences += [_tied(document), _split(found.steps[0], document)]
     sentences.append(_not_excluded(document))
     for step, second in zip(found.steps[1:], others, strict=True):
-        sentences.append(f"Given that, a second one earned its place: {_entry(step, second)}.")
+        sentences.append(f"Given that, a second one earned its place: {_entry(second)}.")
+        sentences.append(_begins(step))
         sentences.append(_compensated(second["constants"]))
     sentences.append(improvement(document))
     sentences.append(_still_fired(found.steps[-1].check))

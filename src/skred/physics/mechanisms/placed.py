@@ -135,6 +135,8 @@ def _check_shape(added: Added, shape: Shape, setting: Setting) -> None:
                 f"expected a shape that is bound to {added.bound_to}, found one"
                 f" {'' if is_named else 'not '}bound to {bound_to}"
             )
+    if shape.s_to_m is not None and shape.s_from_m is None:
+        raise ValueError("expected a shape that ends somewhere to begin somewhere")
     if shape.sensor is not None and shape.sensor not in setting.sensors:
         raise ValueError(f"no sensor {shape.sensor!r}")
     if shape.covariate is not None and shape.covariate not in setting.covariates:

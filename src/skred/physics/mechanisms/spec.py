@@ -297,11 +297,12 @@ def one_shape(setting: Setting) -> tuple[Shape, ...]:
 def whole_or_recorded(setting: Setting) -> tuple[Shape, ...]:
     """Shapes of a mechanism that acts along the whole track, or from the first recording on.
 
-    Above that recordings tell no more than the speed that fronts come with. What they come through there may
-    be other ground, or no ground at all, as a slope that was made up to give them this speed; and a force in
-    no list is looked for where something was recorded.
+    Above that recordings tell little more than the speed that fronts come with. What they come through there
+    may be other ground, or no ground at all, as a slope that was made up to give them this speed; and a force
+    in no list is looked for where something was recorded. Where no speed was read there is the whole track.
     """
-    return Shape(), Shape(s_from_m=setting.recorded_m[0])
+    recorded = Shape(s_from_m=setting.recorded_m[0])
+    return (Shape(), recorded) if any(setting.velocities) else (Shape(),)
 
 
 def along_the_track(column: Column, profile: Profile) -> Callable[[Setting, Shape], Direction]:

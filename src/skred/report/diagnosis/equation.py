@@ -188,16 +188,24 @@ def held_places(document: doc.Document) -> list[str]:
     sentences = []
     strengths = {doc.get(one, "id"): doc.get(one, "strength") for one in doc.listed(document, "mechanisms")}
     for one in doc.listed(document, "report", "added"):
-        stretch, strength = stretch_in(doc.get(one, "shape")), strengths.get(doc.get(one, "id"))
+        where, strength = _held_at(doc.get(one, "shape")), strengths.get(doc.get(one, "id"))
         mean, sd = (doc.get(strength, key) for key in ("mean", "sd"))
-        if stretch and is_number(mean) and is_number(sd):
+        if where and is_number(mean) and is_number(sd):
             decimals = decimals_for(sd)
             sentences.append(
                 f"{name_text(doc.get(one, 'parameter')).capitalize()} is calibrated at its most probable"
-                f" place, s = {whole(stretch[0])} to {whole(stretch[1])} m. Over all places, and with an"
-                f" uncertain form of the term, it is {rounded(mean, decimals)} ± {rounded(sd, decimals)}."
+                f" place, {where}. Over all places, and with an uncertain form of the term, it is"
+                f" {rounded(mean, decimals)} ± {rounded(sd, decimals)}."
             )
     return sentences
+
+
+def _held_at(shape: doc.Document | None) -> str:
+    """Where a shape acts, if it is not along the whole track."""
+    stretch, begins = stretch_in(shape), doc.get(shape, "s_from_m")
+    if stretch is not None:
+        return f"s = {whole(stretch[0])} to {whole(stretch[1])} m"
+    return f"from s = {whole(begins)} m on" if is_number(begins) else ""
 
 
 def _role(parameter: doc.Document) -> str:

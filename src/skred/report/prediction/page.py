@@ -155,6 +155,8 @@ def _added_terms(document: doc.Document) -> list[str]:
         if row["used"] is True:
             place = row["place_m"]
             where = f" from s = {place[0]:.0f} to {place[1]:.0f} m" if place else ""
+            if row.get("begins_m") is not None and doc.get(document, "track", "is_own"):
+                where = f" from s = {row['begins_m']:.0f} m on"
             told.append(f"{row['title']}{where}")
     return list(dict.fromkeys(told))
 
