@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -172,6 +172,13 @@ class EventLikelihood:
         """The rows, of one group, at each of several strengths, (n_groups, n_directions)."""
         given = np.repeat(strengths, len(self.rows.event), axis=0)
         return EventLikelihood(self.extension, self.rows.repeated(len(strengths)), given)
+
+    def of_groups(self, numbers: IntArray) -> EventLikelihood:
+        """The rows of some of the groups, (n,) increasing numbers, which are numbered anew."""
+        rows = np.flatnonzero(np.isin(self.rows.group, numbers))
+        part = self.take(rows)
+        group = np.searchsorted(numbers, part.rows.group)
+        return replace(part, rows=part.rows._replace(group=group))
 
     def at(self, points: FloatArray) -> FloatArray:
         """Log likelihood of each row at its point, (n_rows, n_base + 1) to (n_rows,)."""

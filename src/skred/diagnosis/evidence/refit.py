@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import batched
 from typing import NamedTuple
 
@@ -163,12 +162,10 @@ def _led_on(
     """
     rows, points = likelihood.rows, [fit.points for fit, _ in found]
     lost = np.unique(rows.group[lost_rows(rows, likelihood.predict(np.concatenate(points)))])
-    best, n_rows = list(found), len(points[0])
+    best = list(found)
     if not len(lost):
         return best
-    part = likelihood.take((n_rows * lost[:, None] + np.arange(n_rows)).ravel())
-    group = np.repeat(np.arange(len(lost)), n_rows)
-    part = replace(part, rows=part.rows._replace(group=group))
+    part = likelihood.of_groups(lost)
     again = _round(part, _asked_for(part, [found[k][0] for k in lost]), budget, reference)
     for k, instead in zip(lost, again, strict=True):
         best[k] = max(best[k], instead, key=lambda one: one[0].found.log_evidence)
