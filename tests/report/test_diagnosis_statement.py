@@ -25,7 +25,7 @@ from skred.diagnosis.verdict.document import verdict
 from skred.diagnosis.verdict.figure_data import figure_data
 from skred.diagnosis.verdict.hangs_on import hangs_on
 from skred.diagnosis.verdict.statement import statement
-from skred.diagnosis.words import percent
+from skred.diagnosis.words import percent, plus_minus
 from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Direction, Setting, Shape
 from skred.physics.mechanisms.stretches import U_1, U_2
@@ -294,6 +294,22 @@ def test_logarithms_of_factors_are_said_in_percent_too(kind: str, direction: Dir
     change = np.expm1(document["strength"]["mean"])
     assert words.format(f"{100.0 * change:.0f} %") in document["statement"]
     assert "it reads" not in verdict(diagnosis("tie"))["statement"]
+
+
+@pytest.mark.parametrize(
+    ("mean", "sd", "unit", "text"),
+    [
+        (2.169, 0.757, "m s-2", "2.17 ± 0.76 m/s²"),
+        (0.0027, 0.00102, "m-1", "0.0027 ± 0.0010 1/m"),
+        (2.6106e-4, 7.93e-5, "m-1", "(2.61 ± 0.79)e-4 1/m"),
+        (-3e-5, 4.96e-5, "m-1", "(-3.0 ± 5.0)e-5 1/m"),
+        (1234.4, 345.0, "m", "1234 ± 345 m"),
+        (0.0999, 0.0996, "1", "0.10 ± 0.10"),
+        (0.3, 0.0, "1", "0.3"),
+    ],
+)
+def test_a_strength_has_two_digits_of_its_deviation(mean: float, sd: float, unit: str, text: str) -> None:
+    assert plus_minus(mean, sd, unit) == text
 
 
 @pytest.mark.parametrize("logarithm", [False, True])

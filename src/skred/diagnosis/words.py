@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from skred.units import unit_text
 
 
@@ -19,10 +21,14 @@ def counted(n: int, one: str) -> str:
 
 def plus_minus(mean: float, sd: float, unit: str) -> str:
     """A number with its standard deviation, two significant digits of it, and its unit."""
-    spread = f"{sd:#.2g}"
-    decimals = len(spread.partition(".")[2])
-    text = f"{mean:.3g} ± {sd:.2g}" if "e" in spread else f"{mean:.{decimals}f} ± {sd:.{decimals}f}"
-    return f"{text} {unit_text(unit)}".rstrip()
+    if not sd > 0.0:
+        return f"{mean:.3g} {unit_text(unit)}".rstrip()
+    exponent = math.floor(math.log10(max(abs(mean), sd)))
+    power = exponent if exponent < 0 and "e" in f"{sd:#.2g}" else 0
+    of_mean, of_sd = mean / 10.0**power, sd / 10.0**power
+    decimals = max(1 - math.floor(math.log10(float(f"{of_sd:.1e}"))), 0)
+    text = f"{of_mean:.{decimals}f} ± {of_sd:.{decimals}f}"
+    return f"{text if power == 0 else f'({text})e{power}'} {unit_text(unit)}".rstrip()
 
 
 def error_text(value: float, unit: str) -> str:
