@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,10 +43,11 @@ def check_figure(document: doc.Document, tree: xr.DataTree) -> Figure | None:
         values = simulated[number][np.isfinite(simulated[number])]
         _histogram(axes, values, float(found["statistic"].values[number]))
         check = checks[number] if number < len(checks) else {}
-        name = figure_text(with_added(document, doc.listed(check, "added")), 44)
+        # Of three laws beside each other, the name of each in lines that fit.
+        name = wrap(figure_text(with_added(document, doc.listed(check, "added")), 80), 27)
         p_value = two_digits(doc.get(check, "p_value"))
-        axes.set_title(f"{name}\np = {p_value}, {len(values)} simulated")
-        axes.set_xlabel("log odds of anything against nothing [nats]")
+        axes.set_title("\n".join([*name, f"p = {p_value}, {len(values)} simulated"]))
+        axes.set_xlabel("log odds of anything\nagainst nothing [nats]")
     panels[0].set_ylabel("clean campaigns")
     legend_below(figure, panels, columns=2)
     return figure
