@@ -74,7 +74,7 @@ def source_sentences(document: dict[str, Any]) -> list[str]:
 
 
 def _from_where(begins_m: float, own_track: bool) -> str:
-    """Where a term acts that the recordings tell from one place of their track on."""
+    """Where a term acts that begins at the first recording of the calibration."""
     if own_track:
         return f"from s = {begins_m:.0f} m on, where the recordings of the calibration begin"
     return (

@@ -150,7 +150,6 @@ def added_rows(terms: Sequence[AddedTerm], track: PredictionTrack) -> list[dict[
     for term in terms:
         why, shape = _left_out(term, track), term.shape
         place = None if shape.s_to_m is None else [shape.s_from_m, shape.s_to_m]
-        begins = shape.s_from_m if place is None else None  # along the track, and from there on
         rows.append(
             {
                 "mechanism": term.mechanism,
@@ -158,7 +157,7 @@ def added_rows(terms: Sequence[AddedTerm], track: PredictionTrack) -> list[dict[
                 "parameter": term.name,
                 "between_events": str(term.between),
                 "place_m": place,
-                "begins_m": begins,
+                "begins_m": shape.begins_m,
                 "used": not why,
                 "why": why,
             }

@@ -78,13 +78,13 @@ def _entry(entry: dict[str, Any]) -> str:
 
 def _begins(step: Step) -> str:
     """How probably what acts along the track begins at the first recording, if that is most probable."""
-    found = step.candidate
-    if found.best.shape.s_from_m is None or found.best.shape.s_to_m is not None:
+    found, begins = step.candidate, step.candidate.best.shape.begins_m
+    if begins is None:
         return ""
-    later = [one.shape.s_from_m is not None for one in found.curves]
+    later = [one.shape.begins_m is not None for one in found.curves]
     return (
         f"With a probability of {percent(float(found.shape_weights[later].sum()))} it acts only from"
-        f" s = {found.best.shape.s_from_m:.0f} m on, where recordings begin; else along the whole track."
+        f" s = {begins:.0f} m on, where recordings begin; else along the whole track."
     )
 
 

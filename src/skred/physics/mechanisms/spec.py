@@ -135,6 +135,11 @@ class Shape:
     prior_weight: float = 1.0
 
     @property
+    def begins_m(self) -> float | None:
+        """From where on it acts along the track [m]; None on a stretch, and along the whole track."""
+        return self.s_from_m if self.s_to_m is None else None
+
+    @property
     def place_m(self) -> float | None:
         """Middle of the stretch."""
         if self.s_from_m is None or self.s_to_m is None:

@@ -64,8 +64,8 @@ def is_opposed(shape: Shape) -> bool:
 
 def equation_of(mechanism: Mechanism, shape: Shape) -> str:
     """A mechanism's term in the equation of motion, with what opposes it and where it begins."""
-    if shape.s_from_m is not None and shape.s_to_m is None:
-        return f"{mechanism.equation} for s > {shape.s_from_m:.0f} m"
+    if shape.begins_m is not None:
+        return f"{mechanism.equation} for s > {shape.begins_m:.0f} m"
     return mechanism.equation.replace("U^2", "(U^2 - U_0^2)", 1) if is_opposed(shape) else mechanism.equation
 
 
