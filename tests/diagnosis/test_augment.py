@@ -35,7 +35,7 @@ def calibration(passed: bool, of: str = "augmented") -> Any:
 def added(monkeypatch: pytest.MonkeyPatch) -> Added:
     """What becomes of an obstacle that a first comparison is sure of.
 
-    The checks' p-values, the second comparison, and which calibrations converge are made up.
+    The checks' p-values, what further comparisons say, and which calibrations converge are made up.
     """
 
     def found(
@@ -43,8 +43,10 @@ def added(monkeypatch: pytest.MonkeyPatch) -> Added:
         second: Any,
         passed: tuple[bool, ...] = (True, True),
         same_errors: bool = True,
+        max_mechanisms: int = 2,
     ) -> Any:
         left, gates = iter(p_values), iter(passed)
+        further = iter(second if isinstance(second, tuple) else (second, second))
 
         def checked(*given: Any) -> Any:
             p_value = next(left)
@@ -53,10 +55,10 @@ def added(monkeypatch: pytest.MonkeyPatch) -> Added:
         monkeypatch.setattr(add, "augmented_problem", lambda *given: None)
         monkeypatch.setattr(add, "calibrate_surely", lambda *given: calibration(next(gates)))
         monkeypatch.setattr(add, "check_again", checked)
-        monkeypatch.setattr(add, "compare", lambda base: second)
+        monkeypatch.setattr(add, "compare", lambda base: next(further))
         monkeypatch.setattr(add, "reference", lambda own, problem: lambda: calibration(same_errors, "base"))
         first = compared(nothing=0.0, unlisted=0.0, obstacle=1.0)
-        run = Run(SamplerSettings(), Effort(), Clock(lambda line: None))
+        run = Run(SamplerSettings(), Effort(max_mechanisms=max_mechanisms), Clock(lambda line: None))
         return add.add_mechanisms(BASE, first, ("obstacle",), calibration(True), run)
 
     return found
@@ -75,6 +77,22 @@ def test_after_an_alarm_the_comparison_has_to_be_sure(added: Added) -> None:
     unsure = compared(nothing=0.3, unlisted=0.0, segment_drag=0.7)
     found = added([0.01], unsure)
     assert len(found.steps) == 1 and found.left.comparison is unsure and not found.left.reason
+
+
+def test_what_would_be_a_third_is_told_and_not_added(added: Added) -> None:
+    sure = compared(nothing=0.005, unlisted=0.0, segment_drag=0.995)
+    found = added([0.01, 0.002], sure)
+    assert len(found.steps) == 2 and found.left.comparison is sure
+    assert found.left.reason == "no more than 2 are added"
+    unsure = compared(nothing=0.3, unlisted=0.0, segment_drag=0.7)
+    found = added([0.01, 0.002], (sure, unsure))
+    assert len(found.steps) == 2 and found.left.comparison is unsure and not found.left.reason
+
+
+def test_who_asks_for_one_mechanism_gets_no_further_comparison(added: Added) -> None:
+    sure = compared(nothing=0.005, unlisted=0.0, segment_drag=0.995)
+    found = added([0.01], sure, max_mechanisms=1)
+    assert len(found.steps) == 1 and found.left is None
 
 
 def test_a_second_comparison_without_a_name_is_kept(added: Added) -> None:

@@ -48,6 +48,16 @@ def test_every_kind_has_a_page_that_needs_nothing_else(kind, tmp_path):
     assert "None" not in page.text and "nan" not in page.text.split()
 
 
+def test_what_is_left_and_not_added_is_on_the_page():
+    document, tree = documents("two")
+    left = {"most_probable": "covariate_friction", "covariate": "heading", "sensor": None}
+    document["left"] = left | {"probability": 0.54, "nothing": 0.001, "reason": "no more than 2 are added"}
+    document["report"]["checks"][-1]["fired"] = True
+    text = " ".join(Page(render_diagnosis(document, tree, {})).text.split())
+    assert "Everything was compared once more, and nothing more was added: no more than 2 are added." in text
+    assert re.search(r"Most probable: [^.;]*\(heading\), 0\.54; nothing more: <0\.01\.", text)
+
+
 @pytest.mark.parametrize(
     ("kind", "names"),
     [

@@ -68,6 +68,8 @@ def test_what_a_last_comparison_leaned_to_is_told() -> None:
     document = verdict(leaning)
     assert document["left"]["most_probable"] == "covariate_friction"
     assert document["left"]["nothing"] == leaning.left.comparison.probability["nothing"]
+    assert document["left"]["covariate"] and document["left"]["sensor"] is None
+    assert f"({document['left']['covariate']}), " in document["statement"]
     assert "leans to friction that goes with a property" in document["statement"]
     assert "it was not added (the gate failed)" in document["statement"]
     nothing = verdict(with_finding(found, left=Left(diagnosis("nothing").comparison)))

@@ -1,6 +1,7 @@
 """Mechanisms added to a law one after the other: the named one, and a second only if it earns its place.
 
-A second one is looked for where the check of the law with the first raises an alarm, by the limit of any.
+More is looked for where the check of the law with what was added raises an alarm, by the limit of any. What
+is found then and cannot be added is told.
 """
 
 from __future__ import annotations
@@ -58,18 +59,21 @@ def add_mechanisms(
         check, again = check_again(under_errors.base, augmented, chosen, run)
         steps.append(Step(candidate, tuple(names[1:]), comparison, augmented, check))
         left, error_model = None, under_errors.error_model
-        if not check.fired or number + 1 == run.effort.max_mechanisms:
+        if not check.fired or run.effort.max_mechanisms == 1:  # one alone is asked for: that saves time
             break
-        run.clock.stage("second comparison", "something may be left: every candidate refitted again")
+        run.clock.stage("compare again", "something may be left: every candidate refitted again")
         comparison = compare(again)
         left = Left(comparison)
-        second = decide(comparison.probability, check.p_value, True)
-        if not second.names:
+        more = decide(comparison.probability, check.p_value, True)
+        if not more.names:
+            break
+        if number + 1 == run.effort.max_mechanisms:
+            left = Left(comparison, f"no more than {number + 1} are added")
             break
         if way is not BetweenEvents.COMMON:
             left = Left(comparison, f"avalanches differ in {names[0]}, beside which no second one is added")
             break
-        names = second.names
+        names = more.names
         run.clock.stage("augment", f"calibrating with {names[0]} as well")
     # The base law under the same errors as the last step: before and after then differ by what was added.
     same_errors = references[error_model]()

@@ -17,7 +17,12 @@ from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.predict.held_out import HeldOut, elpd_difference, errors
 from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.conditional import conditional_document
-from skred.diagnosis.verdict.mechanisms import added_document, candidate_documents, work_documents
+from skred.diagnosis.verdict.mechanisms import (
+    added_document,
+    candidate_documents,
+    candidates_of,
+    work_documents,
+)
 from skred.diagnosis.verdict.next_sensor import detection_sensor, next_sensor
 from skred.diagnosis.verdict.statement import statement
 from skred.inference.calibrate import Calibration
@@ -130,8 +135,11 @@ def _left(left: Left | None) -> dict[str, Any] | None:
         return None
     probability = left.comparison.probability
     first = max(probability, key=lambda name: probability[name])
+    candidate = candidates_of(left.comparison).get(first)  # none where that is nothing, or not in the list
     return {
         "most_probable": first,
+        "covariate": candidate and candidate.best.shape.covariate,
+        "sensor": candidate and candidate.best.shape.sensor,
         "probability": probability[first],
         "nothing": probability[NOTHING],
         "reason": left.reason or None,

@@ -70,10 +70,15 @@ def _where(location: dict[str, float] | None) -> str:
 
 def _entry(entry: dict[str, Any]) -> str:
     """What was added, the sensor or covariate it refers to, and where it acts."""
-    subject, standard = entry["covariate"] or entry["sensor"], entry["standard"]
+    standard = entry["standard"]
     by_logarithm = ", by its logarithm" if standard is not None and standard["logarithm"] else ""
-    about = f" ({subject}{by_logarithm})" if subject else ""
-    return f"{_title(entry['id'])}{about}{_where(entry['location'])}"
+    return f"{_title(entry['id'])}{_about(entry, by_logarithm)}{_where(entry['location'])}"
+
+
+def _about(entry: dict[str, Any], how: str = "") -> str:
+    """The covariate or sensor that something refers to; empty where it refers to none."""
+    subject = entry["covariate"] or entry["sensor"]
+    return f" ({subject}{how})" if subject else ""
 
 
 def _begins(step: Step) -> str:
@@ -186,11 +191,11 @@ def _left(document: dict[str, Any]) -> str:
     left = document["left"]
     if left is None or left["most_probable"] == NOTHING:
         return ""
-    name = left["most_probable"]
+    what = f"{_title(left['most_probable'])}{_about(left)}"
     why = f" ({left['reason']})" if left["reason"] else ""
     return (
-        f"Another comparison, of the augmented law, leans to {_title(name)} ({percent(left['probability'])};"
-        f" nothing more: {percent(left['nothing'])}); it was not added{why}."
+        f"Another comparison, of the augmented law, leans to {what}, {percent(left['probability'])}"
+        f" (nothing more: {percent(left['nothing'])}); it was not added{why}."
     )
 
 
