@@ -258,7 +258,7 @@ def _robust(found: Mapping[str, Found]) -> str:
             continue
         listed = sorted(one.get("candidates", []), key=lambda row: -row["log_bayes_factor"])[:2]
         what = "; ".join(
-            f"`{row['id']}` {row['log_bayes_factor']:.1f} at {_where(row['location']) or 'all'}"
+            f"`{row['id']}` {row['log_bayes_factor']:.1f}, {_where(row['location']) or 'along the track'}"
             for row in listed
         )
         said = one["verdict"] + _named(one) + (f": {one['reason']}" if one.get("reason") else "")
@@ -289,8 +289,7 @@ common, spread, some |
 {chr(10).join(rows)}
 
 The last column: how probably all avalanches have the same strength, differ log-normally, or have it only in
-part. The cases below `pcm` are of code before refits were screened by fronts, with campaigns simulated by
-tangents (p = 0.0083 is one in 121 there); delete their results to have them made again.
+part. *Along the track* is all of it, or from the first recording on.
 
 Log Bayes factor of the best shape with the prior of the coefficient half, once and twice as wide:
 
