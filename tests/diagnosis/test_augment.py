@@ -79,7 +79,7 @@ def test_after_an_alarm_the_comparison_has_to_be_sure(added: Added) -> None:
     assert len(found.steps) == 1 and found.left.comparison is unsure and not found.left.reason
 
 
-def test_what_would_be_a_third_is_told_and_not_added(added: Added) -> None:
+def test_what_would_be_a_third_is_reported_and_not_added(added: Added) -> None:
     sure = compared(nothing=0.005, unlisted=0.0, segment_drag=0.995)
     found = added([0.01, 0.002], sure)
     assert len(found.steps) == 2 and found.left.comparison is sure

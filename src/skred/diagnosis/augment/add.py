@@ -1,7 +1,7 @@
 """Mechanisms added to a law one after the other: the named one, and a second only if it earns its place.
 
 More is looked for where the check of the law with what was added raises an alarm, by the limit of any. What
-is found then and cannot be added is told.
+is found then and cannot be added is reported.
 """
 
 from __future__ import annotations
