@@ -198,12 +198,8 @@ def _better_modes(likelihood: EventLikelihood, population: Population, points: F
     """
     modes = event_modes(likelihood, points, population)
     spread = event_nodes(likelihood, population, modes, FINE)
-    n_rows, _, n = spread.points.shape
-    away = spread.points - np.append(population.mean[0], 0.0)
-    precision = population.precision[0][: n - 1, : n - 1]
-    log_prior = -0.5 * np.einsum("rki,ij,rkj->rk", away[:, :, :-1], precision, away[:, :, :-1])
-    best = (spread.log_weights + log_prior).argmax(axis=1)
-    start = spread.points[np.arange(n_rows), best]
+    best = spread.log_shares(population, likelihood.rows).argmax(axis=1)
+    start = spread.points[np.arange(len(best)), best]
     again = event_modes(likelihood, start, population).points
     heights = [log_joint(likelihood, one, population) for one in (points, again)]
     return np.where((heights[1] > heights[0] + DECIDES_NOTHING)[:, None], again, points)

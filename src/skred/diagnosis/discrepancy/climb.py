@@ -1,7 +1,8 @@
 """Climbs to the maximum of the posterior of a force that is not in the list, under one prior.
 
-Gauss-Newton steps around the events' modes: score and information of the knots' values are efficient ones,
-with what events and population take of them taken out.
+By Gauss-Newton steps. Score and information of the knots' values at the events' modes are efficient ones,
+with what events and population take of them taken out. Where fronts may have stopped or gone on, the evidence
+can rise another way. Its own score is by quadrature: dearer, and noisy where fronts are about to stop.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from skred.diagnosis.discrepancy.explored import Expansion, prior_penalty
 from skred.diagnosis.discrepancy.profile import Kind, combined, knot_by_knot
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, look_around
+from skred.diagnosis.evidence.expected_score import expected_score
+from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.linear_mixed_model import efficient_scores, mean_prior
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 from skred.diagnosis.evidence.tolerance import ARRIVED, MOST_ROUNDS, STEP_SHARES
@@ -37,7 +40,9 @@ def expanded_at(
     return _around(base, kind, at, values, _fit_at(base, kind, at, values, start))
 
 
-def climb(base: Base, kind: Kind, at: FloatArray, start: Expansion, cover: FloatArray) -> Expansion:
+def climb(
+    base: Base, kind: Kind, at: FloatArray, start: Expansion, cover: FloatArray, *, by_modes: bool = True
+) -> Expansion:
     """The maximum of the posterior under one prior.
 
     Parameters
@@ -48,16 +53,21 @@ def climb(base: Base, kind: Kind, at: FloatArray, start: Expansion, cover: Float
         Around the values to begin from.
     cover : (n_free + n_knots, n_free + n_knots) array
         Covariance of the values under the prior.
+    by_modes : bool
+        Whether steps follow the score at the events' modes; else that of the evidence itself.
     """
     maximum = start
     precision = np.linalg.inv(cover)
     for _ in range(MOST_ROUNDS):
-        slope = maximum.score - precision @ maximum.values
-        step = np.linalg.solve(maximum.information + precision, slope)
+        score = maximum.score if by_modes else _score(base, kind, at, maximum)
+        slope, curvature = score - precision @ maximum.values, maximum.information + precision
+        step = np.linalg.solve(curvature, slope)
+        # A few fronts at the edge of stopping can have slopes that hold for no length worth the name.
+        step /= max(float(np.abs(step / np.sqrt(np.diag(cover))).max()), 1.0)
         height = maximum.fit.found.log_evidence - prior_penalty(maximum.values, precision)
-        expected = 0.5 * float(step @ slope)
+        rise, bend = float(step @ slope), float(step @ curvature @ step)
         for share in STEP_SHARES:
-            if share * (2.0 - share) * expected < ARRIVED:
+            if share * rise - 0.5 * share**2 * bend < ARRIVED:
                 return _arrived(maximum, precision)
             values = maximum.values + share * step
             fit = _fit_at(base, kind, at, values, maximum.fit.start)
@@ -81,10 +91,15 @@ def _fit_at(
     base: Base, kind: Kind, at: FloatArray, values: FloatArray, start: tuple[Population, FloatArray]
 ) -> Fit:
     """Population and events with the profile in."""
-    held, free = _held(base, at, values), len(values) - len(at)
+    extension, strengths = _with_profile(base, kind, at, values)
+    return refit(extension, base.rows, strengths[None, :], start, Rounds(least=1))[0]
+
+
+def _with_profile(base: Base, kind: Kind, at: FloatArray, values: FloatArray) -> tuple[Extension, FloatArray]:
+    """The base law with the profile as one direction, and all strengths, (n_directions,)."""
+    free = len(values) - len(at)
     extension = base.extended(combined(base.setting, kind, at, values[free:]))
-    strengths = np.concatenate([held, values[:free], [1.0]])[None, :]
-    return refit(extension, base.rows, strengths, start, Rounds(least=1))[0]
+    return extension, np.concatenate([_held(base, at, values), values[:free], [1.0]])
 
 
 def _held(base: Base, at: FloatArray, values: FloatArray) -> FloatArray:
@@ -94,10 +109,22 @@ def _held(base: Base, at: FloatArray, values: FloatArray) -> FloatArray:
 
 def _around(base: Base, kind: Kind, at: FloatArray, values: FloatArray, fit: Fit) -> Expansion:
     """With efficient score and information of the knots' values at what they are."""
-    wide = knot_by_knot(base, kind, at)
     population, points = fit.start
-    held = _held(base, at, values)
-    around = look_around(EventLikelihood(wide, base.rows, np.concatenate([held, values])), points)
-    found = efficient_scores(around, base.rows, population, mean_prior(base.law))
-    n_before = len(held)
+    by_knots = _by_knots(base, kind, at, values)
+    found = efficient_scores(look_around(by_knots, points), base.rows, population, mean_prior(base.law))
+    n_before = len(_held(base, at, values))
     return Expansion(values, fit, found.score[0, n_before:], found.information[0, n_before:, n_before:])
+
+
+def _score(base: Base, kind: Kind, at: FloatArray, there: Expansion) -> FloatArray:
+    """Slope of the log evidence by the knots' values."""
+    extension, strengths = _with_profile(base, kind, at, there.values)
+    likelihood = EventLikelihood(extension, base.rows, strengths)
+    score = expected_score(likelihood, _by_knots(base, kind, at, there.values), *there.fit.start)
+    return score[len(_held(base, at, there.values)) :]
+
+
+def _by_knots(base: Base, kind: Kind, at: FloatArray, values: FloatArray) -> EventLikelihood:
+    """The events' likelihoods with the value at each knot as a strength."""
+    strengths = np.concatenate([_held(base, at, values), values])
+    return EventLikelihood(knot_by_knot(base, kind, at), base.rows, strengths)

@@ -1,7 +1,7 @@
 """The force that is not in the list, fitted, with its evidence over all of its priors.
 
-Gauss-Newton steps, around the events' modes, lead to the maximum of the posterior under one prior after the
-other; from there on by the Laplace approximation.
+Gauss-Newton steps lead to the maximum of the posterior under one prior after the other; from there on by the
+Laplace approximation.
 """
 
 from __future__ import annotations
@@ -49,10 +49,12 @@ def fit_profile(
     again: Prior | None = None,
     beside: Curve | None = None,
 ) -> Profile:
-    """Fit the profile by Gauss-Newton steps around the events' modes; evidence by quadrature at the maximum.
+    """Fit the profile by Gauss-Newton steps; evidence by quadrature at the maximum.
 
-    One prior is tried after the other, as long as those left could matter. The evidence under the others
-    follows from score and information at the maxima that were found. The most probable prior is kept.
+    Steps follow the score at the events' modes, which is cheap and sees far; under the first prior they go on
+    by the score of the evidence itself. One prior is tried after the other, as long as those left could
+    matter. The evidence under the others follows from score and information at the maxima that were found.
+    The most probable prior is kept.
 
     Parameters
     ----------
@@ -83,7 +85,10 @@ def fit_profile(
     while waiting and len(explored.maxima) < most:
         prior = waiting.pop()
         begin = [*starts, *explored.maxima.values()]
-        explored.add(prior, maximum_under(base, kind, at, begin, covers[prior]))
+        found = maximum_under(base, kind, at, begin, covers[prior])
+        if not explored.maxima:  # all others begin at the best, and so at where this leads
+            found = climb(base, kind, at, found, covers[prior], by_modes=False)
+        explored.add(prior, found)
         waiting = waiting or explored.open
     prior = max(explored.maxima, key=explored.factor)
     fit, there = explored.maxima[prior].fit, explored.approximation(prior)

@@ -97,6 +97,14 @@ class Spread(NamedTuple):
         """Those of some rows, then those of others."""
         return cls(*(np.concatenate(values) for values in zip(*parts, strict=True)))
 
+    def log_shares(self, population: Population, rows: Rows) -> FloatArray:
+        """Log of each point's share of its row's integral over a population, (n_rows, n_nodes)."""
+        centre, over = _over(population, rows, self.points.shape[2] - 1, 1.0)
+        log_prior = _Part(0, centre[:, None, :], over).log_density(self.points[:, :, :-1])
+        log_terms = self.log_weights + log_prior
+        shares: FloatArray = log_terms - np.logaddexp.reduce(log_terms, axis=1, keepdims=True)
+        return shares
+
     @property
     def nodes(self) -> Nodes:
         """As the compiled sums over a population read them."""
