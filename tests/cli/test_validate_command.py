@@ -26,6 +26,7 @@ def test_a_good_campaign():
     assert done.returncode == 0
     assert "22" in done.stdout
     assert "78 observed, 7 not reached, 3 missing" in done.stdout
+    assert "4, one of them the runout" in done.stdout
     assert done.stderr == ""
 
 

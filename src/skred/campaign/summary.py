@@ -17,6 +17,7 @@ def campaign_summary(campaign: Campaign) -> dict[str, Any]:
         "origin": campaign.origin,
         "events": campaign.n_events,
         "sensors": campaign.n_sensors,
+        "runouts": sum(sensor.is_runout for sensor in campaign.sensors),
         "readings": {status.name.lower(): int((campaign.status == status).sum()) for status in Status},
         "released_with_a_speed": sum(bool(event.release_speed_m_s) for event in campaign.events),
         "places_known_to": {
@@ -44,6 +45,12 @@ def _events(summary: dict[str, Any]) -> str:
     return f"{summary['events']}{f', {moving} released with a speed' if moving else ''}"
 
 
+def _sensors(summary: dict[str, Any]) -> str:
+    """How many sensors, what of them is where fronts stopped, and how well places are known."""
+    stops = ", one of them the runout" if summary["runouts"] else ""
+    return "\n".join([f"{summary['sensors']}{stops}", *place_sentences(summary["places_known_to"])])
+
+
 def _smoothing(cost: dict[str, float] | None) -> str | None:
     """What smoothing the terrain changes, where it was looked at."""
     if cost is None:
@@ -67,7 +74,7 @@ def summary_table(summary: dict[str, Any]) -> Table:
     rows = {
         "campaign": f"{summary['name']} ({summary['origin']}): no problems",
         "events": _events(summary),
-        "sensors": "\n".join([str(summary["sensors"]), *place_sentences(summary["places_known_to"])]),
+        "sensors": _sensors(summary),
         "readings": readings,
         "covariates": ", ".join(summary["covariates"]) or "none",
         "track": f"{summary['track_length_m']:.1f} m, {summary['track_points']} points",
