@@ -46,7 +46,7 @@ def _events(summary: dict[str, Any]) -> str:
 
 
 def _sensors(summary: dict[str, Any]) -> str:
-    """How many sensors, what of them is where fronts stopped, and how well places are known."""
+    """How many sensors, whether the runout is one of them, and how well places are known."""
     stops = ", one of them the runout" if summary["runouts"] else ""
     return "\n".join([f"{summary['sensors']}{stops}", *place_sentences(summary["places_known_to"])])
 

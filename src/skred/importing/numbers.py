@@ -9,7 +9,6 @@ from skred.campaign.problems import CampaignError, Problem, shown
 from skred.importing.questions import Question, Unclear, set_option
 from skred.importing.sheet import TABLE, NumberText, Section
 
-THOUSANDS = (".", ",", "'", " ")
 _WITH_SIGN = re.compile(r"(?<![\w.,])\d*([.,])\d+(?![\d.,])")
 _LIKE_THOUSANDS = re.compile(r"[1-9]\d{0,2}[.,]\d{3}")
 _BOTH = {

@@ -2,7 +2,8 @@
 
 By Gauss-Newton steps. Score and information of the knots' values at the events' modes are efficient ones,
 with what events and population take of them taken out. Where fronts may have stopped or gone on, the evidence
-can rise another way. Its own score is by quadrature: dearer, and noisy where fronts are about to stop.
+can rise another way. Its own score is by quadrature: it costs more, and is noisy where fronts are about to
+stop.
 """
 
 from __future__ import annotations
@@ -54,7 +55,8 @@ def climb(
     cover : (n_free + n_knots, n_free + n_knots) array
         Covariance of the values under the prior.
     by_modes : bool
-        Whether steps follow the score at the events' modes; else that of the evidence itself.
+        Whether steps follow the score at the events' modes; else that of the evidence itself, no farther than
+        the prior's standard deviations.
     """
     maximum = start
     precision = np.linalg.inv(cover)
@@ -62,8 +64,8 @@ def climb(
         score = maximum.score if by_modes else _score(base, kind, at, maximum)
         slope, curvature = score - precision @ maximum.values, maximum.information + precision
         step = np.linalg.solve(curvature, slope)
-        # A few fronts at the edge of stopping can have slopes that hold for no length worth the name.
-        step /= max(float(np.abs(step / np.sqrt(np.diag(cover))).max()), 1.0)
+        if not by_modes:  # tangents of fronts that are about to stop hold over very short steps only
+            step /= max(float(np.abs(step / np.sqrt(np.diag(cover))).max()), 1.0)
         height = maximum.fit.found.log_evidence - prior_penalty(maximum.values, precision)
         rise, bend = float(step @ slope), float(step @ curvature @ step)
         for share in STEP_SHARES:
@@ -117,7 +119,7 @@ def _around(base: Base, kind: Kind, at: FloatArray, values: FloatArray, fit: Fit
 
 
 def _score(base: Base, kind: Kind, at: FloatArray, there: Expansion) -> FloatArray:
-    """Slope of the log evidence by the knots' values."""
+    """Score of the log evidence by the values."""
     extension, strengths = _with_profile(base, kind, at, there.values)
     likelihood = EventLikelihood(extension, base.rows, strengths)
     score = expected_score(likelihood, _by_knots(base, kind, at, there.values), *there.fit.start)

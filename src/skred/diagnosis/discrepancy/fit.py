@@ -51,8 +51,8 @@ def fit_profile(
 ) -> Profile:
     """Fit the profile by Gauss-Newton steps; evidence by quadrature at the maximum.
 
-    Steps follow the score at the events' modes, which is cheap and sees far; under the first prior they go on
-    by the score of the evidence itself. One prior is tried after the other, as long as those left could
+    Steps follow the score at the events' modes; under the first prior, that of the start if it has one, they
+    go on by the score of the evidence itself. One prior is tried after the other, as long as those left could
     matter. The evidence under the others follows from score and information at the maxima that were found.
     The most probable prior is kept.
 
@@ -86,7 +86,7 @@ def fit_profile(
         prior = waiting.pop()
         begin = [*starts, *explored.maxima.values()]
         found = maximum_under(base, kind, at, begin, covers[prior])
-        if not explored.maxima:  # all others begin at the best, and so at where this leads
+        if not explored.maxima:  # once, for it costs more: climbs under the other priors may begin there
             found = climb(base, kind, at, found, covers[prior], by_modes=False)
         explored.add(prior, found)
         waiting = waiting or explored.open

@@ -99,9 +99,7 @@ class Spread(NamedTuple):
 
     def log_shares(self, population: Population, rows: Rows) -> FloatArray:
         """Log of each point's share of its row's integral over a population, (n_rows, n_nodes)."""
-        centre, over = _over(population, rows, self.points.shape[2] - 1, 1.0)
-        log_prior = _Part(0, centre[:, None, :], over).log_density(self.points[:, :, :-1])
-        log_terms = self.log_weights + log_prior
+        log_terms = self.log_weights + _log_prior(population, rows, self.points[:, :, :-1])
         shares: FloatArray = log_terms - np.logaddexp.reduce(log_terms, axis=1, keepdims=True)
         return shares
 
@@ -243,8 +241,7 @@ def importance_nodes(
     points, log_l = (np.concatenate([one[k] for one in found], axis=1) for k in range(2))
     log_weights = log_l - _log_proposal(parts, points)
     if budget.adapted:
-        centre, over = _over(population, rows, n, 1.0)
-        log_prior = _Part(0, centre[:, None, :], over).log_density(points[:, :, :n])
+        log_prior = _log_prior(population, rows, points[:, :, :n])
         parts.append(_adapted(points, log_weights + log_prior, cover, budget.adapted))
         more, log_more = spread(parts[-1], len(parts))
         points, log_l = np.concatenate([points, more], axis=1), np.concatenate([log_l, log_more], axis=1)
@@ -357,3 +354,9 @@ def _over(population: Population, rows: Rows, axes: int, wider: float) -> tuple[
     if axes > n:
         factor[:, n, n] = 1.0
     return centre, factor
+
+
+def _log_prior(population: Population, rows: Rows, points: FloatArray) -> FloatArray:
+    """Log density of a population at points of the rows, (n_rows, k, n_base) to (n_rows, k)."""
+    centre, over = _over(population, rows, points.shape[2], 1.0)
+    return _Part(0, centre[:, None, :], over).log_density(points)
