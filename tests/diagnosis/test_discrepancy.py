@@ -10,13 +10,14 @@ from diagnosis_cases import base_of, few_dense_base, recorded
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal, norm
 
+from skred.arrays import FloatArray
 from skred.campaign import find_campaign, read_campaign
 from skred.diagnosis.compare.comparison import ComparisonUnderErrors
 from skred.diagnosis.compare.location import Location, locate
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.detect.score_test import log_factor_of_process
 from skred.diagnosis.discrepancy.climb import climb, expanded_at
-from skred.diagnosis.discrepancy.explored import Expansion, ExploredPriors, laplace
+from skred.diagnosis.discrepancy.explored import Expansion, ExploredPriors, laplace, prior_penalty
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
 from skred.diagnosis.discrepancy.profile import (
     KINDS,
@@ -32,7 +33,8 @@ from skred.diagnosis.discrepancy.profile import (
     spline_basis,
 )
 from skred.diagnosis.evidence.coefficient import Base
-from skred.diagnosis.evidence.conditional_map import EventLikelihood
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, event_modes
+from skred.diagnosis.evidence.event_quadrature import event_nodes
 from skred.diagnosis.evidence.expected_score import expected_score
 from skred.diagnosis.evidence.extension import extended
 from skred.physics.kernel.columns import Column
@@ -227,11 +229,24 @@ def around_nothing(base: Base, kind: Kind) -> Expansion:
     return expanded_at(base, kind, at, np.zeros(len(at)), (base.population, base.fit.points))
 
 
-def test_the_slope_from_no_force_is_that_of_the_evidence() -> None:
+def score_of_nothing(base: Base, kind: Kind) -> FloatArray:
+    """Score of the evidence by the values at the knots, where there is no such force."""
+    nothing = EventLikelihood(base.extended(), base.rows, base.strengths)
+    by_knots = by_knots_of(base, kind, np.zeros(len(knots(base.setting))))
+    return expected_score(nothing, by_knots, base.population, base.fit.points)[len(base.strengths) :]
+
+
+def by_knots_of(base: Base, kind: Kind, values: FloatArray) -> EventLikelihood:
+    """Likelihoods with the value at each knot as a strength, beside what the base has."""
+    strengths = np.append(base.strengths, values)
+    return EventLikelihood(knot_by_knot(base, kind, knots(base.setting)), base.rows, strengths)
+
+
+def test_the_score_of_no_force_is_that_of_the_evidence() -> None:
     """At Ryggfonn without drag: against what a small force everywhere gains.
 
     Where an event has several modes, as where its front may have stopped or gone on, a force moves the weight
-    from one to another, and each mode's own score says nothing of that: it points the other way here.
+    from one to another, and each mode's own score says nothing of that: it is below nil here.
     """
     base, kind = base_of(read_campaign(find_campaign("ryggfonn")), "coulomb", "robust"), KINDS[0]
     none, step, at = around_nothing(base, kind), 0.02 * KINDS[0].amplitude, knots(base.setting)
@@ -239,11 +254,58 @@ def test_the_slope_from_no_force_is_that_of_the_evidence() -> None:
         expanded_at(base, kind, at, np.full(len(at), sign * step), none.fit.start).fit.found.log_evidence
         for sign in (-1.0, 1.0)
     ]
-    nothing = EventLikelihood(base.extended(), base.rows, base.strengths)
-    by_knots = EventLikelihood(knot_by_knot(base, kind, at), base.rows, np.zeros(len(at)))
-    score = expected_score(nothing, by_knots, *none.fit.start)
+    score = score_of_nothing(replace(base, fit=none.fit), kind)
     assert score.sum() == pytest.approx((heights[1] - heights[0]) / (2.0 * step), rel=0.3)
-    assert none.score.sum() < 0.0 < score.sum()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_score_is_the_derivative_of_the_quadrature(
+    base: Base, kind: Kind, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Knot by knot, beside a mechanism that is held; in parts as at once.
+
+    What is left out far behind the best point of an event is a hundredth or so.
+    """
+    drag = placed(mechanisms()["segment_drag"], base.setting, Shape(700.0, 900.0)).direction
+    held = replace(base, directions=(drag,), strengths=np.array([5e-4]))
+    score = score_of_nothing(held, kind)
+    likelihood = EventLikelihood(held.extended(), held.rows, held.strengths)
+    modes = event_modes(likelihood, held.fit.points, held.population, n_steps=6)
+    spread = event_nodes(likelihood, held.population, modes)
+    shares, n = spread.log_shares(held.population, held.rows), len(knots(held.setting))
+    assert_allclose(np.logaddexp.reduce(shares, axis=1), 0.0, atol=1e-9)
+
+    def log_likelihoods(values: FloatArray) -> FloatArray:
+        rows = np.repeat(np.arange(len(shares)), shares.shape[1])
+        points = spread.points.reshape(len(rows), -1)
+        return by_knots_of(held, kind, values).take(rows).at(points).reshape(shares.shape)
+
+    steps, nothing = 1e-3 * kind.amplitude * np.eye(n), log_likelihoods(np.zeros(n))
+    ahead, behind = (
+        [np.logaddexp.reduce(shares + log_likelihoods(sign * one) - nothing, axis=1).sum() for one in steps]
+        for sign in (1.0, -1.0)
+    )
+    expected = (np.array(ahead) - behind) / (2e-3 * kind.amplitude)
+    assert_allclose(score, expected, atol=0.03 * np.abs(expected).max())
+    monkeypatch.setattr("skred.diagnosis.evidence.expected_score.MOST_NODES", 1)
+    assert_allclose(score_of_nothing(held, kind), score, rtol=1e-9, atol=1e-9 * np.abs(score).max())
+
+
+def test_a_climb_begins_anywhere_and_goes_on_by_the_score_of_the_evidence() -> None:
+    """Under a prior that is local, at the maximum under one that acts everywhere: far outside its window."""
+    base, kind = base_of(read_campaign(find_campaign("ryggfonn")), "coulomb", "robust"), KINDS[0]
+    at, none = knots(base.setting), around_nothing(base, kind)
+    everywhere, local = (Prior(3.0 * kind.amplitude, *rest).cover(at) for rest in ((40.0,), (40.0, at[5])))
+
+    def height(one: Expansion, cover: FloatArray) -> float:
+        return one.fit.found.log_evidence - prior_penalty(one.values, np.linalg.inv(cover))
+
+    first = climb(base, kind, at, none, everywhere)
+    further = climb(base, kind, at, first, everywhere, by_modes=False)
+    assert height(further, everywhere) > height(first, everywhere) + 10.0
+    there = climb(base, kind, at, further, local)
+    outside = np.abs(at - at[5]) > 480.0
+    assert np.all(np.abs(further.values[outside]).max() > 100.0 * np.abs(there.values[outside]))
 
 
 def test_evidence_under_a_prior_from_the_peak_under_another(base: Base) -> None:

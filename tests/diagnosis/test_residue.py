@@ -22,7 +22,6 @@ from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_evidence_of
 from skred.diagnosis.discrepancy.sampled_evidence import sampled
 from skred.diagnosis.evidence.coefficient import Base, curve_at, curve_near
-from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Shape
@@ -48,7 +47,8 @@ def test_waves_in_closed_form() -> None:
     assert speed(740.0, 20.0, 0.006, 2.4e-4, 0.05) == pytest.approx(np.sqrt(v), rel=1e-4)
 
 
-def test_a_force_that_takes_both_effects_is_not_far_behind_the_first_and_a_force_beside_it() -> None:
+def test_a_force_that_takes_both_effects_is_behind_the_first_and_a_force_beside_it() -> None:
+    """By four or five nats: so it is, too, by forces sampled beside drags that are held, see below."""
     base, drag, profiles = fitted(rolling(2.4e-4, waves=0.05))
     force = log_evidence_of(profiles)
     assert drag.alone > 10.0 and force > drag.alone + 2.0
@@ -57,7 +57,7 @@ def test_a_force_that_takes_both_effects_is_not_far_behind_the_first_and_a_force
     assert found.residue is not None and 0.0 < found.residue < drag.alone
     assert found.alone == drag.alone
     assert found.log_bayes_factor == pytest.approx(drag.alone + log_gain(found.residue))
-    assert force < found.log_bayes_factor < force + COUNTS and force > drag.alone + 30.0
+    assert found.log_bayes_factor == pytest.approx(force + 4.5, abs=2.0) and force > drag.alone + 30.0
 
 
 @pytest.mark.slow
