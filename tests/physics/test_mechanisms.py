@@ -17,7 +17,7 @@ from skred.diagnosis.discrepancy.profile import KINDS
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
 from skred.physics.geometry import contributions_of, path_of
-from skred.physics.kernel.columns import Column
+from skred.physics.kernel.columns import GRAVITY, Column
 from skred.physics.kernel.fronts import front_speeds
 from skred.physics.kernel.inputs import make_contributions
 from skred.physics.law import Law
@@ -26,6 +26,7 @@ from skred.physics.mechanisms import Mechanism, mechanisms
 from skred.physics.mechanisms.coulomb_friction import WITHOUT_CURVATURE
 from skred.physics.mechanisms.entrainment import GROWTH
 from skred.physics.mechanisms.library import NOT_MECHANISMS
+from skred.physics.mechanisms.obstacle import LOSS, TAKEN
 from skred.physics.mechanisms.placed import shapes_of
 from skred.physics.mechanisms.spec import Added, BoundTo, Direction, Group, Setting, Shape
 from skred.physics.mechanisms.stretches import OPPOSED_SHARE, U_1, ends_of, equation_of, is_opposed, shares
@@ -247,6 +248,32 @@ def test_entrainment_of_a_limited_supply(settings: list[Setting]) -> None:
         )
         parts = added.split(setting, shape, 1.0)
         assert parts and all(part.constants == shape.constants for part in parts)
+
+
+def test_what_passing_an_obstacle_costs(settings: list[Setting]) -> None:
+    """v < 2 g h at the crown stops; one that passes loses a share of v, or the same v as all others."""
+    setting, added = settings[1], added_to(ALL["obstacle"])
+    edge, b, h, loss = setting.terrain.edge_s_m, np.array([0.2, 0.5, 1.0]), 6.0, 0.025
+    shapes = added.shapes(setting)
+    ways = {name: [one for one in shapes if name in dict(one.constants)] for name in (LOSS, TAKEN)}
+    assert len(ways[LOSS]) == 2 * len(ways[TAKEN]) > 0
+    for shape in some(ways[TAKEN], 6):
+        first, last = ends_of(shape)
+        v, kept = (
+            with_added(setting, added.direction(setting, shape), b, size) ** 2
+            for size in np.array([[0.0] * 3, [h] * 3])
+        )
+        crown = edge >= 0.5 * (first + last) + np.diff(edge).max()
+        np.testing.assert_allclose(kept[:, crown], v[:, crown] - 2.0 * GRAVITY * h, rtol=1e-9)
+        too_high = 1.01 * v[:, crown][:, 0] / (2.0 * GRAVITY)
+        stopped = with_added(setting, added.direction(setting, shape), b, too_high)
+        assert np.all(stopped[:, edge >= last] == 0.0)
+        other = replace(shape, constants=((LOSS, loss),))
+        below = np.searchsorted(edge, last + np.diff(edge).max())
+        drop = (v - with_added(setting, added.direction(setting, other), b, np.full(3, h)) ** 2)[:, below]
+        share, at_foot = 1.0 - np.exp(-loss * h), v[:, np.searchsorted(edge, first)]
+        assert np.all(drop < share * np.maximum(at_foot, v[:, below]))
+        assert np.all(drop > share * (np.minimum(at_foot, v[:, below]) - 2.0 * GRAVITY * h))
 
 
 @pytest.mark.parametrize("name", ["segment_drag", "entrainment"])

@@ -83,6 +83,7 @@ def test_energy_under_constant_retardation(family: str) -> None:
 TERMS = {
     "none": np.zeros((0, 12)),
     "dam": force_row(Kind.DAM, 800.0, 12.0, 9.0, 0.3, 6.0)[None, :] * np.array([1, 4.0] + [1.0] * 10),
+    "taking": force_row(Kind.DAM, 800.0, 12.0, 9.0, 0.0, 6.0, 0.7)[None, :] * np.array([1, 4.0] + [1.0] * 10),
     "forest": force_row(Kind.STRETCH_DRAG, 600.0, 800.0, 20.0, 1.8, 1.0)[None, :]
     * np.array([1, 2e-3] + [1.0] * 10),
     "two": np.array(
@@ -153,6 +154,25 @@ def test_a_dam_stops_what_is_slower_than_its_height() -> None:
     v, lost = before[passed] ** 2, before[passed] ** 2 - after[passed] ** 2
     assert np.all(lost < (1.0 - kept) * v)
     assert np.all(lost > 0.8 * (1.0 - kept) * (v - 2.0 * GRAVITY * height))
+
+
+def test_a_dam_takes_its_share_of_the_climb() -> None:
+    """On level ground without friction: v < 2 g h stops, and v of all that passes drops by as much."""
+    height, place, taken = 5.0, 900.0, 0.6
+    row = force_row(Kind.DAM, place, 12.0, 9.0, 0.0, 6.0, taken)
+    row[1] = height
+    slope = np.radians(np.where(np.arange(601) * GRID_M < 300.0, 30.0, 0.0))
+    ground = make_ground(slope, np.zeros(601), "ramp", 20.0, 0.0)
+    releases = np.linspace(280.0, 297.0, 15)
+    found = read(
+        ground, "constant", np.zeros((15, 1)), releases, points(500.0, 1500.0), np.tile(row, (15, 1, 1))
+    )
+    before, after, runout = found.values.T
+    assert np.all(runout[before**2 < 2.0 * GRAVITY * height] < place)
+    passed = runout > place
+    assert passed.any() and not passed.all()
+    lost = before[passed] ** 2 - after[passed] ** 2
+    np.testing.assert_allclose(lost, 2.0 * taken * GRAVITY * height, rtol=0.01)
 
 
 def test_a_front_that_cannot_start_stays() -> None:

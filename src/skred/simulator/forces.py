@@ -32,7 +32,7 @@ class Kind(IntEnum):
     WEAKENING = 5
     """Friction that falls with speed [scale m/s, exponent]."""
     DAM = 6
-    """Soft hill; strength is its height m [place, width above and below m, loss, its height m]."""
+    """Soft hill of a height in m [place, width above and below m, loss, its height m, share taken]."""
     STRETCH_DRAG = 7
     """Drag on a stretch [from m, to m, edge m, exponent, phase, opposition]."""
     STRETCH_FRICTION = 8
@@ -70,12 +70,14 @@ def _log_cosh(x):  # type: ignore[no-untyped-def]
 
 @compiled
 def _dam(p, s, u):  # type: ignore[no-untyped-def]
-    """Climb and descent of a soft hill, and a loss on it in proportion to U^2."""
+    """Climb of a soft hill, descent with what of it is given back, and a loss on it in proportion to U^2."""
     height, d = p[1], s - p[2]
     width = p[3] if d < 0.0 else p[4]
     slope = np.tanh(d / width)
     bump = 1.0 - slope * slope
     loss = p[5] * np.tanh(height / p[6])
+    if d > 0.0:
+        slope *= 1.0 - p[7]
     return 2.0 * GRAVITY * height * slope * bump / width - loss * bump / (p[3] + p[4]) * u * u
 
 

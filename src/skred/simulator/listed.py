@@ -77,8 +77,16 @@ def _obstacle(rng: np.random.Generator, scene: Scene) -> Effect:
     dense = len(scene.setting.sensors.s_from_m) > 10
     place = scene.place(float(rng.uniform(0.4 if dense else 0.6, 0.97)))
     above, below, loss = (float(rng.uniform(*r)) for r in ((10, 18), (7, 14), (0.1, 0.4)))
-    row = force_row(Kind.DAM, place, above, below, loss, 6.0)
-    details = {"width_above_m": above, "width_below_m": below, "loss_exponent": 2.0 * loss}
+    taken = 0.0
+    if rng.random() < 0.5:  # what passes loses an energy, the same for all, instead of a share of v
+        loss, taken = 0.0, float(rng.uniform())
+    row = force_row(Kind.DAM, place, above, below, loss, 6.0, taken)
+    details = {
+        "width_above_m": above,
+        "width_below_m": below,
+        "loss_exponent": 2.0 * loss,
+        "share_taken": taken,
+    }
     around = (place - above, place + below)
     return Effect("obstacle", "height", "m", 0.7, 25.0, even(scene), row=row, place_m=around, details=details)
 

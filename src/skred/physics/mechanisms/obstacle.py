@@ -18,8 +18,10 @@ from skred.physics.mechanisms.spec import (
 HALF_WIDTH_M = 25.0
 """Length of the climb and of the descent [m]."""
 LOSS = "loss [m-1]"
-LOSSES_PER_M = (0.006, 0.025)
-"""Energy lost for good in passing, as the exponent of v per metre of height."""
+TAKEN = "J/gh [1]"
+COSTS = ((LOSS, 0.006), (LOSS, 0.025), (TAKEN, 1.0))
+"""What passing costs for good: a share of v, as its exponent per metre of height; or from every front the
+same J, as a share of what the climb takes."""
 _STEP_M = 40.0
 
 
@@ -27,9 +29,9 @@ def _shapes(setting: Setting) -> tuple[Shape, ...]:
     first, last = setting.recorded_m
     n = max(int(np.ceil((last - first) / _STEP_M)), 1)
     return tuple(
-        Shape(float(place - HALF_WIDTH_M), float(place + HALF_WIDTH_M), constants=((LOSS, loss),))
+        Shape(float(place - HALF_WIDTH_M), float(place + HALF_WIDTH_M), constants=(cost,))
         for place in np.linspace(first, last, n + 1)
-        for loss in LOSSES_PER_M
+        for cost in COSTS
         if HALF_WIDTH_M < place < setting.terrain.length_m - HALF_WIDTH_M
     )
 
@@ -48,8 +50,11 @@ def _direction(setting: Setting, shape: Shape) -> Direction:
     assert crown is not None
     climb = setting.terrain.share_between(crown - HALF_WIDTH_M, crown)
     descent = setting.terrain.share_between(crown, crown + HALF_WIDTH_M)
-    slope = GRAVITY / HALF_WIDTH_M
-    loss = dict(shape.constants)[LOSS] / (4.0 * HALF_WIDTH_M)
+    slope, cost = GRAVITY / HALF_WIDTH_M, dict(shape.constants)
+    if TAKEN in cost:
+        profile = slope * (climb - (1.0 - cost[TAKEN]) * descent)
+        return Direction((Column.CONSTANT,), profile[None, :])
+    loss = cost[LOSS] / (4.0 * HALF_WIDTH_M)
     profiles = np.array([slope * (climb - descent), loss * (climb + descent)])
     return Direction((Column.CONSTANT, Column.QUADRATIC), profiles)
 
@@ -64,8 +69,8 @@ MECHANISM = Mechanism(
         prior_scale=8.0,
         prior_reason="dams and steps that matter to a front of 20-40 m/s are metres to tens of metres high",
     ),
-    equation="-(g h / w) [climb - descent] - (l h / 4 w) U^2 around s_o: v < 2 g h stops",
-    signature="stops pile up in front of it; above a threshold of speed fronts pass and lose a share of v",
+    equation="-(g h / w) [climb - descent] - (l h / 4 w) U^2 around s_o, or -(J / w) climb: v < 2 g h stops",
+    signature="stops pile up in front of it; faster fronts pass and lose a share of v, or the same J each",
     reference="Faug, Gauer, Lied and Naaim (2008), Journal of Geophysical Research 113, F03009",
     doi="10.1029/2007JF000854",
     added=Added(
