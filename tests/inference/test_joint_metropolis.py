@@ -98,6 +98,41 @@ def test_half_normal_at_its_boundary(sigma: float) -> None:
         assert abs(np.quantile(draws, probability) - exact * sigma) < 5 * error + 1e-4 * sigma
 
 
+def taken_over() -> pm.Model:
+    """Two positive variables of which the sum is known: on logarithms the posterior is a hook."""
+    with pm.Model() as model:
+        left, added = pm.HalfNormal("left", 1.0), pm.HalfNormal("added", 1.0)
+        pm.Normal("recordings", pt.stack([left + added]), 0.002, observed=[0.4])
+    return model
+
+
+def test_what_takes_over_in_a_straight_line() -> None:
+    """`left` given the sum is truncated normal: nearly even from 0 to 0.4; terms are those of the model."""
+    model = taken_over()
+    step = JointMetropolis(model=model, pointwise="recordings", straight=("left", "added", "unknown"))
+    tree = sample(model, step, draws=4000, tune=1000)
+    left = tree["posterior"]["left"].values
+    exact = np.exp(-0.5 * np.linspace(0.0, 0.4, 401) ** 2 - 0.5 * (0.4 - np.linspace(0.0, 0.4, 401)) ** 2)
+    within = np.cumsum(exact) / exact.sum()
+    size = float(az.ess(left))
+    assert size > 1000
+    for probability in (0.1, 0.5, 0.9):
+        quantile = np.interp(probability, within, np.linspace(0.0, 0.4, 401))
+        assert abs(np.mean(left < quantile) - probability) < 4.0 * np.sqrt(0.25 / size) + 0.005
+    on_logarithms = sample(model, JointMetropolis(model=model), draws=4000, tune=1000)
+    assert float(az.ess(on_logarithms["posterior"]["left"].values)) < 0.5 * size
+
+    # `adapt` and `run` take and give PyMC's values, logarithms.
+    q, rng = np.log([0.2, 0.2]), np.random.default_rng(0)
+    step.adapt(q, 500, rng)
+    draws, terms = step.run(q, 200, rng)
+    assert_allclose(q, draws[-1])
+    sums = np.exp(draws).sum(axis=1, keepdims=True)
+    assert_allclose(
+        terms, -0.5 * ((0.4 - sums) / 0.002) ** 2 - np.log(0.002) - 0.5 * np.log(2 * np.pi), rtol=1e-9
+    )
+
+
 def test_weight_zero_removes_an_event_exactly(readings_step: JointMetropolis) -> None:
     """The same random numbers make the same chain as the model without that event."""
     without = JointMetropolis(model=mean_of_readings(READINGS[[0, 2]]), pointwise="recordings")

@@ -58,7 +58,7 @@ class Calibration:
     @cached_property
     def step(self) -> JointMetropolis:
         """The sampler's step, compiled for the model; every event's term can be weighted."""
-        return JointMetropolis(model=self.model, pointwise="recordings")
+        return _step(self.model, self.problem, self.law)
 
     @cached_property
     def whole_tree(self) -> xr.DataTree:
@@ -84,13 +84,17 @@ class Calibration:
         }
 
 
+def _step(model: pm.Model, problem: Problem, law: Law) -> JointMetropolis:
+    return JointMetropolis(model=model, pointwise="recordings", straight=problem.moved_straight(law))
+
+
 def calibrate(
     problem: Problem, law: Law, settings: SamplerSettings, *, progress: bool = False
 ) -> Calibration:
     """Sample the posterior of a law and check its convergence."""
     model = law.build(problem)
     prior = sample_prior(model, law, settings.seed)
-    step = JointMetropolis(model=model, pointwise="recordings")
+    step = _step(model, problem, law)
     posterior = sample_posterior(model, law, problem, prior, settings, step=step, progress=progress)
     gate = check_gate(posterior, [parameter.name for parameter in problem.parameters(law)])
     gate = gate.with_numerical_problems(problem.numerical_problems(law, posterior["posterior"].to_dataset()))

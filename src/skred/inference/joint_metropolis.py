@@ -11,7 +11,7 @@ ends with tuning; the draws come from a fixed kernel.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from functools import cache
 from typing import Any
 
@@ -20,10 +20,12 @@ import pymc as pm
 import pytensor.tensor as pt
 from numba import typeof, types
 from pymc.blocking import RaveledVars
+from pymc.logprob.transforms import LogTransform
 from pymc.pytensorf import compile as compile_pytensor
 from pymc.pytensorf import join_nonshared_inputs
 from pymc.step_methods.metropolis import MetropolisState
 from pymc.step_methods.state import dataclass_state
+from pytensor.graph.replace import graph_replace
 
 from skred.arrays import FloatArray
 from skred.parallel.compile_cache import compiled, inner
@@ -143,6 +145,12 @@ def _chain_for(density: types.FunctionType, data: types.BaseTuple) -> Callable[.
     return chain
 
 
+def _is_moved_itself(model: pm.Model, value: Any, straight: Collection[str]) -> bool:
+    """Whether a value that PyMC has as a logarithm is to be moved itself."""
+    variable = model.values_to_rvs[value]
+    return variable.name in straight and isinstance(model.rvs_to_transforms[variable], LogTransform)
+
+
 class _WithoutDensity:
     """A model for PyMC's own step, without a density: PyMC would compile one that is not used here."""
 
@@ -181,6 +189,9 @@ class JointMetropolis(pm.Metropolis):
         Metropolis moves between two draws; every second one is a jump.
     pointwise : str, optional
         Observed variable whose terms `run` can weigh one by one, as exact leave-one-out needs.
+    straight : collection of str
+        Positive variables that proposals move themselves, not their logarithms: where one takes over from
+        another in a straight line, the logarithm of what is left of it falls without bound.
     model, rng, initial_point :
         As in `pymc.Metropolis`.
 
@@ -200,6 +211,7 @@ class JointMetropolis(pm.Metropolis):
         *,
         moves_per_draw: int = MOVES_PER_DRAW,
         pointwise: str | None = None,
+        straight: Collection[str] = (),
         model: pm.Model | None = None,
         rng: Any = None,
         initial_point: dict[str, Any] | None = None,
@@ -213,19 +225,19 @@ class JointMetropolis(pm.Metropolis):
             raise ValueError("JointMetropolis samples continuous variables only")
         self.elemwise_update = False
         self.moves_per_draw = moves_per_draw
-        self._density, self._data = self._compile_density(model, initial_point, pointwise)
-        size = sum(int(np.prod(initial_point[v.name].shape)) for v in self.vars)
+        moved = [_is_moved_itself(model, v, straight) for v in self.vars]
+        self._density, self._data = self._compile_density(model, initial_point, pointwise, moved)
+        self._moved = np.repeat(moved, [initial_point[v.name].size for v in self.vars])
         data = self._data_values()
-        self.n_terms = len(self._density(np.zeros(size), *data)[1])
+        self.n_terms = len(self._density(np.ones(len(self._moved)), *data)[1])
         [signature] = self._density.nopython_signatures
         self._chain = _chain_for(types.FunctionType(signature), typeof(data))
-        self._start = 0.1 * np.eye(size)
         self.reset_tuning()
 
     def _compile_density(
-        self, model: pm.Model, point: dict[str, Any], pointwise: str | None
+        self, model: pm.Model, point: dict[str, Any], pointwise: str | None, moved: Sequence[bool]
     ) -> tuple[Any, list[Any]]:
-        """(log density without the pointwise terms, those terms) of the raveled variables, in numba.
+        """(log density without the pointwise terms, those terms) of the raveled coordinates, in numba.
 
         And the containers of its further arguments: variables that another step samples, and data
         that may be set anew (`pymc.Data`).
@@ -235,8 +247,16 @@ class JointMetropolis(pm.Metropolis):
         rest = model.logp(vars=[*others, *model.potentials])
         terms = model.logp(vars=observed, sum=False)[0].ravel() if pointwise else pt.zeros(0)
         elsewhere = {v: self.shared[v.name] for v in model.value_vars if v.name in self.shared}
+        itself = {v: v.clone() for v, is_moved in zip(self.vars, moved, strict=True) if is_moved}
+        if itself:
+            logarithms = {v: pt.log(x) for v, x in itself.items()}
+            rest, terms = graph_replace([rest, terms], logarithms)
+            rest = rest - sum(x.sum() for x in logarithms.values())  # a density of the variables themselves
         outputs, raveled = join_nonshared_inputs(
-            point=point, outputs=[rest, terms], inputs=self.vars, shared_inputs=elsewhere
+            point=point,
+            outputs=[rest, terms],
+            inputs=[itself.get(v, v) for v in self.vars],
+            shared_inputs=elsewhere,
         )
         function = compile_pytensor([raveled], outputs, mode="NUMBA")
         return function.vm.jit_fn, function.input_storage[1:]
@@ -248,24 +268,37 @@ class JointMetropolis(pm.Metropolis):
     def reset_tuning(self) -> None:
         """Reset the adaptation."""
         super().reset_tuning()
-        if hasattr(self, "_start"):
-            self.mean, self.covariance = np.zeros(len(self._start)), self._start.copy()
+        if hasattr(self, "_moved"):
+            self.mean = np.zeros(len(self._moved))
             self.adaptations, self.log_scale = 0, 0.0
-            self.factor = np.linalg.cholesky(self.covariance)
+            self._begin_around(np.ones(len(self._moved)))
             self._forget_block()
+
+    def _begin_around(self, moved: FloatArray) -> None:
+        """Steps to begin with: a third, of variables that are moved themselves a third of their size."""
+        self.covariance = 0.1 * np.diag(np.where(self._moved, moved, 1.0) ** 2)
+        self.factor = np.linalg.cholesky(self.covariance)
 
     def _forget_block(self) -> None:
         """Drop draws that were made in advance."""
-        self._block, self._used = np.empty((0, len(self._start))), 0
+        self._block, self._used = np.empty((0, len(self._moved))), 0
         self._stood, self._stats = np.empty(0), {"accept": 0.0, "accepted": 0.0}
+
+    def _coordinates(self, q: FloatArray) -> FloatArray:
+        """What proposals move, from raveled values of the variables; a copy."""
+        return np.asarray(np.exp(q, out=np.array(q, dtype=float), where=self._moved))
+
+    def _values(self, moved: FloatArray) -> FloatArray:
+        """Raveled values of the variables, from what proposals move; a copy."""
+        return np.asarray(np.log(moved, out=np.array(moved), where=self._moved))
 
     def astep(self, q0: RaveledVars) -> tuple[RaveledVars, list[dict[str, float]]]:
         """One draw: some moves and, while tuning, one step of adaptation."""
         q = np.array(q0.data, dtype=float)
         if self.tune:
-            _, _, accepted, acceptance = self._run(q, 1, self.rng, with_terms=False)
-            self._adapt(q, acceptance)
-            self._stats = {"accept": acceptance, "accepted": accepted}
+            moved = self._coordinates(q)
+            self._stats = self._tuned(moved, self.rng)
+            q = self._values(moved)
         else:
             q = self._next_of_block(q)
         stats = {"scaling": float(np.exp(self.log_scale)), **self._stats}
@@ -274,7 +307,9 @@ class JointMetropolis(pm.Metropolis):
     def _next_of_block(self, q: FloatArray) -> FloatArray:
         """The draw after q, from the present block of draws, or from a new block if q was changed."""
         if self._used >= len(self._block) or not np.array_equal(q, self._stood):
-            self._block, _, accepted, acceptance = self._run(q, _BLOCK, self.rng, with_terms=False)
+            moved = self._coordinates(q)
+            draws, _, accepted, acceptance = self._run(moved, _BLOCK, self.rng, with_terms=False)
+            self._block = self._values(draws)
             self._stats = {"accept": acceptance, "accepted": accepted}
             self._used = 0
         self._stood = self._block[self._used]
@@ -284,9 +319,10 @@ class JointMetropolis(pm.Metropolis):
     def adapt(self, q: FloatArray, n_draws: int, rng: np.random.Generator) -> None:
         """Forget, then adapt over `n_draws` draws from `q`, which is changed in place."""
         self.reset_tuning()
+        moved = self._coordinates(q)
         for _ in range(n_draws):
-            acceptance = self._run(q, 1, rng, with_terms=False)[-1]
-            self._adapt(q, acceptance)
+            self._tuned(moved, rng)
+        q[:] = self._values(moved)
 
     def run(
         self, q: FloatArray, n_draws: int, rng: np.random.Generator, weights: FloatArray | None = None
@@ -308,7 +344,10 @@ class JointMetropolis(pm.Metropolis):
         terms : (n_draws, n_terms) array
             The pointwise log densities, unweighted.
         """
-        return self._run(q, n_draws, rng, with_terms=True, weights=weights)[:2]
+        moved = self._coordinates(q)
+        draws, terms, _, _ = self._run(moved, n_draws, rng, with_terms=True, weights=weights)
+        q[:] = self._values(moved)
+        return self._values(draws), terms
 
     def _run(
         self,
@@ -340,6 +379,14 @@ class JointMetropolis(pm.Metropolis):
             terms,
         )
         return draws, terms, accepted, acceptance
+
+    def _tuned(self, moved: FloatArray, rng: np.random.Generator) -> dict[str, float]:
+        """One draw and one step of adaptation; statistics of the draw."""
+        if not self.adaptations:
+            self._begin_around(moved)
+        _, _, accepted, acceptance = self._run(moved, 1, rng, with_terms=False)
+        self._adapt(moved, acceptance)
+        return {"accept": acceptance, "accepted": accepted}
 
     def _adapt(self, q: FloatArray, acceptance: float) -> None:
         """Recursive covariance, and Robbins-Monro on the scale."""

@@ -71,6 +71,10 @@ class Problem(ABC):
         """The same problem with finer numerics around a posterior; None if they cannot be refined."""
         return None
 
+    def moved_straight(self, law: Law) -> tuple[str, ...]:
+        """Names of parameters that Metropolis moves themselves, not their logarithms; here none."""
+        return ()
+
     def to_start_from(self, law: Law, prior: dict[str, FloatArray], seed: int) -> dict[str, FloatArray]:
         """Parameter vectors from which chains choose their starts; here the draws of the prior."""
         return prior

@@ -171,6 +171,10 @@ class AugmentedProblem(HierarchicalProblem):
         parts: FloatArray = np.exp(log_parts - np.logaddexp.reduce(log_parts, axis=1, keepdims=True))
         return np.moveaxis(parts, 1, 2)
 
+    def moved_straight(self, law: Law) -> tuple[str, ...]:
+        """The base law's coefficients: what is added takes over from them in a straight line."""
+        return tuple(parameter.name for parameter in law.parameters)
+
     def to_start_from(self, law: Law, prior: dict[str, FloatArray], seed: int) -> dict[str, FloatArray]:
         """Parameter vectors from around the posterior, wider.
 
