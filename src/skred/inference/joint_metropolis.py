@@ -252,11 +252,9 @@ class JointMetropolis(pm.Metropolis):
             logarithms = {v: pt.log(x) for v, x in itself.items()}
             rest, terms = graph_replace([rest, terms], logarithms)
             rest = rest - sum(x.sum() for x in logarithms.values())  # a density of the variables themselves
+        inputs = [itself.get(v, v) for v in self.vars]
         outputs, raveled = join_nonshared_inputs(
-            point=point,
-            outputs=[rest, terms],
-            inputs=[itself.get(v, v) for v in self.vars],
-            shared_inputs=elsewhere,
+            point=point, outputs=[rest, terms], inputs=inputs, shared_inputs=elsewhere
         )
         function = compile_pytensor([raveled], outputs, mode="NUMBA")
         return function.vm.jit_fn, function.input_storage[1:]
@@ -307,8 +305,9 @@ class JointMetropolis(pm.Metropolis):
     def _next_of_block(self, q: FloatArray) -> FloatArray:
         """The draw after q, from the present block of draws, or from a new block if q was changed."""
         if self._used >= len(self._block) or not np.array_equal(q, self._stood):
-            moved = self._coordinates(q)
-            draws, _, accepted, acceptance = self._run(moved, _BLOCK, self.rng, with_terms=False)
+            draws, _, accepted, acceptance = self._run(
+                self._coordinates(q), _BLOCK, self.rng, with_terms=False
+            )
             self._block = self._values(draws)
             self._stats = {"accept": acceptance, "accepted": accepted}
             self._used = 0
