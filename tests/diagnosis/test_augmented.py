@@ -266,6 +266,15 @@ def test_the_tree_has_all_groups(problem: AugmentedProblem, calibration: Any) ->
     assert calibration.entry()["added"][0]["id"] == "turbulent_drag"
 
 
+def test_strengths_of_the_base_law_are_moved_themselves(problem: AugmentedProblem, calibration: Any) -> None:
+    """Not what is added, no spread, and no parameter that its strength falls with."""
+    moved = dict(zip([value.name for value in calibration.step.vars], calibration.step.moved, strict=True))
+    assert [name for name, itself in moved.items() if itself] == ["dry_friction_log__"]
+    assert len(moved) == 3
+    assert problem.moved_straight(load_law("pcm")) == ("dry_friction", "turbulent_drag")
+    assert problem.moved_straight(load_law("voellmy")) == ("dry_friction",)
+
+
 def test_recorded_avalanches_do_what_was_recorded(problem: AugmentedProblem, calibration: Any) -> None:
     """Fronts of the recorded avalanches are near their readings, at the draws' own added strengths."""
     fronts = calibration.tree["event_posterior"]["front"].values

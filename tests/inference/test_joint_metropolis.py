@@ -109,7 +109,7 @@ def taken_over() -> pm.Model:
 def test_what_takes_over_in_a_straight_line() -> None:
     """`left` given the sum is truncated normal: nearly even from 0 to 0.4; terms are those of the model."""
     model = taken_over()
-    step = JointMetropolis(model=model, pointwise="recordings", straight=("left", "added", "unknown"))
+    step = JointMetropolis(model=model, pointwise="recordings", straight=("left", "added"))
     tree = sample(model, step, draws=4000, tune=1000)
     left = tree["posterior"]["left"].values
     exact = np.exp(-0.5 * np.linspace(0.0, 0.4, 401) ** 2 - 0.5 * (0.4 - np.linspace(0.0, 0.4, 401)) ** 2)
@@ -125,12 +125,38 @@ def test_what_takes_over_in_a_straight_line() -> None:
     # `adapt` and `run` take and give PyMC's values, logarithms.
     q, rng = np.log([0.2, 0.2]), np.random.default_rng(0)
     step.adapt(q, 500, rng)
+    assert_allclose(np.exp(q).sum(), 0.4, atol=0.02)
     draws, terms = step.run(q, 200, rng)
     assert_allclose(q, draws[-1])
     sums = np.exp(draws).sum(axis=1, keepdims=True)
     assert_allclose(
         terms, -0.5 * ((0.4 - sums) / 0.002) ** 2 - np.log(0.002) - 0.5 * np.log(2 * np.pi), rtol=1e-9
     )
+
+
+@pytest.mark.parametrize("unit", [1e-4, 1.0, 1e5])
+def test_the_unit_of_what_is_moved_itself_does_not_matter(unit: float) -> None:
+    with pm.Model() as model:
+        pm.LogNormal("small", np.log(0.3), 0.02)
+        pm.LogNormal("other", np.log(unit), 0.3)
+    tree = sample(model, JointMetropolis(model=model, straight=("small", "other")), draws=1500, tune=1000)
+    assert min(float(az.ess(tree["posterior"][name].values)) for name in ("small", "other")) > 600
+    assert abs(float(tree["posterior"]["other"].median()) / unit - 1.0) < 0.05
+
+
+def test_what_is_moved_itself_stays_positive_where_nothing_has_density() -> None:
+    with pm.Model() as model:
+        x = pm.HalfNormal("x", 1.0)
+        pm.Potential("nowhere", pt.switch(x > 0.0, -np.inf, 0.0))
+    q = np.zeros(1)
+    draws, _ = JointMetropolis(model=model, straight=("x",)).run(q, 2000, np.random.default_rng(0))
+    assert np.isfinite(draws).all() and np.ptp(draws) > 1.0
+    assert np.isfinite(q).all()
+
+
+def test_a_name_of_nothing_is_refused() -> None:
+    with pytest.raises(ValueError, match="unknown"):
+        JointMetropolis(model=taken_over(), straight=("left", "unknown"))
 
 
 def test_weight_zero_removes_an_event_exactly(readings_step: JointMetropolis) -> None:

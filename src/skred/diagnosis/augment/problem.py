@@ -172,8 +172,12 @@ class AugmentedProblem(HierarchicalProblem):
         return np.moveaxis(parts, 1, 2)
 
     def moved_straight(self, law: Law) -> tuple[str, ...]:
-        """The base law's coefficients: what is added takes over from them in a straight line."""
-        return tuple(parameter.name for parameter in law.parameters)
+        """The base law's strengths: what is added takes over from them in a straight line.
+
+        Not a parameter that its strength falls with, as xi of turbulent friction: that grows without bound.
+        """
+        strengths = {mechanism.strength.name for mechanism in law.mechanisms}
+        return tuple(parameter.name for parameter in law.parameters if parameter.name in strengths)
 
     def to_start_from(self, law: Law, prior: dict[str, FloatArray], seed: int) -> dict[str, FloatArray]:
         """Parameter vectors from around the posterior, wider.

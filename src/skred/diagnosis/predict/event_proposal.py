@@ -10,7 +10,7 @@ from skred.arrays import FloatArray, IntArray
 from skred.diagnosis.evidence.adaptive_sampling import log_student, student
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population
 from skred.diagnosis.predict.draws import Draws, modes_near
-from skred.inference.joint_metropolis import DEGREES_OF_FREEDOM
+from skred.inference.metropolis_chain import DEGREES_OF_FREEDOM
 from skred.inference.reading_density import log_likelihoods
 
 _CENTRES = 6
