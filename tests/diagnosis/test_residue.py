@@ -21,7 +21,7 @@ from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_evidence_of
 from skred.diagnosis.discrepancy.sampled_evidence import sampled
-from skred.diagnosis.evidence.coefficient import Base, curve_at, curve_near
+from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at, curve_near
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Shape
@@ -130,6 +130,30 @@ def test_a_mechanism_that_is_overtaken_is_looked_at_too(monkeypatch: pytest.Monk
         weak = replace(candidates["viscous_drag"], correction=40.0 - drag.alone)
         behind = with_residues(base, {**candidates, "viscous_drag": weak}, force, pool)
     assert behind["turbulent_drag"].residue is None
+
+
+def test_each_form_of_a_mechanism_has_a_residue_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that the recordings speak against is not lost where a force beside it makes up for that."""
+    base, drag, profiles = fitted(rolling(2.4e-4, n_events=6))
+    force = [replace(one, log_bayes_factor=drag.alone + 1.0) for one in profiles]
+    other = replace(drag.best, shape=Shape(constants=(("another", 1.0),)))
+    weights = np.log([0.9, 0.1])
+    both = Candidate(DRAG, (drag.best, other), weights, correction=drag.alone - drag.best.log_bayes_factor)
+    assert [(one.shape.constants, np.exp(share)) for one, share in both.forms] == [
+        ((), pytest.approx(0.9)),
+        ((("another", 1.0),), pytest.approx(0.1)),
+    ]
+    of_each = {(): 1.0, (("another", 1.0),): 8.0}
+
+    def beside(base: Base, curves: list[Curve], pool: object) -> list[float | None]:
+        return [of_each[one.shape.constants] for one in curves]
+
+    monkeypatch.setattr("skred.diagnosis.compare.residue.residues", beside)
+    with ThreadPoolExecutor(1) as pool:
+        found = with_residues(base, {DRAG.id: both}, force, pool)[DRAG.id]
+    assert found.residue == pytest.approx(np.log(0.9 * np.exp(1.0) + 0.1 * np.exp(8.0)))
+    far = replace(both, log_weights=np.log([1.0 - 1e-4, 1e-4]))
+    assert [one.shape.constants for one, _ in far.forms] == [()]
 
 
 def test_what_laplace_lacks_of_the_force_is_added_beside_a_mechanism(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from skred.arrays import FloatArray
 from skred.diagnosis.evidence.coefficient import Curve
+from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.diagnosis.tabulated.between_evidence import Way
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.inference.intervals import LEFT_OUT
@@ -141,6 +142,22 @@ class Candidate:
         """The curve of the highest Bayes factor."""
         return self.curves[int(np.argmax([one.log_bayes_factor for one in self.curves]))]
 
+    @property
+    def forms(self) -> list[tuple[Curve, float]]:
+        """The best curve of each form that shapes have, and the log of the form's posterior probability.
+
+        None that is farther behind than what counts.
+        """
+        weights, of = self.shape_weights, [_form(one) for one in self.curves]
+        found = list[tuple[Curve, float]]()
+        for form in dict.fromkeys(of):
+            own = [k for k in range(len(of)) if of[k] == form]
+            log_share = math.log(max(float(weights[own].sum()), 1e-300))
+            if log_share > -COUNTS:
+                best = max(own, key=lambda k: self.curves[k].log_bayes_factor)
+                found.append((self.curves[best], log_share))
+        return found
+
     def strength(self) -> Strength:
         """The strength by the comparison, over all places."""
         return self.over_places(*self.best.moments)
@@ -177,6 +194,11 @@ class Candidate:
             float(np.quantile(side, share, weights=weights, method="inverted_cdf")) for side in ends.T
         )
         return first, last
+
+
+def _form(curve: Curve) -> tuple[str, ...]:
+    """Which constants a shape's term has, whatever their values: an obstacle's loss or its J, say."""
+    return tuple(name for name, _ in curve.shape.constants)
 
 
 def _quantity(curve: Curve) -> tuple[str | None, str | None, bool, float | None]:

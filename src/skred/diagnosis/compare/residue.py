@@ -7,6 +7,7 @@ well has even odds then.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
@@ -27,8 +28,9 @@ def with_residues(
 ) -> dict[str, Candidate]:
     """Candidates, with a residue those that have more than half of what a force in no list has by itself.
 
-    That is: those that have less than it has by itself, or beside another one. All are by the Laplace
-    approximation, and so should the profiles be.
+    That is: those that have less than it has by itself, or beside another one. It is looked for beside each
+    form of a mechanism's shapes: an obstacle that takes the same from all may need one less than an obstacle
+    that takes a share. All are by the Laplace approximation, and so should the profiles be.
     """
     found, force = dict(candidates), log_evidence_of(profiles)
     best, tried = force, set[str]()
@@ -40,11 +42,16 @@ def with_residues(
         and 0.5 * force < one.log_bayes_factor < best
     ]:
         tried |= {one.mechanism.id for one in looked}
-        for one, residue in zip(looked, residues(base, [one.best for one in looked], pool), strict=True):
+        forms = [(one, curve, log_share) for one in looked for curve, log_share in one.forms]
+        computed = residues(base, [curve for _, curve, _ in forms], pool)
+        beside = defaultdict[str, list[float]](list)
+        for (one, _, log_share), residue in zip(forms, computed, strict=True):
             # What a mechanism leaves is no residue if it is more than what it explains.
             if residue is not None and residue < one.log_bayes_factor:
-                found[one.mechanism.id] = replace(one, residue=residue)
-                best = max(best, found[one.mechanism.id].log_bayes_factor)
+                beside[one.mechanism.id].append(log_share + residue)
+        for name, parts in beside.items():
+            found[name] = replace(found[name], residue=float(np.logaddexp.reduce(parts)))
+            best = max(best, found[name].log_bayes_factor)
     return found
 
 
