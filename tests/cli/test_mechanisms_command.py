@@ -71,9 +71,9 @@ def test_one_in_full(mechanism_id: str, capsys: pytest.CaptureFixture[str]) -> N
 def test_shapes_in_words(capsys: pytest.CaptureFixture[str]) -> None:
     looked_for = {name: str(document(capsys, name)["looked_for"]) for name in ALL}
     assert looked_for["segment_drag"].startswith("stretches of 75, 200 or 500 m")
-    assert (
-        looked_for["obstacle"].startswith("stretches of 50 m") and "0.006 or 0.025" in looked_for["obstacle"]
-    )
+    assert looked_for["obstacle"].startswith("stretches of 50 m")
+    assert looked_for["obstacle"].endswith("; with loss [m-1] of 0.006 or 0.025, or with J/gh [1] of 1")
+    assert looked_for["entrainment"].endswith("; also with m_2/m_1 [1] of 2")
     along_the_track = "the whole track, or from the first recording on"
     assert looked_for["velocity_weakening"] == f"{along_the_track}; U_c [m s-1] of 4, 8 or 15"
     assert looked_for["turbulent_drag"] == along_the_track

@@ -250,6 +250,17 @@ def test_entrainment_of_a_limited_supply(settings: list[Setting]) -> None:
         assert parts and all(part.constants == shape.constants for part in parts)
 
 
+def test_the_equation_of_an_obstacle_is_that_of_its_shape() -> None:
+    place = {"s_from_m": 100.0, "s_to_m": 150.0}
+    share, same = (
+        equation_of(ALL["obstacle"], Shape(**place, constants=(one,)))
+        for one in ((LOSS, 0.006), (TAKEN, 1.0))
+    )
+    assert "descent" in share and "l h" in share and "J" not in share
+    assert "descent" not in same and "l h" not in same and "J = g h" in same
+    assert "v < 2 g h stops" in share and "v < 2 g h stops" in same
+
+
 def test_what_passing_an_obstacle_costs(settings: list[Setting]) -> None:
     """v < 2 g h at the crown stops; one that passes loses a share of v, or the same v as all others."""
     setting, added = settings[1], added_to(ALL["obstacle"])

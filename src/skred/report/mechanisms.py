@@ -105,8 +105,12 @@ def looked_for(mechanism: Mechanism) -> str:
         name: sorted({of_shape[name] for of_shape in constants if name in of_shape})
         for name in dict.fromkeys(name for of_shape in constants for name in of_shape)
     }
-    also = {name: "" if all(name in of_shape for of_shape in constants) else "also with " for name in values}
-    return "; ".join([where, *(f"{also[name]}{name} of {_either(found)}" for name, found in values.items())])
+    words = [f"{name} of {_either(found)}" for name, found in values.items()]
+    if not all(constants):
+        words = [f"also with {one}" for one in words]
+    elif not all(values.keys() == of_shape.keys() for of_shape in constants):
+        words = ["with " + ", or with ".join(words)]
+    return "; ".join([where, *words])
 
 
 def _where(mechanism: Mechanism, setting: Setting, shapes: Sequence[Shape]) -> str:

@@ -59,6 +59,12 @@ def _direction(setting: Setting, shape: Shape) -> Direction:
     return Direction((Column.CONSTANT, Column.QUADRATIC), profiles)
 
 
+def _equation(shape: Shape) -> str:
+    if TAKEN in dict(shape.constants):
+        return "-(g h / w) climb around s_o, and J = g h is lost for good: v < 2 g h stops"
+    return "-(g h / w) [climb - descent] - (l h / 4 w) U^2 around s_o: v < 2 g h stops"
+
+
 MECHANISM = Mechanism(
     id="obstacle",
     title="an obstacle: a dam, a wall, a step",
@@ -80,5 +86,6 @@ MECHANISM = Mechanism(
         shapes=_shapes,
         bound_to=BoundTo.PLACE,
         split=_split,
+        equation=_equation,
     ),
 )

@@ -205,6 +205,8 @@ class Added:
     split : callable
         Setting, shape and steps to finer shapes around it, which share its weight. Steps are 1 around a shape
         of the screening, and less around its parts.
+    equation : callable, optional
+        Shape to its term, where shapes have different ones; by default all have the mechanism's.
     """
 
     scale: float
@@ -216,6 +218,7 @@ class Added:
     either_sign: bool = False
     joins: Callable[[tuple[str, ...]], bool] = lambda base: True
     split: Callable[[Setting, Shape, float], tuple[Shape, ...]] = lambda setting, shape, steps: ()
+    equation: Callable[[Shape], str] | None = None
 
     def scale_of(self, shape: Shape) -> float:
         """Scale of the prior of the coefficient of a shape."""

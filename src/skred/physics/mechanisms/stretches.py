@@ -63,7 +63,9 @@ def is_opposed(shape: Shape) -> bool:
 
 
 def equation_of(mechanism: Mechanism, shape: Shape) -> str:
-    """A mechanism's term in the equation of motion, with what opposes it and where it begins."""
+    """A mechanism's term in the equation of motion: of its shape, with what opposes it, where it begins."""
+    if mechanism.added is not None and mechanism.added.equation is not None:
+        return mechanism.added.equation(shape)
     if shape.begins_m is not None:
         return f"{mechanism.equation} for s > {shape.begins_m:.0f} m"
     return mechanism.equation.replace("U^2", "(U^2 - U_0^2)", 1) if is_opposed(shape) else mechanism.equation

@@ -22,6 +22,8 @@ _SIMPLE = [
     ("kappa", "m-1", "curvature of the track, positive where it is concave"),
     ("g", "m s-2", "gravity, 9.81 m/s²"),
 ]
+_CONSTANTS = {"J/gh": "what every front that passes loses for good, as a share of the climb"}
+"""Constants of shapes that their symbol alone does not explain."""
 _WORD = re.compile(r"[A-Za-z]+(?:_\w+)?")
 
 
@@ -153,7 +155,8 @@ def _constant_rows(constants: doc.Document, opposed: bool) -> list[dict[str, Any
     for named, value in known.items():
         symbol, _, unit = printable(named).partition(" [")
         short = {"loss": "l"}.get(symbol, symbol)
-        rows.append(_row(short, unit.rstrip("]") or "1", f"{symbol}, here {value:g}", new=True))
+        meaning = _CONSTANTS.get(symbol, symbol)
+        rows.append(_row(short, unit.rstrip("]") or "1", f"{meaning}, here {value:g}", new=True))
     return rows
 
 
