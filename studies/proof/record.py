@@ -127,11 +127,13 @@ def add(folder: Path) -> None:
 
 
 def kept_of(folder: Path) -> dict[str, bytes]:
-    """What the record keeps of a revealed proof folder: its files, by name."""
+    """What the record keeps of a revealed proof folder: its files, by name; the ledger of one given up."""
     published = (folder / "ledger.json").read_bytes()  # kept as it was published, to the last byte
     ledger = json.loads(published)
     seed, trials = ledger["seed"], [entry["trial"] for entry in ledger["trials"]]
     files = {f"{seed}/ledger.json": published}
+    if not (folder / "answers").exists():
+        return files
     for method in sorted((folder / "answers").iterdir()):
         answers = {name: kept(_answer(folder, method.name, name)) for name in trials}
         files[f"{seed}/answers/{method.name}.json"] = by_line(answers).encode()

@@ -6,6 +6,7 @@ import copy
 import io
 import json
 import lzma
+import shutil
 import tarfile
 from pathlib import Path
 from typing import Any
@@ -95,6 +96,13 @@ def revealed(folder: Path) -> Path:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(json.dumps(document), encoding="utf-8")
     return folder
+
+
+def test_of_a_batch_that_is_given_up_the_ledger_is_kept(tmp_path: Path) -> None:
+    folder = revealed(tmp_path / "proof")
+    ledger = (folder / "ledger.json").read_bytes()
+    shutil.rmtree(folder / "answers")
+    assert kept_of(folder) == {f"{json.loads(ledger)['seed']}/ledger.json": ledger}
 
 
 def test_a_batch_is_kept_and_the_same_batch_makes_the_same_archive(tmp_path: Path) -> None:
