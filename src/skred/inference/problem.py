@@ -72,7 +72,7 @@ class Problem(ABC):
         return None
 
     def moved_straight(self, law: Law) -> tuple[str, ...]:
-        """Names of parameters that Metropolis moves themselves, not their logarithms; here none."""
+        """Names of parameters that Metropolis moves themselves, by turns with their logarithms; here none."""
         return ()
 
     def to_start_from(self, law: Law, prior: dict[str, FloatArray], seed: int) -> dict[str, FloatArray]:
