@@ -98,7 +98,7 @@ def revealed(folder: Path) -> Path:
     return folder
 
 
-def test_of_a_batch_that_is_given_up_the_ledger_is_kept(tmp_path: Path) -> None:
+def test_a_batch_that_is_given_up_leaves_its_ledger(tmp_path: Path) -> None:
     folder = revealed(tmp_path / "proof")
     ledger = (folder / "ledger.json").read_bytes()
     shutil.rmtree(folder / "answers")

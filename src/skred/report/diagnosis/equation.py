@@ -22,8 +22,11 @@ _SIMPLE = [
     ("kappa", "m-1", "curvature of the track, positive where it is concave"),
     ("g", "m s-2", "gravity, 9.81 m/s²"),
 ]
-_CONSTANTS = {"J/gh": "what every front that passes loses for good, as a share of the climb"}
-"""Constants of shapes that their symbol alone does not explain."""
+_CONSTANTS = {
+    "loss": ("l", "loss"),
+    "J/gh": ("J/gh", "what every front that passes loses for good, as a share of the climb"),
+}
+"""Symbol and meaning of constants of shapes that their name alone does not explain."""
 _WORD = re.compile(r"[A-Za-z]+(?:_\w+)?")
 
 
@@ -154,8 +157,7 @@ def _constant_rows(constants: doc.Document, opposed: bool) -> list[dict[str, Any
     rows = []
     for named, value in known.items():
         symbol, _, unit = printable(named).partition(" [")
-        short = {"loss": "l"}.get(symbol, symbol)
-        meaning = _CONSTANTS.get(symbol, symbol)
+        short, meaning = _CONSTANTS.get(symbol, (symbol, symbol))
         rows.append(_row(short, unit.rstrip("]") or "1", f"{meaning}, here {value:g}", new=True))
     return rows
 
