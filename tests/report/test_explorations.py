@@ -61,6 +61,15 @@ def of_calibration(tree, folder):
     return {name: one.exploration for name, one in drawn.items()}, html
 
 
+@pytest.fixture(scope="module")
+def made(tree, tmp_path_factory):
+    """The short calibration's figures and page, made once for all tests that only look at them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("skred.report.shared.style.DPI", 40)
+        drawn = save_model_figures(tree, tmp_path_factory.mktemp("made"))
+        return drawn, render_calibration(calibrated(), drawn)
+
+
 def plots(page):
     return [[one["plot"] for one in found] for found in explorations(page)]
 
@@ -90,9 +99,9 @@ def numbers(packed):
     return np.frombuffer(raw, dtype=packed["dtype"]).reshape(packed["shape"])
 
 
-def test_a_calibration_has_its_draws_to_explore(tree, tmp_path):
-    found, html = of_calibration(tree, tmp_path)
-    assert {name for name, one in found.items() if one is not None} == {
+def test_a_calibration_has_its_draws_to_explore(made):
+    drawn, html = made
+    assert {name for name, one in drawn.items() if one.exploration is not None} == {
         "trace", "joint", "marginals", "predictive"
     }  # fmt: skip
     page = check_page(html)
@@ -125,7 +134,7 @@ def test_the_same_draws_make_the_same_page(tree, tmp_path):
 
 
 def test_what_else_is_imported_is_not_in_the_page(tree, tmp_path):
-    pytest.importorskip("panel", reason="the extra dashboard is not installed")
+    pytest.importorskip("panel", reason="the extra dashboard is not installed")  # before the page is made
     _, html = of_calibration(tree, tmp_path)
     assert '"defs"' not in json.dumps(explorations(check_page(html)))
 
@@ -201,10 +210,10 @@ def test_a_diagnosis_has_its_check_and_its_coefficient_to_explore(tmp_path):
     assert ["plot_ppc_tstat"] in plots(page)
 
 
-def test_colours_are_those_of_the_page_in_the_light_and_in_the_dark(tree, tmp_path):
-    found, html = of_calibration(tree, tmp_path)
-    for one in found.values():
-        for colour in one.colours if one is not None else ():
+def test_colours_are_those_of_the_page_in_the_light_and_in_the_dark(made):
+    drawn, html = made
+    for one in drawn.values():
+        for colour in one.exploration.colours if one.exploration is not None else ():
             assert html.count(f"--c{colour[1:]}:") == 2
     text = json.dumps(explorations(check_page(html)))
     assert "var(--c" in text and '"#' not in text
@@ -224,8 +233,8 @@ def test_ids_of_events_that_attack_are_data(tmp_path):
     assert told and all(text.startswith("</script>") for text in told)
 
 
-def test_what_a_page_has_no_room_for_is_told(tree, tmp_path, monkeypatch):
-    drawn = save_model_figures(tree, tmp_path)
+def test_what_a_page_has_no_room_for_is_told(made, monkeypatch):
+    drawn, _ = made
     bare = {name: replace(one, exploration=None) for name, one in drawn.items()}
     size = len(render_calibration(calibrated(), bare))
     monkeypatch.setattr("skred.report.shared.html.MOST_BYTES", size + 30_000)
