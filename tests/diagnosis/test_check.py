@@ -12,7 +12,7 @@ from skred.diagnosis.check import by_fronts
 from skred.diagnosis.check.bootstrap_test import odds_test
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.detect.score_test import LinearFactors, ScoreTest
-from skred.diagnosis.evidence.coefficient import Base
+from skred.diagnosis.evidence.coefficient import Base, Curve
 
 
 def test_one_shape_estimates_the_evidence_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -44,7 +44,7 @@ def test_what_reaches_the_recordings_is_computed_again(monkeypatch: pytest.Monke
     again = by_fronts.computed_again
     looked: list[str] = []
 
-    def told(base: Base, one: Any) -> tuple[float, float]:
+    def told(base: Base, one: Any) -> tuple[Curve, float]:
         looked.append(one.mechanism.id)
         return again(base, one)
 

@@ -13,7 +13,7 @@ from rolling_cases import entering, rolling, speed
 from scipy.stats import norm
 
 from skred.campaign import Campaign
-from skred.diagnosis.compare.candidate import Candidate, log_gain
+from skred.diagnosis.compare.candidate import Candidate, log_gain, names_of_constants
 from skred.diagnosis.compare.comparison import compare, free_force
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.residue import with_residues
@@ -139,7 +139,7 @@ def test_each_form_of_a_mechanism_has_a_residue_of_its_own(monkeypatch: pytest.M
     other = replace(drag.best, shape=Shape(constants=(("another", 1.0),)))
     weights = np.log([0.9, 0.1])
     both = Candidate(DRAG, (drag.best, other), weights, correction=drag.alone - drag.best.log_bayes_factor)
-    assert [(one.shape.constants, np.exp(share)) for one, share in both.forms] == [
+    assert [(one.shape.constants, np.exp(share)) for one, share in both.best_of_each(names_of_constants)] == [
         ((), pytest.approx(0.9)),
         ((("another", 1.0),), pytest.approx(0.1)),
     ]
@@ -153,7 +153,7 @@ def test_each_form_of_a_mechanism_has_a_residue_of_its_own(monkeypatch: pytest.M
         found = with_residues(base, {DRAG.id: both}, force, pool)[DRAG.id]
     assert found.residue == pytest.approx(np.log(0.9 * np.exp(1.0) + 0.1 * np.exp(8.0)))
     far = replace(both, log_weights=np.log([1.0 - 1e-4, 1e-4]))
-    assert [one.shape.constants for one, _ in far.forms] == [()]
+    assert [one.shape.constants for one, _ in far.best_of_each(names_of_constants)] == [()]
 
 
 def test_what_laplace_lacks_of_the_force_is_added_beside_a_mechanism(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -186,7 +186,9 @@ def test_nothing_is_one_of_those_compared(monkeypatch: pytest.MonkeyPatch) -> No
         name: replace(drag, mechanism=mechanisms()[name], correction=height - drag.alone)
         for name, height in heights.items()
     }
-    monkeypatch.setattr("skred.diagnosis.compare.recomputed.computed_again", lambda *given: (5.0, 0.125))
+    monkeypatch.setattr(
+        "skred.diagnosis.compare.recomputed.computed_again", lambda base, curve: (curve, 0.125)
+    )
     with ThreadPoolExecutor(1) as pool:
         found, _ = recomputed(base, candidates, [], pool)
     assert found["turbulent_drag"].error == 0.125

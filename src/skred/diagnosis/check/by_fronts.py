@@ -62,7 +62,7 @@ def log_odds_by_fronts(
         one, beside = of_id.pop(first, (None, 0.0))
         if log_odds < reach or not isinstance(one, Curve):
             return log_odds
-        terms[first] = beside + computed_again(simulated, one)[0]
+        terms[first] = beside + computed_again(simulated, one)[0].log_bayes_factor
 
 
 def drawn(base: Base, linear: LinearFactors, rng: np.random.Generator) -> tuple[Curve | Profile, float]:

@@ -1,13 +1,15 @@
 """Whether avalanches differ in what a mechanism does: it is compared in each way that they may differ.
 
-The ways share the mechanism's prior probability. They are computed at its best shape by the same tables, and
-what counts is what each has more than the strength in common.
+The ways share the mechanism's prior probability. They are computed at the best of those shapes that differ in
+place alone, by the same tables, and what counts is what each has more than the strength in common there. A
+scale of speed that is the less probable one with a strength in common can be the more probable one without.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
@@ -15,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from skred.diagnosis.compare.candidate import Candidate, Ways
+from skred.diagnosis.compare.candidate import Candidate, Looked, Ways, all_but_place
+from skred.diagnosis.compare.recomputed import computed_again
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import FINE, Budget
 from skred.diagnosis.evidence.tolerance import COUNTS
@@ -27,6 +30,7 @@ from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism
 
 SEARCH = Budget(64, 64, 128, 1.5, 1.8)
 """Quadrature points of an event in the tables by which modes are looked for."""
+_DIFFERING = BetweenEvents.SPREAD, BetweenEvents.SOME
 
 
 def may_differ(mechanism: Mechanism) -> bool:
@@ -40,27 +44,50 @@ def with_ways(
 ) -> dict[str, Candidate]:
     """Candidates that have evidence with what they gain where avalanches differ in their strength.
 
-    Those that may count then by finer tables. One that is far behind with a strength in common may gain more
-    by this than what leads does.
+    Those that may count then by finer tables, and with a strength in common by as many quadrature points. One
+    that is far behind with a strength in common may gain more by this than what leads does.
 
     Parameters
     ----------
     best : float
         The most that a candidate has under another error model, in nats above nothing under this one.
     """
-    looked = [one for one in candidates.values() if may_differ(one.mechanism) and one.alone > 0.0]
-    found = pool.map(partial(or_none, searched, base), [one.best for one in looked])
-    looked = [replace(one, ways=ways) for one, ways in zip(looked, found, strict=True)]
-    least = max([best, *(one.log_bayes_factor for one in looked)]) - COUNTS
-    leading = [one for one in looked if one.log_bayes_factor > least and one.ways is not None]
-    found = pool.map(
-        partial(or_none, finer, base), [one.best for one in leading], [one.ways for one in leading]
-    )
-    again = [replace(one, ways=ways) for one, ways in zip(leading, found, strict=True)]
-    return {**candidates, **{one.mechanism.id: one for one in (*looked, *again)}}
+    may = [one for one in candidates.values() if may_differ(one.mechanism) and one.alone > 0.0]
+    if not may:
+        return dict(candidates)
+    base.with_nothing(SEARCH, sampled=True)  # before every worker does it once more
+    shapes = [(one, *best) for one in may for best in one.best_of_each(all_but_place)]
+    of_each = pool.map(partial(or_none, searched, base), [curve for _, curve, _ in shapes])
+    found = defaultdict[str, list[Looked]](list)
+    for (one, curve, log_share), ways in zip(shapes, of_each, strict=True):
+        if ways is not None:
+            found[one.mechanism.id].append(Looked(curve, log_share, curve.log_factor_of_sign, ways))
+    differing = [replace(one, looked=tuple(found[one.mechanism.id])) for one in may]
+    least = max([best, *(one.log_bayes_factor for one in differing)]) - COUNTS
+    leading = [one for one in differing if one.log_bayes_factor > least and one.looked]
+    again = with_finer_ways(base, leading, pool)
+    return {**candidates, **{one.mechanism.id: one for one in (*differing, *again)}}
 
 
-def or_none(compute: Callable[..., Ways], *given: Any) -> Ways | None:
+def with_finer_ways(base: Base, candidates: Sequence[Candidate], pool: Executor) -> list[Candidate]:
+    """Candidates with their leading shapes computed by many more quadrature points."""
+    if candidates:
+        base.with_nothing(FINE, sampled=True)  # before every worker does it once more
+    jobs = [shape for one in candidates for shape in one.likely_looked]
+    computed = pool.map(partial(or_none, _looked_closer, base), jobs)
+    closer = {old: new for old, new in zip(jobs, computed, strict=True) if new is not None}
+    return [one.looked_closer(closer) for one in candidates]
+
+
+def _looked_closer(base: Base, shape: Looked) -> Looked:
+    """A shape by many more quadrature points, with a strength in common and without."""
+    curve = shape.curve
+    fine, error = computed_again(base, curve)
+    log_share = shape.log_share + fine.log_bayes_factor - curve.log_bayes_factor
+    return Looked(curve, log_share, fine.log_factor_of_sign, finer(base, curve, shape.ways), error)
+
+
+def or_none[Found](compute: Callable[..., Found], *given: Any) -> Found | None:
     """What is computed; None where some way has no density that draws find."""
     try:
         return compute(*given)
@@ -72,12 +99,12 @@ def searched(base: Base, curve: Curve) -> Ways:
     """Each way at a curve's shape, by tables that are fine enough to find where it is."""
     near = curve.nearest(curve.moments[0]).found
     tables = wide_tables(base, curve, near, SEARCH)
-    return {kind: searched_evidence(BetweenTarget(base, curve, tables, kind), near) for kind in BetweenEvents}
+    return {kind: searched_evidence(BetweenTarget(base, curve, tables, kind), near) for kind in _DIFFERING}
 
 
 def finer(base: Base, curve: Curve, ways: Ways) -> Ways:
     """The same by many more quadrature points, around the populations of the most probable way."""
-    around = max(ways, key=lambda kind: math.log(PRIOR[kind]) + ways[kind].populations.log_evidence)
+    around = max(ways, key=lambda kind: math.log(PRIOR[kind]) + ways[kind].log_factor)
     tables = wide_tables(base, curve, ways[around].populations, FINE)
     return {
         kind: between_evidence(BetweenTarget(base, curve, tables, kind), way.proposal)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from skred.arrays import FloatArray
 from skred.diagnosis.evidence.coefficient import Curve
-from skred.diagnosis.evidence.tolerance import COUNTS
+from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING
 from skred.diagnosis.tabulated.between_evidence import Way
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.inference.intervals import LEFT_OUT
@@ -28,13 +28,18 @@ another one, has more evidence than it: then something acts beside it or in its 
 
 
 Ways = Mapping[BetweenEvents, Way]
-"""Each way in which avalanches may differ in a mechanism's strength."""
+"""Each way in which avalanches differ in a mechanism's strength."""
 
 
-def gains_of(ways: Ways) -> dict[BetweenEvents, float]:
-    """What each way has more than the strength in common, in nats."""
-    common = ways[BetweenEvents.COMMON].populations.log_evidence
-    return {kind: way.populations.log_evidence - common for kind, way in ways.items()}
+def gains_of(ways: Ways, in_common: float) -> dict[BetweenEvents, float]:
+    """What each way has more than the strength in common, in nats.
+
+    Parameters
+    ----------
+    in_common : float
+        Log Bayes factor of that against nothing, at the same shape by strengths of one sign as the ways are.
+    """
+    return {BetweenEvents.COMMON: 0.0} | {kind: way.log_factor - in_common for kind, way in ways.items()}
 
 
 def log_gain(residue: float | None, gains: Mapping[BetweenEvents, float] | None = None) -> float:
@@ -53,6 +58,48 @@ def log_gain(residue: float | None, gains: Mapping[BetweenEvents, float] | None 
     if residue is None:
         return own
     return float(np.logaddexp(math.log1p(-BESIDE) + own, math.log(BESIDE) + residue))
+
+
+@dataclass(frozen=True, eq=False)
+class Looked:
+    """A shape at which avalanches may differ in the strength, for all that differ from it in place alone.
+
+    Attributes
+    ----------
+    curve : Curve
+    log_share : float
+        Log of the posterior probability of these shapes with a strength in common.
+    in_common : float
+        Log Bayes factor of that at the shape, against nothing, by strengths of one sign as the ways are.
+    ways : mapping of BetweenEvents to Way
+    error : float or None
+        Standard error of `in_common`, in nats; None where it is not by as many quadrature points as finer
+        ways.
+    """
+
+    curve: Curve
+    log_share: float
+    in_common: float
+    ways: Ways
+    error: float | None = None
+
+    @property
+    def gains(self) -> dict[BetweenEvents, float]:
+        """What each way has more than the strength in common at this shape, in nats."""
+        return gains_of(self.ways, self.in_common)
+
+    @property
+    def height(self) -> float:
+        """Log of the posterior probability, strengths in common or not; not normalised."""
+        return self.log_share + log_gain(None, self.gains)
+
+
+def gains_over(looked: Sequence[Looked]) -> dict[BetweenEvents, float]:
+    """What each way has more than the strength in common, over all shapes looked at, in nats."""
+    shares = np.array([one.log_share for one in looked])
+    shares -= np.logaddexp.reduce(shares)
+    each = [one.gains for one in looked]
+    return {kind: float(np.logaddexp.reduce(shares + [one[kind] for one in each])) for kind in each[0]}
 
 
 class Strength(NamedTuple):
@@ -74,13 +121,13 @@ class Candidate:
         Prior weight of each shape; they sum to 1.
     correction : float
         What many more quadrature points, and importance sampling over the population, change along the best
-        curve, in nats; 0 where not looked at.
+        curves, in nats; 0 where not looked at.
     error : float or None
         Standard error of the log Bayes factor by importance sampling, in nats; None where not looked at.
     residue : float or None
         Log Bayes factor of a force not in the list beside it; None where not looked at.
-    ways : mapping of BetweenEvents to Way, or None
-        Each way in which avalanches may differ in the strength; None where not looked at.
+    looked : tuple of Looked
+        Where avalanches may differ in the strength; none where that was not looked at.
     """
 
     mechanism: Mechanism
@@ -89,7 +136,7 @@ class Candidate:
     correction: float = 0.0
     error: float | None = None
     residue: float | None = None
-    ways: Ways | None = None
+    looked: tuple[Looked, ...] = ()
 
     @property
     def log_factors(self) -> FloatArray:
@@ -114,7 +161,7 @@ class Candidate:
     @property
     def gains(self) -> dict[BetweenEvents, float] | None:
         """What each way has more than the strength in common, in nats; None where not looked at."""
-        return None if self.ways is None else gains_of(self.ways)
+        return gains_over(self.looked) if self.looked else None
 
     @property
     def between(self) -> dict[BetweenEvents, float]:
@@ -139,19 +186,49 @@ class Candidate:
 
     @property
     def best(self) -> Curve:
-        """The curve of the highest Bayes factor."""
-        return self.curves[int(np.argmax([one.log_bayes_factor for one in self.curves]))]
+        """The curve of the most probable shape; of the highest Bayes factor where none may differ."""
+        return (
+            self.likely_looked[0].curve
+            if self.looked
+            else max(self.curves, key=lambda one: one.log_bayes_factor)
+        )
 
     @property
-    def forms(self) -> list[tuple[Curve, float]]:
+    def ways(self) -> Ways | None:
+        """Each way in which avalanches differ in the strength, at the best shape; None: not looked at."""
+        return self.likely_looked[0].ways if self.looked else None
+
+    @property
+    def likely_looked(self) -> list[Looked]:
+        """Shapes that were looked at, the most probable one first; none that is clearly less probable."""
+        heights = [one.height for one in self.looked]
+        return [
+            self.looked[k] for k in np.argsort(heights)[::-1] if heights[k] > max(heights) - DECIDES_NOTHING
+        ]
+
+    def looked_closer(self, closer: Mapping[Looked, Looked]) -> Candidate:
+        """With some of the shapes that were looked at by many more quadrature points."""
+        looked = tuple(closer.get(one, one) for one in self.looked)
+        before, after = (
+            np.logaddexp.reduce([one.log_share for one in all_]) for all_ in (self.looked, looked)
+        )
+        found = replace(self, looked=looked, correction=float(after - before))
+        return replace(found, error=found.likely_looked[0].error)
+
+    def best_of_each(self, form: Callable[[Curve], Hashable]) -> list[tuple[Curve, float]]:
         """The best curve of each form that shapes have, and the log of the form's posterior probability.
 
         None that is farther behind than what counts.
+
+        Parameters
+        ----------
+        form : callable
+            What shapes of one form share.
         """
-        weights, of = self.shape_weights, [_form(one) for one in self.curves]
+        weights, of = self.shape_weights, [form(one) for one in self.curves]
         found = list[tuple[Curve, float]]()
-        for form in dict.fromkeys(of):
-            own = [k for k in range(len(of)) if of[k] == form]
+        for each in dict.fromkeys(of):
+            own = [k for k in range(len(of)) if of[k] == each]
             log_share = math.log(max(float(weights[own].sum()), 1e-300))
             if log_share > -COUNTS:
                 best = max(own, key=lambda k: self.curves[k].log_bayes_factor)
@@ -196,7 +273,13 @@ class Candidate:
         return first, last
 
 
-def _form(curve: Curve) -> tuple[str, ...]:
+def all_but_place(curve: Curve) -> Hashable:
+    """What shapes share that differ in where their stretch is, and in nothing else."""
+    shape = curve.shape
+    return shape.sensor, shape.covariate, shape.constants, shape.begins_m
+
+
+def names_of_constants(curve: Curve) -> Hashable:
     """Which constants a shape's term has, whatever their values: an obstacle's loss or its J, say."""
     return tuple(name for name, _ in curve.shape.constants)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 
@@ -47,7 +47,8 @@ def recomputed(
     # Each waits for jobs of the pool, and takes none of its threads for that.
     with ThreadPoolExecutor(len(KINDS)) as waiting:
         sampled_of = {k: waiting.submit(sampled, base, profiles[k], pool, some) for k in worth}
-        found = _looked_at(base, candidates, leading, pool)
+        todo = [candidates[name] for name in leading if candidates[name].error is None]
+        found = {**candidates, **{one.mechanism.id: one for one in with_finer_curves(base, todo, pool)}}
         again = [sampled_of[k].result() if k in worth else one for k, one in enumerate(profiles)]
     lacked = log_evidence_of(again) - log_evidence_of(profiles) if worth else 0.0
     for name, one in found.items():
@@ -56,26 +57,23 @@ def recomputed(
     return found, again
 
 
-def _looked_at(
-    base: Base, candidates: Mapping[str, Candidate], leading: Sequence[str], pool: ThreadPoolExecutor
-) -> dict[str, Candidate]:
-    """All mechanisms, those that lead with their best curve computed again."""
-    found = dict(candidates)
-    if leading:
+def with_finer_curves(base: Base, candidates: Sequence[Candidate], pool: Executor) -> list[Candidate]:
+    """Mechanisms with their best curve computed again."""
+    if candidates:
         base.with_nothing(FINE, sampled=True)  # before every worker does it once more
-    again = pool.map(partial(computed_again, base), [candidates[name].best for name in leading])
-    for name, (log_factor, error) in zip(leading, again, strict=True):
-        correction = log_factor - candidates[name].best.log_bayes_factor
-        found[name] = replace(candidates[name], correction=correction, error=error)
-    return found
+    again = pool.map(partial(computed_again, base), [one.best for one in candidates])
+    return [
+        replace(one, correction=fine.log_bayes_factor - one.best.log_bayes_factor, error=error)
+        for one, (fine, error) in zip(candidates, again, strict=True)
+    ]
 
 
-def computed_again(base: Base, curve: Curve) -> tuple[float, float]:
-    """A curve's log Bayes factor by many more quadrature points and importance sampling, with standard error.
+def computed_again(base: Base, curve: Curve) -> tuple[Curve, float]:
+    """A curve by many more quadrature points and importance sampling, with its log Bayes factor's error.
 
-    The error is that at the curve's maximum and that of nothing.
+    The standard error is that at the curve's maximum and that of nothing.
     """
     strengths = curve.strengths[curve.strengths != 0.0]
     fine = curve_at(base, curve, strengths, FINE, curve.known, sampled=True)
     most, nothing = int(np.argmax(fine.log_evidence)), int(np.searchsorted(fine.strengths, 0.0))
-    return fine.log_bayes_factor, math.hypot(*(fine.fits[k].found.error for k in {most, nothing}))
+    return fine, math.hypot(*(fine.fits[k].found.error for k in {most, nothing}))

@@ -16,7 +16,7 @@ from itertools import batched
 
 import numpy as np
 
-from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.candidate import Candidate, names_of_constants
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, knots, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
@@ -42,7 +42,7 @@ def with_residues(
         and 0.5 * force < one.log_bayes_factor < best
     ]:
         tried |= {one.mechanism.id for one in looked}
-        forms = [(one, curve, log_share) for one in looked for curve, log_share in one.forms]
+        forms = [(one, *best) for one in looked for best in one.best_of_each(names_of_constants)]
         computed = residues(base, [curve for _, curve, _ in forms], pool)
         beside = defaultdict[str, list[float]](list)
         for (one, _, log_share), residue in zip(forms, computed, strict=True):

@@ -164,6 +164,14 @@ class Curve(PlacedMechanism):
         return most + math.log(float(np.trapezoid(np.exp(log_density - most), strengths)))
 
     @cached_property
+    def log_factor_of_sign(self) -> float:
+        """Log Bayes factor by strengths of the mean's sign alone, in nats."""
+        strengths, log_density = self.fine()
+        own = strengths * self.moments[0] >= 0.0
+        most = float(log_density.max())
+        return most + math.log(float(np.trapezoid(np.exp(log_density[own] - most), strengths[own])))
+
+    @cached_property
     def moments(self) -> tuple[float, float]:
         """Posterior mean and standard deviation of the strength, if the mechanism is there."""
         strengths, log_density = self.fine()

@@ -179,18 +179,21 @@ class _Part:
 
 def _by_mechanism(candidate: Candidate, base: Base, part: _Part) -> float:
     """The log Bayes factor of a mechanism by a part of the recordings, over its leading shapes."""
-    factors = candidate.log_factors
-    rest, found = part.base(base), list[tuple[float, Curve]]()
-    for k in np.flatnonzero(factors > factors.max() - DECIDES_NOTHING):
+    factors, best = candidate.log_factors, candidate.best
+    leading = factors > factors.max() - DECIDES_NOTHING
+    rest, found = part.base(base), dict[Curve, float]()
+    for k in np.flatnonzero(leading | np.array([one is best for one in candidate.curves])):
         curve = candidate.curves[k]
         known = {strength: part.fit(fit) for strength, fit in curve.known.items()}
         one = curve_at(rest, curve, curve.strengths, USUAL, known)
-        found.append((candidate.log_weights[k] + one.log_bayes_factor, one))
-    in_common = float(np.logaddexp.reduce([factor for factor, _ in found]))
-    if candidate.ways is None:
+        found[one] = candidate.log_weights[k] + one.log_bayes_factor
+        if curve is best:
+            best = one
+    in_common = float(np.logaddexp.reduce(list(found.values())))
+    if not candidate.looked:
         return in_common
-    ways = or_none(searched, rest, max(found, key=lambda one: one[0])[1])
-    return in_common + log_gain(None, None if ways is None else gains_of(ways))
+    ways = or_none(searched, rest, best)
+    return in_common + log_gain(None, None if ways is None else gains_of(ways, best.log_factor_of_sign))
 
 
 def _by_profile(profile: Profile, base: Base, part: _Part) -> float:

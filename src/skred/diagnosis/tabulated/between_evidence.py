@@ -1,8 +1,9 @@
-"""The evidence of each way in which avalanches may differ in an added strength.
+"""The evidence of each way in which avalanches differ in an added strength.
 
 An integral over the population, the strength, and what says how it differs, all at once; the events' own
 strengths are integrated by tables. Importance sampling around the highest mode, which is climbed to from
-several starts.
+several starts. A strength that all have in common is not among the ways: it would have to suit avalanches
+that have none of it, at strengths between tables and populations that no table is around.
 """
 
 from __future__ import annotations
@@ -26,7 +27,6 @@ from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.between_events import BetweenEvents, components, from_unbounded
 
 _STARTS: dict[BetweenEvents, tuple[tuple[float, float], ...]] = {
-    BetweenEvents.COMMON: ((1.0, 0.0),),
     BetweenEvents.SPREAD: ((1.0, -1.6), (1.0, -0.3)),
     BetweenEvents.SOME: ((1.0, 2.5), (1.5, 0.5), (2.5, -0.8)),
 }
@@ -40,10 +40,13 @@ _BAD = -1e10
 
 
 class Way(NamedTuple):
-    """One way in which avalanches may differ.
+    """One way in which avalanches differ.
 
     Attributes
     ----------
+    log_factor : float
+        Log Bayes factor against nothing at the same shape, by as many quadrature points, over
+        strengths of the sign that one in common has.
     populations : Evidence
         The way's own, with mean and covariance over its posterior.
     strength : (float, float)
@@ -54,6 +57,7 @@ class Way(NamedTuple):
         Quadrature points of the tables that it is by.
     """
 
+    log_factor: float
     populations: Evidence
     strength: tuple[float, float]
     proposal: Mixture
@@ -64,8 +68,7 @@ class Way(NamedTuple):
 class BetweenTarget:
     """The density of population, strength and what says how avalanches differ in it, given tables.
 
-    Coordinates are the population's, the logarithm of the strength's size, and, where avalanches differ, that
-    of `from_unbounded`.
+    Coordinates are the population's, the logarithm of the strength's size, and that of `from_unbounded`.
     """
 
     base: Base
@@ -84,12 +87,8 @@ class BetweenTarget:
         size = np.exp(np.minimum(x[:, n_psi], 50.0))
         log_p = self.curve.log_prior(size, self.curve.scale) + x[:, n_psi]
         log_p = np.where(size <= abs(self.farthest), log_p, -np.inf)
-        if self.kind is BetweenEvents.COMMON:
-            parameter = np.zeros(len(x))
-        else:
-            parameter, more = from_unbounded(self.kind, x[:, n_psi + 1])
-            log_p = log_p + more
-        return x[:, :n_psi], np.copysign(size, self.farthest), parameter, log_p
+        parameter, more = from_unbounded(self.kind, x[:, n_psi + 1])
+        return x[:, :n_psi], np.copysign(size, self.farthest), parameter, log_p + more
 
     def __call__(self, x: FloatArray) -> FloatArray:
         """Log density at coordinates, (n, size) to (n,); not normalised by the evidence."""
@@ -122,10 +121,9 @@ def searched_evidence(target: BetweenTarget, near: Evidence) -> Way:
     """
     log_size = math.log(abs(target.curve.moments[0]))
     most = math.log(0.9 * abs(target.farthest))
-    alone = target.kind is BetweenEvents.COMMON
     tops = []
     for multiple, coordinate in _STARTS[target.kind]:
-        start = [*near.psi, min(log_size + math.log(multiple), most), *([] if alone else [coordinate])]
+        start = [*near.psi, min(log_size + math.log(multiple), most), coordinate]
         tops.append(_climbed(target, np.array(start)))
     top = max(tops, key=lambda x: float(target(x[None])[0]))
     return between_evidence(target, Mixture.on([Mode(top, _curvature(target, top))]), 71)
@@ -138,9 +136,11 @@ def between_evidence(target: BetweenTarget, proposal: Mixture, seed: int = 72) -
     psi, strengths, _, _ = target.split(found.draws)
     mean, middle = shares @ psi, float(shares @ strengths)
     away = psi - mean
-    populations = Evidence(found.log_integral, mean, away.T @ (shares[:, None] * away))
+    populations = Evidence(found.log_integral, mean, away.T @ (shares[:, None] * away), found.error)
     sd = math.sqrt(float(shares @ (strengths - middle) ** 2))
-    return Way(populations, (middle, sd), found.proposal, target.tables.budget)
+    budget = target.tables.budget
+    nothing = target.base.with_nothing(budget, sampled=True).found.log_evidence
+    return Way(found.log_integral - nothing, populations, (middle, sd), found.proposal, budget)
 
 
 def _climbed(target: BetweenTarget, start: FloatArray) -> FloatArray:
