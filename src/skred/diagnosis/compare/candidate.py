@@ -273,15 +273,14 @@ class Candidate:
         return first, last
 
 
-def all_but_place(curve: Curve) -> Hashable:
-    """What shapes share that differ in where their stretch is, and in nothing else."""
-    shape = curve.shape
-    return shape.sensor, shape.covariate, shape.constants, shape.begins_m
-
-
 def names_of_constants(curve: Curve) -> Hashable:
     """Which constants a shape's term has, whatever their values: an obstacle's loss or its J, say."""
     return tuple(name for name, _ in curve.shape.constants)
+
+
+def all_but_place(curve: Curve) -> Hashable:
+    """What shapes share that differ in where a stretch is and in constants that go with it, in nothing else."""
+    return *_quantity(curve), names_of_constants(curve), curve.shape.begins_m
 
 
 def _quantity(curve: Curve) -> tuple[str | None, str | None, bool, float | None]:
