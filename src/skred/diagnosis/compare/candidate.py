@@ -279,7 +279,7 @@ def names_of_constants(curve: Curve) -> Hashable:
 
 
 def all_but_place(curve: Curve) -> Hashable:
-    """What shapes share that differ in where a stretch is and in constants that go with it, in nothing else."""
+    """What shapes share that differ only in where a stretch is, and in constants that go with it."""
     return *_quantity(curve), names_of_constants(curve), curve.shape.begins_m
 
 
