@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import Any
 
+import cloudpickle
 import numpy as np
 import pytest
 from diagnosis_cases import base_of
@@ -15,7 +18,7 @@ from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.diagnosis.augment.added_strength import added_strengths, components_of, new_rows
 from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.augment.coefficient import multiples_of_events
-from skred.diagnosis.compare.between import finer, may_differ, searched
+from skred.diagnosis.compare.between import finer, may_differ, searched, with_ways
 from skred.diagnosis.compare.candidate import (
     BESIDE,
     Candidate,
@@ -157,7 +160,7 @@ def dense_log_evidence(base: Base, found: Curve, way: BetweenEvents) -> float:
 def test_gains_are_those_of_dense_grids(few: tuple[Base, Curve]) -> None:
     base, found = few
     ways, (fine, _) = finer(base, found, searched(base, found)), computed_again(base, found)
-    gains = gains_of(ways, fine.log_factor_of_sign)
+    gains = gains_of(ways, fine.log_factor_of(found.sign))
     dense = {way: dense_log_evidence(base, found, way) for way in BetweenEvents}
     exact = {way: value - dense[COMMON] for way, value in dense.items()}
     assert abs(gains[SPREAD] - exact[SPREAD]) < 0.35 and abs(gains[SOME] - exact[SOME]) < 0.35, exact
@@ -249,7 +252,7 @@ def test_gains_do_not_hang_on_quadrature_points() -> None:
         psi = fit.found.psi + wider * np.array([0.0, 0.0, 1.0, 1.0, 0.0])
         other = replace(base, fit=fit._replace(found=fit.found._replace(psi=psi)))
         found = stretch_curve(other, stretch=(980.75, 1820.75))
-        in_common = computed_again(other, found)[0].log_factor_of_sign
+        in_common = computed_again(other, found)[0].log_factor_of(found.sign)
         gains.append(gains_of(finer(other, found, searched(other, found)), in_common))
     for way in (SPREAD, SOME):
         assert gains[0][way] == pytest.approx(gains[1][way], abs=0.4)
@@ -263,18 +266,56 @@ def looked(found: Curve, log_share: float, in_common: float, spread: float, some
     return Looked(found, log_share, in_common, ways)
 
 
+def slower(found: Curve) -> Curve:
+    """Another kind of shape of the same mechanism."""
+    return replace(found, shape=replace(found.shape, constants=(("another", 1.0),)))
+
+
 def test_shapes_are_mixed_by_what_they_have(few: tuple[Base, Curve]) -> None:
-    """Of two shapes the less probable one with a strength in common may lead where avalanches differ."""
-    other = replace(few[1], shape=replace(few[1].shape, s_from_m=STRETCH[0] + 10.0))
-    shapes = looked(few[1], np.log(0.8), 10.0, 9.0, 8.0), looked(other, np.log(0.2), 8.6, 14.0, 8.0)
-    found = Candidate(few[1].mechanism, (few[1], other), np.log([0.5, 0.5]), looked=shapes)
-    assert found.best is other and found.ways is shapes[1].ways
+    """Of two kinds the less probable one with a strength in common may lead where avalanches differ."""
+    found, other = few[1], slower(few[1])
+    shapes = looked(found, np.log(0.8), 10.0, 9.0, 8.0), looked(other, np.log(0.2), 8.6, 14.0, 8.0)
+    candidate = Candidate(found.mechanism, (found, other), np.log([0.8, 0.2]), looked=shapes)
+    assert candidate.best is other and candidate.ways is shapes[1].ways
     gains = gains_over(shapes)
     assert gains[COMMON] == pytest.approx(0.0)
     assert gains[SPREAD] == pytest.approx(np.log(0.8 * np.exp(-1.0) + 0.2 * np.exp(5.4)))
-    closer = found.looked_closer({shapes[0]: replace(shapes[0], log_share=shapes[0].log_share + 0.5)})
-    assert closer.correction == pytest.approx(np.log(0.8 * np.exp(0.5) + 0.2))
-    assert all_but_place(few[1]) == all_but_place(other)
+    heights = [np.log(0.8) + log_gain(None, shapes[0].gains), np.log(0.2) + log_gain(None, shapes[1].gains)]
+    assert_allclose(candidate.shape_weights, np.exp(heights - np.logaddexp.reduce(heights)))
+    assert [one for one, _ in candidate.best_of_each(all_but_place)] == [found, other]
+    # Both that lead are looked at closer: with a strength in common, and where avalanches differ.
+    assert candidate.to_look_closer == list(shapes)
+    closer = {one: replace(one, error=0.1) for one in shapes}
+    closer[shapes[0]] = replace(closer[shapes[0]], log_share=shapes[0].log_share + 0.5)
+    again = candidate.looked_closer(closer)
+    assert again.correction == pytest.approx(np.log(0.8 * np.exp(0.5) + 0.2))
+    assert again.error == 0.1 and again.to_look_closer == []
+
+
+def test_a_way_that_could_not_be_computed_gains_nothing(few: tuple[Base, Curve]) -> None:
+    found, other = few[1], slower(few[1])
+    failed = Looked(found, np.log(0.997), 20.0, {})
+    shapes = failed, looked(other, np.log(0.003), 14.0, 24.0, 14.0)
+    gains = gains_over(shapes)
+    assert gains[SPREAD] == pytest.approx(np.log(0.003) + 10.0)
+    one = Candidate(found.mechanism, (found,), np.zeros(1), looked=(failed,))
+    assert one.gains is None and one.between == {COMMON: 1.0, SPREAD: 0.0, SOME: 0.0}
+
+
+class Copying(ThreadPoolExecutor):
+    """Returns copies, as other processes do."""
+
+    def map(self, compute: Any, *jobs: Any, **options: Any) -> Any:
+        return [cloudpickle.loads(cloudpickle.dumps(one)) for one in super().map(compute, *jobs, **options)]
+
+
+def test_shapes_from_other_processes_are_those_of_the_candidate(few: tuple[Base, Curve]) -> None:
+    base, found = few
+    candidate = Candidate(found.mechanism, (found,), np.zeros(1), correction=3.0)
+    with Copying(1) as pool:
+        [again] = with_ways(base, {found.mechanism.id: candidate}, pool).values()
+    assert again.looked and again.error is not None and again.best is found
+    assert 2.5 < again.correction < 3.5
 
 
 def test_gains_share_the_prior() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from rolling_cases import rolling
 from skred.campaign import Campaign
 from skred.campaign.parts import of_events
 from skred.diagnosis.augment.augmented import augmented_problem
+from skred.diagnosis.compare.between import with_ways
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
 from skred.diagnosis.compare.screening import curve
@@ -105,3 +107,19 @@ def test_an_answer_may_lose_what_the_alarm_has_to_spare() -> None:
     comparison = drag_in(campaign)[0]
     said = influence(comparison, DRAG.id, np.zeros(8), comparison.log_odds - 1.5)
     assert said.needed == pytest.approx(said.log_bayes_factor - 1.5)
+
+
+def test_where_avalanches_may_differ_that_is_in_what_is_left() -> None:
+    """The ways of a part are those of that part: with fewer avalanches and readings, at the best shape."""
+    comparison = drag_in(rolling(2.4e-4, n_events=12))[0]
+    under = comparison.under_each[0]
+    with ThreadPoolExecutor(1) as pool:
+        candidates = with_ways(under.base, under.candidates, pool)
+    differing = replace(comparison, under_each=(replace(under, candidates=candidates),))
+    gained = np.full(12, comparison.log_factors[DRAG.id] / 12)
+    plain, said = (influence(one, DRAG.id, gained, ENOUGH) for one in (comparison, differing))
+    assert candidates[DRAG.id].looked and said.without_a_third is not None
+    # All runs have the same drag: ways gain little, in all of them and in a part.
+    assert plain.without_a_third is not None
+    assert abs(said.without_a_third - plain.without_a_third) < 2.0
+    assert len(said.readings) == len(plain.readings)

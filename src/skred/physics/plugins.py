@@ -6,6 +6,7 @@ import sys
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import Any
 
 from skred.errors import InputError
@@ -43,12 +44,18 @@ class RefusedError(InputError):
 
 def entries_of(group: str) -> list[EntryPoint]:
     """Entry points of a group, by package and name; each once."""
-    return list(_entries(group, tuple(sys.path)))
+    return list(_entries(group, tuple(map(_folder, sys.path))))
+
+
+def _folder(path: str) -> tuple[Path, int]:
+    """A folder that packages are searched in, and when something was put into it or taken out."""
+    folder = Path(path or ".").resolve()
+    return folder, folder.stat().st_mtime_ns if folder.exists() else 0
 
 
 @lru_cache
-def _entries(group: str, searched: tuple[str, ...]) -> list[EntryPoint]:
-    """The same for the folders that packages are searched in: every look reads all of them, 50 ms."""
+def _entries(group: str, searched: tuple[tuple[Path, int], ...]) -> list[EntryPoint]:
+    """The same while folders are as they were: every look reads all packages, 50 ms."""
     return sorted(set(entry_points(group=group)), key=lambda entry: (package_of(entry), entry.name))
 
 

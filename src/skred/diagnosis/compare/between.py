@@ -1,15 +1,15 @@
 """Whether avalanches differ in what a mechanism does: it is compared in each way that they may differ.
 
-The ways share the mechanism's prior probability. They are computed at the best of those shapes that differ in
-place alone, by the same tables, and what counts is what each has more than the strength in common there. A
-scale of speed that is the less probable one with a strength in common can be the more probable one without.
+The ways share the mechanism's prior probability. They are computed at the best shape of each kind, and what
+counts is what each has more than the strength in common there. A scale of speed that is the less probable one
+with a strength in common can be the more probable one without.
 """
 
 from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
@@ -22,7 +22,12 @@ from skred.diagnosis.compare.recomputed import computed_again
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import FINE, Budget
 from skred.diagnosis.evidence.tolerance import COUNTS
-from skred.diagnosis.tabulated.between_evidence import BetweenTarget, between_evidence, searched_evidence
+from skred.diagnosis.tabulated.between_evidence import (
+    BetweenTarget,
+    Way,
+    between_evidence,
+    searched_evidence,
+)
 from skred.diagnosis.tabulated.tables import wide_tables
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.physics.mechanisms.placed import added_of
@@ -55,28 +60,21 @@ def with_ways(
     may = [one for one in candidates.values() if may_differ(one.mechanism) and one.alone > 0.0]
     if not may:
         return dict(candidates)
-    base.with_nothing(SEARCH, sampled=True)  # before every worker does it once more
-    shapes = [(one, *best) for one in may for best in one.best_of_each(all_but_place)]
-    of_each = pool.map(partial(or_none, searched, base), [curve for _, curve, _ in shapes])
+    kinds = [(one, *kind) for one in may for kind in one.best_of_each(all_but_place)]
     found = defaultdict[str, list[Looked]](list)
-    for (one, curve, log_share), ways in zip(shapes, of_each, strict=True):
-        if ways is not None:
-            found[one.mechanism.id].append(Looked(curve, log_share, curve.log_factor_of_sign, ways))
-    differing = [replace(one, looked=tuple(found[one.mechanism.id])) for one in may]
-    least = max([best, *(one.log_bayes_factor for one in differing)]) - COUNTS
-    leading = [one for one in differing if one.log_bayes_factor > least and one.looked]
-    again = with_finer_ways(base, leading, pool)
-    return {**candidates, **{one.mechanism.id: one for one in (*differing, *again)}}
-
-
-def with_finer_ways(base: Base, candidates: Sequence[Candidate], pool: Executor) -> list[Candidate]:
-    """Candidates with their leading shapes computed by many more quadrature points."""
-    if candidates:
-        base.with_nothing(FINE, sampled=True)  # before every worker does it once more
-    jobs = [shape for one in candidates for shape in one.likely_looked]
-    computed = pool.map(partial(or_none, _looked_closer, base), jobs)
-    closer = {old: new for old, new in zip(jobs, computed, strict=True) if new is not None}
-    return [one.looked_closer(closer) for one in candidates]
+    for (one, curve, log_share), ways in zip(
+        kinds, pool.map(partial(or_none, searched, base), [curve for _, curve, _ in kinds]), strict=True
+    ):
+        found[one.mechanism.id].append(Looked(curve, log_share, curve.log_factor_of(curve.sign), ways or {}))
+    looked = {name: replace(candidates[name], looked=tuple(shapes)) for name, shapes in found.items()}
+    least = max([best, *(one.log_bayes_factor for one in looked.values())]) - COUNTS
+    leading = {name: one for name, one in looked.items() if one.log_bayes_factor > least}
+    while jobs := [shape for one in leading.values() for shape in one.to_look_closer]:
+        computed = pool.map(partial(_looked_closer, base), jobs)
+        # What comes from another process is a copy.
+        closer = {old: replace(new, curve=old.curve) for old, new in zip(jobs, computed, strict=True)}
+        leading = {name: one.looked_closer(closer) for name, one in leading.items()}
+    return {**candidates, **looked, **leading}
 
 
 def _looked_closer(base: Base, shape: Looked) -> Looked:
@@ -84,7 +82,10 @@ def _looked_closer(base: Base, shape: Looked) -> Looked:
     curve = shape.curve
     fine, error = computed_again(base, curve)
     log_share = shape.log_share + fine.log_bayes_factor - curve.log_bayes_factor
-    return Looked(curve, log_share, fine.log_factor_of_sign, finer(base, curve, shape.ways), error)
+    ways = or_none(finer, base, curve, shape.ways) or shape.ways
+    if ways:
+        error = math.hypot(error, _most_probable(ways).populations.error)
+    return Looked(curve, log_share, fine.log_factor_of(curve.sign), ways, error)
 
 
 def or_none[Found](compute: Callable[..., Found], *given: Any) -> Found | None:
@@ -104,9 +105,15 @@ def searched(base: Base, curve: Curve) -> Ways:
 
 def finer(base: Base, curve: Curve, ways: Ways) -> Ways:
     """The same by many more quadrature points, around the populations of the most probable way."""
-    around = max(ways, key=lambda kind: math.log(PRIOR[kind]) + ways[kind].log_factor)
-    tables = wide_tables(base, curve, ways[around].populations, FINE)
+    if not ways:
+        return {}
+    tables = wide_tables(base, curve, _most_probable(ways).populations, FINE)
     return {
         kind: between_evidence(BetweenTarget(base, curve, tables, kind), way.proposal)
         for kind, way in ways.items()
     }
+
+
+def _most_probable(ways: Ways) -> Way:
+    """The way with the highest posterior probability."""
+    return ways[max(ways, key=lambda kind: math.log(PRIOR[kind]) + ways[kind].log_factor)]

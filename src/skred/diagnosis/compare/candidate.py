@@ -32,14 +32,15 @@ Ways = Mapping[BetweenEvents, Way]
 
 
 def gains_of(ways: Ways, in_common: float) -> dict[BetweenEvents, float]:
-    """What each way has more than the strength in common, in nats.
+    """What each way has more than the strength in common, in nats; minus infinity for one that is not known.
 
     Parameters
     ----------
     in_common : float
         Log Bayes factor of that against nothing, at the same shape by strengths of one sign as the ways are.
     """
-    return {BetweenEvents.COMMON: 0.0} | {kind: way.log_factor - in_common for kind, way in ways.items()}
+    gains = dict.fromkeys(BetweenEvents, -math.inf) | {BetweenEvents.COMMON: 0.0}
+    return gains | {kind: way.log_factor - in_common for kind, way in ways.items()}
 
 
 def log_gain(residue: float | None, gains: Mapping[BetweenEvents, float] | None = None) -> float:
@@ -62,19 +63,19 @@ def log_gain(residue: float | None, gains: Mapping[BetweenEvents, float] | None 
 
 @dataclass(frozen=True, eq=False)
 class Looked:
-    """A shape at which avalanches may differ in the strength, for all that differ from it in place alone.
+    """A shape at which avalanches may differ in the strength, for all of its kind (`all_but_place`).
 
     Attributes
     ----------
     curve : Curve
     log_share : float
-        Log of the posterior probability of these shapes with a strength in common.
+        Log of the posterior probability of these shapes with a strength in common, relative to all shapes.
     in_common : float
         Log Bayes factor of that at the shape, against nothing, by strengths of one sign as the ways are.
     ways : mapping of BetweenEvents to Way
+        Empty where none could be computed.
     error : float or None
-        Standard error of `in_common`, in nats; None where it is not by as many quadrature points as finer
-        ways.
+        Standard error of the log Bayes factor, in nats; None where it is not by many quadrature points yet.
     """
 
     curve: Curve
@@ -161,7 +162,7 @@ class Candidate:
     @property
     def gains(self) -> dict[BetweenEvents, float] | None:
         """What each way has more than the strength in common, in nats; None where not looked at."""
-        return gains_over(self.looked) if self.looked else None
+        return gains_over(self.looked) if any(one.ways for one in self.looked) else None
 
     @property
     def between(self) -> dict[BetweenEvents, float]:
@@ -180,31 +181,35 @@ class Candidate:
 
     @property
     def shape_weights(self) -> FloatArray:
-        """Posterior probability of each shape."""
-        factors = self.log_factors
+        """Posterior probability of each shape; where avalanches may differ, with what its kind gains so."""
+        gained = {all_but_place(one.curve): one.height - one.log_share for one in self.looked}
+        factors = self.log_factors + [gained.get(all_but_place(one), 0.0) for one in self.curves]
         return np.exp(factors - np.logaddexp.reduce(factors))
+
+    @property
+    def leading(self) -> Looked | None:
+        """The most probable shape of those looked at, strengths in common or not."""
+        return max(self.looked, key=lambda one: one.height, default=None)
 
     @property
     def best(self) -> Curve:
         """The curve of the most probable shape; of the highest Bayes factor where none may differ."""
-        return (
-            self.likely_looked[0].curve
-            if self.looked
-            else max(self.curves, key=lambda one: one.log_bayes_factor)
-        )
+        return self.leading.curve if self.leading else max(self.curves, key=lambda one: one.log_bayes_factor)
 
     @property
     def ways(self) -> Ways | None:
         """Each way in which avalanches differ in the strength, at the best shape; None: not looked at."""
-        return self.likely_looked[0].ways if self.looked else None
+        return self.leading.ways if self.leading else None
 
     @property
-    def likely_looked(self) -> list[Looked]:
-        """Shapes that were looked at, the most probable one first; none that is clearly less probable."""
-        heights = [one.height for one in self.looked]
-        return [
-            self.looked[k] for k in np.argsort(heights)[::-1] if heights[k] > max(heights) - DECIDES_NOTHING
-        ]
+    def to_look_closer(self) -> list[Looked]:
+        """Shapes that may lead, strengths in common or not, and are not by many quadrature points yet."""
+        if not self.looked:
+            return []
+        least = max(one.height for one in self.looked) - DECIDES_NOTHING
+        in_common = max(self.looked, key=lambda one: one.log_share)
+        leading = [one for one in self.looked if one is in_common or one.height > least]
+        return [one for one in leading if one.error is None]
 
     def looked_closer(self, closer: Mapping[Looked, Looked]) -> Candidate:
         """With some of the shapes that were looked at by many more quadrature points."""
@@ -212,20 +217,21 @@ class Candidate:
         before, after = (
             np.logaddexp.reduce([one.log_share for one in all_]) for all_ in (self.looked, looked)
         )
-        found = replace(self, looked=looked, correction=float(after - before))
-        return replace(found, error=found.likely_looked[0].error)
+        found = replace(self, looked=looked, correction=self.correction + float(after - before))
+        return replace(found, error=found.leading.error if found.leading else None)
 
     def best_of_each(self, form: Callable[[Curve], Hashable]) -> list[tuple[Curve, float]]:
         """The best curve of each form that shapes have, and the log of the form's posterior probability.
 
-        None that is farther behind than what counts.
+        Both with a strength in common. None that is farther behind than what counts.
 
         Parameters
         ----------
         form : callable
             What shapes of one form share.
         """
-        weights, of = self.shape_weights, [form(one) for one in self.curves]
+        factors, of = self.log_factors, [form(one) for one in self.curves]
+        weights = np.exp(factors - np.logaddexp.reduce(factors))
         found = list[tuple[Curve, float]]()
         for each in dict.fromkeys(of):
             own = [k for k in range(len(of)) if of[k] == each]
@@ -279,7 +285,10 @@ def names_of_constants(curve: Curve) -> Hashable:
 
 
 def all_but_place(curve: Curve) -> Hashable:
-    """What shapes share that differ only in where a stretch is, and in constants that go with it."""
+    """What shapes of one kind share: the quantity that strengths are, which constants, where a track begins.
+
+    They differ in where a stretch is, and in values of constants.
+    """
     return *_quantity(curve), names_of_constants(curve), curve.shape.begins_m
 
 

@@ -19,7 +19,7 @@ from functools import partial
 import numpy as np
 
 from skred.arrays import FloatArray
-from skred.diagnosis.compare.between import with_ways
+from skred.diagnosis.compare.between import SEARCH, with_ways
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import candidates_of, refine, screened_parts
@@ -255,7 +255,8 @@ def _under_errors(
     best : float
         The most that a candidate has under another error model, in nats above nothing under this one.
     """
-    base.with_nothing(USUAL)  # before every worker does it once more
+    for budget, sampled in ((USUAL, False), (SEARCH, True), (FINE, True)):  # before every worker does it
+        base.with_nothing(budget, sampled=sampled)
     candidates = refine(base.setting, curves, partial(curve_near, base), pool, best)
     fitted = pool.map(partial(free_force, base, candidates=candidates), KINDS)  # and meanwhile:
     candidates = with_ways(base, candidates, pool, best)

@@ -59,8 +59,6 @@ def recomputed(
 
 def with_finer_curves(base: Base, candidates: Sequence[Candidate], pool: Executor) -> list[Candidate]:
     """Mechanisms with their best curve computed again."""
-    if candidates:
-        base.with_nothing(FINE, sampled=True)  # before every worker does it once more
     again = pool.map(partial(computed_again, base), [one.best for one in candidates])
     return [
         replace(one, correction=fine.log_bayes_factor - one.best.log_bayes_factor, error=error)

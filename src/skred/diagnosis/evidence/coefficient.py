@@ -163,13 +163,17 @@ class Curve(PlacedMechanism):
         most = float(log_density.max())
         return most + math.log(float(np.trapezoid(np.exp(log_density - most), strengths)))
 
-    @cached_property
-    def log_factor_of_sign(self) -> float:
-        """Log Bayes factor by strengths of the mean's sign alone, in nats."""
+    def log_factor_of(self, sign: float) -> float:
+        """Log Bayes factor by strengths of one sign alone, in nats."""
         strengths, log_density = self.fine()
-        own = strengths * self.moments[0] >= 0.0
+        own = strengths * sign >= 0.0
         most = float(log_density.max())
         return most + math.log(float(np.trapezoid(np.exp(log_density[own] - most), strengths[own])))
+
+    @property
+    def sign(self) -> float:
+        """That of the mean."""
+        return math.copysign(1.0, self.moments[0])
 
     @cached_property
     def moments(self) -> tuple[float, float]:

@@ -18,11 +18,11 @@ import numpy as np
 
 from skred.arrays import BoolArray, FloatArray, IntArray
 from skred.diagnosis.compare.between import or_none, searched
-from skred.diagnosis.compare.candidate import Candidate, gains_of, log_gain
+from skred.diagnosis.compare.candidate import Candidate, all_but_place, gains_of, log_gain
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of, most_probable
-from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
+from skred.diagnosis.evidence.coefficient import Base, curve_at
 from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.prior_odds import UNLISTED, log_odds
 from skred.diagnosis.evidence.refit import Fit
@@ -180,20 +180,22 @@ class _Part:
 def _by_mechanism(candidate: Candidate, base: Base, part: _Part) -> float:
     """The log Bayes factor of a mechanism by a part of the recordings, over its leading shapes."""
     factors, best = candidate.log_factors, candidate.best
-    leading = factors > factors.max() - DECIDES_NOTHING
-    rest, found = part.base(base), dict[Curve, float]()
-    for k in np.flatnonzero(leading | np.array([one is best for one in candidate.curves])):
-        curve = candidate.curves[k]
+    rest, of_kind, others = part.base(base), list[float](), list[float]()
+    for k, curve in enumerate(candidate.curves):
+        if factors[k] <= factors.max() - DECIDES_NOTHING and curve is not best:
+            continue
         known = {strength: part.fit(fit) for strength, fit in curve.known.items()}
         one = curve_at(rest, curve, curve.strengths, USUAL, known)
-        found[one] = candidate.log_weights[k] + one.log_bayes_factor
+        own = of_kind if all_but_place(curve) == all_but_place(best) else others
+        own.append(candidate.log_weights[k] + one.log_bayes_factor)
         if curve is best:
-            best = one
-    in_common = float(np.logaddexp.reduce(list(found.values())))
-    if not candidate.looked:
-        return in_common
-    ways = or_none(searched, rest, best)
-    return in_common + log_gain(None, None if ways is None else gains_of(ways, best.log_factor_of_sign))
+            at_best = one
+    gain = 0.0
+    if candidate.looked:
+        ways = or_none(searched, rest, at_best)
+        gain = 0.0 if ways is None else log_gain(None, gains_of(ways, at_best.log_factor_of(at_best.sign)))
+    # What another kind of shape gains where avalanches differ is not known for a part, and not counted.
+    return float(np.logaddexp.reduce([*others, gain + np.logaddexp.reduce(of_kind)]))
 
 
 def _by_profile(profile: Profile, base: Base, part: _Part) -> float:

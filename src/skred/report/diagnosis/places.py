@@ -213,7 +213,7 @@ def _at_places(axes: Axes, places: list[Place], colour: str, short_m: float) -> 
         height, order = max(one.factor, floor), 4 if one.best else 2
         axes.hlines(
             height, one.first_m, one.last_m, color=shade, linewidth=2.6 if one.best else 1.2, zorder=order,
-            label="highest" if one.best else "_other",
+            label="most probable" if one.best else "_other",
         )  # fmt: skip
         told = f"s = {one.first_m:.0f} to {one.last_m:.0f} m: {one.factor:.1f} nats"
         mark(axes, 0.5 * (one.first_m + one.last_m), height, [told])
