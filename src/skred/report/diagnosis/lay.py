@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from skred.report.diagnosis.words import in_words, law_id, short_title, stretch_in
+from skred.report.diagnosis.words import law_id, short_title, stretch_in
 from skred.report.shared import document as doc
 from skred.report.shared.labels import printable
 from skred.report.shared.numbers import fixed, is_number
@@ -69,7 +69,7 @@ def _tied(document: doc.Document) -> list[str]:
     tied = doc.listed(document, "indistinguishable")
     if not tied:
         return []
-    return [f"These recordings cannot tell it from {_either(in_words(tied))}."]
+    return [f"These recordings cannot tell it from {_either([short_title(document, one) for one in tied])}."]
 
 
 def _between(document: doc.Document) -> str:
