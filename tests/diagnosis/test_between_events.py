@@ -28,6 +28,7 @@ from skred.diagnosis.compare.candidate import (
     gains_over,
     log_gain,
 )
+from skred.diagnosis.compare.comparison import with_errors
 from skred.diagnosis.compare.recomputed import computed_again
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode
@@ -178,6 +179,8 @@ def test_a_base_law_with_the_term_has_the_same_evidence() -> None:
     differ = ways[SPREAD].log_factor
     assert differ - found.log_bayes_factor > 20.0
     assert abs(differ - (pcm.fit.found.log_evidence - coulomb.fit.found.log_evidence)) < 3.0
+    common = computed_again(coulomb, found)[0].log_bayes_factor
+    assert abs(common - found.log_bayes_factor) < 0.5
 
 
 @pytest.mark.slow
@@ -244,9 +247,9 @@ def test_multiples_of_avalanches_to_come() -> None:
 
 
 def test_gains_do_not_hang_on_quadrature_points() -> None:
-    """Friction on a stretch at Ryggfonn, around two populations: gains differed by nats while a strength in
-    common was by the same tables, between which it lay."""
-    base = base_of(RYGGFONN, "pcm")
+    """Friction on a stretch at Ryggfonn, around two populations: gains differed by 1.5 and 1.7 nats while a
+    strength in common was by the same tables, between which it lay."""
+    base = with_errors(base_of(RYGGFONN, "pcm"), "scaled")
     fit, gains = base.fit, list[dict[BetweenEvents, float]]()
     for wider in (0.0, 0.3):  # of both spreads' logarithms
         psi = fit.found.psi + wider * np.array([0.0, 0.0, 1.0, 1.0, 0.0])

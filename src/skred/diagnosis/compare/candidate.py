@@ -285,7 +285,7 @@ def names_of_constants(curve: Curve) -> Hashable:
 
 
 def all_but_place(curve: Curve) -> Hashable:
-    """What shapes of one kind share: the quantity that strengths are, which constants, where a track begins.
+    """What shapes of one kind share: the quantity that strengths are, which constants, where they begin.
 
     They differ in where a stretch is, and in values of constants.
     """
