@@ -5,6 +5,7 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,10 +19,13 @@ from skred.diagnosis.compare.comparison import compare, free_force
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.residue import with_residues
 from skred.diagnosis.compare.screening import curve
+from skred.diagnosis.discrepancy.climb import climb
+from skred.diagnosis.discrepancy.explored import Expansion
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_evidence_of
 from skred.diagnosis.discrepancy.sampled_evidence import sampled
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at, curve_near
+from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Shape
@@ -58,6 +62,34 @@ def test_a_force_that_takes_both_effects_is_behind_the_first_and_a_force_beside_
     assert found.alone == drag.alone
     assert found.log_bayes_factor == pytest.approx(drag.alone + log_gain(found.residue))
     assert found.log_bayes_factor == pytest.approx(force + 4.5, abs=2.0) and force > drag.alone + 30.0
+
+
+def test_climbs_end_where_a_force_beside_a_mechanism_cannot_bring_it_near_what_leads(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """After the first prior's; where it may count they go on."""
+    base, drag, profiles = fitted(rolling(2.4e-4, waves=0.05))
+    climbed = list[int]()
+
+    def counted(*given: Any, **more: Any) -> Expansion:
+        climbed.append(1)
+        return climb(*given, **more)
+
+    monkeypatch.setattr("skred.diagnosis.discrepancy.fit.climb", counted)
+
+    def looked(best: float) -> tuple[int, float]:
+        climbed.clear()
+        with ThreadPoolExecutor(1) as pool:
+            found = with_residues(base, {DRAG.id: drag}, profiles, pool, best)[DRAG.id]
+        assert found.residue is not None
+        return len(climbed), found.log_bayes_factor
+
+    by_all, usual = looked(-np.inf)
+    n, reached = looked(usual)
+    assert n == by_all and reached == usual
+    n, reached = looked(usual + 2.0 * COUNTS)
+    assert n < 0.7 * by_all
+    assert reached < usual + COUNTS
 
 
 @pytest.mark.slow
@@ -118,7 +150,7 @@ def test_a_mechanism_that_is_overtaken_is_looked_at_too(monkeypatch: pytest.Monk
     }
     n_looked = list[int]()
 
-    def beside(base: Base, curves: list[object], pool: object) -> list[float | None]:
+    def beside(base: Base, curves: list[object], least: object, pool: object) -> list[float | None]:
         n_looked.append(len(curves))
         return [29.0] * len(curves)
 
@@ -145,7 +177,7 @@ def test_each_form_of_a_mechanism_has_a_residue_of_its_own(monkeypatch: pytest.M
     ]
     of_each = {(): 1.0, (("another", 1.0),): 8.0}
 
-    def beside(base: Base, curves: list[Curve], pool: object) -> list[float | None]:
+    def beside(base: Base, curves: list[Curve], least: object, pool: object) -> list[float | None]:
         return [of_each[one.shape.constants] for one in curves]
 
     monkeypatch.setattr("skred.diagnosis.compare.residue.residues", beside)

@@ -261,7 +261,7 @@ def _under_errors(
     fitted = pool.map(partial(free_force, base, candidates=candidates), KINDS)  # and meanwhile:
     candidates = with_ways(base, candidates, pool, best)
     profiles = list(fitted)
-    candidates = with_residues(base, candidates, profiles, pool)
+    candidates = with_residues(base, candidates, profiles, pool, best)
     candidates, profiles = recomputed(base, candidates, profiles, pool, best)
     return ComparisonUnderErrors(error_model, base, candidates, profiles, curves)
 

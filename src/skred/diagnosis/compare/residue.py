@@ -7,6 +7,7 @@ well has even odds then.
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
@@ -20,30 +21,42 @@ from skred.diagnosis.compare.candidate import Candidate, names_of_constants
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, knots, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms.spec import Group
 
 
 def with_residues(
-    base: Base, candidates: Mapping[str, Candidate], profiles: Sequence[Profile], pool: Executor
+    base: Base,
+    candidates: Mapping[str, Candidate],
+    profiles: Sequence[Profile],
+    pool: Executor,
+    best: float = -math.inf,
 ) -> dict[str, Candidate]:
     """Candidates, with a residue those that have more than half of what a force in no list has by itself.
 
     That is: those that have less than it has by itself, or beside another one. It is looked for beside each
     form of a mechanism's shapes: an obstacle that takes the same from all may need one less than an obstacle
     that takes a share. All are by the Laplace approximation, and so should the profiles be.
+
+    Parameters
+    ----------
+    best : float
+        The most that a candidate has under another error model, in nats above nothing under this one.
     """
     found, force = dict(candidates), log_evidence_of(profiles)
-    best, tried = force, set[str]()
+    counts = max([best, force, *(one.log_bayes_factor for one in candidates.values())]) - COUNTS
+    highest, tried = force, set[str]()
     while looked := [
         one
         for name, one in found.items()
         if one.mechanism.group is Group.PHYSICS
         and name not in tried
-        and 0.5 * force < one.log_bayes_factor < best
+        and 0.5 * force < one.log_bayes_factor < highest
     ]:
         tried |= {one.mechanism.id for one in looked}
-        forms = [(one, *best) for one in looked for best in one.best_of_each(names_of_constants)]
-        computed = residues(base, [curve for _, curve, _ in forms], pool)
+        forms = [(one, *form) for one in looked for form in one.best_of_each(names_of_constants)]
+        least = [counts - one.alone - log_share for one, _, log_share in forms]
+        computed = residues(base, [curve for _, curve, _ in forms], least, pool)
         beside = defaultdict[str, list[float]](list)
         for (one, _, log_share), residue in zip(forms, computed, strict=True):
             # What a mechanism leaves is no residue if it is more than what it explains.
@@ -51,16 +64,23 @@ def with_residues(
                 beside[one.mechanism.id].append(log_share + residue)
         for name, parts in beside.items():
             found[name] = replace(found[name], residue=float(np.logaddexp.reduce(parts)))
-            best = max(best, found[name].log_bayes_factor)
+            highest = max(highest, found[name].log_bayes_factor)
     return found
 
 
-def residues(base: Base, curves: Sequence[Curve], pool: Executor) -> list[float | None]:
+def residues(
+    base: Base, curves: Sequence[Curve], least: Sequence[float], pool: Executor
+) -> list[float | None]:
     """Log Bayes factors of a force not in the list beside mechanisms, against these alone.
 
     None where a step leads to what no front can do, as a drag far below nil.
+
+    Parameters
+    ----------
+    least : sequence of float
+        What each must have to count; one that cannot have it is known less well.
     """
-    jobs = [(curve, kind) for curve in curves for kind in KINDS]
+    jobs = [(curve, one, kind) for curve, one in zip(curves, least, strict=True) for kind in KINDS]
     fits = batched(pool.map(partial(_fit_beside, base), *zip(*jobs, strict=True)), len(KINDS))
     fitted = [[one for one in profiles if one is not None] for profiles in fits]
     return [
@@ -69,7 +89,7 @@ def residues(base: Base, curves: Sequence[Curve], pool: Executor) -> list[float 
     ]
 
 
-def _fit_beside(base: Base, curve: Curve, kind: Kind) -> Profile | None:
+def _fit_beside(base: Base, curve: Curve, least: float, kind: Kind) -> Profile | None:
     """A force of one kind beside a mechanism of a curve's shape, from where that is by itself.
 
     Both are fitted together: beside such a force a mechanism is as strong as it is, and not as strong as it
@@ -81,6 +101,6 @@ def _fit_beside(base: Base, curve: Curve, kind: Kind) -> Profile | None:
     values = np.append(curve.strengths[top], np.zeros(len(knots(base.setting))))
     near = values, curve.fits[top].start
     try:
-        return fit_profile(wide, kind, near, beside=curve)
+        return fit_profile(wide, kind, near, beside=curve, least=curve.log_bayes_factor + least)
     except np.linalg.LinAlgError:
         return None

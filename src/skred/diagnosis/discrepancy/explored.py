@@ -91,10 +91,18 @@ class ExploredPriors:
         All priors, and the log of each one's probability.
     covers : dict
         Covariance of the values under each.
+    least : float
+        Log Bayes factor below which nothing more need be known.
     """
 
-    def __init__(self, height: float, shares: dict[Prior, float], covers: dict[Prior, FloatArray]) -> None:
-        self.height, self.shares, self.covers = height, shares, covers
+    def __init__(
+        self,
+        height: float,
+        shares: dict[Prior, float],
+        covers: dict[Prior, FloatArray],
+        least: float = 0.0,
+    ) -> None:
+        self.height, self.shares, self.covers, self.least = height, shares, covers, least
         self.maxima: dict[Prior, Expansion] = {}
         self.approximations: dict[Prior, dict[Prior, Laplace]] = {prior: {} for prior in shares}
 
@@ -123,11 +131,15 @@ class ExploredPriors:
     def open(self) -> list[Prior]:
         """The most probable prior not climbed under; none where all of those are improbable together.
 
-        Nor where all priors are less probable than no force, even by their approximations.
+        Nor where all priors together have less than the least that counts, even by their approximations.
         """
         left = {prior: self.factor(prior) for prior in self.shares if prior not in self.maxima}
         known = np.logaddexp.reduce([self.factor(prior) for prior in self.shares])
-        if not left or known < 0.0 or np.logaddexp.reduce(list(left.values())) < known - DECIDES_NOTHING:
+        if (
+            not left
+            or known < self.least
+            or np.logaddexp.reduce(list(left.values())) < known - DECIDES_NOTHING
+        ):
             return []
         return [max(left, key=lambda one: left[one])]
 

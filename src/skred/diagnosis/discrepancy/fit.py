@@ -48,6 +48,7 @@ def fit_profile(
     near: Start | None = None,
     again: Prior | None = None,
     beside: Curve | None = None,
+    least: float = 0.0,
 ) -> Profile:
     """Fit the profile by Gauss-Newton steps; evidence by quadrature at the maximum.
 
@@ -67,6 +68,9 @@ def fit_profile(
     beside : Curve, optional
         Of the base's last direction, if its strength is to be fitted too: the first of all values, with its
         own prior. The evidence is that of both against neither then.
+    least : float
+        Log Bayes factor below which none counts: that of no force, or more where something else leads.
+        Climbs end where even the approximations of priors not climbed under have less.
     """
     at, n_beside = knots(base.setting), 0 if beside is None else 1
     # Nothing like everything else, so that what is left of integration errors is the same there.
@@ -77,7 +81,7 @@ def fit_profile(
         starts.append(expanded_at(base, kind, at, *near))
     shares = priors_of(kind, at)
     covers = {prior: _with_one_more(beside, prior.cover(at)) for prior in shares}
-    explored = ExploredPriors(height, shares, covers)
+    explored = ExploredPriors(height, shares, covers, least)
     if again is None:
         waiting, maximum_under, most = _first(kind, starts[-1], explored), _maximum_under, _PRIORS_TRIED
     else:
