@@ -153,6 +153,24 @@ def test_population_of_simulated_campaigns_is_recovered() -> None:
     assert np.corrcoef(points[:, 0], true[:, 0])[0, 1] > 0.95
 
 
+def test_scores_of_many_groups_are_those_of_each_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many of them are in memory together."""
+    base = sparse_base()
+    score_test, n = ScoreTest(base), len(base.rows.event)
+    rows, points = base.rows.repeated(5), np.tile(base.fit.points, (5, 1))
+    points[:, 0] += np.repeat([-0.02, -0.01, 0.0, 0.01, 0.02], n)
+    population = Population(*(np.repeat(values, 5, axis=0) for values in base.population))
+    at_once = score_test.scores(rows, points, population)
+    assert at_once.score.shape[0] == 5 and np.ptp(at_once.score[:, 0]) > 0.0
+    monkeypatch.setattr("skred.diagnosis.detect.score_test.MOST_NODES", 2 * n * at_once.score.shape[1])
+    in_blocks = score_test.scores(rows, points, population)
+    for k in range(5):
+        alone = score_test.scores(base.rows, points[k * n : (k + 1) * n], base.population)
+        for found in (at_once, in_blocks):
+            for values, own in zip(found, alone, strict=True):
+                assert_allclose(values[k], own[0], rtol=1e-9, atol=1e-9)
+
+
 def test_order_of_events_does_not_matter() -> None:
     base = sparse_base()
     score_test = ScoreTest(base)

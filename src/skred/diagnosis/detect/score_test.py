@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import batched
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Pop
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.linear_mixed_model import MeanPrior, Scores, efficient_scores, mean_prior
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds
+from skred.diagnosis.evidence.refit import MOST_NODES
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import PlacedMechanism, can_join, placed, shapes_of
 from skred.physics.mechanisms.spec import Direction, Setting
@@ -114,8 +116,16 @@ class ScoreTest:
         return mean_prior(self.base.law)
 
     def scores(self, rows: Rows, points: FloatArray, population: Population) -> Scores:
-        """Efficient scores of all directions at the events' modes."""
-        return self.scores_around(self.around(rows, points), rows, population)
+        """Efficient scores of all directions at the events' modes, some groups at a time."""
+        # A row takes as much memory as there are directions.
+        together = sum(len(part.directions) for part in self._parts) * np.bincount(rows.group).max()
+        found = list[Scores]()
+        for groups in batched(range(len(population.mean)), max(int(MOST_NODES // together), 1)):
+            own = np.flatnonzero(np.isin(rows.group, groups))
+            some = rows.take(own)._replace(group=rows.group[own] - groups[0])
+            around = self.around(some, points[own])
+            found.append(self.scores_around(around, some, population.take(np.array(groups))))
+        return Scores(*(np.concatenate(values) for values in zip(*found, strict=True)))
 
     def scores_around(self, around: Modes, rows: Rows, population: Population) -> Scores:
         """The same from the tangents there."""
