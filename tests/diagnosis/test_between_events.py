@@ -19,18 +19,11 @@ from skred.diagnosis.augment.added_strength import added_strengths, components_o
 from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.augment.coefficient import multiples_of_events
 from skred.diagnosis.compare.between import finer, may_differ, searched, with_ways
-from skred.diagnosis.compare.candidate import (
-    BESIDE,
-    Candidate,
-    Looked,
-    all_but_place,
-    gains_of,
-    gains_over,
-    log_gain,
-)
+from skred.diagnosis.compare.candidate import BESIDE, Candidate, all_but_place, log_gain
 from skred.diagnosis.compare.comparison import with_errors
 from skred.diagnosis.compare.recomputed import computed_again
 from skred.diagnosis.compare.screening import curve
+from skred.diagnosis.compare.ways import Looked, gains_of, gains_over
 from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
 from skred.diagnosis.evidence.event_quadrature import FINE

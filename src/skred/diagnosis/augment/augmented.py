@@ -8,7 +8,7 @@ import skred.diagnosis.augment.results  # noqa: F401 - registers what it says of
 from skred.diagnosis.augment.added_strength import added_strengths
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.diagnosis.compare.between import finer, searched
-from skred.diagnosis.compare.candidate import Ways
+from skred.diagnosis.compare.ways import Ways
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import FINE
 from skred.diagnosis.tabulated.coefficient_grid import TABLES, from_nothing, locate

@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from skred.diagnosis.compare.candidate import Candidate, Looked, Ways, all_but_place
+from skred.diagnosis.compare.candidate import Candidate, all_but_place
 from skred.diagnosis.compare.recomputed import computed_again
+from skred.diagnosis.compare.ways import Looked, Ways
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import FINE, Budget
 from skred.diagnosis.evidence.tolerance import COUNTS

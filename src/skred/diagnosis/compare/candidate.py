@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from skred.arrays import FloatArray
+from skred.diagnosis.compare.ways import Looked, Ways, gains_over, over_ways
 from skred.diagnosis.evidence.coefficient import Curve
 from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING
-from skred.diagnosis.tabulated.between_evidence import Way
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.inference.intervals import LEFT_OUT
 from skred.physics.mechanisms.spec import Group, Mechanism
@@ -27,22 +27,6 @@ BESIDE = 0.5
 another one, has more evidence than it: then something acts beside it or in its place, at even odds."""
 
 
-Ways = Mapping[BetweenEvents, Way]
-"""Each way in which avalanches differ in a mechanism's strength."""
-
-
-def gains_of(ways: Ways, in_common: float) -> dict[BetweenEvents, float]:
-    """What each way has more than the strength in common, in nats; minus infinity for one that is not known.
-
-    Parameters
-    ----------
-    in_common : float
-        Log Bayes factor of that against nothing, at the same shape by strengths of one sign as the ways are.
-    """
-    gains = dict.fromkeys(BetweenEvents, -math.inf) | {BetweenEvents.COMMON: 0.0}
-    return gains | {kind: way.log_factor - in_common for kind, way in ways.items()}
-
-
 def log_gain(residue: float | None, gains: Mapping[BetweenEvents, float] | None = None) -> float:
     """What is added to a mechanism's log Bayes factor, of what was looked at with its prior probability.
 
@@ -53,54 +37,10 @@ def log_gain(residue: float | None, gains: Mapping[BetweenEvents, float] | None 
     gains : mapping of BetweenEvents to float, optional
         What each way in which avalanches may differ has more than the strength in common.
     """
-    own = 0.0
-    if gains is not None:
-        own = float(np.logaddexp.reduce([math.log(PRIOR[kind]) + gain for kind, gain in gains.items()]))
+    own = 0.0 if gains is None else over_ways(gains)
     if residue is None:
         return own
     return float(np.logaddexp(math.log1p(-BESIDE) + own, math.log(BESIDE) + residue))
-
-
-@dataclass(frozen=True, eq=False)
-class Looked:
-    """A shape at which avalanches may differ in the strength, for all of its kind (`all_but_place`).
-
-    Attributes
-    ----------
-    curve : Curve
-    log_share : float
-        Log of the posterior probability of these shapes with a strength in common, relative to all shapes.
-    in_common : float
-        Log Bayes factor of that at the shape, against nothing, by strengths of one sign as the ways are.
-    ways : mapping of BetweenEvents to Way
-        Empty where none could be computed.
-    error : float or None
-        Standard error of the log Bayes factor, in nats; None where it is not by many quadrature points yet.
-    """
-
-    curve: Curve
-    log_share: float
-    in_common: float
-    ways: Ways
-    error: float | None = None
-
-    @property
-    def gains(self) -> dict[BetweenEvents, float]:
-        """What each way has more than the strength in common at this shape, in nats."""
-        return gains_of(self.ways, self.in_common)
-
-    @property
-    def height(self) -> float:
-        """Log of the posterior probability, strengths in common or not; not normalised."""
-        return self.log_share + log_gain(None, self.gains)
-
-
-def gains_over(looked: Sequence[Looked]) -> dict[BetweenEvents, float]:
-    """What each way has more than the strength in common, over all shapes looked at, in nats."""
-    shares = np.array([one.log_share for one in looked])
-    shares -= np.logaddexp.reduce(shares)
-    each = [one.gains for one in looked]
-    return {kind: float(np.logaddexp.reduce(shares + [one[kind] for one in each])) for kind in each[0]}
 
 
 class Strength(NamedTuple):

@@ -18,8 +18,9 @@ import numpy as np
 
 from skred.arrays import BoolArray, FloatArray, IntArray
 from skred.diagnosis.compare.between import or_none, searched
-from skred.diagnosis.compare.candidate import Candidate, all_but_place, gains_of, log_gain
+from skred.diagnosis.compare.candidate import Candidate, all_but_place, log_gain
 from skred.diagnosis.compare.comparison import Comparison
+from skred.diagnosis.compare.ways import gains_of
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of, most_probable
 from skred.diagnosis.evidence.coefficient import Base, curve_at
