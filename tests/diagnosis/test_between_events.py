@@ -285,6 +285,9 @@ def test_shapes_are_mixed_by_what_they_have(few: tuple[Base, Curve]) -> None:
     closer[shapes[0]] = replace(closer[shapes[0]], log_share=shapes[0].log_share + 0.5)
     again = candidate.looked_closer(closer)
     assert again.correction == pytest.approx(np.log(0.8 * np.exp(0.5) + 0.2))
+    # By more points a kind may have more: its shapes have more of the weight then.
+    heights = [heights[0] + 0.5, heights[1]]
+    assert_allclose(again.shape_weights, np.exp(heights - np.logaddexp.reduce(heights)))
     assert again.error == 0.1 and again.to_look_closer == []
 
 

@@ -15,12 +15,13 @@ from skred.diagnosis.evidence.conditional_map import campaign_rows
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of
 from skred.diagnosis.influence.influence import Influence
 from skred.diagnosis.outcome import Diagnosis
-from skred.diagnosis.predict.conditional import BeforeAfter, Conditional, above, conditional
+from skred.diagnosis.predict.conditional import BeforeAfter, Conditional, above, conditional, readings_of
 from skred.diagnosis.predict.draws import Draws, LeftOut
 from skred.diagnosis.predict.unseen import log_densities
 from skred.diagnosis.verdict.conditional import conditional_document
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
+from skred.inference.reading_density import log_likelihoods
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import direction_of
@@ -163,6 +164,22 @@ def test_readings_below_have_no_say(ryggfonn: HierarchicalProblem) -> None:
         assert moved.max() < 0.12
     known = first.n_above[:, RUNOUT] > 2
     assert np.abs(first.mean - second.mean)[known, RUNOUT].max() > 5.0
+
+
+def test_a_bound_on_the_runout_has_no_say_in_speeds_above(ryggfonn: HierarchicalProblem) -> None:
+    """It lies below: in what is known of the readings above there is none."""
+    campaign = ryggfonn.campaign
+    event = int(np.flatnonzero(ryggfonn.readings.observed[:, LC])[0])
+    status, values = campaign.status.copy(), campaign.values.copy()
+    status[event, RUNOUT], values[event, RUNOUT] = Status.AT_MOST, 1000.0
+    bounded = hierarchical_problem(replace(campaign, status=status, values=values))
+    assert bounded.readings.bounded[event, RUNOUT]
+    readings = readings_of(bounded, event, np.zeros((1, campaign.n_sensors), dtype=bool))
+    for front in (900.0, 1300.0):
+        fronts = np.full((1, campaign.n_sensors), 20.0)
+        fronts[0, RUNOUT] = front
+        log_l = log_likelihoods(np.zeros(1, dtype=int), fronts, readings, bounded.error_model.errors)
+        assert log_l[0] == 0.0
 
 
 def test_seeds_are_fixed_and_few_draws_are_told(ryggfonn: HierarchicalProblem) -> None:

@@ -10,7 +10,15 @@ from diagnosis_cases import base_of, first_events, trial, with_sensors
 
 from skred.campaign.parts import of_events
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
-from skred.diagnosis.detect.detectability import LIMIT_Z, Detectability, extra_sensors, mean_power, told
+from skred.diagnosis.detect.detectability import (
+    LIMIT_Z,
+    Detectability,
+    extra_sensors,
+    identify,
+    mean_power,
+    told,
+)
+from skred.diagnosis.detect.detectability import with_sensors as with_more_sensors
 from skred.diagnosis.detect.score_test import ScoreTest, placed_mechanisms
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, campaign_rows, look_around
@@ -82,6 +90,24 @@ def test_detection_limit_by_simulation(base: Base, table: dict[str, Detectabilit
     assert abs(null.mean()) < 0.6 and 0.7 < null.std() < 1.35
     assert (effect.mean() - null.mean()) / null.std() == pytest.approx(LIMIT_Z + 1.2816, rel=0.15)
     assert np.mean(effect > LIMIT_Z) > 0.8  # stated: 0.9
+
+
+def test_one_more_sensor_is_as_good_as_readings_say_where_sensors_do_not(base: Base) -> None:
+    """Each reading may have its own standard deviation, and the sensors none."""
+    campaign = base.problem.campaign
+    n = sum(not sensor.is_runout for sensor in campaign.sensors)
+    sensors = tuple(
+        one if one.is_runout else replace(one, relative_sd=0.0, absolute_sd=0.0) for one in campaign.sensors
+    )
+    stated = campaign.stated_sd.copy()
+    stated[:, :n] = 1.5
+    problem = replace(base.problem, campaign=replace(campaign, sensors=sensors, stated_sd=stated))
+    own = base_of(problem.campaign, "constant", "normal")
+    found = identify(own)
+    assert np.isfinite([found.power, found.power_with, found.sensor_m]).all()
+    assert found.power_with >= found.power
+    added = with_more_sensors(problem, np.array([500.0])).campaign.sensors[-1]
+    assert (added.relative_sd, added.absolute_sd) == (0.0, 1.5)
 
 
 def test_more_events_tell_more(base: Base, table: dict[str, Detectability]) -> None:

@@ -18,10 +18,16 @@ from skred.diagnosis.compare.between import with_ways
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
 from skred.diagnosis.compare.screening import curve
+from skred.diagnosis.compare.ways import Looked
+from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode
 from skred.diagnosis.evidence.coefficient import Curve, curve_near
+from skred.diagnosis.evidence.event_quadrature import FINE
+from skred.diagnosis.evidence.marginal import Evidence
 from skred.diagnosis.evidence.prior_odds import prior_odds
 from skred.diagnosis.influence.influence import MOST, FloatArray, influence
 from skred.diagnosis.predict.held_out import held_out
+from skred.diagnosis.tabulated.between_evidence import Way
+from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.inference.calibrate import calibrate
 from skred.inference.sampling import SamplerSettings
 from skred.physics.mechanisms import mechanisms
@@ -107,6 +113,31 @@ def test_an_answer_may_lose_what_the_alarm_has_to_spare() -> None:
     comparison = drag_in(campaign)[0]
     said = influence(comparison, DRAG.id, np.zeros(8), comparison.log_odds - 1.5)
     assert said.needed == pytest.approx(said.log_bayes_factor - 1.5)
+
+
+def test_the_alarm_goes_by_strengths_in_common() -> None:
+    """What an answer gains where avalanches differ is to spare, for no alarm has it; and some may be lost."""
+    comparison = drag_in(rolling(2.4e-4, n_events=8))[0]
+    under = comparison.under_each[0]
+    for gain in (5.0, -0.6):
+        candidate = replace(
+            under.candidates[DRAG.id], looked=(gaining(under.candidates[DRAG.id].best, gain),)
+        )
+        differing = replace(comparison, under_each=(replace(under, candidates={DRAG.id: candidate}),))
+        assert differing.log_odds == pytest.approx(comparison.log_odds)
+        said = influence(differing, DRAG.id, np.zeros(8), differing.log_odds)
+        assert said.log_bayes_factor == pytest.approx(candidate.alone + gain)
+        assert said.needed == pytest.approx(said.log_bayes_factor)
+
+
+def gaining(found: Curve, gain: float) -> Looked:
+    """A shape where differing strengths gain so many nats over one in common, their prior included."""
+    none = Evidence(0.0, np.zeros(1), np.eye(1))
+    mixture = Mixture.on([Mode(np.zeros(1), np.eye(1))])
+    over = math.log((math.exp(gain) - PRIOR[BetweenEvents.COMMON]) / PRIOR[BetweenEvents.SPREAD])
+    in_common = found.log_factor_of(found.sign)
+    way = Way(in_common + over, none, (1.0, 0.1), mixture, FINE)
+    return Looked(found, 0.0, in_common, {BetweenEvents.SPREAD: way})
 
 
 def test_where_avalanches_may_differ_that_is_in_what_is_left() -> None:

@@ -15,12 +15,15 @@ from jsonschema import Draft202012Validator
 from skred.campaign import Campaign, Status
 from skred.campaign.parts import of_events, without_silent_sensors
 from skred.cli.main import run
+from skred.diagnosis.diagnose import diagnose
+from skred.diagnosis.effort import Effort
 from skred.diagnosis.outcome import NotDiagnosed, Outcome
 from skred.diagnosis.predict.unseen import Predictor, log_scores
 from skred.diagnosis.repeated import folds_of, open_locked, outer_folds, set_aside
 from skred.diagnosis.verdict.predictors import predictors_of
 from skred.errors import InputError
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
+from skred.inference.sampling import SamplerSettings
 from skred.report.diagnosis.unseen import locked
 from skred.report.diagnosis.unseen import outer_folds as told_folds
 from skred.simulator.draw import draw_trial
@@ -86,16 +89,47 @@ def test_nothing_let_in_leaves_nothing_to_compare() -> None:
     assert told is not None and told["rows"] == [] and not told["named"]
 
 
+def test_a_fold_whose_numerics_broke_down_has_no_scores() -> None:
+    """And the others keep theirs: hours of work."""
+    problem = hierarchical_problem(gates_campaign(range(14), biased=True))
+    found = gates_diagnosis(biased=True)
+    outcomes = iter([NotDiagnosed(problem, found.law, "the numerics broke down in 'base'"), found, found])
+    document = outer_folds(problem, 3, 0, lambda others: next(outcomes))
+    valid("outer_folds", document)
+    first, *others = document["folds"]
+    assert first["verdict"] == "cannot_tell" and "broke down" in first["reason"]
+    assert first["log_score_before"] == first["log_score_after"] == []
+    assert document["elpd_diff"] == pytest.approx(sum(fold["elpd_diff"] for fold in others))
+    assert document["elpd_diff"] > 0.0
+    told = told_folds({"outer_folds": document})
+    assert told is not None and len(told["rows"]) == 3
+
+
+def test_numerics_that_break_down_after_the_base_law_leave_its_calibration(
+    problem: HierarchicalProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done = gates_diagnosis(biased=False).calibration
+    monkeypatch.setattr("skred.diagnosis.diagnose.calibrate_surely", lambda *given: done)
+
+    def broken(*given: Any) -> None:
+        raise np.linalg.LinAlgError("singular")
+
+    monkeypatch.setattr("skred.diagnosis.diagnose.identify", broken)
+    found = diagnose(problem, done.law, SamplerSettings(), Effort())
+    assert isinstance(found, NotDiagnosed) and "broke down in 'identify'" in found.reason
+    assert found.calibration is done
+
+
 def test_every_fold_is_left_out_once() -> None:
     """By turns a diagnosis that found the biased sensor and one that found nothing."""
     problem = hierarchical_problem(gates_campaign(range(14), biased=True))
     seen: list[Campaign] = []
 
-    def diagnose(others: HierarchicalProblem) -> Outcome:
+    def by_turns(others: HierarchicalProblem) -> Outcome:
         seen.append(others.campaign)
         return gates_diagnosis(biased=len(seen) % 2 == 1)
 
-    document = outer_folds(problem, 3, 0, diagnose)
+    document = outer_folds(problem, 3, 0, by_turns)
     valid("outer_folds", document)
     events = [event for fold in document["folds"] for event in fold["events"]]
     assert sorted(events) == sorted(problem.campaign.event_ids) and document["k"] == len(seen) == 3

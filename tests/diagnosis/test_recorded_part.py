@@ -10,12 +10,14 @@ import pytest
 from diagnosis_cases import base_of
 from rolling_cases import PLACES_M, rolling
 
+from skred.campaign import Status
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import free_force
 from skred.diagnosis.compare.refinement import candidates_of, screened_parts
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.discrepancy.profile import KINDS, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, curve_near
+from skred.diagnosis.evidence.extension import recorded_range
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import placed, shapes_of
 from skred.physics.mechanisms.spec import Shape
@@ -51,6 +53,24 @@ def test_where_no_speed_was_read_there_is_no_such_place() -> None:
     base = base_of(rolling(D, n_events=6), "coulomb")
     none = replace(base.setting, velocities=(False,) * len(base.setting.velocities))
     assert shapes_of(DRAG, none) == (Shape(),) != shapes_of(DRAG, base.setting)
+
+
+def test_a_sensor_that_never_read_does_not_stretch_the_recorded_part() -> None:
+    base = base_of(rolling(D, n_events=6), "coulomb")
+    campaign = base.problem.campaign
+    usual = next(one for one in campaign.sensors if not one.is_runout)
+    beyond = replace(usual, id="beyond", s_from_m=base.setting.recorded_m[1] + 50.0)
+    beyond = replace(beyond, s_to_m=beyond.s_from_m)
+    silent = np.full((campaign.n_events, 1), np.nan)
+    more = replace(
+        campaign,
+        sensors=(*campaign.sensors, beyond),
+        values=np.hstack([campaign.values, silent]),
+        status=np.hstack([campaign.status, np.full(silent.shape, int(Status.MISSING))]),
+        stated_sd=np.hstack([campaign.stated_sd, silent]),
+        values_to=np.hstack([campaign.values_to, silent]),
+    )
+    assert recorded_range(replace(base.problem, campaign=more)) == base.setting.recorded_m
 
 
 def test_a_drag_that_acts_on_the_ramp_too_is_along_the_whole_track() -> None:

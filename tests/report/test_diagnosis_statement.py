@@ -42,14 +42,17 @@ def document(probability: dict[str, float]) -> dict:
 @pytest.mark.parametrize("kind", ["nothing", "silent"])
 def test_a_lean_that_the_check_does_not_bear_out_is_told_and_not_claimed(kind: str) -> None:
     found = replace(diagnosis(kind), decision=Decision("cannot_tell", ()))
-    leaning = statement(found, document({"nothing": 0.2, "obstacle": 0.5, "unlisted": 0.3}))
+    leaning = statement(found, document({"nothing": 0.08, "obstacle": 0.62, "unlisted": 0.3}))
     assert f"{100.0 * found.table.power:.0f} % of cases" in leaning
     assert ("no silence either" in leaning) == found.table.can_tell == (kind == "nothing")
     assert ("so silence means little" in leaning) == (kind == "silent")
-    assert "an obstacle: a dam, a wall, a step would be the most probable (50 %)" in leaning
+    assert "an obstacle: a dam, a wall, a step would be the most probable (62 %)" in leaning
     assert (
         f"None is claimed: {100.0 * found.check.p_value:.0f} % of clean campaigns have such odds" in leaning
     )
+    kept = statement(found, document({"nothing": 0.2, "obstacle": 0.5, "unlisted": 0.3}))
+    assert "None is claimed: nothing keeps 20 %, and a claim leaves it less than 10 %" in kept
+    assert "of clean campaigns" not in kept
     other = statement(found, document({"nothing": 0.2, "obstacle": 0.3, "unlisted": 0.5}))
     assert "a force not in the list would be" in other
     plain = statement(found, document({"nothing": 0.6, "obstacle": 0.3, "unlisted": 0.1}))

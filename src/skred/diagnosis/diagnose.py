@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from skred.arrays import FloatArray
 from skred.diagnosis.augment.add import add_mechanisms
 from skred.diagnosis.augment.problem import as_diagnosed
+from skred.diagnosis.augment.reference import reference
 from skred.diagnosis.augment.step import Augmented, NotAugmented
 from skred.diagnosis.check.bootstrap_test import odds_test
 from skred.diagnosis.check.decision import Decision, decide
@@ -44,23 +46,28 @@ def diagnose(
     if reason:
         return NotDiagnosed(problem, law, reason, converged=True)
     run = Run(settings, effort, Clock(tell))
+    calibration = None
     try:
         # A diagnosis has its own threads: those of matrix products, small as these are, get in their way.
         with threadpool_limits(1, user_api="blas"):
-            return _steps(problem, law, run)
+            calibration = _calibrated(problem, law, run)
+            return _steps(calibration, run)
     except np.linalg.LinAlgError as error:
         run.clock.end()
         why = f"the numerics broke down in {list(run.clock.seconds)[-1]!r}: {error}"
-        return NotDiagnosed(problem, law, why, seconds=run.clock.seconds)
+        return NotDiagnosed(problem, law, why, calibration, seconds=run.clock.seconds)
 
 
-def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
-    """All steps of a diagnosis."""
-    clock, effort = run.clock, run.effort
-    clock.stage("base", f"{law.id}: calibrating the base law")
+def _calibrated(asked: HierarchicalProblem, law: Law, run: Run) -> Calibration:
+    """The base law, on a problem that is perhaps finer than was asked for."""
+    run.clock.stage("base", f"{law.id}: calibrating the base law")
     meanwhile(compile_ahead, asked.readings, asked.error_model)  # where there are workers
-    calibration = calibrate_surely(as_diagnosed(asked), law, run.settings)
-    problem = calibration.problem  # perhaps finer than was asked for
+    return calibrate_surely(as_diagnosed(asked), law, run.settings)
+
+
+def _steps(calibration: Calibration, run: Run) -> Outcome:
+    """All steps of a diagnosis, from a base law that is calibrated."""
+    clock, effort, law, problem = run.clock, run.effort, calibration.law, calibration.problem
     assert isinstance(problem, HierarchicalProblem)
     if not calibration.gate.passed:
         clock.end()
@@ -93,10 +100,9 @@ def _steps(asked: HierarchicalProblem, law: Law, run: Run) -> Outcome:
     if after is not None:
         assert decision.answer is not None
         clock.stage("influence", "what the answer hangs on: without each avalanche, each kind of reading")
-        with_the_answer = after
-        if isinstance(finding, Augmented) and len(finding.steps) > 1:  # the first of them is the answer
-            with_the_answer = held_out(finding.steps[0].calibration, run.seed)
-        gained = with_the_answer.pointwise - before.pointwise
+        gained = after.pointwise - before.pointwise
+        if isinstance(finding, Augmented) and len(finding.steps) > 1:
+            gained = _by_the_first(finding, calibration, run)
         hangs_on = influence(comparison, decision.answer, gained, check.needed)
         clock.stage("conditional", "predicting each reading from those above it")
         given = BeforeAfter.of(before, after, run.seed)
@@ -117,3 +123,12 @@ def _left_out(finding: Finding, calibration: Calibration, run: Run) -> tuple[Hel
         return held_out(calibration, run.seed, exact=exact), None
     before = held_out(finding.reference, run.seed, exact=exact)
     return before, held_out(finding.steps[-1].calibration, run.seed, exact=exact)
+
+
+def _by_the_first(finding: Augmented, calibration: Calibration, run: Run) -> FloatArray:
+    """What the first that was added gains for each avalanche left out, (n_events,), under its own errors."""
+    first, exact = finding.steps[0], run.effort.exact_loo
+    under_errors = first.comparison.leading(first.candidate.mechanism.id)
+    alone = reference(calibration, under_errors.base.problem)()
+    before, after = (held_out(one, run.seed, exact=exact) for one in (alone, first.calibration))
+    return after.pointwise - before.pointwise

@@ -34,7 +34,7 @@ class NotDiagnosed:
     reason : str
         Why not.
     calibration : Calibration or None
-        Of the base law, which did not converge; None where nothing was sampled, or numerics broke down.
+        Of the base law, as far as one was made before it could not go on.
     converged : bool
         False where numerics are the reason; true where the recordings are too few.
     seconds : dict

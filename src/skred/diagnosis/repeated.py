@@ -111,10 +111,13 @@ def outer_folds(
 
 
 def _fold(found: Outcome, left_out: Campaign, seed: int) -> tuple[dict[str, Any], FloatArray]:
-    """One fold, and the differences of its avalanches."""
-    before, after = predictors_of(found)
-    first = log_scores(before, left_out, seed)
-    second = first if after is None else log_scores(after, left_out, seed)
+    """One fold, and the differences of its avalanches; without any where nothing was calibrated."""
+    first = second = np.empty(0)
+    if not isinstance(found, NotDiagnosed) or found.calibration is not None:
+        before, after = predictors_of(found)
+        first = second = log_scores(before, left_out, seed)
+        if after is not None:
+            second = log_scores(after, left_out, seed)
     difference = second - first
     names = list(found.added) if isinstance(found, Diagnosis) else []
     entry = {

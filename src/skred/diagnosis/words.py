@@ -1,9 +1,11 @@
-"""Numbers in the sentences of a diagnosis."""
+"""Numbers in the sentences of a diagnosis, and which priors it took."""
 
 from __future__ import annotations
 
 import math
 
+from skred.inference.influence_words import enumerated
+from skred.physics.law import Law
 from skred.units import unit_text
 
 
@@ -12,6 +14,21 @@ def percent(share: float) -> str:
     if share > 0.995:
         return "more than 99 %"
     return "less than 1 %" if share < 0.005 else f"{100.0 * share:.0f} %"
+
+
+def prior_note(law: Law) -> str:
+    """Which priors are not the law's own, and which of them only its calibration has; empty where all are.
+
+    Besides it all steps go by half-normal priors of the coefficients (`mean_prior`).
+    """
+    of_coefficients = {mechanism.strength.name for mechanism in law.mechanisms}
+    only = [name for name, _ in law.changed_priors if name not in of_coefficients]
+    if not only:
+        return law.prior_note
+    return (
+        f"{law.prior_note} What may be missing is looked for under priors of the coefficients, which"
+        f" {enumerated(only)} {'does' if len(only) == 1 else 'do'} not change."
+    )
 
 
 def counted(n: int, one: str) -> str:

@@ -122,8 +122,11 @@ class Candidate:
     @property
     def shape_weights(self) -> FloatArray:
         """Posterior probability of each shape; where avalanches may differ, with what its kind gains so."""
-        gained = {all_but_place(one.curve): one.height - one.log_share for one in self.looked}
-        factors = self.log_factors + [gained.get(all_but_place(one), 0.0) for one in self.curves]
+        factors = self.log_factors - np.logaddexp.reduce(self.log_factors)
+        kinds = [all_but_place(one) for one in self.curves]
+        for one in self.looked:
+            own = np.array([kind == all_but_place(one.curve) for kind in kinds])
+            factors[own] += one.height - np.logaddexp.reduce(factors[own])
         return np.exp(factors - np.logaddexp.reduce(factors))
 
     @property

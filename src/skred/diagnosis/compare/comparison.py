@@ -152,10 +152,12 @@ def compare(base: Base, tell: Tell = lambda done, of: None) -> Comparison:
     heights = {name: one.fit.found.log_evidence for name, one in bases.items()}
     height = {name: math.log(ERROR_SHARES[name]) + heights[name] for name in bases}
     preferred = max(height, key=lambda name: height[name])
+    ahead = height[preferred] - height[DEFAULT_ERRORS]
+    if ahead <= DECIDES_NOTHING:
+        preferred = DEFAULT_ERRORS
     with worker_pool() as pool:
         curves = {preferred: screened(bases[preferred], pool, tell)}
-        ahead = height[preferred] - height[DEFAULT_ERRORS]
-        if ahead > DECIDES_NOTHING:
+        if preferred != DEFAULT_ERRORS:
             before = curves[preferred] if ahead <= COUNTS else worth_comparing(curves[preferred], ahead)
             if before:
                 curves[DEFAULT_ERRORS] = screened(bases[DEFAULT_ERRORS], pool, tell, before)

@@ -212,9 +212,7 @@ def _also_reading(modes: Modes, problem: HierarchicalProblem, column: int) -> Mo
 def with_sensors(problem: HierarchicalProblem, places: FloatArray) -> HierarchicalProblem:
     """The problem with more velocity sensors that have read nothing, as good as the campaign's usual one."""
     campaign = problem.campaign
-    velocities = [sensor for sensor in campaign.sensors if not sensor.is_runout]
-    relative = float(np.median([sensor.relative_sd for sensor in velocities])) if velocities else 0.1
-    absolute = float(np.median([sensor.absolute_sd for sensor in velocities])) if velocities else 0.5
+    relative, absolute = _usual_errors(problem)
     taken = set(campaign.sensor_ids)
     new = tuple(
         Sensor(_free_name(k, taken), "front_velocity", float(s), float(s), relative, absolute)
@@ -232,6 +230,23 @@ def with_sensors(problem: HierarchicalProblem, places: FloatArray) -> Hierarchic
             values_to=np.column_stack([campaign.values_to, empty]),
         ),
     )
+
+
+def _usual_errors(problem: HierarchicalProblem) -> tuple[float, float]:
+    """Relative and absolute standard deviation [m/s] of the campaign's usual velocity sensor.
+
+    Where sensors have none, since each reading has its own, the usual reading's.
+    """
+    campaign = problem.campaign
+    velocities = [sensor for sensor in campaign.sensors if not sensor.is_runout]
+    if not velocities:
+        return 0.1, 0.5
+    relative = float(np.median([sensor.relative_sd for sensor in velocities]))
+    absolute = float(np.median([sensor.absolute_sd for sensor in velocities]))
+    if max(relative, absolute) > 0.0:
+        return relative, absolute
+    stated = campaign.stated_sd[problem.observed & problem.readings.is_velocity]
+    return 0.0, float(np.nanmedian(stated)) if np.isfinite(stated).any() else 0.5
 
 
 def _free_name(number: int, taken: set[str]) -> str:

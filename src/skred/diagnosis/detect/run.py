@@ -14,7 +14,7 @@ from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
-from skred.diagnosis.words import percent
+from skred.diagnosis.words import percent, prior_note
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.output import write_json
 from skred.physics.law import Law
@@ -76,7 +76,7 @@ def identify_document(
         "can_tell": None if table is None else table.can_tell,
         "next_sensor": None if table is None else _next_sensor(table),
     }
-    document["statement"] = [*([law.prior_note] if law.prior_note else []), *_statement(document)]
+    document["statement"] = [*filter(None, [prior_note(law)]), *_statement(document)]
     return document
 
 

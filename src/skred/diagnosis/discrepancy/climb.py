@@ -8,6 +8,8 @@ stop.
 
 from __future__ import annotations
 
+import math
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -71,9 +73,11 @@ def climb(
         for share in STEP_SHARES:
             if share * rise - 0.5 * share**2 * bend < ARRIVED:
                 return _arrived(maximum, precision)
-            values = maximum.values + share * step
-            fit = _fit_at(base, kind, at, values, maximum.fit.start)
-            gained = fit.found.log_evidence - prior_penalty(values, precision) - height
+            values, gained = maximum.values + share * step, -math.inf
+            # A step can lead to what no front can do, as a drag far below nil.
+            with suppress(np.linalg.LinAlgError):
+                fit = _fit_at(base, kind, at, values, maximum.fit.start)
+                gained = fit.found.log_evidence - prior_penalty(values, precision) - height
             if gained > 0.0:
                 break
         else:

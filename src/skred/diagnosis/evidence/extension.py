@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from skred.arrays import FloatArray, IntArray
+from skred.campaign.parts import without_silent_sensors
 from skred.diagnosis.evidence.covariates import standard_of
 from skred.errors import InputError
 from skred.inference.added_terms import contributions_with
@@ -57,16 +58,15 @@ def setting_of(problem: HierarchicalProblem, law: Law, front_speed: FloatArray |
 
 
 def recorded_range(problem: HierarchicalProblem) -> tuple[float, float]:
-    """Between which places of the track something was recorded [m]."""
-    places = [place for place in problem.sensor_places if place is not None]
-    first = [place[0] for place in places]
-    last = [place[1] for place in places]
+    """Between which places of the track something was recorded [m]; a sensor that is silent tells of none."""
+    speaking = without_silent_sensors(problem.campaign).sensors
+    ends = [(sensor.s_from_m, sensor.s_to_m) for sensor in speaking if not sensor.is_runout]
     for j, sensor in enumerate(problem.campaign.sensors):
         if sensor.is_runout and problem.observed[:, j].any():
             stops = problem.values[problem.observed[:, j], j]
-            first.append(float(stops.min()))
-            last.append(float(stops.max()))
-    return min(first), max(max(last), min(first) + 1.0)
+            ends.append((float(stops.min()), float(stops.max())))
+    first, last = np.array(ends or [(0.0, problem.terrain.length_m)]).T
+    return float(first.min()), max(float(last.max()), float(first.min()) + 1.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,7 @@ from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of, most_probable
 from skred.diagnosis.evidence.coefficient import Base, curve_at
 from skred.diagnosis.evidence.event_quadrature import USUAL
-from skred.diagnosis.evidence.prior_odds import UNLISTED, log_odds
+from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.evidence.refit import Fit
 from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
 from skred.diagnosis.predict.conditional import sensor_ends
@@ -119,7 +119,7 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray, enough: f
     parts = [_Part(everything, chosen) for _, _, chosen in kinds]
     without_each = stated - gained
     # What is tied with the answer explains the same recordings: without some of them it falls as much.
-    needed = stated - (log_odds(comparison.log_factors, comparison.odds) - enough)
+    needed = stated - (comparison.log_odds - enough)
     order, third = np.argsort(without_each), int(MOST * n)
     parts = [_Part(everything), _first_left_out(order, third), *parts]
     # By the same, quicker method on both sides; only the difference is taken from it.

@@ -138,12 +138,17 @@ def _sets(problem: HierarchicalProblem, event: int) -> tuple[IntArray, BoolArray
 
 
 def readings_of(problem: HierarchicalProblem, event: int, sets: BoolArray) -> EventReadings:
-    """Some of an avalanche's readings, one row for each set; where it did not come is not among them."""
+    """Some of an avalanche's readings, one row for each set.
+
+    Bounds of a reading and places where it did not come are not among them: they may lie below.
+    """
     readings = problem.readings
     _, ends = sensor_ends(problem)
     moved = sets & readings.is_velocity & (readings.values[event] > 0.0)
     return readings.take(np.full(len(sets), event))._replace(
         observed=sets,
+        least=np.full(sets.shape, -np.inf),
+        most=np.full(sets.shape, np.inf),
         reached=np.where(moved, ends, -np.inf).max(axis=1, initial=-np.inf),
         not_reached=np.full(len(sets), np.inf),
     )

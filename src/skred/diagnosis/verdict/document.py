@@ -25,6 +25,7 @@ from skred.diagnosis.verdict.mechanisms import (
 )
 from skred.diagnosis.verdict.next_sensor import detection_sensor, next_sensor
 from skred.diagnosis.verdict.statement import statement
+from skred.diagnosis.words import prior_note
 from skred.inference.calibrate import Calibration
 from skred.inference.hierarchical.problem import HierarchicalProblem
 
@@ -35,7 +36,7 @@ _OF_THE_NAMED = ("location", "strength", "covariate", "sensor", "equation")
 def verdict(found: Outcome) -> dict[str, Any]:
     """The verdict of a diagnosis, as `verdict.json` holds it."""
     document = _told_nothing(found) if isinstance(found, NotDiagnosed) else _told(found)
-    document["statement"] = f"{statement(found, document)} {found.law.prior_note}".rstrip()
+    document["statement"] = f"{statement(found, document)} {prior_note(found.law)}".rstrip()
     document["changed_priors"] = dict(found.law.changed_priors)
     return document | _more(found)
 

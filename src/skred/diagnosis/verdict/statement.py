@@ -257,7 +257,7 @@ def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
     why = (
         f"nothing keeps {percent(probability[NOTHING])}, and a claim leaves it less than"
         f" {percent(NOTHING_AT_MOST)}"
-        if found.check.fired
+        if probability[NOTHING] >= NOTHING_AT_MOST
         else f"{100.0 * found.check.p_value:.0f} % of clean campaigns have such odds"
     )
     return (
