@@ -26,6 +26,7 @@ Ryggfonn, and the record of concealed trials. What is measured again is in
 | `python -m studies.thresholds.calibrate_odds` | chooses the tempering exponent by those |
 | `python -m studies.thresholds.strength_forms` | what the form of a term adds to its uncertainty |
 | `python -m studies.thresholds.line_nodes` | quadrature points of one free coefficient |
+| `python -m studies.thresholds.event_nodes` | quadrature points of several free coefficients |
 | `python -m studies.thresholds.unseen_nodes` | quadrature points of a held-out avalanche |
 | `python -m studies.thresholds.free_force_draws` | draws for the evidence of a force not in the list |
 | `python -m studies.thresholds.left_out` | three ways to the left-out score of a base law |

@@ -1,8 +1,8 @@
 """The model comparison: nothing, each mechanism, each instrument fault, a force that is not in the list.
 
-Two error models take part: the one that the base law alone prefers and, if that is another, the robust one.
-So odd events, heavy tails and correlated errors stay error models and do not become findings. The robust one
-is left out where it is so far behind that no candidate can bring it back.
+The robust error model takes part, and the one that the base law alone prefers if that is clearly better. So
+odd events, heavy tails and correlated errors stay error models and do not become findings. The robust one is
+left out where it is so far behind that no candidate can bring it back.
 
 Curves are computed in threads and by worker processes. scipy's `logsumexp` asks there for JAX, which ArviZ
 loads only when asked, and two threads that ask at once find half of it; NumPy's does not.

@@ -29,7 +29,7 @@ _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
 
 
 class Budget(NamedTuple):
-    """How many quadrature points an event gets, and how much wider than the linear model the proposals are.
+    """How many quadrature points an event gets, and how much wider the proposals are than what they follow.
 
     On a line only their total counts.
 
@@ -40,6 +40,10 @@ class Budget(NamedTuple):
     adapted : int
         Put where the others have found the weight to be: around modes that nobody looked for, along the
         edges that stops make.
+    wider : float
+        Than the linear model at the mode.
+    population_wider : float
+        Than the population, and than what the adapted ones follow.
     """
 
     around_mode: int = 16
@@ -70,13 +74,8 @@ FINE = Budget(256, 128, 512, 1.5, 1.8)
 """Of re-computed evidence, and of the base law under each error model."""
 SCREENING = Budget(16, 32, 32)
 """Of the look at every place, which only says where to look closer."""
-_CENTRES = 16
-"""Places that adapted points are put around, of each event."""
 _SHRUNK = 3.0
-"""As how many effective nodes the linear model counts for the width around those places."""
-_ADAPTED_WIDER = 1.3
-"""Bandwidth around those places, in that of a kernel density of normal points: what is adapted to may be
-narrower than it."""
+"""As how many effective nodes the linear model counts for the covariance that points are adapted to."""
 
 
 class Spread(NamedTuple):
@@ -112,53 +111,44 @@ class Spread(NamedTuple):
 
 
 class _Part(NamedTuple):
-    """A share of the points: mixtures of normal densities of one width each, one for each row.
+    """A share of the points: a normal density for each row.
 
     Attributes
     ----------
     size : int
         Points of a row.
-    centres : (n_rows, n_centres, n_axes) array
+    centre : (n_rows, n_axes) array
     factor : (n_rows, n_axes, n_axes) array
     """
 
     size: int
-    centres: FloatArray
+    centre: FloatArray
     factor: FloatArray
 
     def points(self, numbers: FloatArray) -> FloatArray:
         """Points from normal numbers, both (n_rows, size, n_axes)."""
-        # Around each centre a run of the quasi-random sequence: every sixteenth number would fill a sliver.
-        at = np.arange(self.size) * self.centres.shape[1] // self.size
-        return self.centres[:, at] + numbers @ self.factor.transpose(0, 2, 1)
+        return self.centre[:, None, :] + numbers @ self.factor.transpose(0, 2, 1)
 
     def log_density(self, points: FloatArray) -> FloatArray:
         """At points of the rows, (n_rows, k, n_axes) to (n_rows, k)."""
         whiten = np.linalg.inv(self.factor)
         log_scale = np.log(np.einsum("rii->ri", whiten)).sum(axis=1) - points.shape[2] * _LOG_SQRT_2PI
-        white = points @ whiten.transpose(0, 2, 1), self.centres @ whiten.transpose(0, 2, 1)
-        return _log_mixture(*white) + log_scale[:, None]
+        given = map(np.ascontiguousarray, (points, self.centre, whiten))  # of one layout: compiled once
+        return np.asarray(log_scale[:, None] - 0.5 * _squares(*given))
 
 
 @compiled()
-def _log_mixture(points, centres):  # type: ignore[no-untyped-def]
-    """Log of the mean of unit normal densities around centres, but for their constant, row by row."""
+def _squares(points, centre, whiten):  # type: ignore[no-untyped-def]
+    """Squared size of each row's deviations from its centre, whitened by a lower triangle, (n_rows, k)."""
     n_rows, n_points, n_axes = points.shape
-    n_centres = centres.shape[1]
-    result, squares = np.empty((n_rows, n_points)), np.empty(n_centres)
+    result = np.zeros((n_rows, n_points))
     for row in range(n_rows):
         for k in range(n_points):
-            for centre in range(n_centres):
-                squares[centre] = 0.0
-                for axis in range(n_axes):
-                    squares[centre] += (points[row, k, axis] - centres[row, centre, axis]) ** 2
-            if n_centres == 1:  # most parts: no exponential and no logarithm, a tenth of the time
-                result[row, k] = -0.5 * squares[0]
-                continue
-            least, total = squares.min(), 0.0
-            for centre in range(n_centres):
-                total += math.exp(0.5 * (least - squares[centre]))
-            result[row, k] = math.log(total / n_centres) - 0.5 * least
+            for i in range(n_axes):
+                white = 0.0
+                for j in range(i + 1):
+                    white += whiten[row, i, j] * (points[row, k, j] - centre[row, j])
+                result[row, k] += white**2
     return result
 
 
@@ -220,15 +210,13 @@ def importance_nodes(
     rows = likelihood.rows
     n, axes = population.mean.shape[1], _axes(likelihood)
     cover = _cover(rows, population, modes, axes)
-    parts = [
-        _Part(budget.around_mode, modes.points[:, None, :axes], budget.wider * np.linalg.cholesky(cover))
-    ]
+    parts = [_Part(budget.around_mode, modes.points[:, :axes], budget.wider * np.linalg.cholesky(cover))]
     covered = _covered(population, reference)
     # As many as quasi-random numbers come in.
     size = 1 << ((budget.over_population // len(covered)).bit_length() - 1)
     for one in covered:
         centre, over = _over(one, rows, axes, budget.population_wider)
-        parts.append(_Part(size, centre[:, None, :], over))
+        parts.append(_Part(size, centre, over))
 
     def spread(part: _Part, seed: int) -> tuple[FloatArray, FloatArray]:
         """Points of a part, and the log likelihoods there, the release's prior included."""
@@ -242,7 +230,7 @@ def importance_nodes(
     log_weights = log_l - _log_proposal(parts, points)
     if budget.adapted:
         log_prior = _log_prior(population, rows, points[:, :, :n])
-        parts.append(_adapted(points, log_weights + log_prior, cover, budget.adapted))
+        parts.append(_adapted(points, log_weights + log_prior, cover, budget))
         more, log_more = spread(parts[-1], len(parts))
         points, log_l = np.concatenate([points, more], axis=1), np.concatenate([log_l, log_more], axis=1)
         log_weights = log_l - _log_proposal(parts, points)
@@ -317,23 +305,21 @@ def _log_proposal(parts: list[_Part], points: FloatArray) -> FloatArray:
     return np.asarray(np.logaddexp.reduce(terms, axis=0))
 
 
-def _adapted(points: FloatArray, log_posterior: FloatArray, cover: FloatArray, size: int) -> _Part:
-    """Where weighted points say that each row's posterior is: normal densities around some of them."""
+def _adapted(points: FloatArray, log_posterior: FloatArray, cover: FloatArray, budget: Budget) -> _Part:
+    """Where weighted points say that each row's posterior is: its mean and, wider, its covariance.
+
+    A mixture around single points has more of the weight where there are two modes, but what it is hangs on
+    which points these are: a sum over rows is as rough. One normal density is smooth in the strengths.
+    """
     weights = np.exp(log_posterior - log_posterior.max(axis=1, keepdims=True))
     weights /= weights.sum(axis=1, keepdims=True)
     effective = 1.0 / np.sum(weights**2, axis=1)
-    deviation = points - np.sum(weights[:, :, None] * points, axis=1)[:, None, :]
+    mean = np.sum(weights[:, :, None] * points, axis=1)
+    deviation = points - mean[:, None, :]
     covariance = deviation.transpose(0, 2, 1) @ (weights[:, :, None] * deviation)
     shrink = (_SHRUNK / (_SHRUNK + effective))[:, None, None]
     covariance = shrink * cover + (1.0 - shrink) * covariance
-    # Systematic resampling, and the usual bandwidth of a kernel density of so many.
-    steps = (np.arange(_CENTRES) + 0.5) / _CENTRES
-    chosen = (np.cumsum(weights, axis=1)[:, None, :] < steps[:, None]).sum(axis=2)
-    centres = np.take_along_axis(points, np.minimum(chosen, points.shape[1] - 1)[:, :, None], axis=1)
-    n_axes = points.shape[2]
-    count = np.minimum(effective, _CENTRES)
-    bandwidth = _ADAPTED_WIDER * (4.0 / ((n_axes + 2) * count)) ** (1.0 / (n_axes + 4))
-    return _Part(size, centres, bandwidth[:, None, None] * np.linalg.cholesky(covariance))
+    return _Part(budget.adapted, mean, budget.population_wider * np.linalg.cholesky(covariance))
 
 
 def _rotated(numbers: FloatArray, shifts: FloatArray | None) -> FloatArray:
@@ -359,4 +345,4 @@ def _over(population: Population, rows: Rows, axes: int, wider: float) -> tuple[
 def _log_prior(population: Population, rows: Rows, points: FloatArray) -> FloatArray:
     """Log density of a population at points of the rows, (n_rows, k, n_base) to (n_rows, k)."""
     centre, over = _over(population, rows, points.shape[2], 1.0)
-    return _Part(0, centre[:, None, :], over).log_density(points)
+    return _Part(0, centre, over).log_density(points)

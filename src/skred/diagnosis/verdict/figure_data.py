@@ -43,7 +43,7 @@ def figure_data(found: Outcome) -> xr.DataTree:
         by the base law and by each law with something added
     force : the missing retardation along the track: ``mean``, ``low``, ``high``, ``covered`` (s)
     comparison, comparison_2 : evidence along the strength of each candidate's most probable shape, and its
-        log Bayes factor by the prior's scale (of those above 1 % of probability, and of the first)
+        log Bayes factor by the prior's scale (of those above 5 % of probability, and of the first)
     shapes, shapes_2 : log Bayes factor of each candidate at each place, sensor or covariate
     held_out : each avalanche as predicted from the others, ``before`` and ``after`` something was added
     conditional : each reading as predicted from those above it, ``before`` and ``after``; where something was
