@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,6 +38,7 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, event_mode
 from skred.diagnosis.evidence.event_quadrature import event_nodes
 from skred.diagnosis.evidence.expected_score import expected_score
 from skred.diagnosis.evidence.extension import extended
+from skred.diagnosis.evidence.refit import refit
 from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import placed
@@ -119,6 +121,24 @@ def test_a_planted_force_is_found(base: Base, kind: int, sign: float) -> None:
     none = around_nothing(changed, KINDS[kind])
     assert found.gain > there.fit.found.log_evidence - none.fit.found.log_evidence - 1.0
     assert fit_profile(base, KINDS[kind]).log_bayes_factor < 2.0
+
+
+def test_a_step_to_what_no_front_can_do_is_too_long(base: Base, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shorter ones are tried; a diagnosis of hours is not lost."""
+    changed, kind = planted(base, 0, 800.0, 1.6), KINDS[0]
+    cover = next(iter(priors_of(kind, knots(base.setting)))).cover(knots(base.setting))
+    start, tried = around_nothing(changed, kind), list[int]()
+
+    def first_fails(*given: Any, **more: Any) -> Any:
+        tried.append(1)
+        if len(tried) == 1:
+            raise np.linalg.LinAlgError("a drag far below nil")
+        return refit(*given, **more)
+
+    monkeypatch.setattr("skred.diagnosis.discrepancy.climb.refit", first_fails)
+    found = climb(changed, kind, knots(base.setting), start, cover)
+    assert len(tried) > 1
+    assert found.fit.found.log_evidence > start.fit.found.log_evidence + 5.0
 
 
 def made_profile(base: Base, kind: int) -> Profile:

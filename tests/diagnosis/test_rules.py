@@ -10,14 +10,32 @@ import pytest
 
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import Decision, decide, smallest_set
+from skred.diagnosis.evidence.linear_mixed_model import mean_prior
 from skred.diagnosis.evidence.prior_odds import POWER, prior_odds, probabilities, stated
 from skred.diagnosis.limits import LIMIT
+from skred.diagnosis.words import prior_note
+from skred.inference.priors import laws_with_priors
+from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Group
 
 ALL = [m for m in mechanisms().values() if m.added is not None]
 PHYSICS = [m.id for m in ALL if m.group is Group.PHYSICS]
 INSTRUMENT = [m.id for m in ALL if m.group is Group.INSTRUMENT]
+
+
+def test_a_prior_that_the_search_does_not_have_is_said_to_be_none_of_its_own() -> None:
+    """Voellmy's xi h is no coefficient; its dry friction is one."""
+    [plain] = laws_with_priors([load_law("voellmy")], {"dry_friction": 0.4})
+    [both] = laws_with_priors([load_law("voellmy")], {"dry_friction": 0.4, "xi_h": 2e4})
+    assert prior_note(load_law("voellmy")) == "" and prior_note(plain) == plain.prior_note
+    assert mean_prior(plain).mean[0] < mean_prior(load_law("voellmy")).mean[0]
+    assert mean_prior(both).mean.tolist() == mean_prior(plain).mean.tolist()
+    said = prior_note(both).removeprefix(both.prior_note)
+    assert (
+        said
+        == " What may be missing is looked for under priors of the coefficients, which xi_h does not change."
+    )
 
 
 def test_prior_odds_of_the_whole_library() -> None:
