@@ -47,7 +47,7 @@ class Budget(NamedTuple):
     """
 
     around_mode: int = 16
-    over_population: int = 64
+    over_population: int = 32
     adapted: int = 64
     wider: float = 1.35
     population_wider: float = 1.6
