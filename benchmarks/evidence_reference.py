@@ -4,7 +4,8 @@
 campaign and a candidate, computes both numbers for each, and writes a table and
 ``results/evidence_reference.json``. Each pair has a file of its own in ``--out``, and the same command goes
 on with a run that was ended. ``--pair K`` computes one pair. ``--engine-again`` keeps what the reference
-found and asks the diagnosis anew. Recordings of ``--also`` are named in the results and are not copied.
+found, here or in the results, and asks the diagnosis anew. Recordings of ``--also`` are named in the results
+and are not copied.
 
 The reference is `benchmarks.reference`. Each avalanche is a sum over a lattice at each coefficient, laid
 where a search of a wide box finds its likelihood. The population is integrated by tempered population Monte
@@ -24,7 +25,7 @@ from typing import Annotated, Any
 import cyclopts
 
 from benchmarks.commit import commit
-from benchmarks.files import RESULTS, ROOT, as_columns, rounded, write
+from benchmarks.files import RESULTS, ROOT, as_columns, as_rows, rounded, write
 from benchmarks.reference.pairs import (
     campaigns_in,
     draw_candidate,
@@ -113,9 +114,11 @@ def main(
     started, folders = time.monotonic(), campaigns_in(also or [])
     out = out / f"seed-{seed}"
     out.mkdir(parents=True, exist_ok=True)
+    known = as_rows(json.loads(result.read_text(encoding="utf-8"))["pairs"]) if engine_again else []
+    found_before = {one["pair"]: one for one in known if one["seed"] == seed}
     for number in [pair] if pair is not None else range(1, n + 1):
         file = out / f"pair-{number:04d}.json"
-        before = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None
+        before = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else found_before.get(number)
         if only_table or (before is not None and not engine_again):
             continue
         if time.monotonic() - started > seconds:

@@ -173,7 +173,7 @@ def shape_as_dict(shape: Shape) -> dict[str, Any]:
 
 def shape_from_dict(content: dict[str, Any]) -> Shape:
     """What `shape_as_dict` was given."""
-    constants = tuple((str(name), float(value)) for name, value in content["constants"])
+    constants = tuple((str(name), float(value)) for name, value in content.get("constants", ()))
     return Shape(**{**content, "constants": constants})
 
 
