@@ -145,12 +145,11 @@ def _tied(document: dict[str, Any]) -> str:
     """What the recordings cannot tell from the answer."""
     probability, ties = document["probability"], document["indistinguishable"]
     told = {document["mechanism"], *ties}
-    how = {
-        other: "the same term"
-        if other != UNLISTED and mechanisms()[other].same_term_as in told
-        else percent(probability[other])
-        for other in ties
-    }
+    how = {other: percent(probability.get(other, 0.0)) for other in ties}
+    for other in ties:
+        if other != UNLISTED and mechanisms()[other].same_term_as in told:
+            own = f"; in a form of its own {how[other]}" if other in probability else ""
+            how[other] = f"the same term{own}"
     listed = ", ".join(f"{_short(other)} ({sure})" for other, sure in how.items())
     return f"These recordings cannot tell it from: {listed}." if ties else ""
 
