@@ -52,7 +52,8 @@ def compute(
     Parameters
     ----------
     before : dict, optional
-        What was found before, of which the reference's part is kept.
+        What was found before, of which the reference's part is kept if it is of the same recordings: the
+        simulator may draw others today.
     nested : bool
         Whether nested sampling checks the reference.
     """
@@ -64,8 +65,9 @@ def compute(
 
     drawn = draw_pair(seed, number, also)
     problem, law = hierarchical_problem(drawn.campaign), load_law(drawn.base)
-    record: dict[str, Any] = {"pair": number, "seed": seed, **drawn.as_dict()}
-    if before is not None and "reference" in before:
+    fingerprint = drawn.campaign.fingerprint()[:12]
+    record: dict[str, Any] = {"pair": number, "seed": seed, **drawn.as_dict(), "fingerprint": fingerprint}
+    if before is not None and before.get("fingerprint") == fingerprint and "reference" in before:
         mechanism = mechanisms()[before["mechanism"]]
         shapes = [shape_from_dict(one) for one in before["shapes"]]
         record |= {key: before[key] for key in ("mechanism", "shapes", "reference")}
