@@ -1,8 +1,9 @@
 """How far integrals over an avalanche's strengths are off, by the nodes that they get.
 
 ``python -m studies.thresholds.event_nodes``: Ryggfonn's 22 avalanches and a dense development trial, under
-base laws of two strengths and robust errors, each with one term of each of six mechanisms, at a random place
-and four strengths close to each other; against eight times the nodes of re-computed evidence.
+base laws of two strengths and robust errors, with terms of each of six mechanisms, each at a random place and
+strength; against eight times the nodes of re-computed evidence. A few avalanches whose fronts are about to
+stop are off by far more than all others, so quantiles stand beside the root mean square.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from typing import NamedTuple
 import cyclopts
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import multivariate_normal
 
 from skred.campaign import find_campaign, read_campaign
 from skred.diagnosis.compare.comparison import with_errors
@@ -31,6 +33,8 @@ app = cyclopts.App(help=__doc__)
 RESULT = RESULTS / "event_nodes.json"
 BUDGETS = {"of screening": SCREENING, "usual": USUAL, "of re-computed evidence": FINE}
 EXACT = FINE.times(8)
+TERMS = 4
+"""Of each mechanism."""
 MECHANISMS = (
     "segment_friction",
     "obstacle",
@@ -43,27 +47,23 @@ SEED = 3
 
 
 class Case(NamedTuple):
-    """A base law with a term, at some strengths."""
+    """A base law with a term of some strength."""
 
     campaign: str
     base: Base
     extension: Extension
-    strengths: FloatArray
+    strength: float
 
     def integrals(self, budget: Budget) -> FloatArray:
-        """Log integral of each avalanche at each strength, (n_strengths, n_events)."""
-        base, population, found = self.base, self.base.population, []
-        for strength in self.strengths:
-            given = np.append(base.strengths, strength)
-            likelihood = EventLikelihood(self.extension, base.rows, given)
-            modes = event_modes(likelihood, base.fit.points, population)
-            nodes = importance_nodes(likelihood, population, modes, budget)
-            deviation = nodes.points[:, :, :-1] - population.mean[0]
-            white = deviation @ np.linalg.inv(np.linalg.cholesky(population.covariance[0])).T
-            log_det = np.linalg.slogdet(2.0 * np.pi * population.covariance[0])[1]
-            log_prior = -0.5 * (np.square(white).sum(axis=2) + log_det)
-            found.append(np.logaddexp.reduce(nodes.log_weights + log_prior, axis=1))
-        return np.array(found)
+        """Log integral of each avalanche, (n_events,)."""
+        base, population = self.base, self.base.population
+        given = np.append(base.strengths, self.strength)
+        likelihood = EventLikelihood(self.extension, base.rows, given)
+        modes = event_modes(likelihood, base.fit.points, population)
+        nodes = importance_nodes(likelihood, population, modes, budget)
+        prior = multivariate_normal(population.mean[0], population.covariance[0])
+        log_terms = nodes.log_weights + prior.logpdf(nodes.points[:, :, :-1])
+        return np.asarray(np.logaddexp.reduce(log_terms, axis=1))
 
 
 def cases() -> Iterator[Case]:
@@ -81,10 +81,9 @@ def cases() -> Iterator[Case]:
         base = with_errors(fitted, "robust")
         for mechanism in MECHANISMS:
             own = [one for one in placed_mechanisms(base.setting) if one.mechanism.id == mechanism]
-            if own:
-                term = own[rng.integers(len(own))]
-                strengths = (rng.uniform(0.1, 0.8) + np.linspace(0.0, 0.03, 4)) * term.scale
-                yield Case(f"{name}, {law}", base, base.extended(term.direction), strengths)
+            for term in rng.choice(np.array(own, dtype=object), TERMS) if own else ():
+                strength = float(rng.uniform(0.05, 0.8) * term.scale)
+                yield Case(f"{name}, {law}", base, base.extended(term.direction), strength)
 
 
 @app.default
@@ -95,15 +94,20 @@ def main() -> None:
     for campaign in dict.fromkeys(one.campaign for one, _ in known):
         for name, budget in BUDGETS.items():
             started = time.process_time()
-            off = [one.integrals(budget) - exact for one, exact in known if one.campaign == campaign]
+            off = np.array(
+                [one.integrals(budget) - exact for one, exact in known if one.campaign == campaign]
+            )
+            size = np.abs(off)
             rows.append(
                 {
                     "campaign": campaign,
                     "budget": name,
                     "nodes": budget.total,
-                    "of an avalanche": float(np.sqrt(np.mean([np.mean(one**2) for one in off]))),
-                    "largest": float(max(np.abs(one).max() for one in off)),
-                    "of the sum": float(np.sqrt(np.mean([np.mean(one.sum(axis=1) ** 2) for one in off]))),
+                    "integrals": size.size,
+                    "root mean square": float(np.sqrt(np.mean(size**2))),
+                    "nine in ten": float(np.quantile(size, 0.9)),
+                    "97 in 100": float(np.quantile(size, 0.97)),
+                    "median of the sum": float(np.median(np.abs(off.sum(axis=1)))),
                     "seconds": time.process_time() - started,
                 }
             )
