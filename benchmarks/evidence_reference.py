@@ -116,7 +116,9 @@ def main(
     started, folders = time.monotonic(), campaigns_in(also or [])
     out = out / f"seed-{seed}"
     out.mkdir(parents=True, exist_ok=True)
-    known = as_rows(json.loads(result.read_text(encoding="utf-8"))["pairs"]) if engine_again else []
+    known = []
+    if engine_again and result.exists():
+        known = as_rows(json.loads(result.read_text(encoding="utf-8"))["pairs"])
     found_before = {one["pair"]: one for one in known if one["seed"] == seed}
     for number in [pair] if pair is not None else range(1, n + 1):
         file = out / f"pair-{number:04d}.json"

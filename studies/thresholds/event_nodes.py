@@ -1,8 +1,8 @@
-"""How far integrals over an avalanche's strengths are off, by the nodes that they get.
+"""How far integrals over an avalanche's strengths are off, by the quadrature points that they get.
 
 ``python -m studies.thresholds.event_nodes``: Ryggfonn's 22 avalanches and a dense development trial, under
 base laws of two strengths and robust errors, with terms of each of six mechanisms, each at a random place and
-strength; against eight times the nodes of re-computed evidence. A few avalanches whose fronts are about to
+strength; against eight times the points of re-computed evidence. A few avalanches whose fronts are about to
 stop are off by far more than all others, so quantiles stand beside the root mean square.
 """
 

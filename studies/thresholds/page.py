@@ -54,7 +54,7 @@ Importance nodes by the thousand, the second route, agree with those that stand 
 
 
 def event_nodes() -> str:
-    """How far integrals over an avalanche's strengths are off, by nodes."""
+    """How far integrals over an avalanche's strengths are off, by quadrature points."""
     rows = "".join(
         f"| {row['campaign']} | {row['budget']} | {row['nodes']} | {row['integrals']}"
         f" | {row['root mean square']:.3f} | {row['nine in ten']:.3f} | {row['97 in 100']:.3f}"
@@ -66,10 +66,10 @@ def event_nodes() -> str:
 
 `python -m studies.thresholds.event_nodes`: terms of six mechanisms at random
 places and of random strengths on base laws of two strengths, under robust errors; what log integrals [nats]
-are off by, against eight times the nodes of re-computed evidence. The few that are off most are of fronts
+are off by, against eight times the points of re-computed evidence. The few that are off most are of fronts
 about to stop. The sum over avalanches is mostly compared with one that is off by about as much.
 
-| campaign and law | budget | nodes | integrals | rms | nine in ten | 97 in 100 | sum, median | seconds |
+| campaign and law | budget | points | integrals | rms | nine in ten | 97 in 100 | sum, median | seconds |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 {rows}"""
 

@@ -12,11 +12,15 @@ from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.campaign.parts import of_events
 from skred.diagnosis.diagnose import diagnose
 from skred.diagnosis.effort import Effort
+from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode
 from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
+from skred.diagnosis.evidence.event_quadrature import FINE
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
+from skred.diagnosis.evidence.marginal import Evidence
 from skred.diagnosis.outcome import Diagnosis
+from skred.diagnosis.tabulated.between_evidence import Way
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.inference.sampling import SamplerSettings
@@ -124,3 +128,9 @@ def recorded(base: Base, direction: Direction) -> Base:
     values = np.where(came, np.maximum(noisy, 0.0), np.nan)
     made = replace(campaign, values=values, status=status, stated_sd=np.full(values.shape, np.nan))
     return base_of(made, base.law.id)
+
+
+def made_way(log_factor: float) -> Way:
+    """A way in which avalanches differ that has a log Bayes factor, and nothing behind it."""
+    mixture = Mixture.on([Mode(np.zeros(1), np.eye(1))])
+    return Way(log_factor, Evidence(0.0, np.zeros(1), np.eye(1)), (1.0, 0.1), mixture, FINE)

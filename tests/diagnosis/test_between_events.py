@@ -9,7 +9,7 @@ from typing import Any
 import cloudpickle
 import numpy as np
 import pytest
-from diagnosis_cases import base_of
+from diagnosis_cases import base_of, made_way
 from numpy.testing import assert_allclose
 from scipy.special import logsumexp
 from scipy.stats import beta, halfnorm, lognorm, norm
@@ -24,12 +24,8 @@ from skred.diagnosis.compare.comparison import with_errors
 from skred.diagnosis.compare.recomputed import computed_again
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.compare.ways import Looked, gains_of, gains_over
-from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
-from skred.diagnosis.evidence.event_quadrature import FINE
 from skred.diagnosis.evidence.extension import extended, setting_of
-from skred.diagnosis.evidence.marginal import Evidence
-from skred.diagnosis.tabulated.between_evidence import Way
 from skred.inference.between_events import (
     PRIOR,
     SPREAD_LOG_SD,
@@ -256,9 +252,7 @@ def test_gains_do_not_hang_on_quadrature_points() -> None:
 
 def looked(found: Curve, log_share: float, in_common: float, spread: float, some: float) -> Looked:
     """A shape with the log Bayes factors of both ways."""
-    none = Evidence(0.0, np.zeros(1), np.eye(1))
-    mixture = Mixture.on([Mode(np.zeros(1), np.eye(1))])
-    ways = {k: Way(x, none, (1.0, 0.1), mixture, FINE) for k, x in ((SPREAD, spread), (SOME, some))}
+    ways = {SPREAD: made_way(spread), SOME: made_way(some)}
     return Looked(found, log_share, in_common, ways)
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from diagnosis_cases import base_of
+from diagnosis_cases import base_of, made_way
 from rolling_cases import rolling
 
 from skred.campaign import Campaign
@@ -19,14 +19,10 @@ from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.compare.ways import Looked
-from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode
 from skred.diagnosis.evidence.coefficient import Curve, curve_near
-from skred.diagnosis.evidence.event_quadrature import FINE
-from skred.diagnosis.evidence.marginal import Evidence
 from skred.diagnosis.evidence.prior_odds import prior_odds
 from skred.diagnosis.influence.influence import MOST, FloatArray, influence
 from skred.diagnosis.predict.held_out import held_out
-from skred.diagnosis.tabulated.between_evidence import Way
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.inference.calibrate import calibrate
 from skred.inference.sampling import SamplerSettings
@@ -132,12 +128,9 @@ def test_the_alarm_goes_by_strengths_in_common() -> None:
 
 def gaining(found: Curve, gain: float) -> Looked:
     """A shape where differing strengths gain so many nats over one in common, their prior included."""
-    none = Evidence(0.0, np.zeros(1), np.eye(1))
-    mixture = Mixture.on([Mode(np.zeros(1), np.eye(1))])
     over = math.log((math.exp(gain) - PRIOR[BetweenEvents.COMMON]) / PRIOR[BetweenEvents.SPREAD])
     in_common = found.log_factor_of(found.sign)
-    way = Way(in_common + over, none, (1.0, 0.1), mixture, FINE)
-    return Looked(found, 0.0, in_common, {BetweenEvents.SPREAD: way})
+    return Looked(found, 0.0, in_common, {BetweenEvents.SPREAD: made_way(in_common + over)})
 
 
 def test_where_avalanches_may_differ_that_is_in_what_is_left() -> None:

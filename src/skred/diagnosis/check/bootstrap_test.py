@@ -162,8 +162,7 @@ class _Refitted(NamedTuple):
 
     def one(self, group: int) -> tuple[Rows, tuple[Population, FloatArray], Scores]:
         """One of the campaigns by itself."""
-        own = np.flatnonzero(self.rows.group == group)
-        rows = self.rows.take(own)._replace(group=np.zeros(len(own), dtype=np.int64))
+        own, rows = self.rows.of_groups(np.array([group]))
         scores = Scores(*(values[group : group + 1] for values in self.scores))
         return rows, (self.population.groups[group], self.points[own]), scores
 

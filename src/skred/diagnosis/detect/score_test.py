@@ -120,11 +120,11 @@ class ScoreTest:
         # A row takes as much memory as there are directions.
         together = sum(len(part.directions) for part in self._parts) * np.bincount(rows.group).max()
         found = list[Scores]()
-        for groups in batched(range(len(population.mean)), max(int(MOST_NODES // together), 1)):
-            own = np.flatnonzero(np.isin(rows.group, groups))
-            some = rows.take(own)._replace(group=rows.group[own] - groups[0])
+        for batch in batched(range(len(population.mean)), max(int(MOST_NODES // together), 1)):
+            groups = np.array(batch)
+            own, some = rows.of_groups(groups)
             around = self.around(some, points[own])
-            found.append(self.scores_around(around, some, population.take(np.array(groups))))
+            found.append(self.scores_around(around, some, population.take(groups)))
         return Scores(*(np.concatenate(values) for values in zip(*found, strict=True)))
 
     def scores_around(self, around: Modes, rows: Rows, population: Population) -> Scores:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -46,6 +46,12 @@ class Rows(NamedTuple):
     def take(self, chosen: IntArray) -> Rows:
         """Some of the rows, of the same groups."""
         return Rows(self.event[chosen], self.group[chosen], self.readings.take(chosen), self.errors)
+
+    def of_groups(self, numbers: IntArray) -> tuple[IntArray, Rows]:
+        """Which rows are of some groups, (n,) increasing numbers; and those rows, the groups numbered anew."""
+        own = np.flatnonzero(np.isin(self.group, numbers))
+        some = self.take(own)
+        return own, some._replace(group=np.searchsorted(numbers, some.group))
 
     def repeated(self, n_groups: int) -> Rows:
         """The same rows, of one group, for each of several."""
@@ -175,10 +181,8 @@ class EventLikelihood:
 
     def of_groups(self, numbers: IntArray) -> EventLikelihood:
         """The rows of some of the groups, (n,) increasing numbers, which are numbered anew."""
-        rows = np.flatnonzero(np.isin(self.rows.group, numbers))
-        part = self.take(rows)
-        group = np.searchsorted(numbers, part.rows.group)
-        return replace(part, rows=part.rows._replace(group=group))
+        own, rows = self.rows.of_groups(numbers)
+        return EventLikelihood(self.extension, rows, self.given[own])
 
     def at(self, points: FloatArray) -> FloatArray:
         """Log likelihood of each row at its point, (n_rows, n_base + 1) to (n_rows,)."""

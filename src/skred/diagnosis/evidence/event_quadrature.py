@@ -308,8 +308,8 @@ def _log_proposal(parts: list[_Part], points: FloatArray) -> FloatArray:
 def _adapted(points: FloatArray, log_posterior: FloatArray, cover: FloatArray, budget: Budget) -> _Part:
     """Where weighted points say that each row's posterior is: its mean and, wider, its covariance.
 
-    A mixture around single points has more of the weight where there are two modes, but what it is hangs on
-    which points these are: a sum over rows is as rough. One normal density is smooth in the strengths.
+    A mixture around single points depends on which points these are; this is smooth in the strengths, and off
+    by less or as little (``studies.thresholds.event_nodes``).
     """
     weights = np.exp(log_posterior - log_posterior.max(axis=1, keepdims=True))
     weights /= weights.sum(axis=1, keepdims=True)
