@@ -48,7 +48,7 @@ class Rows(NamedTuple):
         return Rows(self.event[chosen], self.group[chosen], self.readings.take(chosen), self.errors)
 
     def of_groups(self, numbers: IntArray) -> tuple[IntArray, Rows]:
-        """Which rows are of some groups, (n,) increasing numbers; and those rows, the groups numbered anew."""
+        """Which rows are of some groups, (n,) increasing numbers; and these, the groups numbered anew."""
         own = np.flatnonzero(np.isin(self.group, numbers))
         some = self.take(own)
         return own, some._replace(group=np.searchsorted(numbers, some.group))
