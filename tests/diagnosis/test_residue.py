@@ -67,7 +67,7 @@ def test_a_force_that_takes_both_effects_is_behind_the_first_and_a_force_beside_
 def test_climbs_end_where_a_force_beside_a_mechanism_cannot_bring_it_near_what_leads(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """After the first prior's; where it may count they go on."""
+    """After the first prior's, and none is reported; where it may count they go on."""
     base, drag, profiles = fitted(rolling(2.4e-4, waves=0.05))
     climbed = list[int]()
 
@@ -77,19 +77,19 @@ def test_climbs_end_where_a_force_beside_a_mechanism_cannot_bring_it_near_what_l
 
     monkeypatch.setattr("skred.diagnosis.discrepancy.fit.climb", counted)
 
-    def looked(best: float) -> tuple[int, float]:
+    def looked(best: float) -> tuple[int, Candidate]:
         climbed.clear()
         with ThreadPoolExecutor(1) as pool:
             found = with_residues(base, {DRAG.id: drag}, profiles, pool, best)[DRAG.id]
-        assert found.residue is not None
-        return len(climbed), found.log_bayes_factor
+        return len(climbed), found
 
     by_all, usual = looked(-np.inf)
-    n, reached = looked(usual)
-    assert n == by_all and reached == usual
-    n, reached = looked(usual + 2.0 * COUNTS)
+    assert usual.residue is not None
+    n, found = looked(usual.log_bayes_factor)
+    assert n == by_all and found.residue == usual.residue
+    n, found = looked(usual.log_bayes_factor + 2.0 * COUNTS)
     assert n < 0.7 * by_all
-    assert reached < usual + COUNTS
+    assert found.residue is None and found.log_bayes_factor == drag.log_bayes_factor
 
 
 @pytest.mark.slow

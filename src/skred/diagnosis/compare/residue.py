@@ -73,20 +73,22 @@ def residues(
 ) -> list[float | None]:
     """Log Bayes factors of a force not in the list beside mechanisms, against these alone.
 
-    None where a step leads to what no front can do, as a drag far below nil.
+    None where that is less than what counts, or where a step leads to what no front can do, as a drag far
+    below nil.
 
     Parameters
     ----------
     least : sequence of float
-        What each must have to count; one that cannot have it is known less well.
+        What each must have to count: climbs end where it cannot be had, and then know less than they say.
     """
     jobs = [(curve, one, kind) for curve, one in zip(curves, least, strict=True) for kind in KINDS]
     fits = batched(pool.map(partial(_fit_beside, base), *zip(*jobs, strict=True)), len(KINDS))
     fitted = [[one for one in profiles if one is not None] for profiles in fits]
-    return [
-        log_evidence_of(profiles) - curve.log_bayes_factor if len(profiles) == len(KINDS) else None
+    found = [
+        log_evidence_of(profiles) - curve.log_bayes_factor if len(profiles) == len(KINDS) else -math.inf
         for curve, profiles in zip(curves, fitted, strict=True)
     ]
+    return [own if own > lowest else None for own, lowest in zip(found, least, strict=True)]
 
 
 def _fit_beside(base: Base, curve: Curve, least: float, kind: Kind) -> Profile | None:
