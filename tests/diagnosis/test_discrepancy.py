@@ -117,7 +117,7 @@ def test_a_planted_force_is_found(base: Base, kind: int, sign: float) -> None:
     assert found.mean @ unit == pytest.approx(size * 150.0, abs=within) and sd < 0.4 * abs(size) * 150.0
     # What was planted is no better explanation than what was found.
     as_planted = np.interp(found.knots_m, centre + SHAPE_M, size * SHAPE, 0.0, 0.0)
-    there = expanded_at(changed, KINDS[kind], found.knots_m, as_planted, found.fit.start)
+    there = expanded_at(changed, KINDS[kind], as_planted, found.fit.start)
     none = around_nothing(changed, KINDS[kind])
     assert found.gain > there.fit.found.log_evidence - none.fit.found.log_evidence - 1.0
     assert fit_profile(base, KINDS[kind]).log_bayes_factor < 2.0
@@ -136,7 +136,7 @@ def test_a_step_to_what_no_front_can_do_is_too_long(base: Base, monkeypatch: pyt
         return refit(*given, **more)
 
     monkeypatch.setattr("skred.diagnosis.discrepancy.climb.refit", first_fails)
-    found = climb(changed, kind, knots(base.setting), start, cover)
+    found = climb(changed, kind, start, cover)
     assert len(tried) > 1
     assert found.fit.found.log_evidence > start.fit.found.log_evidence + 5.0
 
@@ -254,7 +254,7 @@ def test_a_smooth_profile_does_what_a_force_on_a_stretch_does(errors: str, id_: 
 def around_nothing(base: Base, kind: Kind) -> Expansion:
     """The log likelihood of a profile around no force."""
     at = knots(base.setting)
-    return expanded_at(base, kind, at, np.zeros(len(at)), (base.population, base.fit.points))
+    return expanded_at(base, kind, np.zeros(len(at)), (base.population, base.fit.points))
 
 
 def score_of_nothing(base: Base, kind: Kind) -> FloatArray:
@@ -279,7 +279,7 @@ def test_the_score_of_no_force_is_that_of_the_evidence() -> None:
     base, kind = base_of(read_campaign(find_campaign("ryggfonn")), "coulomb", "robust"), KINDS[0]
     none, step, at = around_nothing(base, kind), 0.02 * KINDS[0].amplitude, knots(base.setting)
     heights = [
-        expanded_at(base, kind, at, np.full(len(at), sign * step), none.fit.start).fit.found.log_evidence
+        expanded_at(base, kind, np.full(len(at), sign * step), none.fit.start).fit.found.log_evidence
         for sign in (-1.0, 1.0)
     ]
     score = score_of_nothing(replace(base, fit=none.fit), kind)
@@ -328,10 +328,10 @@ def test_a_climb_begins_anywhere_and_goes_on_by_the_score_of_the_evidence() -> N
     def height(one: Expansion, cover: FloatArray) -> float:
         return one.fit.found.log_evidence - prior_penalty(one.values, np.linalg.inv(cover))
 
-    first = climb(base, kind, at, none, everywhere)
-    further = climb(base, kind, at, first, everywhere, by_modes=False)
+    first = climb(base, kind, none, everywhere)
+    further = climb(base, kind, first, everywhere, by_modes=False)
     assert height(further, everywhere) > height(first, everywhere) + 10.0
-    there = climb(base, kind, at, further, local)
+    there = climb(base, kind, further, local)
     outside = np.abs(at - at[5]) > 480.0
     assert np.all(np.abs(further.values[outside]).max() > 100.0 * np.abs(there.values[outside]))
 
@@ -343,7 +343,7 @@ def test_evidence_under_a_prior_from_the_peak_under_another(base: Base) -> None:
     flat = around_nothing(changed, kind)
     height = flat.fit.found.log_evidence
     usual, other = Prior(0.8, 120.0), Prior(1.6, 120.0, 800.0)
-    peak, own = (climb(changed, kind, at, flat, one.cover(at)) for one in (usual, other))
+    peak, own = (climb(changed, kind, flat, one.cover(at)) for one in (usual, other))
     found, exact = (laplace(one, height, other.cover(at)).log_factor() for one in (peak, own))
     assert exact > 20.0
     assert found == pytest.approx(exact, abs=0.5)
@@ -387,11 +387,11 @@ def test_push_and_pull_beside_each_other_are_of_no_listed_shape(base: Base) -> N
 def test_evidence_over_priors_against_climbing_under_each(base: Base, kind: int, size: float) -> None:
     """The few priors that are climbed under stand for all."""
     changed = planted(base, kind, 800.0, size) if size else base
-    own, at = KINDS[kind], knots(base.setting)
+    own, at = KINDS[kind], knots(changed.setting)
     flat = around_nothing(changed, own)
     height = flat.fit.found.log_evidence
     factors = [
-        laplace(climb(changed, own, at, flat, cover), height, cover).log_factor() + share
+        laplace(climb(changed, own, flat, cover), height, cover).log_factor() + share
         for prior, share in priors_of(own, at).items()
         for cover in [prior.cover(at)]
     ]

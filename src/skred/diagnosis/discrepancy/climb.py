@@ -16,7 +16,7 @@ import numpy as np
 
 from skred.arrays import FloatArray
 from skred.diagnosis.discrepancy.explored import Expansion, prior_penalty
-from skred.diagnosis.discrepancy.profile import Kind, combined, knot_by_knot
+from skred.diagnosis.discrepancy.profile import Kind, combined, knot_by_knot, knots
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, look_around
 from skred.diagnosis.evidence.expected_score import expected_score
@@ -27,31 +27,25 @@ from skred.diagnosis.evidence.tolerance import ARRIVED, MOST_ROUNDS, STEP_SHARES
 
 
 def expanded_at(
-    base: Base, kind: Kind, at: FloatArray, values: FloatArray, start: tuple[Population, FloatArray]
+    base: Base, kind: Kind, values: FloatArray, start: tuple[Population, FloatArray]
 ) -> Expansion:
     """The log likelihood around some values of a profile, population and events refitted with them in.
 
     Parameters
     ----------
-    at : (n_knots,) array
-        Places of the knots [m].
     values : (n_free + n_knots,) array
         Strengths of the base's last directions, if some are free too, then the profile in the kind's unit.
     start : (Population, points)
         Where the refit begins.
     """
-    return _around(base, kind, at, values, _fit_at(base, kind, at, values, start))
+    return _around(base, kind, values, _fit_at(base, kind, values, start))
 
 
-def climb(
-    base: Base, kind: Kind, at: FloatArray, start: Expansion, cover: FloatArray, *, by_modes: bool = True
-) -> Expansion:
+def climb(base: Base, kind: Kind, start: Expansion, cover: FloatArray, *, by_modes: bool = True) -> Expansion:
     """The maximum of the posterior under one prior.
 
     Parameters
     ----------
-    at : (n_knots,) array
-        Places of the knots [m].
     start : Expansion
         Around the values to begin from.
     cover : (n_free + n_knots, n_free + n_knots) array
@@ -63,7 +57,7 @@ def climb(
     maximum = start
     precision = np.linalg.inv(cover)
     for _ in range(MOST_ROUNDS):
-        score = maximum.score if by_modes else _score(base, kind, at, maximum)
+        score = maximum.score if by_modes else _score(base, kind, maximum)
         slope, curvature = score - precision @ maximum.values, maximum.information + precision
         step = np.linalg.solve(curvature, slope)
         if not by_modes:  # tangents of fronts that are about to stop hold over very short steps only
@@ -76,13 +70,13 @@ def climb(
             values, gained = maximum.values + share * step, -math.inf
             # A step can lead to what no front can do, as a drag far below nil.
             with suppress(np.linalg.LinAlgError):
-                fit = _fit_at(base, kind, at, values, maximum.fit.start)
+                fit = _fit_at(base, kind, values, maximum.fit.start)
                 gained = fit.found.log_evidence - prior_penalty(values, precision) - height
             if gained > 0.0:
                 break
         else:
             break
-        maximum = _around(base, kind, at, values, fit)
+        maximum = _around(base, kind, values, fit)
         if gained < ARRIVED:
             break
     return _arrived(maximum, precision)
@@ -93,44 +87,43 @@ def _arrived(maximum: Expansion, precision: FloatArray) -> Expansion:
     return replace(maximum, score=precision @ maximum.values)
 
 
-def _fit_at(
-    base: Base, kind: Kind, at: FloatArray, values: FloatArray, start: tuple[Population, FloatArray]
-) -> Fit:
+def _fit_at(base: Base, kind: Kind, values: FloatArray, start: tuple[Population, FloatArray]) -> Fit:
     """Population and events with the profile in."""
-    extension, strengths = _with_profile(base, kind, at, values)
+    extension, strengths = _with_profile(base, kind, values)
     return refit(extension, base.rows, strengths[None, :], start, Rounds(least=1))[0]
 
 
-def _with_profile(base: Base, kind: Kind, at: FloatArray, values: FloatArray) -> tuple[Extension, FloatArray]:
+def _with_profile(base: Base, kind: Kind, values: FloatArray) -> tuple[Extension, FloatArray]:
     """The base law with the profile as one direction, and all strengths, (n_directions,)."""
+    at, held = knots(base.setting), _held(base, values)
     free = len(values) - len(at)
     extension = base.extended(combined(base.setting, kind, at, values[free:]))
-    return extension, np.concatenate([_held(base, at, values), values[:free], [1.0]])
+    return extension, np.concatenate([held, values[:free], [1.0]])
 
 
-def _held(base: Base, at: FloatArray, values: FloatArray) -> FloatArray:
+def _held(base: Base, values: FloatArray) -> FloatArray:
     """Strengths of the base's directions that are not free."""
-    return base.strengths[: len(base.strengths) - (len(values) - len(at))]
+    return base.strengths[: len(base.strengths) - (len(values) - len(knots(base.setting)))]
 
 
-def _around(base: Base, kind: Kind, at: FloatArray, values: FloatArray, fit: Fit) -> Expansion:
+def _around(base: Base, kind: Kind, values: FloatArray, fit: Fit) -> Expansion:
     """With efficient score and information of the knots' values at what they are."""
     population, points = fit.start
-    by_knots = _by_knots(base, kind, at, values)
+    by_knots = _by_knots(base, kind, values)
     found = efficient_scores(look_around(by_knots, points), base.rows, population, mean_prior(base.law))
-    n_before = len(_held(base, at, values))
+    n_before = len(_held(base, values))
     return Expansion(values, fit, found.score[0, n_before:], found.information[0, n_before:, n_before:])
 
 
-def _score(base: Base, kind: Kind, at: FloatArray, there: Expansion) -> FloatArray:
+def _score(base: Base, kind: Kind, there: Expansion) -> FloatArray:
     """Score of the log evidence by the values."""
-    extension, strengths = _with_profile(base, kind, at, there.values)
+    extension, strengths = _with_profile(base, kind, there.values)
     likelihood = EventLikelihood(extension, base.rows, strengths)
-    score = expected_score(likelihood, _by_knots(base, kind, at, there.values), *there.fit.start)
-    return score[len(_held(base, at, there.values)) :]
+    score = expected_score(likelihood, _by_knots(base, kind, there.values), *there.fit.start)
+    return score[len(_held(base, there.values)) :]
 
 
-def _by_knots(base: Base, kind: Kind, at: FloatArray, values: FloatArray) -> EventLikelihood:
+def _by_knots(base: Base, kind: Kind, values: FloatArray) -> EventLikelihood:
     """The events' likelihoods with the value at each knot as a strength."""
-    strengths = np.concatenate([_held(base, at, values), values])
-    return EventLikelihood(knot_by_knot(base, kind, at), base.rows, strengths)
+    strengths = np.concatenate([_held(base, values), values])
+    return EventLikelihood(knot_by_knot(base, kind, knots(base.setting)), base.rows, strengths)

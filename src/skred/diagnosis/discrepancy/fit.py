@@ -75,10 +75,10 @@ def fit_profile(
     at, n_beside = knots(base.setting), 0 if beside is None else 1
     # Nothing like everything else, so that what is left of integration errors is the same there.
     none = np.zeros(n_beside + len(at))
-    starts = [expanded_at(base, kind, at, none, base.fit.start)]
+    starts = [expanded_at(base, kind, none, base.fit.start)]
     height = starts[0].fit.found.log_evidence
     if near is not None:
-        starts.append(expanded_at(base, kind, at, *near))
+        starts.append(expanded_at(base, kind, *near))
     shares = priors_of(kind, at)
     covers = {prior: _with_one_more(beside, prior.cover(at)) for prior in shares}
     explored = ExploredPriors(height, shares, covers, least)
@@ -89,9 +89,9 @@ def fit_profile(
     while waiting and len(explored.maxima) < most:
         prior = waiting.pop()
         begin = [*starts, *explored.maxima.values()]
-        found = maximum_under(base, kind, at, begin, covers[prior])
+        found = maximum_under(base, kind, begin, covers[prior])
         if not explored.maxima:  # once, for it costs more: climbs under the other priors may begin there
-            found = climb(base, kind, at, found, covers[prior], by_modes=False)
+            found = climb(base, kind, found, covers[prior], by_modes=False)
         explored.add(prior, found)
         waiting = waiting or explored.open
     prior = max(explored.maxima, key=explored.factor)
@@ -116,11 +116,11 @@ def _with_one_more(beside: Curve | None, cover: FloatArray) -> FloatArray:
 
 def mode_at(base: Base, profile: Profile, values: FloatArray) -> Mode:
     """The mode near some values, under the prior that suits them best."""
-    kind, at = profile.kind, profile.knots_m
-    densities = log_prior_densities(kind, at, values)
-    cover = max(densities, key=lambda prior: densities[prior][0]).cover(at)
-    begin = expanded_at(base, kind, at, values, profile.fit.start)
-    maximum = climb(base, kind, at, begin, cover)
+    kind = profile.kind
+    densities = log_prior_densities(kind, profile.knots_m, values)
+    cover = max(densities, key=lambda prior: densities[prior][0]).cover(profile.knots_m)
+    begin = expanded_at(base, kind, values, profile.fit.start)
+    maximum = climb(base, kind, begin, cover)
     there = laplace(maximum, profile.fit.found.log_evidence, cover)
     return Mode(there.values, there.covariance)
 
@@ -147,26 +147,22 @@ def _first(kind: Kind, start: Expansion, explored: ExploredPriors) -> list[Prior
     return [usual, own] if own != usual else [usual]
 
 
-def _maximum_under(
-    base: Base, kind: Kind, at: FloatArray, starts: Sequence[Expansion], cover: FloatArray
-) -> Expansion:
+def _maximum_under(base: Base, kind: Kind, starts: Sequence[Expansion], cover: FloatArray) -> Expansion:
     """The maximum under a prior, from the start with the highest posterior and from the one that fits best.
 
     Sharp edges of a listed shape cost more under a smooth prior than they gain; but where recordings are far
     from what no force does, there may be no other way up.
     """
-    found = _maximum_from_one(base, kind, at, starts, cover)
+    found = _maximum_from_one(base, kind, starts, cover)
     best = max(starts, key=lambda one: one.fit.found.log_evidence)
     if best.fit.found.log_evidence < found.fit.found.log_evidence + DECIDES_NOTHING:
         return found
-    return _highest([found, climb(base, kind, at, best, cover)], cover)
+    return _highest([found, climb(base, kind, best, cover)], cover)
 
 
-def _maximum_from_one(
-    base: Base, kind: Kind, at: FloatArray, starts: Sequence[Expansion], cover: FloatArray
-) -> Expansion:
+def _maximum_from_one(base: Base, kind: Kind, starts: Sequence[Expansion], cover: FloatArray) -> Expansion:
     """The maximum under a prior, from the start with the highest posterior."""
-    return climb(base, kind, at, _highest(starts, cover), cover)
+    return climb(base, kind, _highest(starts, cover), cover)
 
 
 def as_profile(base: Base, kind: Kind, near: Curve) -> Start:
