@@ -111,6 +111,31 @@ def test_many_parameters_are_adapted_to_for_longer(seed: int) -> None:
     assert result.failed == () and max(step.lengths) == 4 * REFIT_DRAWS
 
 
+def test_refits_start_where_all_recordings_lead() -> None:
+    """Beside a mode that nothing leads out of, at which a model starts by default; r-hat is good there."""
+    sd = 0.01
+
+    def logp(value: Any, x: Any) -> Any:
+        def peak(centre: Any) -> Any:
+            return -0.5 * ((x - centre) / sd) ** 2 - np.log(sd * np.sqrt(2.0 * np.pi))
+
+        return pm.math.logaddexp(peak(value) - 0.01, peak(value + 50.0) - 5.0)
+
+    values = 50.0 + sd * np.array([-1.0, 0.3, 0.8])
+    with pm.Model() as model:
+        x = pm.Normal("x", 0.0, 100.0, initval=100.0)
+        pm.CustomDist("recordings", x, logp=logp, observed=values)
+    step = JointMetropolis(model=model, pointwise="recordings")
+    near = {"x": 50.0 + sd * np.random.default_rng(3).standard_normal(400) / np.sqrt(3.0)}
+    names = ["a", "b", "c"]
+    far, found = (exact_leave_one_out(model, step, names, 4, near=one) for one in (None, near))
+    rest = np.array([values[[k for k in range(3) if k != left]].mean() for left in range(3)])
+    density = -0.5 * ((values - rest) / sd) ** 2 / 1.5 - 0.5 * np.log(2.0 * np.pi * 1.5 * sd**2) - 0.01
+    assert far.failed == () and far.elpd < density.sum() - 10.0
+    assert found.failed == ()
+    assert_allclose(found.pointwise, density, atol=0.1)
+
+
 def test_a_refit_that_does_not_converge_is_named(calibration: Any) -> None:
     apart: Any = ChainsApart()
     result = exact_leave_one_out(calibration.model, apart, ["bad", "good"], 0)

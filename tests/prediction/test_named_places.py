@@ -131,6 +131,24 @@ def test_a_place_that_none_reaches_has_no_return_period(problem: HierarchicalPro
     assert row["reached"]["return_period_years"] == {"value": None, "low": None, "high": None}
 
 
+def test_no_return_period_is_longer_than_the_simulation_can_tell(problem: HierarchicalProblem) -> None:
+    """A runout so rare is refused; a speed is told as rarer than what 3 of the avalanches say."""
+    n, rate = 64, Rate(0.5)
+    longest = n / (3 * 0.5)
+    speeds = tuple(np.arange(1.0, 100.0, 2.0))
+    wanted = Wanted((("farm", 1900.0),), speeds, rate=rate)
+    (row,) = rows_of(problem, prediction_track(problem, None, 0.0), wanted, n=n)
+    told = [one["return_period_years"] for one in row["speed"]["above"] if one["value"] > 0.0]
+    rare = [one for one in told if one["value"] is None]
+    assert rare and all(one["low"] <= longest and one["high"] is None for one in rare)
+    assert any(one["low"] == longest for one in rare)
+    for one in told:
+        known = [end for end in one.values() if end is not None]
+        assert max(known) <= longest
+        if one["value"] is not None:
+            assert one["low"] <= one["value"] and (one["high"] is None or one["value"] <= one["high"])
+
+
 def test_the_table_and_the_page(problem: HierarchicalProblem, tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "made", tree_of(problem, "coulomb"))
     out = tmp_path / "out"

@@ -30,6 +30,15 @@ def of_events(campaign: Campaign, rows: Sequence[int]) -> Campaign:
     )
 
 
+def without_silent_events(campaign: Campaign) -> Campaign:
+    """The campaign without avalanches of which nothing is known, not even that they did not come.
+
+    Nothing can be learnt from them, and they must not count among those that something was learnt from.
+    """
+    known = np.any(campaign.status != Status.MISSING, axis=1)
+    return campaign if known.all() else of_events(campaign, np.flatnonzero(known).tolist())
+
+
 def without_silent_sensors(campaign: Campaign) -> Campaign:
     """The campaign without sensors of which nothing is known, neither a reading nor that none came there."""
     speaking = np.flatnonzero(np.any(campaign.status != Status.MISSING, axis=0))

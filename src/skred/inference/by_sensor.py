@@ -46,11 +46,12 @@ class SensorReadings(NamedTuple):
 def sensors_with_readings(problem: Problem) -> list[SensorReadings]:
     """The sensors of which something is known, in the order of the campaign.
 
-    Names are the ids, without what netCDF does not take; an underscore is added where one is taken already.
+    Names are the ids, without blanks and what else netCDF or xarray's coordinates do not take; an underscore
+    is added where one is taken already.
     """
     found, taken = list[SensorReadings](), set(_TAKEN)
     for column, sensor in enumerate(problem.campaign.sensors):
-        name = re.sub(r"[^\w .-]+", "_", sensor.id).strip(" .-") or "sensor"
+        name = re.sub(r"[^\w.-]+", "_", sensor.id).strip(".-") or "sensor"
         while {name, f"event_{name}"} & taken:
             name += "_"
         taken |= {name, f"event_{name}"}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import arviz_stats as az
@@ -65,8 +65,12 @@ def exact_leave_one_out(
     events: Sequence[str],
     seed: int,
     which: Sequence[int] | None = None,
+    near: Mapping[str, FloatArray] | None = None,
 ) -> ExactLoo:
     """Refit without each event and predict it; chains go in threads, each with random numbers of its own.
+
+    Each chain of a refit starts from another draw of the posterior of all events. From one start in common
+    all could stay at a mode that few draws lead out of, and would agree.
 
     Parameters
     ----------
@@ -78,18 +82,21 @@ def exact_leave_one_out(
     seed : int
     which : sequence of int, optional
         Numbers of the events to leave out; by default all.
+    near : mapping, optional
+        Draws of the posterior of all events by name of parameter, (n,) each; where there are none, chains
+        start where a model's do by default.
     """
     left_out = list(range(len(events)) if which is None else which)
     rng = np.random.default_rng([seed, 2])
-    start = DictToArrayBijection.map(model.initial_point()).data.astype(float)
+    starts = _starts(model, step, near, rng)
     # Proposals adapt to the posterior of all events for as long as a chain is: 500 are too few for
     # seven parameters, whose refits then converge only now and then.
-    step.adapt(start, _n_draws(start), rng)
-    draws, densities = _refits(step, start, left_out, rng, 1)
+    step.adapt(starts[0], _n_draws(starts[0]), rng)
+    draws, densities = _refits(step, starts, left_out, rng, 1)
     r_hat = _r_hat(draws)
     again = np.flatnonzero(~(r_hat <= R_HAT_LIMIT))
     if len(again):
-        longer = _refits(step, start, [left_out[k] for k in again], rng, _LONGER)
+        longer = _refits(step, starts, [left_out[k] for k in again], rng, _LONGER)
         r_hat[again] = _r_hat(longer[0])
         draws[again], densities[again] = (values[:, :, ::_LONGER] for values in longer)
     failed = tuple(events[k] for k, value in zip(left_out, r_hat, strict=True) if not value <= R_HAT_LIMIT)
@@ -116,13 +123,37 @@ def samples_of(model: pm.Model, step: JointMetropolis, draws: FloatArray) -> tup
     return tuple(result)
 
 
+def _starts(
+    model: pm.Model, step: JointMetropolis, near: Mapping[str, FloatArray] | None, rng: np.random.Generator
+) -> FloatArray:
+    """Where the chains of a refit start, (n_chains, n_q): raveled values of the (transformed) variables."""
+    if near is None:
+        point = DictToArrayBijection.map(model.initial_point()).data.astype(float)
+        return np.tile(point, (REFIT_CHAINS, 1))
+    columns = list[FloatArray]()
+    chosen = rng.choice(len(next(iter(near.values()))), REFIT_CHAINS, replace=False)
+    for value in step.vars:
+        variable = model.values_to_rvs[value]
+        transform, found = model.rvs_to_transforms[variable], near[variable.name][chosen]
+        if transform is not None:
+            transformed = transform.forward(pt.as_tensor(found), *variable.owner.inputs)
+            found = np.asarray(transformed.eval(mode="FAST_COMPILE"))
+        columns.append(found)
+    return np.column_stack(columns)
+
+
 def _refits(
-    step: JointMetropolis, start: FloatArray, left_out: Sequence[int], rng: np.random.Generator, longer: int
+    step: JointMetropolis,
+    starts: FloatArray,
+    left_out: Sequence[int],
+    rng: np.random.Generator,
+    longer: int,
 ) -> tuple[FloatArray, FloatArray]:
     """Draws without each event, (n, n_chains, n_draws, n_q), and its log density there."""
     numbers = np.repeat(left_out, REFIT_CHAINS)
-    jobs = list(zip(numbers.tolist(), rng.spawn(len(numbers)), strict=True))
-    chains = side_by_side(lambda job: _refit(step, start.copy(), *job, longer), jobs)
+    begin = np.tile(starts, (len(left_out), 1))
+    jobs = list(zip(begin, numbers.tolist(), rng.spawn(len(numbers)), strict=True))
+    chains = side_by_side(lambda job: _refit(step, *job, longer), jobs)
     draws, densities = (np.array(parts) for parts in zip(*chains, strict=True))
     shape = len(left_out), REFIT_CHAINS
     return draws.reshape(*shape, *draws.shape[1:]), densities.reshape(*shape, *densities.shape[1:])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from skred.campaign import Status
 from skred.inference.along_track import with_along_track
-from skred.inference.calibrate import Calibration, calibrate
+from skred.inference.calibrate import Calibration, calibrate, posterior_of
 from skred.inference.evidence import SMC_DRAWS, evidence
 from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY, PRACTICAL_DIFFERENCE
@@ -135,9 +135,8 @@ def scores(
     pareto_k = np.asarray(loo.pareto_k, dtype=float)
     unreliable = np.flatnonzero(~(pareto_k <= float(loo.good_k)))
     which = list(range(len(events))) if exact else unreliable.tolist()
-    refits = (
-        exact_leave_one_out(calibration.model, calibration.step, events, seed, which=which) if which else None
-    )
+    model, step, near = calibration.model, calibration.step, posterior_of(calibration)
+    refits = exact_leave_one_out(model, step, events, seed, which, near) if which else None
     return {
         "loo": {
             "elpd": float(loo.elpd),

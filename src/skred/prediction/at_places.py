@@ -11,7 +11,7 @@ from skred.arrays import FloatArray
 from skred.inference.intervals import INTERVAL_PROBABILITY
 from skred.prediction.fronts import NewFronts
 from skred.prediction.probabilities import SHARES
-from skred.prediction.wanted import Wanted, impact_pressure_kpa
+from skred.prediction.wanted import Wanted, impact_pressure_kpa, longest_years
 
 _LEAST_ARRIVALS = 16
 """Avalanches of a population that must come for a quantile of those that do."""
@@ -91,7 +91,7 @@ def _within(limits: tuple[float, float], uniform: FloatArray) -> FloatArray:
 def _row(here: _Here, wanted: Wanted, rate: FloatArray | None) -> dict[str, Any]:
     reached = np.isfinite(here.speed).mean(axis=1)
     return {
-        "reached": _chance(reached, rate),
+        "reached": _chance(reached, rate, here.speed.shape[1]),
         "speed": _quantity(here.speed, wanted.speeds_m_s, "m/s", rate),
         "pressure": _quantity(here.pressure, wanted.pressures_kpa, "kPa", rate),
     }
@@ -101,7 +101,7 @@ def _quantity(
     values: FloatArray, thresholds: tuple[float, ...], unit: str, rate: FloatArray | None
 ) -> dict[str, Any]:
     """Quantiles of all avalanches (0 where one does not come) and of those that come, and thresholds."""
-    everyone, coming = np.where(np.isfinite(values), values, 0.0), []
+    everyone, coming, n = np.where(np.isfinite(values), values, 0.0), [], values.shape[1]
     levels = 1.0 - np.array(SHARES)
     enough = np.isfinite(values).sum(axis=1) >= _LEAST_ARRIVALS
     all_by = np.quantile(everyone, levels, axis=1)
@@ -120,17 +120,18 @@ def _quantity(
         ],
         "given_reached": coming,
         "above": [
-            {"threshold": threshold, **_chance((everyone > threshold).mean(axis=1), rate)}
+            {"threshold": threshold, **_chance((everyone > threshold).mean(axis=1), rate, n)}
             for threshold in thresholds
         ],
     }
 
 
-def _chance(probability: FloatArray, rate: FloatArray | None) -> dict[str, Any]:
+def _chance(probability: FloatArray, rate: FloatArray | None, n_avalanches: int) -> dict[str, Any]:
     """A probability for an avalanche; with a rate also for a year.
 
     Avalanches are a Poisson process: at least one a year exceeds with 1 - exp(-rate P), and the mean time
-    between two that do is 1 / (rate P). A time without an end is null.
+    between two that do is 1 / (rate P). A time longer than the simulation can tell is null, and its lower end
+    then the longest that it can; all are null where no avalanche exceeds.
     """
     row: dict[str, Any] = _band(probability, float(probability.mean()))
     if rate is not None:
@@ -138,13 +139,21 @@ def _chance(probability: FloatArray, rate: FloatArray | None) -> dict[str, Any]:
         row["annual"] = _band(annual_exceedance(rate, probability), float("nan"))
         row["annual"]["value"] = float(annual_exceedance(rate, probability).mean())
         often = _band(per_year, float(per_year.mean()))
-        period = {key: None if often[k] <= 0.0 else 1.0 / often[k] for key, k in _TURNED.items()}
-        row["return_period_years"] = period
+        row["return_period_years"] = _period(often, longest_years(float(rate.mean()), n_avalanches))
     return row
 
 
-_TURNED = {"value": "value", "low": "high", "high": "low"}
-"""The shortest time goes with the highest frequency."""
+def _period(often: dict[str, float], longest: float) -> dict[str, float | None]:
+    """Mean times between avalanches that come so often; the shortest goes with the highest frequency."""
+    if often["value"] <= 0.0:
+        return dict.fromkeys(_ENDS)
+    value, low, high = (1.0 / often[key] if often[key] > 1.0 / longest else None for key in _TURNED)
+    if value is None or low is None:
+        return {"value": None, "low": low or longest, "high": None}
+    return {"value": value, "low": low, "high": high}
+
+
+_ENDS, _TURNED = ("value", "low", "high"), ("value", "high", "low")
 
 
 def annual_exceedance(rate: Any, probability: Any) -> Any:

@@ -42,7 +42,7 @@ MOST_PLACES = 20
 AVALANCHES = 1024
 """Of each population, simulated."""
 _FEWEST_BEYOND = 3
-"""Of these, those that must run farther than a runout for a return period."""
+"""Of these, those that must do what a return period is told of: run farther, or be faster."""
 _NAME = re.compile(r"\w[\w .-]{0,39}")
 _LONGEST_YEARS = 100_000.0
 _LARGEST_DENSITY, _LARGEST_DRAG, _LARGEST_RATE, _LARGEST = 917.0, 20.0, 1000.0, 1e5
@@ -158,8 +158,7 @@ class Wanted:
                     " or a --release above it (s counts from the first point of the track, downhill)"
                 )
         rarest = max(self.return_periods_years, default=0.0)
-        if self.rate is not None and self.rate.mean * rarest > avalanches / _FEWEST_BEYOND:
-            longest = avalanches / (_FEWEST_BEYOND * self.rate.mean)
+        if self.rate is not None and rarest > (longest := longest_years(self.rate.mean, avalanches)):
             raise InputError(
                 f"--return-period {rarest:g}: with {self.rate.mean:g} avalanches a year, such runouts are"
                 f" rarer than the simulation can tell; at most {longest:.0f} years"
@@ -181,6 +180,11 @@ class Wanted:
             },
             "rate": rate,
         }
+
+
+def longest_years(per_year: float, avalanches: int) -> float:
+    """The longest return period [years] that a simulation of so many avalanches of a population can tell."""
+    return avalanches / (_FEWEST_BEYOND * per_year)
 
 
 def _check_range(option: str, limits: tuple[float, float], largest: float) -> None:

@@ -94,7 +94,8 @@ def held_out(calibration: Calibration, seed: int, *, exact: bool = False) -> Hel
     failed: tuple[str, ...] = ()
     refitted: dict[int, Samples] = {}
     if again:
-        refits = exact_leave_one_out(calibration.model, calibration.step, events, seed, which=again)
+        near = posterior_of(calibration)
+        refits = exact_leave_one_out(calibration.model, calibration.step, events, seed, again, near)
         pointwise[again] = refits.pointwise
         samples = samples_of(calibration.model, calibration.step, refits.draws)
         failed, refitted = refits.failed, dict(zip(again, samples, strict=True))

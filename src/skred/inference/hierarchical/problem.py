@@ -13,6 +13,7 @@ import xarray as xr
 
 from skred.arrays import FloatArray
 from skred.campaign import Campaign
+from skred.campaign.parts import without_silent_events
 from skred.inference.error_model import (
     DEFAULT_ERRORS,
     ERROR_MODELS,
@@ -336,13 +337,14 @@ def hierarchical_problem(
     smoothing_m: float | None = None,
     cell_m: float | None = None,
 ) -> HierarchicalProblem:
-    """Problem of a campaign.
+    """Problem of a campaign, of those of its avalanches of which something is known.
 
     Raises
     ------
     ValueError
         If no event has a reading.
     """
+    campaign = without_silent_events(campaign)
     track = build_terrain(campaign.track.x_m, campaign.track.z_m, smoothing_m=smoothing_m, cell_m=cell_m)
     terrain = terrain_with_releases(track, campaign.events)
     problem = HierarchicalProblem(campaign, terrain, ERROR_MODELS[error_model])

@@ -11,6 +11,7 @@ import numpy as np
 
 from skred.arrays import FloatArray, IntArray
 from skred.campaign import Campaign, Status
+from skred.campaign.parts import without_silent_events
 from skred.inference.pooled.density import PooledArrays, pooled_arrays, pooled_log_density
 from skred.inference.pooled.recordings_covariance import recordings_covariance
 from skred.inference.problem import Problem
@@ -170,13 +171,14 @@ class PooledProblem(Problem):
 def pooled_problem(
     campaign: Campaign, *, smoothing_m: float | None = None, cell_m: float | None = None
 ) -> PooledProblem:
-    """Problem of a campaign, with the covariance of its recordings.
+    """Problem of a campaign, of its avalanches of which something is known, with their covariance.
 
     Raises
     ------
     ValueError
         If the recordings do not determine their covariance.
     """
+    campaign = without_silent_events(campaign)
     terrain = build_terrain(campaign.track.x_m, campaign.track.z_m, smoothing_m=smoothing_m, cell_m=cell_m)
     not_reached = campaign.status == Status.NOT_REACHED
     values = np.where(campaign.status == Status.OBSERVED, campaign.values, np.nan)
