@@ -33,3 +33,16 @@ def test_the_recordings():
     assert "1 avalanche at 1 sensor:" in text and "1 reading observed," in text
     assert "1 reading missing" in text and "Of 1 reading only bounds are known" in text
     assert "4 avalanches at 4 sensors:" in Page(render_comparison(comparison(), {})).text
+
+
+def test_scores_that_put_another_law_first_are_told_before_its_weight():
+    document = comparison()
+    best, other = (model["id"] for model in document["models"][:2])
+    agreed = {name: [best, other] for name in ("exact", "loo", "waic", "evidence")}
+    document["ranking"] = {"best": best, "orders": agreed}
+    assert "do not rely" not in " ".join(lay_words(document))
+    document["ranking"]["orders"] = agreed | {"evidence": [other, best], "waic": [other, best]}
+    told = lay_words(document)
+    assert told[1] == f"Answer: {best}."
+    doubt = f"other scores put another one first ({other} by WAIC and {other} by evidence)."
+    assert any(one.startswith("But do not rely on that") and one.endswith(doubt) for one in told[2:-1])

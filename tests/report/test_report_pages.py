@@ -41,6 +41,7 @@ def test_a_diagnosis_is_a_page_for_everyone(kind):
         "sensor": "something in the recordings is off", "tie": "cannot tell it from", "two": "Answer:",
     }  # fmt: skip
     assert said[kind] in lay
+    assert (f"({document['sensor']}, which reads " in lay) == bool(document["sensor"])
     carried = document["influence"]["carried_by"] if document["influence"] else []
     assert ("Take it with care" in lay) == bool(carried)
 

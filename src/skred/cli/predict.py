@@ -60,7 +60,7 @@ def predict(
         checked = campaign_of(campaign or "ryggfonn")
         problem = hierarchical_of(checked, likelihood.errors, likelihood.smoothing)
 
-    from skred.prediction.statement import cautions
+    from skred.prediction.statement import cautions, not_used
     from skred.prediction.track import prediction_track
     from skred.report.folders import write_reports
     from skred.report.prediction.table import prediction_table
@@ -84,7 +84,7 @@ def predict(
             command=shlex.join(["skred", *sys.argv[1:]]),
         )
         write_reports(results.unfinished)
-    first = [*prediction["warnings"], *cautions(prediction)]
+    first = [*prediction["warnings"], *not_used(prediction), *cautions(prediction)]
     output.show(prediction, prediction_table, prediction["statement"], results.path, first)
     return DONE if prediction["gate"]["passed"] else NOT_CONVERGED
 

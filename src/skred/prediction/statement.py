@@ -52,25 +52,39 @@ def source_sentences(document: dict[str, Any]) -> list[str]:
     """Which calibration this is, and what of it is left out here: before everything else."""
     told = [] if document["from"] is None else [document["from"]["told"]]
     told += [document["prior_note"]] if document.get("prior_note") else []
-    apart: dict[str, list[dict[str, Any]]] = {}
-    for row in document["added"]:
-        apart.setdefault(row["title"], []).append(row)
-    for title, rows in apart.items():
-        ends = [end for row in rows for end in row["place_m"] or ()]
-        where = f" (s = {min(ends):.0f} to {max(ends):.0f} m)" if ends else ""
-        begins = rows[0].get("begins_m")
-        if not rows[0]["used"]:
-            told.append(f"Left out: {title}{where}: {rows[0]['why']}.")
-        elif begins is not None:
+    told += not_used(document)
+    for title, rows in _added(document, used=True).items():
+        where, begins = _stretch(rows), rows[0].get("begins_m")
+        if begins is not None:
             told.append(f"Used: {title}, {_from_where(begins, document['track']['is_own'])}.")
-        elif ends:
+        elif where:
             told.append(
                 f"Used: {title}{where}, at the most probable place; how uncertain the place is does not widen"
                 " the intervals. (The verdict gives the median of each end, which can differ from that.)"
             )
-        if rows[0]["used"] and rows[0]["between_events"] != BetweenEvents.COMMON:
+        if rows[0]["between_events"] != BetweenEvents.COMMON:
             told.append("Each new avalanche has its own strength of it, as those recorded differ.")
     return told
+
+
+def not_used(document: dict[str, Any]) -> list[str]:
+    """What was added to the law and is left out here, and why."""
+    added = _added(document, used=False).items()
+    return [f"Left out: {title}{_stretch(rows)}: {rows[0]['why']}." for title, rows in added]
+
+
+def _added(document: dict[str, Any], *, used: bool) -> dict[str, list[dict[str, Any]]]:
+    """What was added, by title: that is used here, or not."""
+    apart: dict[str, list[dict[str, Any]]] = {}
+    for row in document["added"]:
+        apart.setdefault(row["title"], []).append(row)
+    return {title: rows for title, rows in apart.items() if bool(rows[0]["used"]) == used}
+
+
+def _stretch(rows: Sequence[dict[str, Any]]) -> str:
+    """Where terms of one title act, from the first to the last."""
+    ends = [end for row in rows for end in row["place_m"] or ()]
+    return f" (s = {min(ends):.0f} to {max(ends):.0f} m)" if ends else ""
 
 
 def _from_where(begins_m: float, own_track: bool) -> str:

@@ -8,6 +8,13 @@ from skred.report.shared.document import Document, failed, get, listed, ranked
 from skred.report.shared.labels import printable
 from skred.report.shared.numbers import counted, is_number
 
+_OTHER_SCORES = {
+    "loo": "predictions of avalanches left out without a refit",
+    "waic": "WAIC",
+    "evidence": "evidence",
+}
+"""Scores beside that which decides, in words."""
+
 
 def lay_words(comparison: Document) -> list[str]:
     """Sentences that say what was asked, what came out, and what to make of it; no nats, no Pareto k."""
@@ -23,7 +30,8 @@ def lay_words(comparison: Document) -> list[str]:
             asked,
             "Answer: none can be used yet. The computation of all of them has to be repeated, longer.",
         ]
-    return [asked, *_answer(laws), *_firm(comparison, n), *_miss(laws), _meaning(laws)]
+    answer = [*_answer(laws), *_disputed(comparison), *_firm(comparison, n), *_miss(laws)]
+    return [asked, *answer, _meaning(laws)]
 
 
 def _fitted(laws: Sequence[Document], others: Sequence[Document]) -> str:
@@ -50,6 +58,18 @@ def _answer(laws: Sequence[Document]) -> list[str]:
     if close:
         told.append(f"Between {names[0]} and {_listed(close, 'or')} these recordings do not decide.")
     return told
+
+
+def _disputed(comparison: Document) -> list[str]:
+    """Which other scores put another law first."""
+    orders = get(comparison, "ranking", "orders") or {}
+    first = get(comparison, "ranking", "best")
+    others = {name: listed(orders, name)[:1] for name in _OTHER_SCORES}
+    against = {name: printable(ids[0]) for name, ids in others.items() if ids and ids[0] != first}
+    if not against:
+        return []
+    told = [f"{law} by {_OTHER_SCORES[name]}" for name, law in against.items()]
+    return [f"But do not rely on that: other scores put another one first ({_listed(told)})."]
 
 
 def _firm(comparison: Document, n: str) -> list[str]:

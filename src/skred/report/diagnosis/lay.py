@@ -48,13 +48,22 @@ def _answer(document: doc.Document) -> list[str]:
 
 
 def _named(document: doc.Document, verdict: str, where: str) -> str:
-    name = short_title(document, doc.get(document, "mechanism") or "something")
+    name = short_title(document, doc.get(document, "mechanism") or "something") + _which(document)
     what = "something in the recordings is off" if verdict == "instrument" else "a force is missing"
     if doc.get(document, "report", "disputed"):
         what = "a force is missing, or the recordings are off"
     seconds = doc.listed(document, "mechanisms")[1:]
     more = "".join(f", and {short_title(document, doc.get(one, 'id'))}" for one in seconds)
     return f"Answer: {_how_sure(document)}, {what}: {name}{where}{more}."
+
+
+def _which(document: doc.Document) -> str:
+    """Which sensor reads wrongly, and which way."""
+    sensor, mean = doc.get(document, "sensor"), doc.get(document, "strength", "mean")
+    if not sensor:
+        return ""
+    way = f", which reads {'high' if mean > 0.0 else 'low'}" if is_number(mean) else ""
+    return f" ({printable(sensor)}{way})"
 
 
 def _how_sure(document: doc.Document) -> str:
@@ -96,10 +105,12 @@ def _use(document: doc.Document) -> list[str]:
     for key, words, unit, decimals in (("velocity", "speeds", "m/s", 1), ("runout", "runouts", "m", 0)):
         before, after = (doc.get(document, "held_out", f"rmse_{key}_{when}") for when in ("before", "after"))
         if is_number(before) and is_number(after):
-            parts.append(f"from {fixed(before, decimals)} to {fixed(after, decimals)} {unit} for {words}")
+            ends = [fixed(one, decimals) for one in (before, after)]
+            way = f"stays at {ends[0]}" if ends[0] == ends[1] else f"goes from {ends[0]} to {ends[1]}"
+            parts.append(f"{way} {unit} for {words}")
     told = []
     if parts:
-        told = [f"With it, the typical error for avalanches that were left out goes {' and '.join(parts)}."]
+        told = [f"With it, the typical error for avalanches that were left out {' and '.join(parts)}."]
     gains = {doc.get(one, "gain") for one in doc.listed(document, "conditional", "sensors")} - {None}
     if gains and "better" not in gains:
         told.append("Predicted from the readings further up, no reading is clearly predicted better.")

@@ -21,7 +21,7 @@ _KINDS = {
 _VERDICTS = {
     "missing_physics": "Physics is missing",
     "nothing_missing": "Nothing is missing",
-    "instrument": "The recordings are off, not the physics",
+    "instrument": "The recordings are off",
     "unexplained": "Something is missing that is not in the list",
     "cannot_tell": "These recordings cannot tell",
 }
