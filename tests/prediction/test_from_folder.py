@@ -171,6 +171,11 @@ def test_what_is_bound_to_a_place_stays_on_its_track(
     assert one["at"] == two["at"] and one["runout"] == two["runout"]
     assert "Left out" in one["statement"][1] and "does not transfer" in one["statement"][1]
     assert "Left out" in (left / "report.html").read_text(encoding="utf-8")
+    capsys.readouterr()
+    words = ["predict", "--from", str(folder), "--out", str(left), "--force", *there]
+    assert run(words) == 0
+    said = capsys.readouterr().out
+    assert said.index("Left out: ") < said.index("runout exceeded by") and said.count("Left out: ") == 1
 
 
 def test_faults_of_instruments_move_no_front(problem: HierarchicalProblem) -> None:

@@ -185,6 +185,18 @@ def test_the_table_and_the_page(problem: HierarchicalProblem, tmp_path: Path) ->
         assert tree["speed_exceedance"].dims == ("at", "speed_threshold")
 
 
+def test_a_place_above_some_releases_is_told(problem: HierarchicalProblem, tmp_path: Path) -> None:
+    """Fewer come there than to a place further down, which looks like a fault."""
+    folder, out = folder_of(tmp_path / "made", tree_of(problem, "coulomb")), tmp_path / "out"
+    words = ["--release", "0", "--release", "1000:3", "--at", "upper=900", "--at", "hut=1100", "--quiet"]
+    assert run(["predict", "--from", str(folder), "--out", str(out), *words]) == 0
+    document = json.loads((out / "prediction.json").read_text())
+    chances = {place["name"]: place["reached"]["value"] for place in document["at"]}
+    assert chances["upper"] < chances["hut"]
+    told = {name: next(s for s in document["statement"] if f"reach {name} " in s) for name in chances}
+    assert "above some of the releases" in told["upper"] and "releases" not in told["hut"]
+
+
 @pytest.mark.parametrize(
     ("name", "written"),
     [

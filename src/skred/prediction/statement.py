@@ -143,7 +143,16 @@ def _once_in(document: dict[str, Any]) -> list[str]:
 
 
 def _at_places(document: dict[str, Any]) -> list[str]:
-    return [*(_at(place) for place in document["at"]), *_left_out(document.get("places_left_out", ()))]
+    lowest = max(document["track"]["releases_s_m"])
+    told = [f"{_at(place)}{_above_some(place['s_m'], lowest)}" for place in document["at"]]
+    return [*told, *_left_out(document.get("places_left_out", ()))]
+
+
+def _above_some(s_m: float, lowest_release_m: float) -> str:
+    """That a place lies above some of the releases: fewer come there than to places further down."""
+    if s_m >= lowest_release_m:
+        return ""
+    return " It lies above some of the releases, whose avalanches start below it and count as not coming."
 
 
 def _left_out(places: Sequence[dict[str, Any]]) -> list[str]:
