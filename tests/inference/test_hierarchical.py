@@ -144,13 +144,16 @@ def test_density_of_an_event_does_not_depend_on_the_others(ryggfonn: Hierarchica
 
 
 def test_an_event_without_any_reading_says_nothing() -> None:
-    """Its density is 1 for any population, and the others' are what they were."""
+    """Its density is 1 for any population, and the others' are what they are without it, as it is left out."""
     campaign = pick([0, 2, 14])
     status, values = np.array(campaign.status), np.array(campaign.values)
     status[1], values[1] = Status.MISSING, np.nan
     silent = replace(campaign, status=status, values=values, stated_sd=np.full(values.shape, np.nan))
-    with_silent = densities(hierarchical_problem(silent), "coulomb")
+    with_silent = densities(replace(hierarchical_problem(campaign), campaign=silent), "coulomb")
     assert_allclose(with_silent[:, 1], 0.0, atol=0.02)
+    left_out = hierarchical_problem(silent)
+    assert left_out.campaign.event_ids == (campaign.event_ids[0], campaign.event_ids[2])
+    assert_allclose(densities(left_out, "coulomb"), with_silent[:, [0, 2]], atol=0.02)
 
 
 def test_no_reading_at_all_is_refused() -> None:
