@@ -144,7 +144,7 @@ def test_density_of_an_event_does_not_depend_on_the_others(ryggfonn: Hierarchica
 
 
 def test_an_event_without_any_reading_says_nothing() -> None:
-    """Its density is 1 for any population, and the others' are what they are without it, as it is left out."""
+    """Its density is 1 for any population, and the others' are what they are without it: it is left out."""
     campaign = pick([0, 2, 14])
     status, values = np.array(campaign.status), np.array(campaign.values)
     status[1], values[1] = Status.MISSING, np.nan
