@@ -110,7 +110,8 @@ def _use(document: doc.Document) -> list[str]:
             parts.append(f"{way} {unit} for {words}")
     told = []
     if parts:
-        told = [f"With it, the typical error for avalanches that were left out {' and '.join(parts)}."]
+        both = " and ".join(parts).replace(" and goes from ", " and from ")
+        told = [f"With it, the typical error for avalanches that were left out {both}."]
     gains = {doc.get(one, "gain") for one in doc.listed(document, "conditional", "sensors")} - {None}
     if gains and "better" not in gains:
         told.append("Predicted from the readings further up, no reading is clearly predicted better.")
