@@ -30,7 +30,7 @@ def lay_words(comparison: Document) -> list[str]:
             asked,
             "Answer: none can be used yet. The computation of all of them has to be repeated, longer.",
         ]
-    answer = [*_answer(laws), *_disputed(comparison), *_firm(comparison, n), *_miss(laws)]
+    answer = [*_answer(laws), *_disputed(comparison, laws), *_firm(comparison, n), *_miss(laws)]
     return [asked, *answer, _meaning(laws)]
 
 
@@ -60,12 +60,12 @@ def _answer(laws: Sequence[Document]) -> list[str]:
     return told
 
 
-def _disputed(comparison: Document) -> list[str]:
-    """Which other scores put another law first."""
+def _disputed(comparison: Document, laws: Sequence[Document]) -> list[str]:
+    """Which other scores put a law first that does clearly worse by that which decides."""
     orders = get(comparison, "ranking", "orders") or {}
-    first = get(comparison, "ranking", "best")
+    worse = {get(law, "id") for law in laws if get(law, "difference", "practical") is True}
     others = {name: listed(orders, name)[:1] for name in _OTHER_SCORES}
-    against = {name: printable(ids[0]) for name, ids in others.items() if ids and ids[0] != first}
+    against = {name: printable(ids[0]) for name, ids in others.items() if ids and ids[0] in worse}
     if not against:
         return []
     told = [f"{law} by {_OTHER_SCORES[name]}" for name, law in against.items()]
