@@ -42,9 +42,7 @@ def test_scores_that_put_another_law_first_are_told_before_its_weight():
     document["ranking"] = {"best": best, "orders": agreed}
     assert "do not rely" not in " ".join(lay_words(document))
     document["ranking"]["orders"] = agreed | {"evidence": [other, best], "waic": [other, best]}
-    document["models"][1]["difference"]["practical"] = (
-        False  # between those the recordings do not decide anyway
-    )
+    document["models"][1]["difference"]["practical"] = False  # not decided between the two anyway
     assert "do not rely" not in " ".join(lay_words(document))
     document["models"][1]["difference"]["practical"] = True
     told = lay_words(document)

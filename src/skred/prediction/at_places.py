@@ -146,14 +146,12 @@ def _chance(probability: FloatArray, rate: FloatArray | None, n_avalanches: int)
 def _period(often: dict[str, float], longest: float) -> dict[str, float | None]:
     """Mean times between avalanches that come so often; the shortest goes with the highest frequency."""
     if often["value"] <= 0.0:
-        return dict.fromkeys(_ENDS)
-    value, low, high = (1.0 / often[key] if often[key] > 1.0 / longest else None for key in _TURNED)
+        return {"value": None, "low": None, "high": None}
+    ends = "value", "high", "low"
+    value, low, high = (1.0 / often[end] if often[end] * longest > 1.0 else None for end in ends)
     if value is None or low is None:
         return {"value": None, "low": low or longest, "high": None}
     return {"value": value, "low": low, "high": high}
-
-
-_ENDS, _TURNED = ("value", "low", "high"), ("value", "high", "low")
 
 
 def annual_exceedance(rate: Any, probability: Any) -> Any:

@@ -101,17 +101,17 @@ def _use(document: doc.Document) -> list[str]:
     """What the new term buys, and what it is."""
     if not doc.listed(document, "mechanisms") and not doc.get(document, "profile"):
         return []
-    parts = []
+    parts = list[str]()
     for key, words, unit, decimals in (("velocity", "speeds", "m/s", 1), ("runout", "runouts", "m", 0)):
         before, after = (doc.get(document, "held_out", f"rmse_{key}_{when}") for when in ("before", "after"))
         if is_number(before) and is_number(after):
             ends = [fixed(one, decimals) for one in (before, after)]
-            way = f"stays at {ends[0]}" if ends[0] == ends[1] else f"goes from {ends[0]} to {ends[1]}"
+            goes = "" if any(part.startswith("goes") for part in parts) else "goes "
+            way = f"stays at {ends[0]}" if ends[0] == ends[1] else f"{goes}from {ends[0]} to {ends[1]}"
             parts.append(f"{way} {unit} for {words}")
     told = []
     if parts:
-        both = " and ".join(parts).replace(" and goes from ", " and from ")
-        told = [f"With it, the typical error for avalanches that were left out {both}."]
+        told = [f"With it, the typical error for avalanches that were left out {' and '.join(parts)}."]
     gains = {doc.get(one, "gain") for one in doc.listed(document, "conditional", "sensors")} - {None}
     if gains and "better" not in gains:
         told.append("Predicted from the readings further up, no reading is clearly predicted better.")
