@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,15 +15,16 @@ from rolling_cases import rolling
 from skred.campaign import Campaign
 from skred.campaign.parts import of_events
 from skred.diagnosis.augment.augmented import augmented_problem
+from skred.diagnosis.augment.step import Step
 from skred.diagnosis.compare.between import with_ways
 from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
+from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors, with_errors
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.compare.ways import Looked
 from skred.diagnosis.evidence.coefficient import Curve, curve_near
 from skred.diagnosis.evidence.prior_odds import prior_odds
 from skred.diagnosis.influence.influence import MOST, FloatArray, influence
-from skred.diagnosis.predict.held_out import held_out
+from skred.diagnosis.predict.held_out import gained_by, held_out
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.inference.calibrate import calibrate
 from skred.inference.sampling import SamplerSettings
@@ -70,6 +72,29 @@ def test_without_an_avalanche_as_in_a_campaign_that_never_had_it() -> None:
     assert said.log_bayes_factor == pytest.approx(found.log_bayes_factor)
     for event in (0, 7):
         assert said.without_each[event] == pytest.approx(without_one(campaign, event), abs=0.5)
+
+
+def test_a_first_finding_is_judged_under_its_own_errors() -> None:
+    """The base law that it is held against has its errors too, whatever the base law was calibrated under."""
+    campaign = rolling(2.4e-4, n_events=8, friction=0.015)
+    values = np.array(campaign.values)
+    values[4, 2] += 3.0  # far off: what it costs is another thing under each error model
+    robust = base_of(replace(campaign, values=values), "coulomb")
+    student, settings = with_errors(robust, "student"), SamplerSettings(draws=300, tune=300, seed=0)
+    found = curve_near(student, curve(student, placed(DRAG, student.setting, Shape())), Shape())
+    candidate = Candidate(DRAG, (found,), np.zeros(1))
+    under_errors = ComparisonUnderErrors("student", student, {DRAG.id: candidate}, [], [found])
+    comparison = Comparison((under_errors,), prior_odds([DRAG]), {"student": 0.0})
+    with_drag = calibrate(augmented_problem(student, [found]), student.law, settings)
+    not_asked: Any = None
+    step = Step(candidate, (), comparison, with_drag, not_asked)
+    gained = gained_by(step, calibrate(robust.problem, robust.law, settings), 0)
+    after = held_out(with_drag, 0).pointwise
+    own, other = (
+        after - held_out(calibrate(one.problem, one.law, settings), 0).pointwise for one in (student, robust)
+    )
+    np.testing.assert_allclose(gained, own, atol=0.3)
+    assert np.abs(other - own).max() > 2.0
 
 
 def test_a_strong_effect_in_all_avalanches_hangs_on_no_few() -> None:

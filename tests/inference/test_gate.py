@@ -30,6 +30,17 @@ def apart() -> np.ndarray:
     return independent() + 0.3 * np.arange(4)[:, None]
 
 
+def at_two_modes() -> np.ndarray:
+    """Each chain has settled; one is elsewhere, and narrower."""
+    draws = independent()
+    draws[3] = 9.0 + 0.2 * draws[3]
+    return draws
+
+
+def at_two_modes_and_drifting() -> np.ndarray:
+    return at_two_modes() + np.linspace(0.0, 1.0, 1000)
+
+
 def stuck() -> np.ndarray:
     return np.full((4, 1000), 0.3)
 
@@ -64,6 +75,8 @@ def test_independent_draws_pass(diverging: int | None) -> None:
         (independent(), 3, ["3 divergent transitions", "--sampler metropolis"]),
         (with_nan(), None, ["r-hat nan", "--tune"]),
         (stuck(), None, ["--tune"]),
+        (at_two_modes(), None, ["separate modes", "--sampler smc"]),
+        (at_two_modes_and_drifting(), None, ["--tune", "--draws"]),
     ],
 )
 def test_what_fails_says_what_to_do(draws: np.ndarray, diverging: int | None, words: list[str]) -> None:
@@ -78,6 +91,9 @@ def test_only_what_fails_is_told() -> None:
     assert "divergent" in problem
     gate = check_gate(tree(rare_tail()), ["mu"])
     assert gate.ess_tail_min < ESS_LIMIT
+    # More draws do not join separate modes: nothing is said of how many there are.
+    [problem] = check_gate(tree(at_two_modes()), ["mu"]).problems
+    assert "draws" not in problem
 
 
 def test_every_parameter_counts_and_no_other() -> None:

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from skred.arrays import FloatArray
 from skred.diagnosis.augment.add import add_mechanisms
 from skred.diagnosis.augment.problem import as_diagnosed
-from skred.diagnosis.augment.reference import reference
 from skred.diagnosis.augment.step import Augmented, NotAugmented
 from skred.diagnosis.check.bootstrap_test import odds_test
 from skred.diagnosis.check.decision import Decision, decide
@@ -25,7 +23,7 @@ from skred.diagnosis.evidence.prior_odds import UNLISTED
 from skred.diagnosis.influence.influence import influence
 from skred.diagnosis.outcome import Diagnosis, Finding, NotDiagnosed, Outcome
 from skred.diagnosis.predict.conditional import BeforeAfter
-from skred.diagnosis.predict.held_out import HeldOut, held_out
+from skred.diagnosis.predict.held_out import HeldOut, gained_by, held_out
 from skred.diagnosis.predict.profile_law import ProfileLaw, profile_law
 from skred.inference.calibrate import Calibration, calibrate_surely
 from skred.inference.hierarchical.problem import HierarchicalProblem
@@ -102,7 +100,7 @@ def _steps(calibration: Calibration, run: Run) -> Outcome:
         clock.stage("influence", "what the answer hangs on: without each avalanche, each kind of reading")
         gained = after.pointwise - before.pointwise
         if isinstance(finding, Augmented) and len(finding.steps) > 1:
-            gained = _by_the_first(finding, calibration, run)
+            gained = gained_by(finding.steps[0], calibration, run.seed, exact=effort.exact_loo)
         hangs_on = influence(comparison, decision.answer, gained, check.needed)
         clock.stage("conditional", "predicting each reading from those above it")
         given = BeforeAfter.of(before, after, run.seed)
@@ -123,12 +121,3 @@ def _left_out(finding: Finding, calibration: Calibration, run: Run) -> tuple[Hel
         return held_out(calibration, run.seed, exact=exact), None
     before = held_out(finding.reference, run.seed, exact=exact)
     return before, held_out(finding.steps[-1].calibration, run.seed, exact=exact)
-
-
-def _by_the_first(finding: Augmented, calibration: Calibration, run: Run) -> FloatArray:
-    """What the first that was added gains for each avalanche left out, (n_events,), under its own errors."""
-    first, exact = finding.steps[0], run.effort.exact_loo
-    under_errors = first.comparison.leading(first.candidate.mechanism.id)
-    alone = reference(calibration, under_errors.base.problem)()
-    before, after = (held_out(one, run.seed, exact=exact) for one in (alone, first.calibration))
-    return after.pointwise - before.pointwise

@@ -85,13 +85,19 @@ def check_gate(tree: xr.DataTree, parameters: Sequence[str]) -> Gate:
     divergences = int(stats["diverging"].sum()) if "diverging" in stats else 0
     problems = []
     # Written so that NaN fails too.
-    if not r_hat <= R_HAT_LIMIT:
+    apart = not r_hat <= R_HAT_LIMIT and _at_separate_modes(posterior)
+    if apart:
+        problems.append(
+            f"r-hat {r_hat:.3f} exceeds {R_HAT_LIMIT}: chains have settled at separate modes, and longer ones"
+            " would stay there; sequential Monte Carlo weighs modes (sampler='smc', --sampler smc)"
+        )
+    elif not r_hat <= R_HAT_LIMIT:
         problems.append(
             f"r-hat {r_hat:.3f} exceeds {R_HAT_LIMIT}: more draws for tuning (tune=, --tune), or look at"
             " the trace for modes"
         )
     for name, size in (("bulk", ess_bulk), ("tail", ess_tail)):
-        if not size >= ESS_LIMIT:
+        if not size >= ESS_LIMIT and not apart:
             problems.append(
                 f"{name} effective sample size {size:.0f} below {ESS_LIMIT:.0f}: more draws (draws=, --draws)"
             )
@@ -101,6 +107,15 @@ def check_gate(tree: xr.DataTree, parameters: Sequence[str]) -> Gate:
             " (sampler='metropolis', --sampler metropolis)"
         )
     return Gate(r_hat, ess_bulk, ess_tail, divergences, tuple(problems))
+
+
+def _at_separate_modes(posterior: xr.Dataset) -> bool:
+    """Whether each chain has settled by itself, and two have no value of some parameter in common."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        by_itself = (posterior - posterior.mean("draw")) / posterior.std("draw")
+        settled = _extreme(az.rhat(by_itself), max) <= R_HAT_LIMIT
+    gap = posterior.min("draw").max("chain") - posterior.max("draw").min("chain")
+    return settled and _extreme(gap, max) > 0.0
 
 
 def _extreme(dataset: xr.Dataset, choose: Any) -> float:

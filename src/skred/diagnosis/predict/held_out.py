@@ -11,6 +11,8 @@ from scipy.special import logsumexp
 
 from skred.arrays import BoolArray, FloatArray
 from skred.diagnosis.augment.problem import AugmentedProblem
+from skred.diagnosis.augment.reference import reference
+from skred.diagnosis.augment.step import Step
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.predictive import Predicted
 from skred.diagnosis.predict.draws import N_DRAWS, LeftOut, draws_of, predictions
@@ -101,6 +103,25 @@ def held_out(calibration: Calibration, seed: int, *, exact: bool = False) -> Hel
         failed, refitted = refits.failed, dict(zip(again, samples, strict=True))
     others = _others(calibration, weights, refitted, seed)
     return HeldOut.of(pointwise, others, seed, k, tuple(events[e] for e in again), failed)
+
+
+def gained_by(step: Step, calibration: Calibration, seed: int, *, exact: bool = False) -> FloatArray:
+    """What a mechanism that was added first gains for each avalanche left out, under its own errors.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        Of the base law, under any error model.
+
+    Returns
+    -------
+    (n_events,) array
+        Log predictive density with it, less that of the base law.
+    """
+    under_errors = step.comparison.leading(step.candidate.mechanism.id)
+    alone = reference(calibration, under_errors.base.problem)()
+    before, after = (held_out(one, seed, exact=exact) for one in (alone, step.calibration))
+    return after.pointwise - before.pointwise
 
 
 def leave_out_weights(densities: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -37,7 +37,7 @@ def _gains(rows: list[tuple[str, str, dict[str, Any]]], which: str) -> str:
     first = "no reading is clearly predicted better with what was added."
     if told[CLEAR]:
         first = f"what was added improves the prediction of {enumerated(told[CLEAR])}."
-    kinds = ((UNCLEAR, "No clear gain"), (NOTHING_GAINED, "Nothing is gained"), (WORSE, "Worse"))
+    kinds = ((UNCLEAR, "No clear gain"), (NOTHING_GAINED, "Practically unchanged"), (WORSE, "Worse"))
     return " ".join((first, *(f"{words}: {enumerated(told[one])}." for one, words in kinds if told[one])))
 
 

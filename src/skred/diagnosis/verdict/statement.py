@@ -54,12 +54,8 @@ def _not_converged(events: Sequence[str]) -> str:
 
 
 def _title(name: str) -> str:
-    return "a force not in the list" if name == UNLISTED else mechanisms()[name].title
-
-
-def _short(name: str) -> str:
-    """Its title without examples, which have commas of their own."""
-    return _title(name).partition(":")[0]
+    """Without its examples: recordings of speeds do not show whether it is ice or bare ground."""
+    return "a force not in the list" if name == UNLISTED else mechanisms()[name].title.partition(":")[0]
 
 
 def _where(location: dict[str, float] | None) -> str:
@@ -150,7 +146,7 @@ def _tied(document: dict[str, Any]) -> str:
         if other != UNLISTED and mechanisms()[other].same_term_as in told:
             own = f"; in a form of its own {how[other]}" if other in probability else ""
             how[other] = f"the same term{own}"
-    listed = ", ".join(f"{_short(other)} ({sure})" for other, sure in how.items())
+    listed = ", ".join(f"{_title(other)} ({sure})" for other, sure in how.items())
     return f"These recordings cannot tell it from: {listed}." if ties else ""
 
 
@@ -204,8 +200,8 @@ def _split(step: Step, document: dict[str, Any]) -> str:
     if sensor is not None and sensor["splits"]:
         first, second = sensor["splits"]
         at = f"A speed at s = {sensor['s_from_m']:.0f} m"
-        return f"{at} would split {_short(first)} and {_short(second)} best."
-    same = ", ".join(_short(name) for name in step.tied if name != UNLISTED)
+        return f"{at} would split {_title(first)} and {_title(second)} best."
+    same = ", ".join(_title(name) for name in step.tied if name != UNLISTED)
     return f"No further speed would split off {same}: the term is the same." if same else ""
 
 
