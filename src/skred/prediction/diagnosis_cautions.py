@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from skred.chances import percent
 from skred.inference.influence_words import carried
 from skred.physics.mechanisms import mechanisms
-from skred.prediction.words import percent
 
 _NOT_LISTED = "unlisted"
 

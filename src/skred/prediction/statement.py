@@ -6,9 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from skred.chances import percent
 from skred.inference.between_events import BetweenEvents
 from skred.prediction.without_added import comparison_sentences
-from skred.prediction.words import chance, percent, ranged
+from skred.prediction.words import chance, ranged
 
 MOST = 0.5
 """Share of avalanches from which on it is said first that they do not start."""

@@ -7,11 +7,12 @@ from typing import Any
 
 import xarray as xr
 
+from skred.chances import digits
 from skred.prediction.bands import runouts_exceeded_by
 from skred.prediction.source import Source
 from skred.prediction.terms import added_rows
 from skred.prediction.track import PredictionTrack
-from skred.prediction.words import chance, digits, name_of, period, valued
+from skred.prediction.words import chance, name_of, period, valued
 
 SHARE = 0.1
 """Of all avalanches, which exceed the speed and the pressure that are compared."""

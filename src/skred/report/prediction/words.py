@@ -4,23 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+from skred import chances
 from skred.report.shared import document as doc
-from skred.report.shared.numbers import ABSENT, decimals_for, is_number, rounded, three_digits, whole
-
-_SURE = 0.0005
-"""Nearer to 0 or 1 than this a simulated probability is not told: it is no certainty."""
+from skred.report.shared.numbers import ABSENT, is_number, three_digits, whole
 
 
 def percent(value: Any) -> str:
     """A probability in percent, never as an exact 0 or 100."""
-    if not is_number(value):
-        return ABSENT
-    if value < _SURE:
-        return "<0.1 %"
-    if value > 1.0 - _SURE:
-        return ">99.9 %"
-    text = f"{100 * value:.{1 if value < 0.0995 or value > 0.9005 else 0}f} %"
-    return text.replace(".0 %", " %")
+    return chances.percent(value) if is_number(value) else ABSENT
 
 
 def chance(band: Any) -> str:
@@ -43,10 +34,8 @@ def period(band: Any) -> str:
 
 def period_and_interval(band: Any) -> tuple[str, str]:
     """A return period, and its interval: empty where there is none."""
-    value, low, high = (doc.get(band, key) for key in ("value", "low", "high"))
-    if not is_number(value):
-        return ("longer than can be said" if not is_number(low) else f"more than {_years(low)}"), ""
-    return _years(value), f"{_years(low)} {f'to {_years(high)}' if is_number(high) else 'or more'}"
+    found = (doc.get(band, key) for key in ("value", "low", "high"))
+    return chances.period_and_interval(*(one if is_number(one) else None for one in found))
 
 
 def once(row: Any) -> str:
@@ -66,8 +55,3 @@ def ranged(limits: Any, unit: str) -> str:
     if low == high:
         return f"{low:g}{one} (one value, taken as exact)"
     return f"{low:g} to {high:g}{one} (each value as likely)"
-
-
-def _years(value: float) -> str:
-    """Two significant digits: a return period is never known better."""
-    return rounded(value, decimals_for(value))
