@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import arviz as az
@@ -11,6 +12,9 @@ import pytest
 import xarray as xr
 from numpy.testing import assert_array_equal
 
+from skred.campaign import read_campaign
+from skred.campaign.template import write_template
+from skred.inference.pooled.problem import pooled_problem
 from skred.inference.sampling import SamplerSettings, sample_posterior, sample_prior, starting_points
 from skred.physics.laws import load_law
 
@@ -121,6 +125,21 @@ def test_each_chain_starts_from_the_likeliest_of_its_own(problem: Any, calibrati
         rows = LAW.strength_rows({n: prior[n].values.ravel()[10 * chain : 10 * (chain + 1)] for n in names})
         best = problem.log_density(LAW.mechanisms, rows).sum(axis=1).argmax()
         assert start[names[0]] == own[best]
+
+
+def test_chains_start_at_the_mode_that_holds_the_probability(tmp_path: Path) -> None:
+    """On the filled example the mean front has a second mode, where it stops above the last sensor."""
+    write_template(tmp_path / "example")
+    example, law = pooled_problem(read_campaign(tmp_path / "example")), load_law("coulomb")
+    prior = sample_prior(law.build(example), law, 0)
+    starts = np.array(
+        [one["dry_friction"] for one in starting_points(law, example, prior, SamplerSettings())]
+    )
+    places = np.linspace(0.3, 0.6, 3001)
+    density = example.log_likelihood(law, {"dry_friction": places}).sum(axis=1)
+    assert np.abs(starts - places[density.argmax()]).max() < 0.01
+    apart = places[np.flatnonzero((density[1:-1] > density[:-2]) & (density[1:-1] > density[2:])) + 1]
+    assert np.abs(apart - 0.368).min() < 0.005
 
 
 def test_pymc_says_nothing(calibration: Any, problem: Any, caplog: pytest.LogCaptureFixture) -> None:

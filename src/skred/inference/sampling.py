@@ -26,8 +26,9 @@ TUNE = {"pooled": 500, "hierarchical": 1000}
 """Adaptation draws where none are asked for: more parameters take longer to adapt to."""
 PRIOR_DRAWS = 1000
 """Draws of the prior that are kept for figures and starting points."""
-_STARTS_PER_CHAIN = 20
-"""Draws of the prior among which a chain's start is the most probable one."""
+_STARTS_TRIED = {"pooled": 250, "hierarchical": 20}
+"""Draws of the prior among which a chain's start is the most probable one. A response of all avalanches may
+have several modes, as where it stops between two sensors: pooled chains start where the probability is."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ def sample_posterior(
 ) -> xr.DataTree:
     """Posterior and sample_stats of a law's model.
 
-    Chains of Metropolis and NUTS start each from the most likely of twenty draws of its own: of the prior, so
+    Chains of Metropolis and NUTS start each from the most likely of some draws of its own: of the prior, so
     that starts are overdispersed and yet not on the plateau where no front moves, or of what the problem
     knows already of the posterior (`Problem.to_start_from`).
     `step` is for Metropolis, if there is one compiled already.
@@ -123,7 +124,7 @@ def starting_points(
     """
     samples = {str(name): variable.values.ravel() for name, variable in prior.data_vars.items()}
     chains = settings.chains
-    n = min(_STARTS_PER_CHAIN, prior.sizes["chain"] * prior.sizes["draw"] // chains)
+    n = min(_STARTS_TRIED[problem.likelihood], prior.sizes["chain"] * prior.sizes["draw"] // chains)
     first = {name: values[: n * chains] for name, values in samples.items()}
     first = problem.to_start_from(law, first, settings.seed)
     log_density = problem.log_likelihood(law, first).sum(axis=1).reshape(chains, n)
