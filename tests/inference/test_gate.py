@@ -75,7 +75,7 @@ def test_independent_draws_pass(diverging: int | None) -> None:
         (independent(), 3, ["3 divergent transitions", "--sampler metropolis"]),
         (with_nan(), None, ["r-hat nan", "--tune"]),
         (stuck(), None, ["--tune"]),
-        (at_two_modes(), None, ["separate modes", "--sampler smc"]),
+        (at_two_modes(), None, ["separate modes", "skred calibrate --sampler smc"]),
         (at_two_modes_and_drifting(), None, ["--tune", "--draws"]),
     ],
 )

@@ -89,7 +89,8 @@ def check_gate(tree: xr.DataTree, parameters: Sequence[str]) -> Gate:
     if apart:
         problems.append(
             f"r-hat {r_hat:.3f} exceeds {R_HAT_LIMIT}: chains have settled at separate modes, and longer ones"
-            " would stay there; sequential Monte Carlo weighs modes (sampler='smc', --sampler smc)"
+            " would stay there; a calibration by sequential Monte Carlo weighs modes (sampler='smc', or"
+            " skred calibrate --sampler smc)"
         )
     elif not r_hat <= R_HAT_LIMIT:
         problems.append(
