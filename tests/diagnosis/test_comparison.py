@@ -20,7 +20,7 @@ from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at, curve_ne
 from skred.diagnosis.evidence.event_quadrature import FINE, FIRST, SCREENING, USUAL
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.refit import Rounds, refit
-from skred.diagnosis.evidence.tolerance import COUNTS
+from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Direction, Shape
@@ -319,8 +319,11 @@ def test_errors_in_common_are_integrated_as_closely_as_others() -> None:
 
 @pytest.mark.slow
 def test_screening_has_what_a_grid_over_the_prior_has() -> None:
-    """Where climbs begin, and about where they lead, tells what strengths to 3.5 scales of the prior do."""
-    base = sparse_base()
+    """Where climbs begin, and about where they lead, tells what strengths to 3.5 scales of the prior do.
+
+    It is for looking closer within 6 nats: between few strengths a curve may be off by some tenths.
+    """
+    base, off = sparse_base(), list[float]()
     local = [
         one for one in placed_mechanisms(base.setting) if one.mechanism.id in ("segment_friction", "obstacle")
     ]
@@ -329,7 +332,8 @@ def test_screening_has_what_a_grid_over_the_prior_has() -> None:
         grid = np.append(-grid[::-1], grid) if job.added.either_sign else grid
         whole = curve_at(base, job, grid, SCREENING)
         found = curve(base, job)
-        assert found.log_bayes_factor == pytest.approx(whole.log_bayes_factor, abs=0.3)
+        off.append(abs(found.log_bayes_factor - whole.log_bayes_factor))
+    assert max(off) < 0.5 * DECIDES_NOTHING and np.median(off) < 0.1
 
 
 def test_nothing_is_the_same_whatever_is_not_added() -> None:
