@@ -32,4 +32,5 @@ def digits(value: float | None, n: int) -> str:
     if not value:
         return "0"
     places = n - 1 - math.floor(math.log10(abs(value)))
-    return f"{round(value, places):.{max(0, min(places, 4))}f}"
+    text = f"{round(value, places):.{max(0, min(places, 4))}f}"
+    return text.lstrip("-") if float(text) == 0.0 else text

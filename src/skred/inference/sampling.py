@@ -28,7 +28,7 @@ PRIOR_DRAWS = 1000
 """Draws of the prior that are kept for figures and starting points."""
 _STARTS_TRIED = {"pooled": 250, "hierarchical": 20}
 """Draws of the prior among which a chain's start is the most probable one. A response of all avalanches may
-have several modes, as where it stops between two sensors: pooled chains start where the probability is."""
+have several modes, as where it stops between two sensors: of few draws none may lie near the largest."""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skred.chances import digits
+
 ABSENT = "n/a"
 """What stands where a number is not available."""
 _MOST_DIGITS = 7
@@ -51,10 +53,7 @@ def counted(value: Any, thing: str) -> str:
 
 def three_digits(value: Any) -> str:
     """A number to act on, with three significant digits and no exponent; ``n/a`` where there is none."""
-    if not is_number(value) or value == 0:
-        return fixed(value, 0)
-    places = 2 - _magnitude(value)
-    return fixed(round(float(value), places), max(0, min(places, 4)))
+    return digits(float(value), 3) if is_number(value) else ABSENT
 
 
 def share(value: Any) -> str:
