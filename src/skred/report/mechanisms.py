@@ -1,4 +1,4 @@
-"""The library of mechanisms for the terminal: one table over all of them, and one of each."""
+"""The library of mechanisms: one table over all of them, and what there is to say of each."""
 
 from __future__ import annotations
 
@@ -192,15 +192,12 @@ def mechanisms_table(documents: Sequence[dict[str, Any]], n_laws: int) -> Table:
     return table
 
 
-def mechanism_table(document: dict[str, Any], n_laws: int) -> RenderableType:
-    """One mechanism in full; parameters as `mechanisms_table`."""
-    from rich.console import Group as Lines
-    from rich.table import Table
-
+def mechanism_rows(document: dict[str, Any], n_laws: int) -> dict[str, str]:
+    """What there is to say of one mechanism, by what each row is about; parameters as `mechanisms_table`."""
     strength, prior, in_base = document["strength"], document["prior"], document["prior_in_a_base_law"]
     paper = f", in the paper {strength['paper_symbol']}" if strength["paper_symbol"] else ""
     unit = "" if strength["unit"] == "1" else f" {unit_text(strength['unit'])}"
-    rows = {
+    return {
         "group": _GROUPS[document["group"]],
         "enters as": document["equation"],
         "coefficient": f"{strength['parameter']}, symbol {strength['symbol']}{paper}",
@@ -219,10 +216,17 @@ def mechanism_table(document: dict[str, Any], n_laws: int) -> RenderableType:
         "doi": f"https://doi.org/{document['doi']}" if document["doi"] else "none",
         "package": document["package"],
     }
+
+
+def mechanism_table(document: dict[str, Any], n_laws: int) -> RenderableType:
+    """One mechanism in full; parameters as `mechanisms_table`."""
+    from rich.console import Group as Lines
+    from rich.table import Table
+
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
-    for name, text in rows.items():
+    for name, text in mechanism_rows(document, n_laws).items():
         table.add_row(plain_text(name, "bold"), plain_text(text))
     return Lines(plain_text(f"{document['id']}: {document['title']}", "bold"), table)
 

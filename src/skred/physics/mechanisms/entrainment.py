@@ -22,13 +22,13 @@ from skred.physics.mechanisms.stretches import (
 
 GROWTH = "m_2/m_1 [1]"
 """How many times the mass is larger at the end of the stretch than at its beginning."""
-_DOUBLED = 2.0
+DOUBLED = 2.0
 """By which growth the form is taken: in large avalanches mass has been seen to double and more."""
 
 
 def _shapes(setting: Setting) -> tuple[Shape, ...]:
     """The stretches of drag, and those on which every metre adds as much."""
-    limited = [replace(one, constants=((GROWTH, _DOUBLED),)) for one in stretches(setting)]
+    limited = [replace(one, constants=((GROWTH, DOUBLED),)) for one in stretches(setting)]
     return (*stretches_of_drag(setting), *limited)
 
 
