@@ -113,6 +113,7 @@ def test_a_diagnosis_tells_of_its_priors_and_arviz_takes_both_laws(tmp_path: Pat
         assert set(az.loo_pit(tree).data_vars) == {"LC", "CD", "b", "runout"}
 
 
+@pytest.mark.slow
 def test_nuts_is_warned_of() -> None:
     with pytest.warns(UserWarning, match="kinks"):
         skred.calibrate("constant", sampler="nuts", **SHORT)
@@ -129,6 +130,7 @@ def test_what_cannot_be_used_is_told() -> None:
             wrong()
 
 
+@pytest.mark.slow
 def test_readings_of_fronts_are_those_of_the_kernel_and_have_gradients() -> None:
     import pytensor
     import pytensor.tensor as pt

@@ -235,6 +235,7 @@ def test_multiples_of_avalanches_to_come() -> None:
     assert abs(spread.mean()) < 0.015 and abs(spread.std() - 0.5) < 0.01
 
 
+@pytest.mark.slow
 def test_gains_do_not_hang_on_quadrature_points() -> None:
     """Friction on a stretch at Ryggfonn, around two populations: gains differed by 1.5 and 1.7 nats while a
     strength in common was by the same tables, between which it lay."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from diagnosis_cases import base_of, ryggfonn_base
 
 from skred.diagnosis.augment.augmented import augmented_problem
@@ -17,6 +18,7 @@ from skred.physics.mechanisms.spec import Shape
 from skred.simulator.draw import draw_trial
 
 
+@pytest.mark.slow
 def test_refits_far_from_the_base_law_end_where_small_steps_do() -> None:
     """A narrow population lets no event go: 22 000 nats were lost at strengths that readings ask for."""
     base = base_of(draw_trial(1374178000, kind="sparse", hidden="listed").campaign, "constant")

@@ -136,6 +136,7 @@ def test_an_answer_may_lose_what_the_alarm_has_to_spare() -> None:
     assert said.needed == pytest.approx(said.log_bayes_factor - 1.5)
 
 
+@pytest.mark.slow
 def test_the_alarm_goes_by_strengths_in_common() -> None:
     """What an answer gains where avalanches differ is to spare, for no alarm has it; and some may be lost."""
     comparison = drag_in(rolling(2.4e-4, n_events=8))[0]
@@ -158,6 +159,7 @@ def gaining(found: Curve, gain: float) -> Looked:
     return Looked(found, 0.0, in_common, {BetweenEvents.SPREAD: made_way(in_common + over)})
 
 
+@pytest.mark.slow
 def test_where_avalanches_may_differ_that_is_in_what_is_left() -> None:
     """The ways of a part are those of that part: with fewer avalanches and readings, at the best shape."""
     comparison = drag_in(rolling(2.4e-4, n_events=12))[0]

@@ -64,6 +64,7 @@ def test_a_force_that_takes_both_effects_is_behind_the_first_and_a_force_beside_
     assert found.log_bayes_factor == pytest.approx(force + 4.5, abs=2.0) and force > drag.alone + 30.0
 
 
+@pytest.mark.slow
 def test_climbs_end_where_a_force_beside_a_mechanism_cannot_bring_it_near_what_leads(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

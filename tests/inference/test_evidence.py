@@ -27,6 +27,7 @@ def test_evidence_is_that_of_the_grid(
     assert found.spread < 2 * TOLERANCE[law_id]
 
 
+@pytest.mark.slow
 def test_a_seed_reproduces(model_of: Callable[[str], Any]) -> None:
     first, again = (evidence(model_of("constant"), [5], draws=100) for _ in range(2))
     assert first == again

@@ -96,6 +96,7 @@ class Timed(JointMetropolis):
         return super().run(q, n_draws, *others)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_many_parameters_are_adapted_to_for_longer(seed: int) -> None:
     """Seven, of unlike scales: no refit is run again for longer, as both are after 500 draws."""

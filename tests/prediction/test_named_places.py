@@ -185,6 +185,7 @@ def test_the_table_and_the_page(problem: HierarchicalProblem, tmp_path: Path) ->
         assert tree["speed_exceedance"].dims == ("at", "speed_threshold")
 
 
+@pytest.mark.slow
 def test_a_place_above_some_releases_is_told(problem: HierarchicalProblem, tmp_path: Path) -> None:
     """Fewer come there than to a place further down, which looks like a fault."""
     folder, out = folder_of(tmp_path / "made", tree_of(problem, "coulomb")), tmp_path / "out"

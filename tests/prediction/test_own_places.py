@@ -46,6 +46,7 @@ def test_places_asked_for_leave_nothing_out(tmp_path: Path) -> None:
     assert shown_places(problem, other, Wanted()) == places_left_out(problem, other, Wanted()) == []
 
 
+@pytest.mark.slow
 def test_what_is_not_shown_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     problem = problem_with(tmp_path / "gates", 34)
     folder, out = folder_of(tmp_path / "made", tree_of(problem, "coulomb")), tmp_path / "out"

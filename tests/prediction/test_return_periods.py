@@ -141,6 +141,7 @@ def test_priors_of_a_prediction_that_samples(tmp_path: Path) -> None:
     assert json.loads(result.posterior.attrs["changed_priors"]) == {"dry_friction": 0.9}
 
 
+@pytest.mark.slow
 def test_a_folder_from_python(problem: HierarchicalProblem, tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "made", tree_of(problem, "coulomb"))
     result = skred.predict(
@@ -153,6 +154,7 @@ def test_a_folder_from_python(problem: HierarchicalProblem, tmp_path: Path) -> N
         skred.predict("pcm", from_folder=folder)
 
 
+@pytest.mark.slow
 def test_another_track_is_checked_as_validate_does(
     problem: HierarchicalProblem, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -87,6 +87,7 @@ def test_where_the_effect_is_left_out_that_is_told(
     assert meaning in box and "fitted beside what was added, which is left out here" in page
 
 
+@pytest.mark.slow
 def test_without_places_runouts_are_compared(
     problem: HierarchicalProblem, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -143,6 +144,7 @@ def test_the_diagnosis_speaks_against_itself(
         source_of(folder)
 
 
+@pytest.mark.slow
 def test_most_do_not_start_is_told_first(
     problem: HierarchicalProblem, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -158,6 +160,7 @@ def test_most_do_not_start_is_told_first(
     assert page.count(escape(first)) == 2
 
 
+@pytest.mark.slow
 def test_a_place_above_every_release_is_refused(
     problem: HierarchicalProblem, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -170,6 +173,7 @@ def test_a_place_above_every_release_is_refused(
     assert run([*words, "--release", "90", "--quiet"]) == 0
 
 
+@pytest.mark.slow
 def test_how_it_was_made_is_on_the_page(problem: HierarchicalProblem, tmp_path: Path) -> None:
     folder, out = folder_of(tmp_path / "made", tree_of(problem, "coulomb")), tmp_path / "out"
     track = plane(tmp_path)

@@ -207,7 +207,7 @@ def test_a_formula_keeps_what_it_says():
     assert formula("mu g cos(phi)") == "μ g cos(φ)"
 
 
-@pytest.mark.parametrize("kind", ["tie", "unexplained"])
+@pytest.mark.parametrize("kind", [pytest.param("tie", marks=pytest.mark.slow), "unexplained"])
 def test_the_improvement_is_on_the_first_screen(kind, tmp_path):
     """Readings given those above: figure and sentence before the contents, the table in its section."""
     document, tree = documents(kind)

@@ -112,6 +112,7 @@ def test_a_calibration_has_its_draws_to_explore(made):
     assert html.count('id="bokeh"') == 1
 
 
+@pytest.mark.slow
 def test_a_hierarchical_one_has_a_forest_of_avalanches(tmp_path):
     problem, law = hierarchical_ryggfonn(), load_law("coulomb")
     tree = as_saved(hierarchical_calibration(problem, law), law, problem)
@@ -133,6 +134,7 @@ def test_the_same_draws_make_the_same_page(tree, tmp_path):
     assert first == second
 
 
+@pytest.mark.slow
 def test_what_else_is_imported_is_not_in_the_page(tree, tmp_path):
     pytest.importorskip("panel", reason="the extra dashboard is not installed")  # before the page is made
     _, html = of_calibration(tree, tmp_path)
@@ -146,6 +148,7 @@ def test_a_page_without_such_figures_carries_no_bokeh(tmp_path):
     check_page(html)
 
 
+@pytest.mark.slow
 def test_thinned_draws_are_told(tree, tmp_path):
     many = changed(
         tree, lambda name, data: data.isel(draw=np.arange(500) % 60) if name == "posterior" else data
@@ -157,7 +160,7 @@ def test_thinned_draws_are_told(tree, tmp_path):
     assert found["plot_pair"]["panels"][0]["note"] == "250 of the 500 draws of each chain."
 
 
-@pytest.mark.parametrize("n_draws", [1, 2, 4])
+@pytest.mark.parametrize("n_draws", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (2, 4))])
 def test_few_draws_are_no_reason_to_fail(tree, tmp_path, n_draws):
     few = changed(tree, lambda name, data: data.isel(draw=slice(n_draws)) if "draw" in data.sizes else data)
     found, html = of_calibration(few, tmp_path)
@@ -165,12 +168,14 @@ def test_few_draws_are_no_reason_to_fail(tree, tmp_path, n_draws):
     assert found["predictive"] is not None
 
 
+@pytest.mark.slow
 def test_one_chain_has_no_ranks_to_compare(tree, tmp_path):
     one = changed(tree, lambda name, data: data.isel(chain=slice(1)) if "chain" in data.sizes else data)
     _, html = of_calibration(one, tmp_path)
     assert ["plot_trace"] in plots(check_page(html))
 
 
+@pytest.mark.slow
 def test_a_parameter_that_is_always_the_same_has_no_density(tree, tmp_path):
     def constant(name, data):
         return data.assign(dry_friction=0.0 * data["dry_friction"] + 0.3) if name == "posterior" else data

@@ -81,6 +81,7 @@ def test_names_in_any_script(problem, tmp_path):
     assert_pictures(save_model_figures(as_saved(calibration(changed, law), law, changed), tmp_path))
 
 
+@pytest.mark.slow
 def test_only_runouts_several_releases_and_draws_all_alike(problem, tmp_path):
     events = tuple(
         Event(event.id, 25.0 * (k % 3), None, {}) for k, event in enumerate(problem.campaign.events)
