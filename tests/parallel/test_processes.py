@@ -77,6 +77,28 @@ def test_meanwhile_something_is_done_elsewhere(two_cores: None) -> None:
         meanwhile(divmod, 1, 0)()
 
 
+class Remembers:
+    """It changes what it is in while it is copied, as another thread may."""
+
+    def __init__(self, held: dict[str, object]) -> None:
+        self.held = held
+
+    def __reduce__(self) -> tuple[type, tuple[()]]:
+        self.held[f"found {len(self.held)}"] = None
+        return object, ()
+
+
+def test_what_changes_while_it_is_copied_is_done_here(two_cores: None) -> None:
+    held: dict[str, object] = {}
+    held |= {"itself": Remembers(held), "more": None}
+    with helpers():
+        assert meanwhile(lambda given: (len(given) >= 2, os.getpid()), held)() == (True, os.getpid())
+        assert len(held) > 2  # it was tried
+        assert meanwhile(os.getpid)() != os.getpid()  # the helper goes on
+        with worker_pool() as pool:
+            assert all(n >= 2 for n in pool.map(len, [held] * 4))
+
+
 def killed(file: Path) -> int:
     """Kills the process that does it, unless that is the one that says so in a file."""
     if os.getpid() != int(file.read_text()):

@@ -3,6 +3,8 @@
 Threads of such work wait for Python's global lock; processes do not. Workers exist only within `helpers`. A
 command asks for them, and starts them while it does something that needs one core only. Library code never
 starts a process by itself. If a worker is killed, perhaps for its memory, its work is done in this process.
+So is work on something that another thread has just changed while it was copied: what an object has found
+once it may remember, and a copy of it then breaks off.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from importlib import import_module
+from pickle import PicklingError
 from typing import Any
 
 from skred.parallel.threads import threads
@@ -83,14 +86,15 @@ def meanwhile[Result](work: Callable[..., Result], *given: Any) -> Callable[[], 
     Returns
     -------
     callable
-        Waits for the result. Without workers the work is done then, in this process.
+        Waits for the result. Without workers, or where nothing could be copied to one, the work is done then,
+        in this process.
     """
     begun = _begun(work, *given)
 
     def result() -> Result:
         try:
             return begun.result() if begun is not None else work(*given)
-        except BrokenProcessPool:
+        except (BrokenProcessPool, PicklingError):
             return work(*given)
 
     return result
