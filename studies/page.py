@@ -3,6 +3,7 @@
 import cyclopts
 
 from skred.output import write_text
+from studies.another_hand import page as another_hand
 from studies.files import ROOT
 from studies.masked import page as masked
 from studies.thresholds import page as thresholds
@@ -19,6 +20,7 @@ Ryggfonn, and the record of concealed trials. What is measured again is in
 | `python -m studies.ryggfonn` | diagnoses [Ryggfonn](../docs/ryggfonn.md) under each base law |
 | `python -m studies.ryggfonn.build_campaigns` | builds the embedded campaigns from the raw figures |
 | `python -m studies.proof` | writes [the record](../docs/proof.md) of trials; `--add DIR` adds some |
+| `python -m studies.another_hand` | diagnoses campaigns that were simulated by another hand |
 | `python -m studies.thresholds.alarm` | how often clean campaigns pass the alarm's limit |
 | `python -m studies.thresholds.nothing_at_most` | how probable nothing may be beside an alarm |
 | `python -m studies.thresholds.tie_rules` | which names are tied with the leading one |
@@ -40,7 +42,10 @@ app = cyclopts.App(help=__doc__)
 @app.default
 def main() -> None:
     """Write the page."""
-    write_text(ROOT / "studies" / "README.md", HEAD + thresholds.sections() + masked.sections())
+    write_text(
+        ROOT / "studies" / "README.md",
+        HEAD + another_hand.sections() + thresholds.sections() + masked.sections(),
+    )
 
 
 if __name__ == "__main__":

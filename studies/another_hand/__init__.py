@@ -1,0 +1,1 @@
+"""Campaigns that were simulated by another hand, and what a diagnosis says of them."""

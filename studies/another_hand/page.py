@@ -1,0 +1,98 @@
+"""Section of studies/README.md about the campaigns of another hand."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from skred.diagnosis.evidence.prior_odds import UNLISTED, same_term
+from skred.physics.mechanisms import mechanisms
+from skred.prove.scoring.intervals import share
+from studies.another_hand.campaigns import Hidden, hidden
+from studies.files import RESULTS, read
+
+SILENT = ("nothing_missing", "cannot_tell")
+"""Verdicts that claim nothing."""
+RIGHT = "right name"
+HOLDS = (RIGHT, "in the tie")
+"""What an answer is worth that holds the truth."""
+
+
+def told(answer: dict[str, Any]) -> list[str]:
+    """All ids of an answer: what is named, or a force in no list, then what is tied with it."""
+    first = [UNLISTED] if answer["verdict"] == "unexplained" else answer["mechanisms"][:1]
+    return [*first, *answer["tied"]]
+
+
+def other_names(ids: Sequence[str]) -> set[str]:
+    """Ids, and those that are the same term by another name, either way."""
+    twins = {mechanisms()[name].same_term_as for name in ids if name in mechanisms()} - {""}
+    return {*ids, *twins, *(one.id for name in ids for one in same_term(name))}
+
+
+def judged(truth: Hidden, answer: dict[str, Any]) -> str:
+    """In a word or two, what an answer is worth."""
+    if not truth.ids:
+        return "right" if answer["verdict"] in SILENT else "false alarm"
+    if answer["verdict"] in SILENT:
+        return "missed"
+    right, names = other_names(truth.ids), told(answer)
+    if names[0] in right:
+        return RIGHT
+    return "in the tie" if right & set(names) else "wrong"
+
+
+def counted(hits: Sequence[bool]) -> str:
+    """So many of so many, with the exact 95 % interval of their share."""
+    found = share(hits)
+    if not found["n"]:
+        return "0 of 0"
+    return f"{found['hits']} of {found['n']} ({found['low']:.2f} to {found['high']:.2f})"
+
+
+def sections() -> str:
+    """The section."""
+    truths, answers = hidden(), read(RESULTS / "another_hand.json")["answers"]
+    worth = {name: judged(truths[name], answer) for name, answer in answers.items()}
+    rows = "".join(_row(name, truths[name], answer, worth[name]) for name, answer in answers.items())
+    clean = [worth[name] == "right" for name in answers if not truths[name].ids]
+    listed = [one for name, one in worth.items() if truths[name].ids and UNLISTED not in truths[name].ids]
+    single = [name for name, one in answers.items() if one["mechanisms"] and not one["tied"]]
+    tied = [name for name, one in answers.items() if one["tied"]]
+    versions = ", ".join(dict.fromkeys(one["commit"] for one in answers.values()))
+    every = truths.values()
+    spreads = [sd for one in every for sd in one.spreads]
+    wider = [one.errors for one in every if one.errors > 1.0]
+    return f"""
+## Campaigns by another hand
+
+`python -m studies.another_hand` (code {versions}): {len(answers)} campaigns of a simulator that shares
+no code with skred's. It was written from the campaign format, the base laws and the list of mechanisms, lies
+with the campaigns in `studies/another_hand/campaigns.zip`, and integrates in time. It breaks what trials of
+the record assume: coefficients differ between avalanches with an sd of the logarithm of {min(spreads):g}
+to {max(spreads):g}, errors are {max(wider):g} times as large as stated in {len(wider)} campaigns, one
+reading is half of what it should be in {sum(one.is_odd for one in every)}, and in
+{sum(one.differs for one in every)} an effect acts in half of the avalanches only, or differs in strength.
+Edges are soft, and exponents others than the library's. Truths were opened after the verdicts.
+
+The ratio is the log likelihood ratio with the true effect against without, population and avalanches
+refitted.
+
+| campaign | base law | hidden | ratio | verdict | tied with | worth |
+| --- | --- | --- | --- | --- | --- | --- |
+{rows}
+- Nothing is claimed where nothing is hidden: {counted(clean)}.
+- Listed effects found: {counted([one != "missed" for one in listed])}. The first name is right in
+  {counted([one == RIGHT for one in listed])}, name or tie hold the truth in
+  {counted([one in HOLDS for one in listed])}.
+- Single names that are right: {counted([worth[name] == RIGHT for name in single])}. Ties that hold the truth:
+  {counted([worth[name] in HOLDS for name in tied])}.
+"""
+
+
+def _row(name: str, truth: Hidden, answer: dict[str, Any], worth: str) -> str:
+    ratio = "" if truth.log_likelihood_ratio is None else f"{truth.log_likelihood_ratio:.0f}"
+    what = f"{', '.join(truth.ids)}: {truth.note}" if truth.ids else "nothing"
+    says = " + ".join(answer["mechanisms"]) or answer["verdict"]
+    cells = (name, truth.base_model, what.replace("|", "/"), ratio, says, ", ".join(answer["tied"]), worth)
+    return f"| {' | '.join(cells)} |\n"
