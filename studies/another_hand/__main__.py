@@ -2,7 +2,7 @@
 
 ``python -m studies.another_hand`` goes on with those that are not in ``results/another_hand.json`` yet;
 remove that file to diagnose all again. The truths lie in the archive beside the campaigns. Nothing was tuned
-on these.
+on these. ``faults`` of the result file, written by hand, says which ended with a fault before it was mended.
 """
 
 from __future__ import annotations
@@ -51,14 +51,15 @@ def diagnosed(name: str, base_model: str, folder: Path) -> dict[str, Any]:
 @app.default
 def main() -> None:
     """Diagnose those that are not yet."""
-    answers = read(RESULT)["answers"] if RESULT.exists() else {}
+    known = read(RESULT) if RESULT.exists() else {}
+    answers = known.get("answers", {})
     for name, truth in hidden().items():
         if name in answers:
             continue
         with tempfile.TemporaryDirectory(prefix="another-hand-") as scratch:
             answers[name] = answer(diagnosed(name, truth.base_model, Path(scratch)), commit())
         print(f"{name}: {answers[name]['verdict']} {answers[name]['mechanisms']}", flush=True)
-        write(RESULT, {"answers": dict(sorted(answers.items()))})
+        write(RESULT, {**known, "answers": dict(sorted(answers.items()))})
 
 
 if __name__ == "__main__":
