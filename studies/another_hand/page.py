@@ -53,7 +53,7 @@ def counted(hits: Sequence[bool]) -> str:
 def sections() -> str:
     """The section."""
     truths, found = hidden(), read(RESULTS / "another_hand.json")
-    answers, faults = found["answers"], found["faults"]
+    answers, faults = found["answers"], found.get("faults", {})
     worth = {name: judged(truths[name], answer) for name, answer in answers.items()}
     rows = "".join(_row(name, truths[name], answer, worth[name]) for name, answer in answers.items())
     clean = [worth[name] == "right" for name in answers if not truths[name].ids]
@@ -76,8 +76,7 @@ reading is half of what it should be in {sum(one.is_odd for one in every)}, and 
 {sum(one.differs for one in every)} an effect acts in half of the avalanches only, or differs in strength.
 Edges are soft, and exponents others than the library's. Truths were opened after the verdicts.
 
-When they were first diagnosed, {len(faults)} ended with a fault ({_listed(faults)}), which was mended; their
-answers are by the mended code. The ratio is the log likelihood ratio with the true effect against without,
+{_first(faults)}The ratio is the log likelihood ratio with the true effect against without,
 population and avalanches refitted.
 
 | campaign | base law | hidden | ratio | verdict | tied with | worth |
@@ -92,8 +91,15 @@ population and avalanches refitted.
 """
 
 
-def _listed(faults: dict[str, str]) -> str:
-    return ", ".join(f"{name}: {what}" for name, what in faults.items())
+def _first(faults: dict[str, str]) -> str:
+    """Which ended with a fault when they were first diagnosed; empty where none did."""
+    if not faults:
+        return ""
+    listed = ", ".join(f"{name}: {what}" for name, what in faults.items())
+    return (
+        f"When they were first diagnosed, {len(faults)} ended with a fault ({listed}), which was mended;\n"
+        "their answers are by the mended code. "
+    )
 
 
 def _row(name: str, truth: Hidden, answer: dict[str, Any], worth: str) -> str:
