@@ -1,7 +1,8 @@
 """For MkDocs (`hooks` in mkdocs.yml): every notebook of docs/notebooks is run and becomes a page.
 
-``SKRED_NOTEBOOKS=text`` shows them without running them, ``SKRED_NOTEBOOKS=quick`` runs them with the values
-of `QUICK`. What was run is kept in ``.cache/notebooks`` until a notebook, the package or its data change.
+``SKRED_NOTEBOOKS=text`` shows them without running them, ``SKRED_NOTEBOOKS=quick`` runs those in `QUICK` with
+the values there. What was run is kept in ``.cache/notebooks`` until a notebook, the package or its data
+change.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from scripts import notebooks
 ROOT = Path(__file__).resolve().parent.parent
 KEPT = ROOT / ".cache" / "notebooks"
 QUICK = {"arviz_results": {"DRAWS": 100}}
-"""Enough to see that all cells work; the other notebooks compute as little as they can."""
+"""Enough to see that all cells work; the other notebooks diagnose, which takes minutes on a slow machine."""
 LOG = logging.getLogger("mkdocs.plugins.notebooks")
 
 
@@ -42,7 +43,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         raise PluginError(f"SKRED_NOTEBOOKS is {how!r}; expected full, quick or text")
     for file in [one for one in files if one.src_uri.startswith("notebooks/") and one.src_uri[-3:] == ".py"]:
         source = Path(str(file.abs_src_path))
-        notebook = notebooks.read(source) if how == "text" else _run(source, how)
+        is_run = how == "full" or (how == "quick" and source.stem in QUICK)
+        notebook = _run(source, how) if is_run else notebooks.read(source)
         page = notebooks.shown(notebook, source.stem)
         named = source.with_suffix(".ipynb").name
         text = page.text.replace("\n\n", f"\n\n{_download(named)}\n\n", 1)

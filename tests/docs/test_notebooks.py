@@ -54,6 +54,15 @@ def test_what_a_quick_run_changes_is_there_to_be_changed(notebooks: Any) -> None
         assert set(given) == set(re.findall(r"^(\w+) = ", named, re.M))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
+def test_every_notebook_runs(file: Path, notebooks: Any) -> None:
+    import notebook_pages
+
+    cells = notebooks.run(file, notebook_pages.QUICK.get(file.stem)).cells
+    assert all(cell.outputs for cell in cells if "alt" in cell.metadata)
+
+
 TEXT = """\
 # %% [markdown]
 # # Notebook: small
