@@ -5,41 +5,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from skred.diagnosis.evidence.prior_odds import UNLISTED, same_term
-from skred.physics.mechanisms import mechanisms
+from skred.prove.scoring.answers import UNLISTED, Pair
 from skred.prove.scoring.intervals import share
 from studies.another_hand.campaigns import Hidden, hidden
 from studies.files import RESULTS, read
 
-SILENT = ("nothing_missing", "cannot_tell")
-"""Verdicts that claim nothing."""
 RIGHT = "right name"
 HOLDS = (RIGHT, "in the tie")
 """What an answer is worth that holds the truth."""
 
 
-def told(answer: dict[str, Any]) -> list[str]:
-    """All ids of an answer: what is named, or a force in no list, then what is tied with it."""
-    first = [UNLISTED] if answer["verdict"] == "unexplained" else answer["mechanisms"][:1]
-    return [*first, *answer["tied"]]
-
-
-def other_names(ids: Sequence[str]) -> set[str]:
-    """Ids, and those that are the same term by another name, either way."""
-    twins = {mechanisms()[name].same_term_as for name in ids if name in mechanisms()} - {""}
-    return {*ids, *twins, *(one.id for name in ids for one in same_term(name))}
-
-
 def judged(truth: Hidden, answer: dict[str, Any]) -> str:
-    """In a word or two, what an answer is worth."""
+    """In a word or two what an answer is worth, by the rules of the record of concealed trials."""
+    effects = [{"id": name, "listed": name != UNLISTED} for name in truth.ids]
+    first = answer["mechanisms"][0] if answer["mechanisms"] else None
+    given = {**answer, "mechanism": first, "indistinguishable": answer["tied"]}
+    pair = Pair("", {"mechanisms": effects}, given)
     if not truth.ids:
-        return "right" if answer["verdict"] in SILENT else "false alarm"
-    if answer["verdict"] in SILENT:
+        return "false alarm" if pair.alarm else "right"
+    if not pair.alarm:
         return "missed"
-    right, names = other_names(truth.ids), told(answer)
-    if names[0] in right:
+    if pair.right_name:
         return RIGHT
-    return "in the tie" if right & set(names) else "wrong"
+    return "in the tie" if pair.right_set else "wrong" if pair.name else pair.verdict
 
 
 def counted(hits: Sequence[bool]) -> str:
@@ -59,7 +47,7 @@ def sections() -> str:
     clean = [worth[name] == "right" for name in answers if not truths[name].ids]
     listed = [one for name, one in worth.items() if truths[name].ids and UNLISTED not in truths[name].ids]
     single = [name for name, one in answers.items() if one["mechanisms"] and not one["tied"]]
-    tied = [name for name, one in answers.items() if one["tied"]]
+    tied = [name for name, one in answers.items() if one["mechanisms"] and one["tied"]]
     versions = ", ".join(dict.fromkeys(one["commit"] for one in answers.values()))
     every = truths.values()
     spreads = [sd for one in every for sd in one.spreads]
@@ -77,7 +65,8 @@ reading is half of what it should be in {sum(one.is_odd for one in every)}, and 
 Edges are soft, and exponents others than the library's. Truths were opened after the verdicts.
 
 {_first(faults)}The ratio is the log likelihood ratio with the true effect against without,
-population and avalanches refitted.
+population and avalanches refitted. Answers are judged by the rules of the record: entrainment and drag on a
+stretch are the same term and are always told together, and what is tied with `unexplained` is no name.
 
 | campaign | base law | hidden | ratio | verdict | tied with | worth |
 | --- | --- | --- | --- | --- | --- | --- |
