@@ -28,9 +28,9 @@ base law and not in their place: with mu in the base law, friction that falls wi
 rest and mu at high speed.
 
 - **`obstacle`**: *climb* is 1 over the w = {width:.0f} m above its crown s_o, *descent* over the
-  {width:.0f} m below it, both 0 elsewhere. A front that passes gets back what the climb took and loses a
-  share of U², l h with l = {losses} 1/m; or it keeps nothing of the climb, and J = g h is lost by every
-  front. h is the coefficient in all of them.
+  {width:.0f} m below it, both 0 elsewhere. A front that passes gets back what the climb took, and its U²
+  is multiplied by exp(-l h), with l = {losses} 1/m; or it gets nothing back, and every front loses
+  J = g h. h is the coefficient in all of them.
 - **`entrainment`**: e is the growth of the mass with the way, (1/m)(dm/ds), at the beginning of the
   stretch. Where it is constant the term is that of `segment_drag`. Where every metre adds as much snow,
   it falls with m_1/m, and the mass doubles over the stretch (m_2/m_1 = {growth:g}).
