@@ -1,8 +1,10 @@
-"""Exact leave-one-event-out: the posterior refitted without each event in turn."""
+"""Leave-one-event-out: by smoothed weights, and exactly, the posterior refitted without each event."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import arviz_stats as az
@@ -190,3 +192,11 @@ def _mcse(densities: FloatArray) -> FloatArray:
     spread = batches.std(axis=(0, 2), ddof=1) / np.sqrt(n_batches)
     error: FloatArray = spread / batches.mean(axis=(0, 2))
     return error
+
+
+@contextmanager
+def large_k_shown_elsewhere() -> Iterator[None]:
+    """Silence ArviZ's warnings of large Pareto k: tables show them, and such events are refitted."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Estimated shape parameter", category=UserWarning)
+        yield

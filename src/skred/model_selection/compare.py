@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-import warnings
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +18,7 @@ from skred.inference.calibrate import Calibration, calibrate, posterior_of
 from skred.inference.evidence import SMC_DRAWS, evidence
 from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
 from skred.inference.intervals import INTERVAL_KIND, INTERVAL_PROBABILITY, PRACTICAL_DIFFERENCE
-from skred.inference.leave_one_out import ExactLoo, exact_leave_one_out
+from skred.inference.leave_one_out import ExactLoo, exact_leave_one_out, large_k_shown_elsewhere
 from skred.inference.paired import best_first, paired_difference, sum_se
 from skred.inference.pooled.problem import PooledProblem
 from skred.inference.problem import Problem
@@ -127,7 +125,7 @@ def scores(
     """
     events = calibration.problem.campaign.event_ids
     seed = calibration.settings.seed
-    with _told_elsewhere():
+    with large_k_shown_elsewhere():
         loo = az.loo(calibration.tree, var_name="recordings", pointwise=True)
     information = waic(calibration.tree, variable="recordings")
     seeds = [10 * seed + k + 1 for k in range(evidence_seeds)]
@@ -210,7 +208,7 @@ def _stacking(ids: Sequence[str], trees: dict[str, Any]) -> dict[str, float]:
     """Weights that predict best together (Yao and others, 2018, doi 10.1214/17-BA1091)."""
     if len(ids) < 2:
         return dict.fromkeys(ids, 1.0)
-    with _told_elsewhere():
+    with large_k_shown_elsewhere():
         table = az.compare({law: trees[law] for law in ids}, method="stacking", var_name="recordings")
     return {law: float(table.loc[law, "weight"]) for law in ids}
 
@@ -244,11 +242,3 @@ def _document(
         "models": models,
         "alpha_beta": alpha_beta_entry(problem),
     }
-
-
-@contextmanager
-def _told_elsewhere() -> Iterator[None]:
-    """Silence ArviZ's warnings of large Pareto k: the tables show them, and such events are refitted."""
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Estimated shape parameter", category=UserWarning)
-        yield

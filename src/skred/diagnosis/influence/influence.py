@@ -10,9 +10,9 @@ Of a speed that is left out it stays known that the front came there.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from bisect import bisect_left
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -126,9 +126,12 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray, enough: f
     with worker_pool() as pool:
         whole, *found = pool.map(again, parts)
     without_third, *without_kinds = stated + np.array(found) - whole
-    many, left = _carried(
-        lambda many: stated + again(_first_left_out(order, many)) - whole, third, without_third, needed
-    )
+    left_by = cache(lambda many: stated + again(_first_left_out(order, many)) - whole)
+    many, left = 0, without_third
+    if left < needed:
+        # Each one more leaves less: their number is found by halving.
+        many = 1 + bisect_left(range(1, third), True, key=lambda so_many: left_by(so_many) < needed)
+        left = without_third if many == third else left_by(many)
     ids = base.problem.campaign.event_ids
     return Influence(
         answer,
@@ -208,32 +211,6 @@ def _by_profile(profile: Profile, base: Base, part: _Part) -> float:
 def _first_left_out(order: IntArray, many: int) -> _Part:
     """The recordings without the first avalanches of an order."""
     return _Part(~np.isin(np.arange(len(order)), order[:many]))
-
-
-def _carried(factor: Callable[[int], float], third: int, left: float, needed: float) -> tuple[int, float]:
-    """How many avalanches an answer needs, and what it has without; 0 where it has enough without a third.
-
-    They are left out in the order of what each takes, so that each one more leaves less: their number is
-    found by halving.
-
-    Parameters
-    ----------
-    factor : callable
-        What the answer has without the first so many.
-    third : int
-        How many a third are, without which it has `left`.
-    """
-    if left >= needed:
-        return 0, left
-    enough, too_many = 0, third
-    while too_many - enough > 1:
-        many = (enough + too_many) // 2
-        there = factor(many)
-        if there < needed:
-            too_many, left = many, there
-        else:
-            enough = many
-    return too_many, left
 
 
 def _kinds(base: Base) -> list[tuple[str, str | None, BoolArray]]:

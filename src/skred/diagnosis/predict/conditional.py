@@ -30,8 +30,6 @@ from skred.inference.intervals import ENDS
 from skred.inference.reading_density import log_likelihoods
 from skred.parallel.threads import side_by_side
 
-ENOUGH = 100.0
-"""Effective draws below which an avalanche is drawn again around what was missed, and it is told."""
 _POINTS = (4, 16, 16)
 """Points around each place for each draw of the population: at first, and twice more where too few of those
 counted."""
@@ -173,7 +171,7 @@ def _event(extension: Extension, draws: Draws, event: int, seed: int) -> FloatAr
     first, *more = _POINTS
     found = sample(likelihood, draws, first, np.empty((0, extension.n_base + 1)), rng)
     for each in more:
-        missed = found.missed(ENOUGH)
+        missed = found.missed()
         if len(missed):
             found = sample(likelihood, draws, each, missed, rng)
     fronts = found.fronts[:, :-1]

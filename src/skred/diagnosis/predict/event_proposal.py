@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from skred.arrays import FloatArray, IntArray
 from skred.diagnosis.evidence.adaptive_sampling import log_student, student
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Modes, Population
+from skred.diagnosis.evidence.tolerance import STANDARD_ERROR
 from skred.diagnosis.predict.draws import Draws, modes_near
 from skred.inference.metropolis_chain import DEGREES_OF_FREEDOM
 from skred.inference.reading_density import log_likelihoods
@@ -39,11 +40,16 @@ class Sample(NamedTuple):
         weights = np.exp(self.log_weights[which] - self.log_weights[which].max())
         return float(weights.sum() ** 2 / np.sum(weights**2))
 
-    def missed(self, enough: float) -> FloatArray:
+    def missed(self) -> FloatArray:
         """The likeliest point of each set of readings that too few draws count for, (n, n_base + 1)."""
-        sets = [k for k in range(len(self.log_weights)) if self.effective(k) < enough]
+        sets = [k for k in range(len(self.log_weights)) if too_few(self.effective(k))]
         found: FloatArray = self.points[self.log_weights[sets].argmax(axis=1)]
         return found
+
+
+def too_few(effective: Any) -> Any:
+    """Whether the logarithm of the mean of so many effective draws is less well known than evidence is."""
+    return effective**-0.5 > STANDARD_ERROR
 
 
 class _Parts(NamedTuple):

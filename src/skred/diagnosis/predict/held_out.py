@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import arviz_stats as az
 import numpy as np
-from arviz_stats.base import array_stats
-from scipy.special import logsumexp
 
 from skred.arrays import BoolArray, FloatArray
 from skred.diagnosis.augment.problem import AugmentedProblem
@@ -18,7 +17,12 @@ from skred.diagnosis.evidence.predictive import Predicted
 from skred.diagnosis.predict.draws import N_DRAWS, LeftOut, draws_of, predictions
 from skred.inference.calibrate import Calibration, posterior_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
-from skred.inference.leave_one_out import Samples, exact_leave_one_out, samples_of
+from skred.inference.leave_one_out import (
+    Samples,
+    exact_leave_one_out,
+    large_k_shown_elsewhere,
+    samples_of,
+)
 from skred.inference.paired import sum_se
 
 K_LIMIT = 0.7
@@ -85,13 +89,12 @@ def held_out(calibration: Calibration, seed: int, *, exact: bool = False) -> Hel
         Refit without every avalanche instead of only where importance sampling is unreliable.
     """
     problem, tree = calibration.problem, calibration.tree
-    log_likelihood = tree["log_likelihood"]["recordings"]
-    array = log_likelihood.transpose("chain", "draw", "event")
-    densities = np.asarray(array.values, dtype=float).reshape(-1, array.sizes["event"])
-    log_weights, k = leave_out_weights(densities)
-    weights = np.exp(log_weights - logsumexp(log_weights, axis=0))
-    pointwise = logsumexp(densities + np.log(np.maximum(weights, 1e-300)), axis=0)
+    with large_k_shown_elsewhere():
+        loo = az.loo(tree, var_name="recordings", pointwise=True, reff=1.0)
+    pointwise, k = np.array(loo.elpd_i), np.array(loo.pareto_k)
     events = list(problem.campaign.event_ids)
+    log_weights = loo.log_weights.transpose("chain", "draw", "event").values
+    weights = np.exp(log_weights).reshape(-1, len(events))
     again = list(range(len(events))) if exact else [int(e) for e in np.flatnonzero(~(k <= K_LIMIT))]
     failed: tuple[str, ...] = ()
     refitted: dict[int, Samples] = {}
@@ -122,24 +125,6 @@ def gained_by(step: Step, calibration: Calibration, seed: int, *, exact: bool = 
     alone = reference(calibration, under_errors.base.problem)()
     before, after = (held_out(one, seed, exact=exact) for one in (alone, step.calibration))
     return after.pointwise - before.pointwise
-
-
-def leave_out_weights(densities: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Pareto-smoothed weights of draws that leave each event out.
-
-    Parameters
-    ----------
-    densities : (n_draws, n_events) array
-        Log density of each event at each draw of the posterior of all.
-
-    Returns
-    -------
-    log_weights : (n_draws, n_events) array
-    pareto_k : (n_events,) array
-    """
-    # ArviZ takes log likelihoods and changes their sign itself.
-    log_weights, k = array_stats.psislw(densities.T, axis=-1)
-    return np.asarray(log_weights, dtype=float).T, np.asarray(k, dtype=float)
 
 
 def _others(

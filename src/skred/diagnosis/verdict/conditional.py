@@ -10,9 +10,11 @@ import xarray as xr
 
 from skred.arrays import BoolArray, FloatArray
 from skred.diagnosis.outcome import Diagnosis
-from skred.diagnosis.predict.conditional import ENOUGH, BeforeAfter, Conditional
+from skred.diagnosis.predict.conditional import BeforeAfter, Conditional
+from skred.diagnosis.predict.event_proposal import too_few
 from skred.diagnosis.verdict.given_above import gain_of, given_above
 from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.paired import sum_se
 
 
 def conditional_document(found: Diagnosis) -> dict[str, Any] | None:
@@ -41,7 +43,7 @@ def conditional_document(found: Diagnosis) -> dict[str, Any] | None:
         ],
         "speeds": _sets(pair, problem, velocity, carrying) if shown[:, velocity].any() else None,
         "effective_draws_min": float(effective.min()) if effective.size else None,
-        "n_few_draws": int((effective < ENOUGH).sum()),
+        "n_few_draws": int(too_few(effective).sum()),
     }
     return document | {"statement": given_above(document)}
 
@@ -127,5 +129,4 @@ def _of(
 
 def _doubled(moved: FloatArray) -> float | None:
     """Twice the standard error of what avalanches move by so much; None of one avalanche."""
-    n = len(moved)
-    return float(2.0 * np.sqrt(n / (n - 1) * np.sum(moved**2))) if n > 1 else None
+    return 2.0 * sum_se(moved) if len(moved) > 1 else None

@@ -57,12 +57,6 @@ def _of_diagnosis(found: Diagnosis) -> dict[str, Any]:
     return {
         "disputed": found.decision.disputed,
         "not_added": _not_added(found),
-        "detectability": {
-            "can_tell": found.table.can_tell,
-            "power": found.table.power,
-            "power_with": found.table.power_with,
-            "sensor_m": found.table.sensor_m,
-        },
         "mechanisms": _mechanisms(found),
         "checks": _checks(found),
         "force": _force(found.location),
