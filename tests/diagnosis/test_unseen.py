@@ -116,11 +116,11 @@ def test_what_was_missing_predicts_unseen_avalanches_better(
     document = json.loads(
         json.dumps({"before": as_dict(predictor_of(base)), "after": as_dict(predictor_of(augmented))})
     )
-    gain = realised_gain(document, biased(), fresh)
+    gain = realised_gain(document, fresh)
     assert gain is not None and gain["n_fresh"] == 12 and gain["realised"] > 1.0
     expected = log_scores(predictor_of(augmented), fresh) - log_scores(predictor_of(base), fresh)
     assert gain["realised"] == pytest.approx(expected.mean())
-    assert realised_gain(document | {"after": None}, biased(), fresh) is None
+    assert realised_gain(document | {"after": None}, fresh) is None
     held = unseen(predictor_of(augmented), fresh)
     seen = np.asarray(fresh.status) == Status.OBSERVED
     assert_array_equal(np.isfinite(held.predicted.mean), seen)
@@ -242,13 +242,13 @@ HOSTILE: dict[str, Any] = {
 }  # fmt: skip
 IN_TERMS: list[tuple[int, str, Any]] = [
     (0, "mechanism", "gnomes"), (0, "mechanism", ["segment_drag"]), (0, "mechanism", "constant_retardation"),
-    (0, "s_from_m", None), (0, "s_from_m", 600.0), (0, "s_to_m", float("nan")), (0, "constants", {"c": -1.0}),
+    (0, "s_from_m", None), (0, "s_from_m", 600.0), (0, "s_to_m", float("nan")), (0, "constants", [["c", -1]]),
     (0, "constants", [1.0]), (1, "standard", {"centre": 0.0, "scale": 0.0, "kinds": []}),
     (1, "standard", {"centre": 0.0, "scale": 1.0, "kinds": ["a"]}),
-    (1, "standard", {"centre": 0.0, "scale": 1.0, "kinds": [], "logarithm": 1}), (1, "covariate", 3.0),
+    (1, "standard", {"centre": 0.0, "scale": 1.0, "kinds": [], "logarithm": 3}), (1, "covariate", 3.0),
 ]  # fmt: skip
 NO_DRAWS: list[Any] = [
-    None, [], "x", 3, [[]], [[10**400], [1.0]], [[1e300], [1.0]], [[float("nan")], [1.0]], [[True], [1]],
+    None, [], "x", 3, [[]], [[10**400], [1.0]], [[1e300], [1.0]], [[float("nan")], [1.0]], [[True]] * 2,
     [["1"], ["1"]], [[[1.0]], [[1.0]]], [1.0, 1.0], [[1.0], []], [[1.0], [1.0, 1.0]], [[1.0] * 99] * 2,
 ]  # fmt: skip
 
@@ -258,14 +258,15 @@ def test_what_is_no_predictor_is_refused(key: str) -> None:
     assert from_dict(document()).law == "constant"
     with pytest.raises(InputError, match=key):
         from_dict(document() | {key: HOSTILE[key]})
-    with pytest.raises(InputError, match=f"{key}: field required"):
+    with pytest.raises(InputError, match=key):
         from_dict({name: value for name, value in document().items() if name != key})
 
 
 @pytest.mark.parametrize(("number", "key", "value"), IN_TERMS)
 def test_what_is_no_term_is_refused(number: int, key: str, value: Any) -> None:
     damaged = copy.deepcopy(document())
-    damaged["terms"][number][key] = value
+    part = damaged["terms"][number]
+    (part if key in part else part["shape"])[key] = value
     with pytest.raises(InputError):
         from_dict(damaged)
 
@@ -288,13 +289,8 @@ def test_other_paths_are_refused() -> None:
         with pytest.raises(InputError, match=message):
             log_scores(predictor, few)
     documents = {"before": as_dict(by_hand()), "after": as_dict(by_hand())}
-    gain = realised_gain(documents, campaign(), few)
+    gain = realised_gain(documents, few)
     assert gain is not None and gain["realised"] == 0.0 and gain["n_fresh"] == 2
-    with pytest.raises(InputError, match="sensors"):
-        realised_gain(documents, campaign(), with_sensors(few, [0, 1]))
-    steeper = replace(few, track=replace(few.track, z_m=1.01 * few.track.z_m))
-    with pytest.raises(InputError, match="track"):
-        realised_gain(documents, campaign(), steeper)
-    assert realised_gain(None, campaign(), few) is None
+    assert realised_gain(None, few) is None
     with pytest.raises(InputError):
-        realised_gain([1], campaign(), few)
+        realised_gain([1], few)

@@ -198,8 +198,7 @@ def test_gains_are_realised_once(answered: ProofFolder) -> None:
     for number, one in enumerate([after, damaged, None], 1):
         predictors = {"before": before, "after": one}
         edit(answered.answer(f"trial-{number:04d}"), predictors=predictors, gain={"promised": 0.5})
-    campaign, fresh = (read_campaign(at("trial-0001")) for at in (answered.campaign, answered.fresh))
-    exact = realised_gain({"before": before, "after": after}, campaign, fresh)
+    exact = realised_gain({"before": before, "after": after}, read_campaign(answered.fresh("trial-0001")))
     assert exact is not None and exact["realised"] != 0.0 and exact["n_fresh"] == 12
     first, second, third = gains(answered)
     assert first == {"promised": 0.5, **exact} and third == {"promised": 0.5}

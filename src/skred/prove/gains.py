@@ -101,9 +101,8 @@ def realise(job: dict[str, Any]) -> dict[str, Any]:
     require_same_code(job["code"], f"{job['folder']}, on this worker")
     folder, method, name = ProofFolder(Path(job["folder"])), job["method"], job["trial"]
     file = folder.answer(name, method)
-    campaign, fresh = read_campaign(folder.campaign(name)), read_campaign(folder.fresh(name))
     try:
-        gain = realised_gain(read_object(file)["predictors"], campaign, fresh) or {}
+        gain = realised_gain(read_object(file)["predictors"], read_campaign(folder.fresh(name))) or {}
     except InputError as error:
         gain = {"error": str(error)}
     write_once(_file(folder, method, name), {"answer_sha256": file_sha256(file), "gain": gain})

@@ -1,21 +1,23 @@
 """Avalanches that a calibration has not seen: how probable they were, and what was predicted of them.
 
 A `Predictor` is what is left of a calibration for that: draws of the population and of what is added. It is
-small enough to be written beside an answer, and plain data, so that it can be kept and used elsewhere.
+small enough to be written beside an answer. Its annotations say how `predictor_document` reads and writes it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
+from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator
 from scipy.special import logsumexp
 
 from skred.arrays import FloatArray
 from skred.campaign import Campaign
 from skred.diagnosis.augment.problem import AugmentedProblem
-from skred.diagnosis.discrepancy.profile import Kind, Profile, entering, spline_basis
+from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, entering, spline_basis
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Rows, campaign_rows
 from skred.diagnosis.evidence.covariates import Standard, standard_of
 from skred.diagnosis.evidence.event_quadrature import Budget
@@ -26,6 +28,7 @@ from skred.diagnosis.tabulated.tables import exact_log_densities
 from skred.errors import InputError
 from skred.inference.calibrate import Calibration, posterior_of
 from skred.inference.error_model import ERROR_MODELS
+from skred.inference.hierarchical.event_draws import FARTHEST
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.hierarchical.releases import terrain_with_releases
 from skred.physics.law import Law
@@ -39,9 +42,24 @@ NODES = Budget(32, 32, 0, 1.5, 1.8)
 """Quadrature points of an event for each draw; their errors average out over the draws. None are adapted:
 where those go depends on the others' weights, and few of them are too low in the mean
 (``studies.thresholds.unseen_nodes``)."""
-FARTHEST = 50.0
-"""Size of what stands in an exponent, logarithms of coefficients and covariates in standard deviations, from
-which on a predictor is of another path or damaged."""
+
+
+def _numbers(values: Any) -> FloatArray:
+    array = np.asarray(values)
+    if array.dtype.kind not in "fi" or not np.isfinite(array).all():
+        raise ValueError("expected finite numbers")
+    return array.astype(float)
+
+
+def _kind(value: Any) -> Kind:
+    for kind in KINDS:
+        if value in (kind, kind.equation):
+            return kind
+    raise ValueError(f"found {value!r:.40}: expected one of {', '.join(kind.equation for kind in KINDS)}")
+
+
+_Numbers = Annotated[FloatArray, PlainValidator(_numbers), PlainSerializer(np.ndarray.tolist)]
+_Kind = Annotated[Kind, PlainValidator(_kind), PlainSerializer(lambda kind: kind.equation)]
 
 
 @dataclass(frozen=True)
@@ -75,10 +93,10 @@ class ProfileTerm:
         Places between the knots, and the typical speed there [m/s] that a force refers to which is nil at it.
     """
 
-    kind: Kind
-    knots_m: FloatArray
-    edge_m: FloatArray
-    front_speed: FloatArray
+    kind: _Kind
+    knots_m: _Numbers
+    edge_m: _Numbers
+    front_speed: _Numbers
 
     @classmethod
     def of(cls, profile: Profile, setting: Setting) -> ProfileTerm:
@@ -117,14 +135,16 @@ class Predictor:
         The force profile that is added, if one is.
     """
 
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(allow_inf_nan=False)
+
     law: str
     error_model: str
-    place_sd_m: float
-    smoothing_m: float
-    means: FloatArray
-    factors: FloatArray
+    place_sd_m: Annotated[float, Field(gt=0.0)]
+    smoothing_m: Annotated[float, Field(ge=0.0, le=1000.0)]
+    means: _Numbers
+    factors: _Numbers
     terms: tuple[Term, ...]
-    strengths: FloatArray
+    strengths: _Numbers
     profile: ProfileTerm | None = None
 
     @property
