@@ -153,7 +153,7 @@ def made_profile(base: Base, kind: int) -> Profile:
 
 def location_of(base: Base, profile: Profile) -> Location:
     """Where, by this profile alone."""
-    return locate(ComparisonUnderErrors("robust", base, {}, [profile], []))
+    return locate(ComparisonUnderErrors("robust", base, {}, [profile]))
 
 
 def test_work_is_the_integral_of_the_force(base: Base) -> None:
@@ -199,7 +199,7 @@ def test_the_most_probable_kind_is_shown_or_the_one_asked_for(base: Base) -> Non
     """An opposed kind has the smaller share; what is missing of a fast front is then meant."""
     plain = replace(made_profile(base, 0), log_bayes_factor=10.0)
     opposed = replace(made_profile(base, 2), log_bayes_factor=10.1)
-    under_errors = ComparisonUnderErrors("robust", base, {}, [plain, opposed], [])
+    under_errors = ComparisonUnderErrors("robust", base, {}, [plain, opposed])
     assert locate(under_errors).log_bayes_factor == 10.0 and not locate(under_errors).opposed
     found = locate(under_errors, opposed=True)
     assert found.log_bayes_factor == 10.1 and found.opposed

@@ -30,7 +30,7 @@ def under_errors(name: str, height: float, forces: list[float]) -> ComparisonUnd
         SimpleNamespace(log_bayes_factor=one, kind=kind, error=0.1)
         for one, kind in zip(forces, KINDS, strict=False)
     ]
-    return ComparisonUnderErrors(name, SimpleNamespace(), {"obstacle": candidate}, profiles, [])
+    return ComparisonUnderErrors(name, SimpleNamespace(), {"obstacle": candidate}, profiles)
 
 
 def test_a_force_that_was_fitted_under_one_error_model_alone() -> None:

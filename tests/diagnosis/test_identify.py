@@ -85,7 +85,8 @@ def test_detection_limit_by_simulation(base: Base, table: dict[str, Detectabilit
             EventLikelihood(alone, rows, NONE), mean_prior(base.law), (start, points)
         )
         around = look_around(EventLikelihood(with_it, rows, np.zeros(1)), modes)
-        found.append(efficient_scores(around, rows, population, mean_prior(base.law)).z[:, 0])
+        scores = efficient_scores(around, rows, population, mean_prior(base.law))
+        found.append((scores.score / np.sqrt(scores.own))[:, 0])
     null, effect = found
     assert abs(null.mean()) < 0.6 and 0.7 < null.std() < 1.35
     assert (effect.mean() - null.mean()) / null.std() == pytest.approx(LIMIT_Z + 1.2816, rel=0.15)

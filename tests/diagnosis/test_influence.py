@@ -42,7 +42,7 @@ def drag_in(campaign: Campaign) -> tuple[Comparison, Curve]:
     base = base_of(campaign, "coulomb")
     found = curve_near(base, curve(base, placed(DRAG, base.setting, Shape())), Shape())
     candidates = {DRAG.id: Candidate(DRAG, (found,), np.zeros(1))}
-    under_errors = ComparisonUnderErrors("robust", base, candidates, [], [found])
+    under_errors = ComparisonUnderErrors("robust", base, candidates, [])
     return Comparison((under_errors,), prior_odds([DRAG]), {"robust": 0.0}), found
 
 
@@ -83,7 +83,7 @@ def test_a_first_finding_is_judged_under_its_own_errors() -> None:
     student, settings = with_errors(robust, "student"), SamplerSettings(draws=300, tune=300, seed=0)
     found = curve_near(student, curve(student, placed(DRAG, student.setting, Shape())), Shape())
     candidate = Candidate(DRAG, (found,), np.zeros(1))
-    under_errors = ComparisonUnderErrors("student", student, {DRAG.id: candidate}, [], [found])
+    under_errors = ComparisonUnderErrors("student", student, {DRAG.id: candidate}, [])
     comparison = Comparison((under_errors,), prior_odds([DRAG]), {"student": 0.0})
     with_drag = calibrate(augmented_problem(student, [found]), student.law, settings)
     not_asked: Any = None

@@ -29,7 +29,7 @@ from skred.inference.sampling import SamplerSettings
 
 def law_of(base: Base) -> ProfileLaw:
     profiles = [fit_profile(base, KINDS[0])]
-    return profile_law(ComparisonUnderErrors("robust", base, {}, profiles, []), most=40, seed=0)
+    return profile_law(ComparisonUnderErrors("robust", base, {}, profiles), most=40, seed=0)
 
 
 def thinned(hidden: str, snr: float | None) -> Base:
@@ -72,7 +72,7 @@ def test_a_force_that_is_not_there_does_not() -> None:
 
 
 def diagnosed(hidden: Base, added: ProfileLaw) -> Diagnosis:
-    under_errors = ComparisonUnderErrors("robust", hidden, {}, [added.profile], [])
+    under_errors = ComparisonUnderErrors("robust", hidden, {}, [added.profile])
     comparison = Comparison((under_errors,), {}, {"robust": 0.0})
     nothing: Any = None
     return Diagnosis(
@@ -143,7 +143,7 @@ def test_an_avalanche_has_no_say_in_what_is_predicted_of_it(hidden: Base, added:
     values = readings.values.copy()
     values[event] *= 1.3
     changed = replace(hidden, rows=hidden.rows._replace(readings=readings._replace(values=values)))
-    other = profile_law(ComparisonUnderErrors("robust", changed, {}, [added.profile], []), most=40, seed=0)
+    other = profile_law(ComparisonUnderErrors("robust", changed, {}, [added.profile]), most=40, seed=0)
     for one, again in ((added.before, other.before), (added.after, other.after)):
         assert_array_equal(one.predicted.mean[event], again.predicted.mean[event])
         assert abs(one.pointwise[event] - again.pointwise[event]) > 1.0

@@ -53,5 +53,4 @@ def test_an_augmented_problem_is_not_taken_for_a_hierarchical_one() -> None:
     from skred.diagnosis.augment.problem import AugmentedProblem
 
     assert augmented_problem.__module__ == "skred.diagnosis.augment.augmented"
-    for generic in (predictive, summary):
-        assert generic.dispatch(AugmentedProblem) is not generic.dispatch(HierarchicalProblem)
+    assert predictive.dispatch(AugmentedProblem) is not predictive.dispatch(HierarchicalProblem)

@@ -87,7 +87,7 @@ def comparison_of(
     }
     profile = SimpleNamespace(log_bayes_factor=tops.get("unlisted", -1.0), kind=KINDS[0], error=0.15)
     under_each = tuple(
-        ComparisonUnderErrors(name, SimpleNamespace(), candidates, [profile], [])
+        ComparisonUnderErrors(name, SimpleNamespace(), candidates, [profile])
         for name in ("robust", "student")[:n_error_models]
     )
     odds = prior_odds(candidate.mechanism for candidate in candidates.values())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from skred.inference.influence_words import enumerated
+from skred.inference.intervals import ENDS
 from skred.physics.law import Law
 from skred.units import unit_text
 
@@ -53,8 +54,8 @@ def error_text(value: float, unit: str) -> str:
     return f"{value:.0f}" if unit == "m" else f"{value:.1f}"
 
 
-TOLD_FROM = 0.05
-"""Probability from which what is not the answer is told of: below it, its name misleads more than it
-informs."""
+TOLD_FROM = ENDS[0]
+"""Probability from which what is not the answer is told of: below what a tail of an interval leaves out, its
+name misleads more than it informs."""
 MOST_NAMED = 5
 """Sensors or avalanches that a sentence tells of one by one."""

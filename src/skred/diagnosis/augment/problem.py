@@ -199,17 +199,6 @@ class AugmentedProblem(HierarchicalProblem):
         between = {one.between_name: prior[one.between_name] for one in self.added if one.between_name}
         return {**own, **rest, **{one.name: added[:, k] for k, one in enumerate(self.added)}, **between}
 
-    def constants(self) -> dict[str, Any]:
-        """How well the releases are known, and between which strengths there are tables."""
-        low, high = self.range
-        return {
-            **super().constants(),
-            "added_strength": ("added", [one.name for one in self.added]),
-            "added_scale": ("added", [one.scale for one in self.added]),
-            "added_from": ("added", low),
-            "added_to": ("added", high),
-        }
-
     def integration_errors(self, law: Law, samples: Mapping[str, Any], seed: int = 0) -> FloatArray:
         """Differences of event log densities to exact ones, (n, n_checked_events), of at most 16 draws.
 

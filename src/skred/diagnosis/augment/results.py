@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from skred.arrays import FloatArray
-from skred.diagnosis.augment.added_strength import AddedStrength, components_of, new_rows
+from skred.diagnosis.augment.added_strength import components_of, new_rows
 from skred.diagnosis.augment.problem import AugmentedProblem
 from skred.inference.hierarchical.event_density import draw_nodes
 from skred.inference.hierarchical.event_draws import Avalanches, new_points
@@ -17,15 +17,13 @@ from skred.inference.hierarchical.population import population_of
 from skred.inference.hierarchical.results import (
     add_readings,
     avalanche_dataset,
-    hierarchical_summary,
     readings_by_sensor,
     thinned,
 )
-from skred.inference.results import draws_by_name, predictive, summary
+from skred.inference.results import draws_by_name, predictive
 from skred.physics.geometry import sensor_table
 from skred.physics.kernel.fronts import simulate
 from skred.physics.law import Law
-from skred.physics.mechanisms.stretches import equation_of
 
 
 @predictive.register
@@ -51,29 +49,6 @@ def augmented_predictive(
         "new_avalanches": new,
         "posterior_predictive": readings_by_sensor(problem, new, seed),
         "prior_predictive": readings_by_sensor(problem, before, seed),
-    }
-
-
-@summary.register
-def augmented_summary(problem: AugmentedProblem, law: Law, tree: xr.DataTree) -> dict[str, Any]:
-    """As of any hierarchical calibration, and what was added."""
-    return {**hierarchical_summary(problem, law, tree), "added": [_added_row(one) for one in problem.added]}
-
-
-def _added_row(one: AddedStrength) -> dict[str, Any]:
-    shape = one.shape
-    return {
-        "id": one.mechanism.id,
-        "title": one.mechanism.title,
-        "parameter": one.name,
-        "between_events": str(one.between),
-        "between_events_parameter": one.between_name or None,
-        "equation": equation_of(one.mechanism, shape),
-        "s_from_m": shape.s_from_m,
-        "s_to_m": shape.s_to_m,
-        "covariate": shape.covariate,
-        "sensor": shape.sensor,
-        "constants": dict(shape.constants),
     }
 
 

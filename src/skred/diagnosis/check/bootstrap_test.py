@@ -17,6 +17,7 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import logit
 
 from skred.arrays import FloatArray
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
@@ -25,19 +26,19 @@ from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
 from skred.diagnosis.evidence.linear_mixed_model import Scores, fit_population
-from skred.diagnosis.limits import FEWEST_CLEAN, LIMIT, NOTHING_AT_MOST
+from skred.diagnosis.limits import FEWEST_CLEAN, LIMIT, NOTHING_AT_MOST, fewest_clean
 from skred.parallel.processes import worker_pool
 
 _ENOUGH_ABOVE = 4
 """Clean campaigns at least as odd after which sampling stops: p is known to half of itself then."""
 _BATCH = 25
 """Campaigns refitted together: large enough for arrays, small enough to stop early."""
-_FEW = 9
+_FEW = fewest_clean(NOTHING_AT_MOST)
 """Clean campaigns by fronts at most where nothing is too probable for a claim, or the odds are rare: they
 show what is usual. Else as few as place the limit."""
 _RARE = -math.log(LIMIT)
 """Log odds that at most so many of clean campaigns have, by Markov's inequality."""
-_OF_A_CLAIM = math.log((1.0 - NOTHING_AT_MOST) / NOTHING_AT_MOST)
+_OF_A_CLAIM = -float(logit(NOTHING_AT_MOST))
 """Log odds above which nothing is not too probable for a claim."""
 
 

@@ -55,16 +55,12 @@ class ComparisonUnderErrors:
     ----------
     profiles : list of Profile
         The force not in the list, of each kind; none under an error model that cannot count.
-    screened : list of Curve
-        One for each candidate of the mechanisms compared; that under another error model where it cannot
-        count.
     """
 
     error_model: str
     base: Base
     candidates: dict[str, Candidate]
     profiles: list[Profile]
-    screened: list[Curve]
 
     @property
     def log_factors(self) -> dict[str, float]:
@@ -236,7 +232,7 @@ def _under_each(
         behind = height[first] + _most([leads]) - max(top[name], height[name] + _most([there]))
         if behind > COUNTS:
             candidates = candidates_of(screened_parts(curves[name]))
-            found[name] = ComparisonUnderErrors(name, bases[name], candidates, [], curves[name])
+            found[name] = ComparisonUnderErrors(name, bases[name], candidates, [])
         else:
             found[name] = _under_errors(name, bases[name], curves[name], pool, reached - height[name])
     return found
@@ -265,7 +261,7 @@ def _under_errors(
     profiles = list(fitted)
     candidates = with_residues(base, candidates, profiles, pool, best)
     candidates, profiles = recomputed(base, candidates, profiles, pool, best)
-    return ComparisonUnderErrors(error_model, base, candidates, profiles, curves)
+    return ComparisonUnderErrors(error_model, base, candidates, profiles)
 
 
 def worth_comparing(curves: Sequence[Curve], behind: float) -> list[Curve]:

@@ -10,15 +10,13 @@ from functools import partial
 import numpy as np
 
 from skred.diagnosis.detect.score_test import placed_mechanisms
-from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
+from skred.diagnosis.evidence.coefficient import NEAR, Base, Curve, curve_at
 from skred.diagnosis.evidence.event_quadrature import SCREENING
 from skred.diagnosis.evidence.global_start import first_strengths, global_starts
 from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms.placed import PlacedMechanism
 
 Tell = Callable[[int, int], None]
-_ABOUT = (-2.0, 0.0, 2.0)
-"""Strengths about a global start, in its standard deviations."""
 
 
 def curve(base: Base, candidate: PlacedMechanism) -> Curve:
@@ -31,7 +29,7 @@ def curve(base: Base, candidate: PlacedMechanism) -> Curve:
     extension = base.extended(candidate.direction)
     starts = global_starts(extension, base.rows, base.strengths, base.fit.start, scale, either_sign)
     begin = {0.0: base.fit} | {one.strength: one.fit for one in starts if one.strength != 0.0}
-    about = np.array([one.strength + one.sd * by for one in starts for by in _ABOUT])
+    about = np.array([one.strength + one.sd * by for one in starts for by in NEAR[1::2]])
     strengths = np.append(first_strengths(scale, either_sign), about)
     if not either_sign:
         strengths = strengths[strengths > 0.0]

@@ -153,9 +153,10 @@ def _maximum_under(base: Base, kind: Kind, starts: Sequence[Expansion], cover: F
     Sharp edges of a listed shape cost more under a smooth prior than they gain; but where recordings are far
     from what no force does, there may be no other way up.
     """
-    found = _maximum_from_one(base, kind, starts, cover)
+    first = _highest(starts, cover)
+    found = climb(base, kind, first, cover)
     best = max(starts, key=lambda one: one.fit.found.log_evidence)
-    if best.fit.found.log_evidence < found.fit.found.log_evidence + DECIDES_NOTHING:
+    if best is first or best.fit.found.log_evidence < found.fit.found.log_evidence + DECIDES_NOTHING:
         return found
     return _highest([found, climb(base, kind, best, cover)], cover)
 

@@ -17,10 +17,8 @@ import numpy as np
 from scipy.special import gammaln
 
 from skred.arrays import FloatArray
-from skred.diagnosis.evidence.tolerance import MOST_ROUNDS, STANDARD_ERROR
+from skred.diagnosis.evidence.tolerance import DRAWS, MOST_ROUNDS, STANDARD_ERROR
 
-DRAWS = 200
-"""Draws of a turn, where a density takes no time."""
 _ODD = 0.1
 """Share of all weight on one draw from which on a mode is looked for there: the proposals have missed one."""
 _DEGREES = 7.0

@@ -35,7 +35,7 @@ from skred.physics.law import Law
 from skred.physics.mechanisms.placed import PlacedMechanism, placed
 from skred.physics.mechanisms.spec import Direction, Setting, Shape
 
-_NEAR = (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0)
+NEAR = (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0)
 """Strengths around what was found before, in its standard deviations: a normal posterior has fallen by eight
 nats at the ends, more than `COUNTS`."""
 _SMALLEST = 1e-3
@@ -212,9 +212,9 @@ def _strengths_near(near: Curve, wider: float) -> FloatArray:
     """Strengths around the mean of a curve, without 0, so many times as far apart as it says."""
     mean, sd = near.moments
     sd = wider * max(sd, _SMALLEST * near.scale)
-    strengths = mean + sd * np.array(_NEAR)
-    if abs(mean) > 2.0 * abs(_NEAR[0]) * sd:  # nothing between 0 and there otherwise
-        strengths = np.append(strengths, 0.5 * (mean - math.copysign(abs(_NEAR[0]) * sd, mean)))
+    strengths = mean + sd * np.array(NEAR)
+    if abs(mean) > 2.0 * abs(NEAR[0]) * sd:  # nothing between 0 and there otherwise
+        strengths = np.append(strengths, 0.5 * (mean - math.copysign(abs(NEAR[0]) * sd, mean)))
     return strengths if near.added.either_sign else strengths[strengths > 0.05 * sd]
 
 

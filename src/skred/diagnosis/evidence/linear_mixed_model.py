@@ -72,11 +72,6 @@ class Scores(NamedTuple):
         """Information about each strength if all others are nil, (n_groups, n_directions)."""
         return np.maximum(_diagonal(self.information), 1e-300)
 
-    @property
-    def z(self) -> FloatArray:
-        """Score in standard deviations, (n_groups, n_directions)."""
-        return self.score / np.sqrt(self.own)
-
 
 def _diagonal(matrices: FloatArray) -> FloatArray:
     """Diagonals of many matrices, (n, k)."""

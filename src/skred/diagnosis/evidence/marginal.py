@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from skred.arrays import FloatArray
-from skred.diagnosis.evidence.adaptive_sampling import DRAWS, Mixture, Mode, Weighted, weighted_draws
+from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, Weighted, weighted_draws
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.population_target import (
     MOST_CORRELATED,
@@ -21,7 +21,7 @@ from skred.diagnosis.evidence.population_target import (
     log_targets,
     slopes,
 )
-from skred.diagnosis.evidence.tolerance import STANDARD_ERROR
+from skred.diagnosis.evidence.tolerance import DRAWS, STANDARD_ERROR
 from skred.inference.hierarchical.surface import Nodes
 
 _LOG_2PI = math.log(2.0 * math.pi)

@@ -2,6 +2,9 @@
 
 STANDARD_ERROR = 0.1
 """Standard error of a log integral, in nats, at which there are enough draws."""
+DRAWS = 200
+"""Draws of a turn in which an integral is sampled where a density takes no time, and populations that every
+prediction is made of."""
 DECIDES_NOTHING = 1.0
 """Nats that decide nothing between two answers: what is closer than that counts as equally good."""
 COUNTS = 6.0

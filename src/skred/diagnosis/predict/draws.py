@@ -26,8 +26,6 @@ from skred.inference.hierarchical.rough_population import moments_of
 from skred.inference.leave_one_out import Samples
 from skred.parallel.threads import side_by_side
 
-N_DRAWS = 200
-"""Populations that every prediction is made of: few enough to be written beside an answer."""
 _FRONTS = 1200
 """New fronts of these populations that an avalanche's readings are predicted by: six of each."""
 

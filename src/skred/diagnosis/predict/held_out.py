@@ -14,7 +14,8 @@ from skred.diagnosis.augment.reference import reference
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.predictive import Predicted
-from skred.diagnosis.predict.draws import N_DRAWS, LeftOut, draws_of, predictions
+from skred.diagnosis.evidence.tolerance import DRAWS
+from skred.diagnosis.predict.draws import LeftOut, draws_of, predictions
 from skred.inference.calibrate import Calibration, posterior_of
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.leave_one_out import (
@@ -143,7 +144,7 @@ def _others(
         if event in refitted:
             draws = draws_of(calibration, refitted[event], rng)
             share = np.full(len(draws.means), 1.0 / len(draws.means))
-        parts.append(LeftOut(extension, draws.take(rng.choice(len(share), size=N_DRAWS, p=share))))
+        parts.append(LeftOut(extension, draws.take(rng.choice(len(share), size=DRAWS, p=share))))
     return tuple(parts)
 
 

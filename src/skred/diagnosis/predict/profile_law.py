@@ -26,7 +26,8 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, event_mode
 from skred.diagnosis.evidence.event_quadrature import USUAL, event_nodes
 from skred.diagnosis.evidence.marginal import evidence, importance_draws, population_at
 from skred.diagnosis.evidence.refit import Rounds, refit
-from skred.diagnosis.predict.draws import N_DRAWS, Draws, LeftOut
+from skred.diagnosis.evidence.tolerance import DRAWS
+from skred.diagnosis.predict.draws import Draws, LeftOut
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.predict.unseen import log_densities
 from skred.parallel.processes import worker_pool
@@ -127,7 +128,7 @@ def _rng(seed: int, part: IntArray) -> np.random.Generator:
 
 def _plain(base: Base, rng: np.random.Generator) -> LeftOut:
     """The base law, and draws by the base's events."""
-    own = np.tile(base.strengths, (N_DRAWS, 1))
+    own = np.tile(base.strengths, (DRAWS, 1))
     return LeftOut(base.extended(), _draws(base, base, own, rng))
 
 
@@ -137,7 +138,7 @@ def with_profile(base: Base, profile: Profile, rng: np.random.Generator) -> Left
     The profile's values are drawn by the Laplace approximation.
     """
     wide = knot_by_knot(base, profile.kind, profile.knots_m)
-    values = rng.multivariate_normal(profile.mean, profile.covariance, N_DRAWS)
+    values = rng.multivariate_normal(profile.mean, profile.covariance, DRAWS)
     return LeftOut(wide, _draws(base, _with_mean(base, profile), base.given(values), rng))
 
 

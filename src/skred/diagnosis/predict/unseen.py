@@ -22,7 +22,8 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, Rows, camp
 from skred.diagnosis.evidence.covariates import Standard, standard_of
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of
-from skred.diagnosis.predict.draws import N_DRAWS, Draws, LeftOut, draws_of, modes_near
+from skred.diagnosis.evidence.tolerance import DRAWS
+from skred.diagnosis.predict.draws import Draws, LeftOut, draws_of, modes_near
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.tabulated.tables import exact_log_densities
 from skred.errors import InputError
@@ -153,7 +154,7 @@ class Predictor:
         return Draws(self.means, self.factors, self.strengths)
 
 
-def predictor_of(calibration: Calibration, n_draws: int = N_DRAWS) -> Predictor:
+def predictor_of(calibration: Calibration, n_draws: int = DRAWS) -> Predictor:
     """What a calibration says of avalanches to come.
 
     Parameters
@@ -283,7 +284,7 @@ def log_densities(
     typical, rng = draws.typical, np.random.default_rng([seed, 35])
     n = len(draws.means)
     likelihood = EventLikelihood(extension, rows, draws.strengths.mean(axis=0))
-    start = modes_near(likelihood, typical, draws.so_many(N_DRAWS).points(1, rng)).points
+    start = modes_near(likelihood, typical, draws.so_many(DRAWS).points(1, rng)).points
     result = np.empty((n, len(start)))
     for event, near in enumerate(start):
         of_event = likelihood.take(np.array([event])).in_groups(draws.strengths)
