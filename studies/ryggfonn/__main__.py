@@ -126,7 +126,7 @@ def _best_factor(comparison: Any, name: str, factor: float) -> float:
     """Log Bayes factor of a mechanism's best shape if its prior were wider or narrower."""
     candidate = comparison.leading(name).candidates[name]
     scale = candidate.mechanism.added.scale_of(candidate.best.shape)
-    return float(candidate.best.log_bayes_factor_at(factor * scale))
+    return float(candidate.best.log_factor_of(scale=factor * scale))
 
 
 app = cyclopts.App(help=__doc__)

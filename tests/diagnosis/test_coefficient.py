@@ -92,4 +92,4 @@ def test_other_scales_of_the_prior() -> None:
     one = quadratic("sensor_bias", grid, 0.06, 0.08)
     for scale in (0.05, 0.1, 0.15):
         expected = closed_form(0.06, 0.08, scale, True)[0]
-        assert one.log_bayes_factor_at(scale) == pytest.approx(expected, abs=0.1)
+        assert one.log_factor_of(scale=scale) == pytest.approx(expected, abs=0.1)

@@ -97,9 +97,9 @@ class AugmentedProblem(HierarchicalProblem):
     @property
     def range(self) -> tuple[FloatArray, FloatArray]:
         """Between which values each added strength is sampled, (n_added,) each: all that counts."""
-        grid = self.tables.grid
+        points = self.tables.grid.points
         either = [one.added.either_sign for one in self.added]
-        return np.where(either, grid.least, np.maximum(grid.least, 0.0)), grid.most
+        return np.where(either, points.min(axis=0), np.maximum(points.min(axis=0), 0.0)), points.max(axis=0)
 
     def parameters(self, law: Law) -> tuple[Parameter, ...]:
         """The base law's and its population's parameters, then the added strengths."""

@@ -155,17 +155,11 @@ class Curve(PlacedMechanism):
     @cached_property
     def log_bayes_factor(self) -> float:
         """Against strength 0, in nats."""
-        return self.log_bayes_factor_at(None)
+        return self.log_factor_of()
 
-    def log_bayes_factor_at(self, scale: float | None) -> float:
-        """Against strength 0, in nats, with the prior of another scale."""
+    def log_factor_of(self, sign: float = 0.0, scale: float | None = None) -> float:
+        """Against strength 0, in nats, by strengths of one sign alone, or with the prior of another scale."""
         strengths, log_density = self.fine(scale)
-        most = float(log_density.max())
-        return most + math.log(float(np.trapezoid(np.exp(log_density - most), strengths)))
-
-    def log_factor_of(self, sign: float) -> float:
-        """Log Bayes factor by strengths of one sign alone, in nats."""
-        strengths, log_density = self.fine()
         own = strengths * sign >= 0.0
         most = float(log_density.max())
         return most + math.log(float(np.trapezoid(np.exp(log_density[own] - most), strengths[own])))

@@ -17,7 +17,6 @@ from skred.diagnosis.evidence.population_target import (
     MOST_CORRELATED,
     NARROWEST,
     factor_at,
-    log_correlation_constant,
     log_targets,
     slopes,
 )
@@ -117,7 +116,7 @@ def evidence(nodes: Nodes, log_scale: FloatArray, start: FloatArray, n_steps: in
     psi, best, hessian = _climb(start, n, log_scale, nodes, n_steps)
     values, covariance = curvatures(hessian)
     laplace = best + 0.5 * (len(psi) * _LOG_2PI - float(np.log(values).sum()))
-    return Evidence(laplace + log_correlation_constant(n), psi, covariance)
+    return Evidence(laplace, psi, covariance)
 
 
 def curvatures(hessian: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -133,8 +132,7 @@ def curvatures(hessian: FloatArray) -> tuple[FloatArray, FloatArray]:
 def importance_evidence(nodes: Nodes, log_scale: FloatArray, found: Evidence, seed: int = 0) -> Evidence:
     """What was found, with evidence by importance sampling from the Laplace approximation on."""
     weighted = _weighted(nodes, log_scale, found, np.random.default_rng([seed, 11]), DRAWS, STANDARD_ERROR)
-    log_evidence = weighted.log_integral + log_correlation_constant(len(log_scale))
-    return found._replace(log_evidence=log_evidence, error=weighted.error)
+    return found._replace(log_evidence=weighted.log_integral, error=weighted.error)
 
 
 def importance_draws(

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import gammaln
 
 from skred.inference.hierarchical.event_density import integrated_log_density, inverse_factor
 from skred.inference.hierarchical.population import LKJ_SHAPE
@@ -55,7 +54,7 @@ def _means(psi, n, n_events):  # type: ignore[no-untyped-def]
 
 @compiled()
 def log_prior(psi, n, log_scale):  # type: ignore[no-untyped-def]
-    """Log prior density in these coordinates, but for `log_correlation_constant`."""
+    """Log prior density in these coordinates; (1 + r) / 2 of a partial correlation r is a beta variable."""
     total = 0.0
     for i in range(n):
         # Half-normal median, in the logarithm.
@@ -65,10 +64,11 @@ def log_prior(psi, n, log_scale):  # type: ignore[no-untyped-def]
         total += -0.5 * z * z - math.log(SPREAD_LOG_SD) - _HALF_LOG_2PI
     position = 2 * n
     for j in range(n):
+        shape = LKJ_SHAPE + 0.5 * (n - 2 - j)
+        constant = math.lgamma(2.0 * shape) - 2.0 * math.lgamma(shape) - (2.0 * shape - 1.0) * math.log(2.0)
         for _ in range(j + 1, n):
-            shape = LKJ_SHAPE + 0.5 * (n - 2 - j)
             r = math.tanh(psi[position])
-            total += shape * math.log(max(1.0 - r * r, 1e-300))
+            total += constant + shape * math.log(max(1.0 - r * r, 1e-300))
             position += 1
     return total
 
@@ -224,13 +224,3 @@ def log_targets(psis, n, log_scale, first, points, log_weights):  # type: ignore
     for k in range(len(psis)):
         result[k] = _log_target(psis[k], n, log_scale, first, points, log_weights)
     return result
-
-
-def log_correlation_constant(n: int) -> float:
-    """Of the prior of the partial correlations: (1 + r) / 2 is Beta(shape, shape)."""
-    total = 0.0
-    for j in range(n):
-        shape = LKJ_SHAPE + 0.5 * (n - 2 - j)
-        each = float(gammaln(2.0 * shape) - 2.0 * gammaln(shape)) - (2.0 * shape - 1.0) * math.log(2.0)
-        total += (n - 1 - j) * each
-    return total

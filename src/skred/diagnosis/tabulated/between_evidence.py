@@ -21,7 +21,7 @@ from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, weighted_d
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.marginal import Evidence, curvatures, population_at
-from skred.diagnosis.evidence.population_target import NARROWEST, log_correlation_constant, log_prior
+from skred.diagnosis.evidence.population_target import NARROWEST, log_prior
 from skred.diagnosis.tabulated.tables import Tables
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.between_events import BetweenEvents, components, from_unbounded
@@ -107,7 +107,7 @@ class BetweenTarget:
         )  # fmt: skip
         of_events = np.logaddexp.reduce(densities + log_shares[:, :, None], axis=1)
         total = of_events.sum(axis=1) + [log_prior(one, n, self.base.log_scale) for one in psi[inside]]
-        result[inside] = np.nan_to_num(total + log_p[inside], nan=-np.inf) + log_correlation_constant(n)
+        result[inside] = np.nan_to_num(total + log_p[inside], nan=-np.inf)
         return result
 
 

@@ -52,16 +52,6 @@ class Grid(NamedTuple):
         places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
         return self.strengths(places)
 
-    @property
-    def least(self) -> FloatArray:
-        """Smallest of each strength, (n_added,)."""
-        return self.points.min(axis=0)
-
-    @property
-    def most(self) -> FloatArray:
-        """Largest of each strength, (n_added,)."""
-        return self.points.max(axis=0)
-
     def strengths(self, places: FloatArray) -> FloatArray:
         """Strengths at places in steps from the first table, (n, n_added) both."""
         return self.origin + places @ self.steps.T

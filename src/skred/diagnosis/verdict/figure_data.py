@@ -163,7 +163,7 @@ def _fine(curve: Curve) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _factor_at(candidate: Candidate, relative: float) -> float:
     """Log Bayes factor of a candidate with its prior scale multiplied; re-computed at its own scale alone."""
-    factors = [one.log_bayes_factor_at(relative * one.scale) for one in candidate.curves]
+    factors = [one.log_factor_of(scale=relative * one.scale) for one in candidate.curves]
     moved = float(logsumexp(candidate.log_weights + np.array(factors)) - logsumexp(candidate.log_factors))
     return candidate.log_bayes_factor + moved
 
