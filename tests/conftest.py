@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -11,6 +12,10 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp
 from scipy.stats import halfnorm
+
+# Two tests at a time fill two cores: threads and processes beside them would wait for each other, and each
+# process imports everything anew. Tests of threads and processes say how many they want.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 
 @pytest.fixture(scope="session")

@@ -148,6 +148,7 @@ def test_what_begins_at_the_first_recording_acts_from_the_top_of_another_track(
         assert ("from s = 800 m on" if track.is_own else "along the whole track") in told
 
 
+@pytest.mark.slow
 def test_what_is_bound_to_a_place_stays_on_its_track(
     problem: HierarchicalProblem, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
