@@ -9,7 +9,6 @@ nodes, as many as a minute or so allows, are the second route to those.
 from __future__ import annotations
 
 import time
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import cyclopts
@@ -18,7 +17,6 @@ from threadpoolctl import threadpool_limits
 
 from skred.campaign import find_campaign, read_campaign
 from skred.diagnosis.compare.comparison import Comparison, compare
-from skred.diagnosis.compare.screening import screened
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import (
     EventLikelihood,
@@ -67,10 +65,7 @@ def integrations(comparison: Comparison) -> list[Integration]:
     """Those of one in eight curves, screened or computed again, by all error models."""
     rng, kept = np.random.default_rng(0), list[Integration]()
     for under_errors in comparison.under_each:
-        with ThreadPoolExecutor(1) as pool:
-            coarse = screened(under_errors.base, pool)
-        finer = [one for candidate in under_errors.candidates.values() for one in candidate.curves]
-        for curve in (*coarse, *finer):
+        for curve in (one for candidate in under_errors.candidates.values() for one in candidate.curves):
             if rng.random() < KEPT:
                 kept.append(integration_of(under_errors.base, curve))
     return kept

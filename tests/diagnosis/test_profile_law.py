@@ -117,7 +117,7 @@ def test_a_predictor_s_profile_is_that_which_was_fitted(hidden: Base, added: Pro
         ("knots_m", [10.0, 5.0], "knots_m: expected two or more increasing"),
         ("knots_m", [1.0] * 1000, "at most"),
         ("front_speed", [-1.0, 2.0], "front_speed: expected one for each edge_m, 0 or more"),
-        ("front_speed", "fast", "front_speed: expected finite numbers"),
+        ("front_speed", "fast", "front_speed: found 'fast': expected finite numbers"),
         ("front_speed", [1.0], "front_speed: expected one for each edge_m"),
     ],
 )

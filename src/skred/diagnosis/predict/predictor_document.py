@@ -59,8 +59,10 @@ def _told(error: ValidationError) -> str:
     """The first thing that pydantic found, in one line."""
     details = error.errors(include_url=False)[0]
     key = shown(".".join(("predictor", *map(str, details["loc"]))), 200)
+    found = details["input"]
+    told = "" if isinstance(found, Mapping | list) else f"found {found!r:.40}: "
     message = details["msg"].removeprefix("Value error, ")
-    return f"{key}: {message[:1].lower()}{message[1:]}"
+    return f"{key}: {told}{message[:1].lower()}{message[1:]}"
 
 
 def _scale(term: Term, law: Law) -> float:

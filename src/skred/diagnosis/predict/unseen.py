@@ -56,7 +56,7 @@ def _kind(value: Any) -> Kind:
     for kind in KINDS:
         if value in (kind, kind.equation):
             return kind
-    raise ValueError(f"found {value!r:.40}: expected one of {', '.join(kind.equation for kind in KINDS)}")
+    raise ValueError(f"expected one of {', '.join(kind.equation for kind in KINDS)}")
 
 
 _Numbers = Annotated[FloatArray, PlainValidator(_numbers), PlainSerializer(np.ndarray.tolist)]

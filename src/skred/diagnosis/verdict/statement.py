@@ -6,9 +6,6 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
-from skred.campaign import Sensor
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import Decision
@@ -20,6 +17,7 @@ from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.between import between_sentence
 from skred.diagnosis.verdict.hangs_on import carried, hangs_on
 from skred.diagnosis.verdict.improvement import improvement
+from skred.diagnosis.verdict.stated_places import place_as_stated
 from skred.diagnosis.words import TOLD_FROM, percent, plus_minus
 from skred.inference.influence_words import enumerated
 from skred.physics.mechanisms import mechanisms
@@ -42,34 +40,9 @@ def statement(found: Outcome, document: dict[str, Any]) -> str:
 
 def _caution(found: Diagnosis) -> str:
     """The first thing to know: that few avalanches carry the answer, and what it takes for granted."""
-    reasons = carried(found.influence), _not_converged(found.refits_not_converged), _place_as_stated(found)
+    reasons = carried(found.influence), _not_converged(found.refits_not_converged), place_as_stated(found)
     given = [one for one in reasons if one]
     return f"Take this with care: {'; '.join(given)}." if given else ""
-
-
-def _place_as_stated(found: Diagnosis) -> str:
-    """How differently a sensor would read as far off as its place is known; the one that differs most.
-
-    Places are exact in every model: where something is claimed, an error of one could be taken for it.
-    """
-    known = [one for one in found.problem.campaign.sensors if one.place_sd_m and not one.is_runout]
-    if not known or found.decision.verdict in ("nothing_missing", "cannot_tell"):
-        return ""
-    setting = found.comparison.under_each[0].base.setting
-    edges, speed = setting.terrain.edge_s_m, setting.front_speed
-
-    def differs(sensor: Sensor) -> float:
-        at = 0.5 * (sensor.s_from_m + sensor.s_to_m) + np.array([-1.0, 0.0, 1.0]) * sensor.place_sd_m
-        above, there, below = np.interp(at, edges, speed)
-        return abs(below - above) / (2.0 * there) if there > 0.0 else math.inf
-
-    most = max(known, key=differs)
-    size = differs(most)
-    how = f"{percent(size)} faster or slower" if size < 1.0 else "something else"
-    return (
-        f"places of sensors are taken as exact, and {most.id}, whose place is known to {most.place_sd_m:g} m"
-        f" (sd), would read {how} so far up or down"
-    )
 
 
 def _not_converged(events: Sequence[str]) -> str:
