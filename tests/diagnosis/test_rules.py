@@ -40,12 +40,12 @@ def test_a_prior_that_the_search_does_not_have_is_said_to_be_none_of_its_own() -
 
 def test_prior_odds_of_the_whole_library() -> None:
     odds = prior_odds(ALL)
-    assert INSTRUMENT == ["release_offset", "sensor_bias"] and len(PHYSICS) >= 8
+    assert INSTRUMENT == ["release_offset", "sensor_bias", "sensor_place"] and len(PHYSICS) >= 8
     assert odds["nothing"] == pytest.approx(0.5) and odds["unlisted"] == pytest.approx(0.05)
     shares = dict.fromkeys(PHYSICS, 1.0) | {"segment_drag": 1.5, "entrainment": 0.5}  # one term, two names
     for name, share in shares.items():
         assert odds[name] == pytest.approx(0.35 * share / len(PHYSICS))
-    assert odds["sensor_bias"] == odds["release_offset"] == pytest.approx(0.05)
+    assert odds["sensor_bias"] == odds["release_offset"] == pytest.approx(0.1 / 3.0)
     assert sum(odds.values()) == pytest.approx(1.0)
 
 

@@ -349,3 +349,25 @@ def test_a_front_with_terms_in_speed_is_the_same_alone_and_beside_others(name: s
         for one, own in zip(together, alone, strict=True):
             np.testing.assert_array_equal(one[k], own[0])
         np.testing.assert_array_equal(speeds[k], front_speeds(*one_alone, begin[[k]])[0])
+
+
+def test_each_front_has_its_sensors_where_they_are_for_it() -> None:
+    """Moved sensors read what sensors noted there read, with tangents; none goes beyond the track's ends."""
+    terrain = TERRAINS["counter slope"]
+    rng, n, end = np.random.default_rng(8), 9, terrain.length_m
+    strengths = np.array([0.5, 0.002, 0.2]) * rng.uniform(0.3, 1.5, (n, 3))
+    columns = np.array([int(c) for c in (Column.CONSTANT, Column.QUADRATIC, Column.FRICTION)])
+    law = make_contributions(columns, np.ones((3, terrain.n_cells)), WEAKENING_SPEED)
+    releases, path = rng.uniform(0.0, 0.1 * end, n), path_of(terrain)
+    places = [(0.3 * end, 0.3 * end), (0.4 * end, 0.5 * end)]
+    shifts = np.column_stack([rng.uniform(-0.1 * end, 0.1 * end, (n, 2)), np.zeros(n)])
+    shifts[0, 0], shifts[1, 1] = -end, end
+    found = simulate_with_jacobian(strengths, releases, path, law, sensor_table([*places, None]), 8.0, shifts)
+    for k in range(n):
+        moved = [(a + by, b + by) for (a, b), by in zip(places, shifts[k, :2], strict=True)]
+        moved[0] = moved[0] if k != 0 else (0.0, 0.0)
+        moved[1] = moved[1] if k != 1 else (0.9 * end, end)
+        sensors = sensor_table([*moved, None])
+        alone = simulate_with_jacobian(strengths[[k]], releases[[k]], path, law, sensors, 8.0)
+        for one, own in zip(found, alone, strict=True):
+            np.testing.assert_allclose(one[k], own[0], rtol=1e-12)

@@ -37,7 +37,7 @@ FOLDER = Path(skred.physics.mechanisms.__file__).parent
 IN_THE_FORMAT = {
     "coulomb_friction", "centrifugal", "turbulent_drag", "viscous_drag", "constant_retardation",
     "velocity_weakening", "obstacle", "segment_drag", "segment_friction", "entrainment",
-    "covariate_friction", "sensor_bias", "release_offset",
+    "covariate_friction", "sensor_bias", "release_offset", "sensor_place",
 }  # fmt: skip
 IN_A_LAW = {name: one for name, one in ALL.items() if one.column is not None}
 ONLY_ADDED = {name: one for name, one in ALL.items() if one.column is None}
@@ -109,7 +109,7 @@ def test_a_mechanism_is_found_by_its_file() -> None:
 def test_all_of_the_format_are_there() -> None:
     assert set(ALL) == IN_THE_FORMAT
     assert {one.id for one in ALL.values() if one.group is Group.INSTRUMENT} == {
-        "sensor_bias", "release_offset"
+        "sensor_bias", "release_offset", "sensor_place"
     }  # fmt: skip
 
 
@@ -397,12 +397,14 @@ def assert_well_formed(direction: Direction, setting: Setting) -> None:
         changes.append(bool(np.any(direction.profiles)))
     assert (direction.weakening_speed is not None) == (Column.WEAKENING in direction.columns)
     for values, n in (
-        (direction.log_strengths, setting.n_events), (direction.log_readings, len(setting.sensors))
-    ):  # fmt: skip
+        (direction.log_strengths, setting.n_events),
+        (direction.log_readings, len(setting.sensors)),
+        (direction.places, len(setting.sensors)),
+    ):
         if values is not None:
             assert values.shape == (n,)
             changes.append(bool(np.any(values)))
-    for values in (direction.profiles, direction.log_strengths, direction.log_readings):
+    for values in (direction.profiles, direction.log_strengths, direction.log_readings, direction.places):
         assert values is None or np.all(np.isfinite(values))
     assert np.isfinite(direction.release) and any(changes)
 

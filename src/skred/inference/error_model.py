@@ -198,6 +198,15 @@ class EventReadings(NamedTuple):
         return sd
 
 
+def fronts_seen(campaign: Campaign) -> tuple[BoolArray, BoolArray]:
+    """By which sensors fronts came, and above which they stopped, (n_events, n_sensors) each."""
+    observed, least = np.asarray(campaign.status == Status.OBSERVED), campaign.bounds[0]
+    is_velocity = np.array([not sensor.is_runout for sensor in campaign.sensors])
+    came = (observed & (np.nan_to_num(campaign.values) > 0.0)) | (least > 0.0)
+    stayed = np.asarray(campaign.status == Status.NOT_REACHED)
+    return came & is_velocity, stayed & is_velocity
+
+
 def event_readings(campaign: Campaign, place_sd_m: float = PLACE_SD_M) -> EventReadings:
     """Readings of a campaign."""
     observed = np.asarray(campaign.status == Status.OBSERVED)
@@ -207,8 +216,7 @@ def event_readings(campaign: Campaign, place_sd_m: float = PLACE_SD_M) -> EventR
     ends = np.array([np.nan if sensor.is_runout else sensor.s_to_m for sensor in sensors], dtype=float)
     least, most = campaign.bounds
     known = observed | np.isfinite(least) | np.isfinite(most)
-    moved = is_velocity & ((values > 0.0) | (least > 0.0))
-    stopped = np.asarray(campaign.status == Status.NOT_REACHED) & is_velocity
+    came, stayed = fronts_seen(campaign)
     return EventReadings(
         values,
         observed,
@@ -216,8 +224,8 @@ def event_readings(campaign: Campaign, place_sd_m: float = PLACE_SD_M) -> EventR
         np.array([sensor.relative_sd for sensor in sensors], dtype=float),
         np.array([sensor.absolute_sd for sensor in sensors], dtype=float),
         is_velocity,
-        np.where(moved, ends, -np.inf).max(axis=1, initial=-np.inf),
-        np.where(stopped, ends, np.inf).min(axis=1, initial=np.inf),
+        np.where(came, ends, -np.inf).max(axis=1, initial=-np.inf),
+        np.where(stayed, ends, np.inf).min(axis=1, initial=np.inf),
         float(place_sd_m),
         least,
         most,

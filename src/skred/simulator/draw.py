@@ -15,7 +15,7 @@ from skred.campaign import Campaign
 from skred.errors import InputError
 from skred.simulator.effects import Effect
 from skred.simulator.fresh import Source, draw_fresh
-from skred.simulator.listed import BASES, INSTRUMENT, LISTED, PHYSICS, fits
+from skred.simulator.listed import BASES, INSTRUMENT, LISTED, OF_RECORD, PHYSICS, fits
 from skred.simulator.masked import draw_masked, largest_mean
 from skred.simulator.observe import NASTY, observe
 from skred.simulator.scene import Scene, TrialKind, draw_scene
@@ -145,7 +145,7 @@ def _draw_ids(rng: np.random.Generator, group: str, base: str | None) -> tuple[s
     if group == "unlisted":
         return (str(rng.choice(sorted(UNLISTED))),)
     if group == "instrument":
-        return (str(rng.choice(INSTRUMENT)),)
+        return (str(rng.choice(OF_RECORD)),)
     while True:
         names = tuple(str(name) for name in rng.choice(PHYSICS, 2 if group == "two" else 1, replace=False))
         if any(all(fits(name, law) for name in names) for law in ([base] if base else BASES)):

@@ -11,7 +11,7 @@ import numpy as np
 from skred.arrays import FloatArray
 from skred.simulator.forces import TERM_WIDTH, Kind
 
-Target = Literal["force", "friction", "sensor", "release"]
+Target = Literal["force", "friction", "sensor", "place", "release"]
 Weigh = Callable[[np.random.Generator, Mapping[str, FloatArray], int], FloatArray]
 """Weights of further avalanches, from their covariates and their number."""
 
@@ -35,15 +35,15 @@ class Effect:
         Magnitudes of the strength that are physically plausible.
     sign : float
         Of the strength: 1 or -1.
-    target : {"force", "friction", "sensor", "release"}
+    target : {"force", "friction", "sensor", "place", "release"}
         What it acts on: the equation of motion, the events' friction (log), one sensor's readings (log
-        factor), the release (m).
+        factor), one sensor's place (m), the release (m).
     row : (12,) array
         For a force: its row, with the strength 1.
     weight : (n_events,) array
         The strength of an event is this times the strength.
     sensor : int
-        For a bias: the sensor's position.
+        For a bias or a place: which sensor.
     retuned : bool
         Whether the base friction is chosen anew so that the typical avalanche stops where it did; for
         what acts along the whole track.
@@ -84,6 +84,8 @@ class Hidden:
         Shift of the log of the first base parameter.
     factor : (n_sensors,) array
         Factor of each sensor's readings; the runout's is 1.
+    shift_m : (n_sensors - 1,) array
+        How much further down than noted each speed sensor stands.
     release_m : float
         Offset of the true release points from the noted ones.
     """
@@ -91,6 +93,7 @@ class Hidden:
     terms: FloatArray
     friction: FloatArray
     factor: FloatArray
+    shift_m: FloatArray
     release_m: float
 
 
@@ -109,11 +112,14 @@ def hidden_of(effects: Sequence[Effect], strengths: Sequence[float], n_events: i
         terms[:, k] = effect.row
         terms[:, k, 1] = effect.sign * strength * effect.weight
     friction, factor, release = np.zeros(n_events), np.ones(n_sensors), 0.0
+    shift = np.zeros(n_sensors - 1)
     for effect, strength in zip(effects, strengths, strict=True):
         if effect.target == "friction":
             friction += effect.sign * strength * effect.weight
         elif effect.target == "sensor":
             factor[effect.sensor] *= np.exp(effect.sign * strength)
+        elif effect.target == "place":
+            shift[effect.sensor] += effect.sign * strength
         elif effect.target == "release":
             release += effect.sign * strength
-    return Hidden(terms, friction, factor, release)
+    return Hidden(terms, friction, factor, shift, release)

@@ -118,12 +118,13 @@ def predict(setting: Setting, theta: FloatArray, hidden: Hidden | None) -> tuple
     parameters, releases = np.exp(theta[:, :k]), np.repeat(setting.releases_m, each)
     if theta.shape[1] > k:
         releases = releases + theta[:, k] * setting.release_sd_m
-    terms, factor = None, np.ones(len(setting.absolute_sd))
+    terms, factor, sensors = None, np.ones(len(setting.absolute_sd)), setting.sensors
     if hidden is not None:
         parameters[:, 0] *= np.repeat(np.exp(hidden.friction), each)
         releases = releases + hidden.release_m
         terms, factor = np.repeat(hidden.terms, each, axis=0), hidden.factor
-    found = read(setting.ground, setting.base, parameters, np.maximum(releases, 1.0), setting.sensors, terms)
+        sensors = sensors.moved(hidden.shift_m)
+    found = read(setting.ground, setting.base, parameters, np.maximum(releases, 1.0), sensors, terms)
     return found.values * factor, found.reached
 
 

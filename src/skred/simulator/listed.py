@@ -175,6 +175,18 @@ def _sensor_bias(rng: np.random.Generator, scene: Scene) -> Effect:
     )  # fmt: skip
 
 
+def _sensor_place(rng: np.random.Generator, scene: Scene) -> Effect:
+    sensors, sign = scene.setting.sensors, float(rng.choice([-1.0, 1.0]))
+    sensor = int(rng.integers(len(sensors.s_from_m)))
+    # it stays where the typical avalanche comes by
+    above = float(sensors.s_from_m[sensor]) - scene.place(0.05)
+    below = scene.place(0.97) - float(sensors.s_to_m[sensor])
+    high = float(np.clip(below if sign > 0 else above, 10.0, 200.0))
+    return Effect(
+        "sensor_place", "shift", "m", 2.0, high, even(scene), sign=sign, target="place", sensor=sensor
+    )
+
+
 def _release_offset(rng: np.random.Generator, scene: Scene) -> Effect:
     sign = float(rng.choice([-1.0, 1.0]))
     setting = scene.setting
@@ -200,8 +212,11 @@ LISTED: dict[str, Draw] = {
     "covariate_friction": _covariate_friction,
     "sensor_bias": _sensor_bias,
     "release_offset": _release_offset,
+    "sensor_place": _sensor_place,
 }
-INSTRUMENT = ("sensor_bias", "release_offset")
+INSTRUMENT = ("sensor_bias", "release_offset", "sensor_place")
+OF_RECORD = INSTRUMENT[:2]
+"""Faults that are drawn where none is asked for: those there were when the seeds of the record were drawn."""
 PHYSICS = tuple(name for name in LISTED if name not in INSTRUMENT)
 
 _BASES: dict[str, tuple[str, ...]] = {

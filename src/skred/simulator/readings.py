@@ -37,6 +37,10 @@ class Sensors:
     s_from_m: FloatArray
     s_to_m: FloatArray
 
+    def moved(self, by_m: FloatArray) -> Sensors:
+        """Each so many metres further down, (n_speeds,); spans as a whole."""
+        return Sensors(self.s_from_m + by_m, self.s_to_m + by_m)
+
 
 @dataclass(frozen=True, eq=False)
 class Readings:

@@ -22,7 +22,6 @@ from skred.inference.hierarchical.results import (
 )
 from skred.inference.results import draws_by_name, predictive
 from skred.physics.geometry import sensor_table
-from skred.physics.kernel.fronts import simulate
 from skred.physics.law import Law
 
 
@@ -148,13 +147,13 @@ def fronts_of(
     n, n_events = points.shape[:2]
     extension, events = problem.extension, np.tile(np.arange(n_events), n)
     given = problem.base.given(own.reshape(n * n_events, -1))
-    rows, releases, speeds, factors = extension.inputs(events, points.reshape(n * n_events, -1), given)
+    runs = extension.inputs(events, points.reshape(n * n_events, -1), given)
     # As instruments read: 0 where a front does not come, spans as a whole.
     table = sensor_table([*problem.sensor_places, None])
-    fronts = factors * simulate(rows, releases, problem.path, extension.contributions, table, speeds)
+    fronts = runs.read(problem.path, extension.contributions, table)
     avalanches = Avalanches(
-        rows[:, : extension.n_base].reshape(n, n_events, -1),
-        releases.reshape(n, n_events),
-        speeds.reshape(n, n_events),
+        runs.strengths[:, : extension.n_base].reshape(n, n_events, -1),
+        runs.releases.reshape(n, n_events),
+        runs.speeds.reshape(n, n_events),
     )
     return avalanches, fronts.reshape(n, n_events, -1)

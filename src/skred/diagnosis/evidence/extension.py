@@ -5,22 +5,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from skred.arrays import FloatArray, IntArray
 from skred.campaign.parts import without_silent_sensors
 from skred.diagnosis.evidence.covariates import standard_of
+from skred.diagnosis.evidence.moved_sensors import StopBounds, stop_bounds
 from skred.errors import InputError
 from skred.inference.added_terms import contributions_with
 from skred.inference.hierarchical.event_draws import FARTHEST
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.kernel.columns import Column
 from skred.physics.kernel.fronts import front_speeds, simulate, simulate_with_jacobian
-from skred.physics.kernel.inputs import Contributions
+from skred.physics.kernel.inputs import Contributions, Path
 from skred.physics.law import Law
 from skred.physics.laws import check_library
 from skred.physics.mechanisms.spec import Direction, Setting
+
+_STEP_M = 0.01
+"""Of the differences by a sensor's place [m]: above rounding, and hardly any front stops within it."""
 
 
 def setting_of(problem: HierarchicalProblem, law: Law, front_speed: FloatArray | None = None) -> Setting:
@@ -69,6 +74,37 @@ def recorded_range(problem: HierarchicalProblem) -> tuple[float, float]:
     return float(first.min()), max(float(last.max()), float(first.min()) + 1.0)
 
 
+class Runs(NamedTuple):
+    """Runs of the kernel, and what becomes of their readings.
+
+    Attributes
+    ----------
+    strengths : (n, n_columns) array
+        Of the base and of all columns that are added.
+    releases, speeds : (n,) arrays, m and m/s
+    factors : (n, n_sensors + 1) array
+        What readings are multiplied by; a single row where none is off.
+    shifts : (n, n_sensors + 1) array or None, m
+        How much further down than noted each sensor stands; None where all stand there.
+    """
+
+    strengths: FloatArray
+    releases: FloatArray
+    speeds: FloatArray
+    factors: FloatArray
+    shifts: FloatArray | None
+
+    def read(self, path: Path, law: Contributions, sensors: FloatArray) -> FloatArray:
+        """Readings, (n, n_sensors + 1)."""
+        readings = simulate(self.strengths, self.releases, path, law, sensors, self.speeds, self.shifts)
+        return np.asarray(readings * self.factors)
+
+    def moved(self, further: FloatArray) -> Runs:
+        """The same with moved sensors that stand so many metres further down, (n_sensors + 1,)."""
+        assert self.shifts is not None
+        return self._replace(shifts=self.shifts + further)
+
+
 @dataclass(frozen=True, eq=False)
 class Extension:
     """A law with mechanisms added, on a campaign.
@@ -115,31 +151,25 @@ class Extension:
         """Which added mechanism each added column belongs to."""
         return np.repeat(np.arange(len(self.directions)), [len(d.columns) for d in self.directions])
 
-    def inputs(
-        self, events: IntArray, points: FloatArray, strengths: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """What the kernel is given for each row, and what its readings are multiplied by.
+    @cached_property
+    def _stops(self) -> StopBounds:
+        return stop_bounds(self.problem)
+
+    def inputs(self, events: IntArray, points: FloatArray, strengths: FloatArray) -> Runs:
+        """What the kernel is given for each row, and what becomes of its readings.
 
         Parameters
         ----------
         events : (n,) integer array
         points : (n, n_base + 1) array
         strengths : (n, n_directions) array
-
-        Returns
-        -------
-        rows : (n, n_columns) array
-            Strengths of the base and of all columns that are added.
-        releases, speeds : (n,) arrays, m and m/s
-        factors : (n, n_sensors + 1) array
-            Or a single row, where no reading is off.
         """
         releases, n = self.problem.releases, self.n_base
         place = releases.mean[events] + releases.sd[events] * points[:, -1]
         rows = np.empty((len(events), n + len(self._owner)))
         rows[:, :n] = points[:, :n]
         rows[:, n:] = strengths[:, self._owner]
-        log_factor = np.zeros((1, len(self.problem.sensors)))
+        log_factor, shifts = np.zeros((1, len(self.problem.sensors))), None
         for k, direction in enumerate(self.directions):
             if direction.release:
                 place += strengths[:, k] * direction.release
@@ -150,13 +180,19 @@ class Extension:
             if direction.log_readings is not None:
                 reads = np.append(direction.log_readings, 0.0)
                 log_factor = log_factor + np.outer(strengths[:, k], reads)
+            if direction.places is not None:
+                moved = np.outer(strengths[:, k], np.append(direction.places, 0.0))
+                shifts = moved if shifts is None else shifts + moved
         # An event that nothing explains may be looked for beyond all numbers.
         rows[:, :n] = np.exp(np.minimum(rows[:, :n], FARTHEST))
         place = np.clip(place, releases.first, releases.length)
-        return rows, place, releases.speeds(events, points[:, -1]), np.exp(log_factor)
+        return Runs(rows, place, releases.speeds(events, points[:, -1]), np.exp(log_factor), shifts)
 
     def predict(self, events: IntArray, points: FloatArray, strengths: FloatArray) -> FloatArray:
         """Readings of fronts, (n, n_sensors + 1), the runout last; spans up to the stop.
+
+        The runout is what noted places are compared with: where a sensor is moved by which a front is known
+        to have stopped below or above, see `StopBounds.as_noted`.
 
         Parameters
         ----------
@@ -165,16 +201,21 @@ class Extension:
         strengths : (n_directions,) or (n, n_directions) array
         """
         given = np.broadcast_to(strengths, (len(events), len(self.directions)))
-        rows, releases, begin, factors = self.inputs(events, points, given)
-        path, sensors = self.problem.path, self.problem.sensors
-        readings: FloatArray = simulate(rows, releases, path, self.contributions, sensors, begin)
-        return readings * factors
+        runs = self.inputs(events, points, given)
+        return self._read(events, runs)
+
+    def _read(self, events: IntArray, runs: Runs) -> FloatArray:
+        """Readings of runs, (n, n_sensors + 1), as `predict` has them."""
+        readings = runs.read(self.problem.path, self.contributions, self.problem.sensors)
+        if runs.shifts is not None:
+            readings[:, -1], _ = self._stops.as_noted(readings[:, -1], events, runs.shifts[:, :-1])
+        return readings
 
     def speeds(self, points: FloatArray, strengths: FloatArray) -> FloatArray:
         """Front speed of each event at the cells' edges [m/s], (n_events, n_cells + 1), at one point each."""
         given = np.broadcast_to(strengths, (len(points), len(self.directions)))
-        rows, releases, begin, _ = self.inputs(np.arange(len(points)), points, given)
-        return front_speeds(rows, releases, self.problem.path, self.contributions, begin)
+        runs = self.inputs(np.arange(len(points)), points, given)
+        return front_speeds(runs.strengths, runs.releases, self.problem.path, self.contributions, runs.speeds)
 
     def tangents(
         self, events: IntArray, points: FloatArray, strengths: FloatArray
@@ -188,15 +229,18 @@ class Extension:
         by_strengths : (n, n_sensors + 1, n_directions) array
         """
         given = np.broadcast_to(strengths, (len(events), len(self.directions)))
-        rows, releases, begin, factors = self.inputs(events, points, given)
+        runs = self.inputs(events, points, given)
+        rows, releases, begin, factors, shifts = runs
         noted = self.problem.releases
         by_speed = bool(noted.speed_sd.any())
         path, sensors = self.problem.path, self.problem.sensors
         readings, jacobian = simulate_with_jacobian(
-            rows, releases, path, self.contributions, sensors, begin, by_speed=by_speed
+            rows, releases, path, self.contributions, sensors, begin, shifts, by_speed=by_speed
         )
-        readings = readings * factors
-        jacobian = jacobian * factors[:, :, None]
+        readings, jacobian = readings * factors, jacobian * factors[:, :, None]
+        if shifts is not None:
+            readings[:, -1], slope = self._stops.as_noted(readings[:, -1], events, shifts[:, :-1])
+            jacobian[:, -1] *= slope[:, None]
         inside = (releases > noted.first) & (releases < noted.length)
         by_release = jacobian[:, :, rows.shape[1]] * inside[:, None]
         by_logs = jacobian[:, :, : self.n_base] * rows[:, None, : self.n_base]
@@ -215,7 +259,15 @@ class Extension:
                 by_strengths[:, :, k] += by_logs[:, :, 0] * direction.log_strengths[events][:, None]
             if direction.log_readings is not None:
                 by_strengths[:, :-1, k] += readings[:, :-1] * direction.log_readings
+            if direction.places is not None:
+                by_strengths[:, :, k] += self._by_places(events, runs, direction.places)
         return readings, by_points, by_strengths
+
+    def _by_places(self, events: IntArray, runs: Runs, places: FloatArray) -> FloatArray:
+        """Change of the readings as sensors are moved, by so much each per unit, (n, n_sensors + 1)."""
+        step = _STEP_M * np.append(places, 0.0)
+        ahead, behind = (self._read(events, runs.moved(by)) for by in (step, -step))
+        return (ahead - behind) / (2.0 * _STEP_M)
 
 
 def typical_speed(speeds: FloatArray) -> FloatArray:

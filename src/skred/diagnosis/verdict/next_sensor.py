@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -58,10 +57,7 @@ def _splitting(found: Diagnosis, first: Candidate, second: Candidate) -> float:
     for candidate in (first, second):
         curve = candidate.best
         at = int(np.argmax(curve.log_evidence))
-        direction = curve.direction
-        if direction.log_readings is not None:
-            padded = np.concatenate([direction.log_readings, np.zeros(len(places))])
-            direction = replace(direction, log_readings=padded)
+        direction = curve.direction.with_more_sensors(len(places))
         extension = extended(problem, found.law, [direction])
         points = curve.fits[at].points
         events = np.arange(len(points))

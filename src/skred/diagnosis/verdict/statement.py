@@ -108,7 +108,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         f" {percent(probability[UNLISTED])}).",
         f"Its {strength['parameter'].replace('_', ' ')} is"
         f" {plus_minus(strength['mean'], strength['sd'], strength['unit'])}"
-        f"{_in_percent(found, strength['mean'])}.",
+        f"{_in_words(found, strength['mean'])}.",
         _begins(found.steps[0]),
         between_sentence(strength),
         _compensated(first["constants"]),
@@ -127,12 +127,14 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     return [*sentences, _left(document)]
 
 
-def _in_percent(found: Diagnosis, mean: float) -> str:
-    """What a strength does that is the logarithm of a factor; empty for all others."""
+def _in_words(found: Diagnosis, mean: float) -> str:
+    """What a strength does that is the logarithm of a factor, or a place; empty for all others."""
     direction, change = found.steps[0].candidate.best.direction, math.expm1(mean)
     size = f"{100.0 * abs(change):.0f} %"
     if direction.log_readings is not None:
         return f": it reads {size} too {'high' if change > 0.0 else 'low'}"
+    if direction.places is not None:
+        return f": it stands {'further down' if mean > 0.0 else 'further up'} than noted"
     if direction.log_strengths is not None:
         what = found.law.mechanisms[0].strength.name.replace("_", " ")
         return f": one standard deviation up, {what} is {size} {'more' if change > 0.0 else 'less'}"

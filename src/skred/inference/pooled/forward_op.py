@@ -93,7 +93,8 @@ def _funcify_readings(op: FrontReadings, node: Any = None, **kwargs: Any) -> Any
         law = Contributions(columns, profiles, u_c.item(), terms.item())
         readings, none = np.empty((releases.size, sensors.shape[0])), np.empty((releases.size, 0))
         jacobian = np.empty((releases.size, sensors.shape[0], 0))
-        fill_readings(strengths, releases, begin * begin, path, law, sensors, readings, jacobian, none)
+        where = sensors, np.empty((0, 0))  # none is moved
+        fill_readings(strengths, releases, begin * begin, path, law, *where, readings, jacobian, none)
         return readings
 
     return front_readings, cache_key(fill_readings)
@@ -110,7 +111,8 @@ def _funcify_jacobian(op: FrontReadingsJacobian, node: Any = None, **kwargs: Any
         law = Contributions(columns, profiles, u_c.item(), terms.item())
         readings, none = np.empty((releases.size, sensors.shape[0])), np.empty((releases.size, 0))
         jacobian = np.empty((releases.size, sensors.shape[0], strengths.shape[1] + 1))
-        fill_readings(strengths, releases, begin * begin, path, law, sensors, readings, jacobian, none)
+        where = sensors, np.empty((0, 0))  # none is moved
+        fill_readings(strengths, releases, begin * begin, path, law, *where, readings, jacobian, none)
         return jacobian
 
     return front_readings_jacobian, cache_key(fill_readings)

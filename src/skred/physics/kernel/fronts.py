@@ -29,15 +29,25 @@ def _cells_of(sensors, edge):  # type: ignore[no-untyped-def]
     return cells
 
 
+@inner()
+def _move(sensors, by, edge, moved, cells):  # type: ignore[no-untyped-def]
+    """Sensors moved along the track, none beyond its ends, spans as a whole; and their cells."""
+    for j in range(sensors.shape[0]):
+        place = min(max(sensors[j, 1] + by[j], edge[0]), edge[-1] - (sensors[j, 2] - sensors[j, 1]))
+        moved[j, 1], moved[j, 2] = place, place + (sensors[j, 2] - sensors[j, 1])
+        cells[j] = cell_of(edge, place)
+
+
 @compiled()
 def fill_readings(  # type: ignore[no-untyped-def]
-    strengths, releases, start_v, path, law, sensors, readings, jacobian, speeds
+    strengths, releases, start_v, path, law, sensors, shifts, readings, jacobian, speeds
 ):
     """Fill the readings of many fronts, run by run; see `simulate`.
 
-    `start_v` (n_runs,) is U^2 at the release [m2 s-2]. Fill the jacobian (n_runs, n_sensors, n_strengths + 1,
-    or + 2 with the release's speed) and the speeds (n_runs, n_cells + 1) as well, unless their last axis is
-    empty. One function for all three: with two the march would be compiled twice.
+    `start_v` (n_runs,) is U^2 at the release [m2 s-2]; `shifts` has no rows where no sensor is moved. Fill
+    the jacobian (n_runs, n_sensors, n_strengths + 1, or + 2 with the release's speed) and the speeds (n_runs,
+    n_cells + 1) as well, unless their last axis is empty. One function for all three: with two the march
+    would be compiled twice.
     """
     # Unpacked once: reading an array out of a tuple costs as much as ten cells.
     edge, ground, barriers, limits = path.edge, path.ground, path.barriers, path.limits
@@ -45,7 +55,7 @@ def fill_readings(  # type: ignore[no-untyped-def]
     u_c, speed_terms = law.weakening_speed, law.speed_terms
     n_cells, n_tangents = ground.shape[1], jacobian.shape[2]
     scaled, cells = scale_ground(edge, ground), _cells_of(sensors, edge)
-    spans = spans_of(profiles)
+    spans, placed = spans_of(profiles), sensors.copy()
     table = np.zeros((_N_COLUMNS, n_cells))
     keep, gain, v = np.empty(n_cells), np.empty(n_cells), np.empty(n_cells + 1)
     alike = cells_alike(profiles[:, : n_cells if speed_terms else 1])
@@ -77,8 +87,10 @@ def fill_readings(  # type: ignore[no-untyped-def]
             runout, last, first = march(
                 release, start_v[run], edge, ground, barriers, limits, table, keep, gain, v
             )
+        if shifts.shape[0] > 0:
+            _move(sensors, shifts[run], edge, placed, cells)
         read(
-            run, sensors, cells, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms,
+            run, placed, cells, release, runout, first, edge, ground, barriers, limits, u_c, speed_terms,
             table, v, readings,
         )  # fmt: skip
         if n_tangents > 0:
@@ -91,7 +103,7 @@ def fill_readings(  # type: ignore[no-untyped-def]
                 table, carry, v, increment, dv, step, shift, d_time, d_runout,
             )  # fmt: skip
             read_tangents(
-                run, sensors, cells, release, runout, first, edge, ground, barriers, limits, columns,
+                run, placed, cells, release, runout, first, edge, ground, barriers, limits, columns,
                 profiles, u_c, speed_terms, table, v, dv, step, shift, d_time, d_runout, readings, jacobian,
             )  # fmt: skip
         if speeds.shape[1] > 0:
@@ -106,6 +118,7 @@ def simulate(
     law: Contributions,
     sensors: FloatArray,
     release_speeds: FloatArray | float = 0.0,
+    shifts: FloatArray | None = None,
 ) -> FloatArray:
     """Readings of many fronts.
 
@@ -121,6 +134,8 @@ def simulate(
         Quantity (FRONT_VELOCITY or RUNOUT), s_from and s_to [m]; equal for a point.
     release_speeds : (n_runs,) array or float, m/s
         How fast each front is there; 0 for one that starts from rest.
+    shifts : (n_runs, n_sensors) array, m, optional
+        How much further down each sensor stands for each front.
 
     Returns
     -------
@@ -128,7 +143,7 @@ def simulate(
         0 for a front velocity where the front does not come.
 
     """
-    return _filled(strengths, releases, release_speeds, path, law, sensors)[0]
+    return _filled(strengths, releases, release_speeds, path, law, sensors, shifts)[0]
 
 
 def simulate_with_jacobian(
@@ -138,6 +153,7 @@ def simulate_with_jacobian(
     law: Contributions,
     sensors: FloatArray,
     release_speeds: FloatArray | float = 0.0,
+    shifts: FloatArray | None = None,
     *,
     by_speed: bool = False,
 ) -> tuple[FloatArray, FloatArray]:
@@ -152,7 +168,7 @@ def simulate_with_jacobian(
 
     """
     n_tangents = strengths.shape[1] + (2 if by_speed else 1)
-    return _filled(strengths, releases, release_speeds, path, law, sensors, n_tangents)[:2]
+    return _filled(strengths, releases, release_speeds, path, law, sensors, shifts, n_tangents)[:2]
 
 
 def front_speeds(
@@ -174,6 +190,7 @@ def _filled(
     path: Path,
     law: Contributions,
     sensors: FloatArray,
+    shifts: FloatArray | None = None,
     n_tangents: int = 0,
     n_edges: int = 0,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -185,5 +202,7 @@ def _filled(
     squares[:] = np.square(release_speeds)
     # In this order in memory: of any other the kernel would be compiled once more.
     runs = np.ascontiguousarray(strengths), np.ascontiguousarray(releases)
-    fill_readings(*runs, squares, path, law, np.ascontiguousarray(sensors), readings, jacobian, speeds)
+    moved = np.empty((0, 0)) if shifts is None else np.ascontiguousarray(shifts)
+    sensors = np.ascontiguousarray(sensors)
+    fill_readings(*runs, squares, path, law, sensors, moved, readings, jacobian, speeds)
     return readings, jacobian, speeds

@@ -152,6 +152,7 @@ def _check_direction(direction: Direction, setting: Setting) -> None:
         "profiles": (direction.profiles if n_columns else None, (n_columns, n_cells)),
         "log_strengths": (direction.log_strengths, (setting.n_events,)),
         "log_readings": (direction.log_readings, (len(setting.sensors),)),
+        "places": (direction.places, (len(setting.sensors),)),
     }
     for name, (values, expected) in arrays.items():
         if values is not None and (np.shape(values) != expected or not np.isfinite(values).all()):

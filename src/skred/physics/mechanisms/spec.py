@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -163,6 +163,8 @@ class Direction:
         Shift of all release places [m], downhill positive.
     log_readings : (n_sensors,) array or None
         Change of the logarithm of each sensor's readings.
+    places : (n_sensors,) array or None
+        How much further down than noted each sensor stands [m]; 0 for a runout.
     weakening_speed : float or None
         Its speed scale U_c [m/s] where it enters the column of weakening friction.
     own : (n_events,) array or None
@@ -174,8 +176,16 @@ class Direction:
     log_strengths: FloatArray | None = None
     release: float = 0.0
     log_readings: FloatArray | None = None
+    places: FloatArray | None = None
     weakening_speed: float | None = None
     own: FloatArray | None = None
+
+    def with_more_sensors(self, n: int) -> Direction:
+        """The same beside so many sensors more, after the others, that it leaves alone."""
+        padded = [
+            None if one is None else np.append(one, np.zeros(n)) for one in (self.log_readings, self.places)
+        ]
+        return replace(self, log_readings=padded[0], places=padded[1])
 
 
 @dataclass(frozen=True)

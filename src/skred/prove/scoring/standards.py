@@ -95,6 +95,7 @@ STRENGTHS = {
     "covariate_friction": ("log friction per standard deviation", "covariate_effect"),
     "sensor_bias": ("log factor", "log_sensor_factor"),
     "release_offset": ("offset", "release_offset"),
+    "sensor_place": ("shift", "sensor_shift"),
 }
 """The truth's word for a strength and the verdict's, where both mean the same quantity."""
 
