@@ -37,8 +37,8 @@ rest and mu at high speed.
 - **`covariate_friction`**: x is standardised over the campaign's avalanches (mean 0, sd 1), so beta is
   the logarithm of a factor on mu per standard deviation: 0.1 is 11 % more. Where the law has no mu it is
   a factor on b.
-- **`sensor_bias`**: a is the logarithm of a factor as well. **`release_offset`**: a positive r is
-  further down the track.
+- **`sensor_bias`**: a is the logarithm of a factor as well. **`release_offset`** and **`sensor_place`**: a
+  positive r or d_s is further down the track.
 
 | id | what it is | adds | coefficient |
 | --- | --- | --- | --- |

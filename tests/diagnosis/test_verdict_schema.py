@@ -28,7 +28,7 @@ KEYS = (
     "indistinguishable", "location", "strength", "covariate", "sensor", "equation", "evidence", "held_out",
     "detection_limits", "next_sensor", "diagnostics", "statement",
 )  # fmt: skip
-MORE = ("alarm_by", "converged", "refits_not_converged", "influence", "conditional")
+MORE = ("alarm_by", "converged", "refits_not_converged", "influence", "conditional", "sensor_places")
 """Keys that came later: they are written, and verdicts before them stay whole."""
 NULLABLE = {
     "evidence": ("elpd_diff", "elpd_se", "log_bayes_factor", "p_value"),

@@ -125,11 +125,11 @@ def test_what_a_sensor_would_read_elsewhere_is_told_where_something_is_claimed(
 ) -> None:
     """10 % otherwise 20 m off; 2 m off it is less than what errors of its readings leave open."""
     found = diagnosis(kind)
-    assert "taken as exact" not in verdict(found)["statement"]
+    assert "only its odds allow" not in verdict(found)["statement"]
     said, sensor = placed_about(found, 20.0), found.problem.campaign.sensor_ids[0]
     words = f"{sensor}, whose place is known to 20 m (sd), would read 10 % faster or slower so far up or down"
-    assert (words in said) is claimed and ("taken as exact" in said) is claimed
-    assert "taken as exact" not in placed_about(found, 2.0)
+    assert (words in said) is claimed and ("only its odds allow" in said) is claimed
+    assert "only its odds allow" not in placed_about(found, 2.0)
 
 
 def test_how_probably_what_is_named_begins_at_the_first_recording_is_told() -> None:

@@ -69,6 +69,8 @@ class Candidate:
         Log Bayes factor of a force not in the list beside it; None where not looked at.
     looked : tuple of Looked
         Where avalanches may differ in the strength; none where that was not looked at.
+    of_places : float
+        What stated errors of sensors' places change, less what they change for nothing, in nats.
     """
 
     mechanism: Mechanism
@@ -78,6 +80,7 @@ class Candidate:
     error: float | None = None
     residue: float | None = None
     looked: tuple[Looked, ...] = ()
+    of_places: float = 0.0
 
     @property
     def log_factors(self) -> FloatArray:
@@ -87,7 +90,7 @@ class Candidate:
     @property
     def alone(self) -> float:
         """Log Bayes factor against nothing, shapes and strength integrated over, no force beside it."""
-        return float(np.logaddexp.reduce(self.log_factors)) + self.correction
+        return float(np.logaddexp.reduce(self.log_factors)) + self.correction + self.of_places
 
     @property
     def log_bayes_factor(self) -> float:

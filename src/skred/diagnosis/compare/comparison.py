@@ -25,6 +25,7 @@ from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import candidates_of, refine, screened_parts
 from skred.diagnosis.compare.residue import with_residues
 from skred.diagnosis.compare.screening import Tell, screened
+from skred.diagnosis.compare.sensor_places import along_places, of_places, with_stated_places
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, alike, log_evidence_of, most_probable
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
@@ -55,12 +56,15 @@ class ComparisonUnderErrors:
     ----------
     profiles : list of Profile
         The force not in the list, of each kind; none under an error model that cannot count.
+    places : tuple of Curve
+        The shift of each sensor whose place has a stated error, beside nothing.
     """
 
     error_model: str
     base: Base
     candidates: dict[str, Candidate]
     profiles: list[Profile]
+    places: tuple[Curve, ...] = ()
 
     @property
     def log_factors(self) -> dict[str, float]:
@@ -160,7 +164,7 @@ def compare(base: Base, tell: Tell = lambda done, of: None) -> Comparison:
         under = _under_each({name: bases[name] for name in curves}, curves, height, pool)
     # The evidence of an error model that is left out counts for nothing and everything alike.
     listed = [candidate.mechanism for candidate in under[preferred].candidates.values()]
-    evidence = {name: heights[name] for name in under}
+    evidence = {name: heights[name] + of_places(one.places) for name, one in under.items()}
     return Comparison(tuple(under[name] for name in curves), prior_odds(listed), evidence)
 
 
@@ -226,13 +230,14 @@ def _under_each(
     first = max(top, key=lambda name: top[name])
     found = {first: _under_errors(first, bases[first], curves[first], pool)}
     leads = max(found[first].candidates.values(), key=lambda one: one.log_bayes_factor).best
-    reached = height[first] + max(found[first].log_factors.values())
+    reached = height[first] + of_places(found[first].places) + max(found[first].log_factors.values())
     for name in curves.keys() - found.keys():
         there = curve_near(bases[name], leads, leads.shape)  # places were screened coarsely
         behind = height[first] + _most([leads]) - max(top[name], height[name] + _most([there]))
         if behind > COUNTS:
             candidates = candidates_of(screened_parts(curves[name]))
-            found[name] = ComparisonUnderErrors(name, bases[name], candidates, [])
+            places = along_places(bases[name], pool)
+            found[name] = ComparisonUnderErrors(name, bases[name], candidates, [], places)
         else:
             found[name] = _under_errors(name, bases[name], curves[name], pool, reached - height[name])
     return found
@@ -261,7 +266,7 @@ def _under_errors(
     profiles = list(fitted)
     candidates = with_residues(base, candidates, profiles, pool, best)
     candidates, profiles = recomputed(base, candidates, profiles, pool, best)
-    return ComparisonUnderErrors(error_model, base, candidates, profiles)
+    return ComparisonUnderErrors(error_model, base, *with_stated_places(base, candidates, profiles, pool))
 
 
 def worth_comparing(curves: Sequence[Curve], behind: float) -> list[Curve]:

@@ -25,6 +25,7 @@ from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.linear_mixed_model import MeanPrior, Scores, efficient_scores, mean_prior
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds
 from skred.diagnosis.evidence.refit import MOST_NODES
+from skred.diagnosis.evidence.stated_places import stated_places
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import PlacedMechanism, can_join, placed, shapes_of
 from skred.physics.mechanisms.spec import Direction, Setting
@@ -71,7 +72,7 @@ class ScoreTest:
     Attributes
     ----------
     base : Base
-        The law. What is in it already has its share of everything else.
+        The law. What is in it already has its share of everything else; so have stated errors of places.
     """
 
     base: Base
@@ -99,14 +100,24 @@ class ScoreTest:
             if candidate.with_speed:
                 by_scale.setdefault(candidate.direction.weakening_speed, []).append(candidate.direction)
         parts += list(by_scale.values())
-        return [self.base.extended(*part) for part in parts]
+        places = [place.direction for place in self._places]
+        return [self.base.extended(*places, *part) for part in parts]
+
+    @cached_property
+    def _places(self) -> list[PlacedMechanism]:
+        return stated_places(self.base)
+
+    @property
+    def _n_in(self) -> int:
+        """Directions, the first of every part, that everything else leaves their share to."""
+        return len(self.base.directions) + len(self._places)
 
     @cached_property
     def order(self) -> IntArray:
         """Where each candidate's direction is, over all parts."""
         position: dict[int, int] = {}
         for part in self._parts:
-            for direction in part.directions[len(self.base.directions) :]:
+            for direction in part.directions[self._n_in :]:
                 position[id(direction)] = len(position)
         return np.array([position[id(candidate.direction)] for candidate in self.placed_mechanisms])
 
@@ -129,17 +140,18 @@ class ScoreTest:
 
     def scores_around(self, around: Modes, rows: Rows, population: Population) -> Scores:
         """The same from the tangents there."""
-        return efficient_scores(around, rows, population, self.prior, len(self.base.directions))
+        free = np.zeros(len(self.base.directions))
+        precision = np.append(free, [place.scale**-2.0 for place in self._places])
+        return efficient_scores(around, rows, population, self.prior, precision)
 
     def around(self, rows: Rows, points: FloatArray) -> Modes:
         """Tangents by all directions at the events' modes."""
         around: list[Modes] = []
-        n_in = len(self.base.directions)
         for part in self._parts:
             strengths = np.zeros(len(part.directions))
-            strengths[:n_in] = self.base.strengths
+            strengths[: len(self.base.directions)] = self.base.strengths
             around.append(look_around(EventLikelihood(part, rows, strengths), points))
-        changes = [part.by_strengths[:, :, 0 if k == 0 else n_in :] for k, part in enumerate(around)]
+        changes = [part.by_strengths[:, :, 0 if k == 0 else self._n_in :] for k, part in enumerate(around)]
         by_strengths = np.concatenate(changes, axis=2)
         return around[0]._replace(by_strengths=by_strengths)
 

@@ -189,6 +189,12 @@ def combined(setting: Setting, kind: Kind, at: FloatArray, values: FloatArray) -
     return entering(setting, kind, values @ spline_basis(setting.terrain, at))
 
 
+def with_mean(base: Base, profile: Profile) -> Base:
+    """The law with a profile's mean in, as one direction: quicker than a knot each."""
+    direction = combined(base.setting, profile.kind, profile.knots_m, profile.mean)
+    return base.with_in(direction, 1.0, profile.fit)
+
+
 def entering(setting: Setting, kind: Kind, profile: FloatArray) -> Direction:
     """A profile over the cells, (n_cells,), in the equation of motion."""
     if not kind.opposed:

@@ -80,6 +80,11 @@ class Base:
         """The base law without what was added before."""
         return replace(self, directions=(), strengths=np.empty(0))
 
+    def with_in(self, direction: Direction, strength: float, fit: Fit) -> Base:
+        """The law with one thing more in, fitted."""
+        strengths = np.append(self.strengths, strength)
+        return replace(self, directions=(*self.directions, direction), strengths=strengths, fit=fit)
+
     def extended(self, *more: Direction) -> Extension:
         """The law with what is in already, and with more."""
         return extended(self.problem, self.law, (*self.directions, *more))

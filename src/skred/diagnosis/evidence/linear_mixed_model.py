@@ -145,17 +145,26 @@ def _left(score: FloatArray, information: FloatArray, n_first: int) -> tuple[Flo
 
 
 def efficient_scores(
-    modes: Modes, rows: Rows, population: Population, prior: MeanPrior, n_in: int = 0
+    modes: Modes,
+    rows: Rows,
+    population: Population,
+    prior: MeanPrior,
+    precision_in: FloatArray | None = None,
 ) -> Scores:
     """Efficient scores and information of the directions of the modes.
 
     Parameters
     ----------
-    n_in : int
-        Directions, the first, that are in already and free: they have their share too.
+    precision_in : (n_in,) array, optional
+        Of the first directions, which are in already and have their share too: the precisions of their normal
+        priors about where they are, 0 where they are free.
     """
+    n, precision_in = population.mean.shape[1], np.zeros(0) if precision_in is None else precision_in
+    n_in = len(precision_in)
     of_all, added = _normal_equations(modes, rows, population, prior), modes.by_strengths[:, :, n_in:]
-    score, information = _left(of_all.score, of_all.information, population.mean.shape[1] + n_in)
+    own = np.arange(n, n + n_in)
+    of_all.information[:, own, own] += precision_in
+    score, information = _left(of_all.score, of_all.information, n + n_in)
     raw = _by_group(rows, np.einsum("rij,rij->rj", added, modes.weighed(added)))
     return Scores(score, information, raw)
 

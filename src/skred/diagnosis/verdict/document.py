@@ -24,6 +24,7 @@ from skred.diagnosis.verdict.mechanisms import (
     work_documents,
 )
 from skred.diagnosis.verdict.next_sensor import detection_sensor, next_sensor
+from skred.diagnosis.verdict.stated_places import places_document
 from skred.diagnosis.verdict.statement import statement
 from skred.diagnosis.words import prior_note
 from skred.inference.calibrate import Calibration
@@ -172,7 +173,7 @@ def _more(found: Outcome) -> dict[str, Any]:
         "seconds": found.seconds,
     }
     if isinstance(found, NotDiagnosed):
-        return more | {"alarm_by": None, "influence": None, "conditional": None}
+        return more | {"alarm_by": None, "influence": None, "conditional": None, "sensor_places": []}
     more |= {
         "alarm": found.alarm_by is not None,
         "alarm_by": found.alarm_by,
@@ -182,6 +183,7 @@ def _more(found: Outcome) -> dict[str, Any]:
         "candidates": candidate_documents(found, found.comparison),
         "influence": _influence(found.influence),
         "conditional": conditional_document(found),
+        "sensor_places": places_document(found),
         **_with_what_was_added(found),
         "identifiability": [row.as_dict() for row in found.table.rows],
         "power": found.table.power,

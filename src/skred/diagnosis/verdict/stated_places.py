@@ -1,13 +1,16 @@
-"""What stated errors of sensors' places may do to an answer: every model takes places as exact."""
+"""What stated errors of sensors' places may do to an answer beyond its odds, which allow for them."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
+from skred.diagnosis.evidence.prior_odds import NOTHING
+from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.diagnosis.outcome import Diagnosis
-from skred.diagnosis.words import percent
+from skred.diagnosis.words import percent, plus_minus
 
 
 def place_as_stated(found: Diagnosis) -> str:
@@ -28,9 +31,39 @@ def place_as_stated(found: Diagnosis) -> str:
     sensor = problem.campaign.sensors[most]
     how = f"{percent(share)} faster or slower" if share < 1.0 else "something else"
     return (
-        f"places of sensors are taken as exact, and {sensor.id}, whose place is known to"
+        f"only its odds allow for stated errors of sensors' places: {sensor.id}, whose place is known to"
         f" {sensor.place_sd_m:g} m (sd), would read {how} so far up or down"
     )
+
+
+def moved_as_stated(found: Diagnosis) -> str:
+    """Sensors that recordings have elsewhere, as their stated errors allow, where nothing is claimed."""
+    if found.decision.verdict not in ("nothing_missing", "cannot_tell"):
+        return ""
+    elsewhere = [one for one in places_document(found) if one["log_bayes_factor"] > COUNTS]
+    return " ".join(
+        f"As its stated error allows, {one['sensor']} probably stands"
+        f" {plus_minus(abs(one['mean']), one['sd'], 'm')} further {_way(one['mean'])} than noted (log Bayes"
+        f" factor {one['log_bayes_factor']:.1f} nats)."
+        for one in elsewhere
+    )
+
+
+def _way(shift: float) -> str:
+    return "down" if shift > 0.0 else "up"
+
+
+def places_document(found: Diagnosis) -> list[dict[str, Any]]:
+    """The shift of each sensor whose place has a stated error, with nothing added, as plain data."""
+    return [
+        {
+            "sensor": one.shape.sensor,
+            **dict(zip(("mean", "sd"), one.moments, strict=True)),
+            "unit": one.mechanism.strength.unit,
+            "log_bayes_factor": one.log_bayes_factor,
+        }
+        for one in found.comparison.leading(NOTHING).places
+    ]
 
 
 def _shift(found: Diagnosis, j: int) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.between import between_sentence
 from skred.diagnosis.verdict.hangs_on import carried, hangs_on
 from skred.diagnosis.verdict.improvement import improvement
-from skred.diagnosis.verdict.stated_places import place_as_stated
+from skred.diagnosis.verdict.stated_places import moved_as_stated, place_as_stated
 from skred.diagnosis.words import TOLD_FROM, percent, plus_minus
 from skred.inference.influence_words import enumerated
 from skred.physics.mechanisms import mechanisms
@@ -35,7 +35,8 @@ def statement(found: Outcome, document: dict[str, Any]) -> str:
         "nothing_missing": _nothing,
         "cannot_tell": _cannot,
     }[found.decision.verdict](found, document)
-    return " ".join(part for part in (_caution(found), *parts, *hangs_on(found.influence)) if part)
+    parts = [_caution(found), *parts, moved_as_stated(found), *hangs_on(found.influence)]
+    return " ".join(part for part in parts if part)
 
 
 def _caution(found: Diagnosis) -> str:

@@ -11,13 +11,8 @@ from skred.physics.mechanisms.spec import (
     Setting,
     Shape,
     Strength,
+    each_velocity,
 )
-
-
-def _shapes(setting: Setting) -> tuple[Shape, ...]:
-    """One velocity sensor each; with a single one its factor is no fault but a change of all speeds."""
-    velocities = [name for name, is_one in zip(setting.sensors, setting.velocities, strict=True) if is_one]
-    return tuple(Shape(sensor=name) for name in velocities) if len(velocities) > 1 else ()
 
 
 def _direction(setting: Setting, shape: Shape) -> Direction:
@@ -32,7 +27,7 @@ MECHANISM = Mechanism(
         symbol="a",
         unit="1",
         prior_scale=0.15,
-        prior_reason="a calibration or a place that is off by 15 % of the reading",
+        prior_reason="a calibration that is off by 15 % of the reading",
     ),
     equation="reading = exp(a) times the front's speed, at one sensor",
     signature="equal and opposite work in the two stretches beside the sensor",
@@ -40,9 +35,9 @@ MECHANISM = Mechanism(
     doi="10.1002/kin.20906",
     added=Added(
         scale=0.15,
-        reason="a calibration or a place that is off by 15 % of the reading",
+        reason="a calibration that is off by 15 % of the reading",
         direction=_direction,
-        shapes=_shapes,
+        shapes=each_velocity,
         bound_to=BoundTo.SENSOR,
         either_sign=True,
     ),

@@ -11,15 +11,10 @@ from skred.physics.mechanisms.spec import (
     Setting,
     Shape,
     Strength,
+    each_velocity,
 )
 
 _REASON = "places are read from maps and plans to a few tens of metres"
-
-
-def _shapes(setting: Setting) -> tuple[Shape, ...]:
-    """One velocity sensor each: a runout is a place itself."""
-    named = zip(setting.sensors, setting.velocities, strict=True)
-    return tuple(Shape(sensor=name) for name, is_velocity in named if is_velocity)
 
 
 def _direction(setting: Setting, shape: Shape) -> Direction:
@@ -38,7 +33,7 @@ MECHANISM = Mechanism(
         scale=30.0,
         reason=_REASON,
         direction=_direction,
-        shapes=_shapes,
+        shapes=each_velocity,
         bound_to=BoundTo.SENSOR,
         either_sign=True,
     ),

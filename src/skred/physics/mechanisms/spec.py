@@ -312,6 +312,13 @@ def one_shape(setting: Setting) -> tuple[Shape, ...]:
     return (Shape(),)
 
 
+def each_velocity(setting: Setting) -> tuple[Shape, ...]:
+    """Shapes of a fault of one velocity sensor; of a single one it is no fault but a change of all speeds."""
+    named = zip(setting.sensors, setting.velocities, strict=True)
+    velocities = [name for name, is_velocity in named if is_velocity]
+    return tuple(Shape(sensor=name) for name in velocities) if len(velocities) > 1 else ()
+
+
 def whole_or_recorded(setting: Setting) -> tuple[Shape, ...]:
     """Shapes of a mechanism that acts along the whole track, or from the first recording on.
 

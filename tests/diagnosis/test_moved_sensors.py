@@ -1,0 +1,155 @@
+"""A sensor elsewhere: as in a campaign that notes it there; found, or allowed for by its stated error."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from skred.campaign import Campaign, Status
+from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.sensor_places import along_places, of_places, with_stated_places
+from skred.diagnosis.detect.score_test import ScoreTest
+from skred.diagnosis.evidence.coefficient import Base, curve_at
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
+from skred.diagnosis.evidence.event_quadrature import USUAL
+from skred.diagnosis.evidence.extension import extended
+from skred.diagnosis.evidence.moved_sensors import StopBounds
+from skred.inference.hierarchical.problem import hierarchical_problem
+from skred.physics.laws import load_law
+from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.placed import placed
+from skred.physics.mechanisms.spec import Shape
+from tests.diagnosis.diagnosis_cases import base_of, trial
+
+PLACE = mechanisms()["sensor_place"]
+HIDDEN = "v02"
+
+
+@pytest.fixture(scope="module")
+def base() -> Base:
+    """Mean speeds over spans, the second of them 41 m further up than noted; some fronts stop between two."""
+    return base_of(trial(9103, "sparse", "sensor_place", "coulomb", 10.0).campaign, "coulomb")
+
+
+def elsewhere(campaign: Campaign, sensor: str, by_m: float) -> Campaign:
+    """A campaign that notes one sensor so much further down."""
+    moved = [
+        replace(one, s_from_m=one.s_from_m + by_m, s_to_m=one.s_to_m + by_m) if one.id == sensor else one
+        for one in campaign.sensors
+    ]
+    return replace(campaign, sensors=tuple(moved))
+
+
+@pytest.mark.parametrize(("sensor", "by_m"), [("v02", -30.0), ("v02", 35.0), ("v03", -25.0), ("v01", 40.0)])
+def test_likelihoods_are_those_of_a_campaign_that_notes_it_there(
+    base: Base, sensor: str, by_m: float
+) -> None:
+    """Exactly where one sensor alone tells of a stop; about as well where a front stopped between two."""
+    campaign = base.problem.campaign
+    points = base.fit.points + 0.05 * np.random.default_rng(3).standard_normal(base.fit.points.shape)
+    direction = placed(PLACE, base.setting, Shape(sensor=sensor)).direction
+    moved = EventLikelihood(base.extended(direction), base.rows, np.array([by_m]))
+    problem = hierarchical_problem(elsewhere(campaign, sensor, by_m))
+    there = extended(replace(problem, error_model=base.problem.error_model), load_law("coulomb"))
+    noted = EventLikelihood(there, campaign_rows(there), np.zeros(0))
+    readings = moved.predict(points), noted.predict(points)
+    np.testing.assert_allclose(readings[0][:, :-1], readings[1][:, :-1], rtol=1e-9)
+    stops = np.abs(readings[0][:, -1] - readings[1][:, -1])
+    assert stops.max() > 1.0 or sensor == "v01"  # no front is known to have stopped by the uppermost one
+    unmoved = EventLikelihood(base.extended(), base.rows, np.zeros(0)).at(points) - noted.at(points)
+    errors = moved.at(points) - noted.at(points)
+    both = (campaign.status == Status.NOT_REACHED).any(axis=1)
+    np.testing.assert_allclose(errors[~both], 0.0, atol=1e-5)
+    assert np.abs(errors[both]).max() < 0.5 and np.median(np.abs(errors[both])) < 0.05
+    assert np.abs(unmoved).max() > 1.0
+
+
+def test_a_stop_is_as_far_from_the_noted_place_as_from_the_sensor() -> None:
+    came, stayed = np.array([[True, False], [True, False]]), np.array([[False, True], [False, False]])
+    bounds = StopBounds(np.array([100.0, 200.0]), came, stayed)
+    stops, shifts = np.array([90.0, 125.0, 260.0]), np.tile([-10.0, 20.0], (3, 1))
+    seen, slope = bounds.as_noted(stops, np.zeros(3, dtype=int), shifts)
+    np.testing.assert_allclose(seen, [100.0, 100.0 + 35.0 * 100.0 / 130.0, 240.0])
+    np.testing.assert_allclose(slope, [1.0, 100.0 / 130.0, 1.0])
+    seen, slope = bounds.as_noted(stops, np.ones(3, dtype=int), shifts)
+    np.testing.assert_allclose(seen, stops + 10.0, atol=1e-3)
+    np.testing.assert_allclose(slope, 1.0, atol=1e-4)
+
+
+def test_another_sensor_may_tell_of_the_stop_once_one_is_moved() -> None:
+    bounds = StopBounds(np.array([100.0, 120.0]), np.array([[True, True]]), np.array([[False, False]]))
+    lowest, _ = bounds.between(np.zeros(2, dtype=int), np.array([[0.0, -50.0], [90.0, 0.0]]))
+    assert lowest.tolist() == [100.0, 190.0]
+
+
+def test_it_is_found_where_it_is(base: Base) -> None:
+    """Closer to the truth than a factor of its readings comes, and than a shift of any other sensor."""
+    assert (base.problem.campaign.status == Status.NOT_REACHED).any()
+    strengths = np.array([-60.0, -50.0, -40.0, -30.0, -20.0, -10.0, 10.0])
+    curves = {
+        name: curve_at(base, placed(PLACE, base.setting, Shape(sensor=name)), strengths)
+        for name in ("v01", "v02", "v03")
+    }
+    bias = placed(mechanisms()["sensor_bias"], base.setting, Shape(sensor=HIDDEN))
+    factor = curve_at(base, bias, np.array([0.05, 0.1, 0.13, 0.16, 0.19, 0.22]))
+    mean, sd = curves[HIDDEN].moments
+    assert abs(mean + 40.6) < 2.0 * sd and sd < 8.0
+    others = [factor.log_bayes_factor, *(curves[name].log_bayes_factor for name in ("v01", "v03"))]
+    assert curves[HIDDEN].log_bayes_factor > max(others) + 1.0
+
+
+def stated(base: Base, sd_m: float, sensor: str = HIDDEN) -> Base:
+    """The base on the same recordings, the place of one sensor known to so many metres."""
+    campaign = base.problem.campaign
+    sensors = tuple(replace(one, place_sd_m=sd_m) if one.id == sensor else one for one in campaign.sensors)
+    problem = replace(base.problem, campaign=replace(campaign, sensors=sensors))
+    return replace(base, problem=problem)
+
+
+def test_stated_places_are_integrated_over_as_by_campaigns_that_note_them_elsewhere(base: Base) -> None:
+    """By the trapezium rule over refits of such campaigns, which know nothing of moved sensors."""
+    sd, step = 25.0, 5.0
+    shifts = np.arange(-70.0, -9.0, step)
+    heights = [
+        base_of(elsewhere(base.problem.campaign, HIDDEN, shift), "coulomb").fit.found.log_evidence
+        for shift in shifts
+    ]
+    expected = np.logaddexp.reduce(np.array(heights) + norm.logpdf(shifts, scale=sd) + np.log(step))
+    expected -= base.with_nothing(USUAL).found.log_evidence
+    with ThreadPoolExecutor(1) as pool:
+        places = along_places(stated(base, sd), pool)
+        assert along_places(base, pool) == ()
+    assert expected > 30.0 and of_places(places) == pytest.approx(expected, abs=1.0)
+
+
+def test_a_shift_that_stated_places_allow_for_is_no_finding(base: Base) -> None:
+    strengths = np.array([-60.0, -50.0, -40.0, -30.0, -20.0, -10.0, 10.0])
+    found = curve_at(base, placed(PLACE, base.setting, Shape(sensor=HIDDEN)), strengths)
+    candidates = {PLACE.id: Candidate(PLACE, (found,), np.zeros(1))}
+    assert candidates[PLACE.id].log_bayes_factor > 40.0
+    with ThreadPoolExecutor(1) as pool:
+        changed, _, of_nothing = with_stated_places(stated(base, 40.0), candidates, [], pool)
+        little, _, of_less = with_stated_places(stated(base, 4.0), candidates, [], pool)
+        same, _, none = with_stated_places(base, candidates, [], pool)
+    nothing, less = of_places(of_nothing), of_places(of_less)
+    assert nothing > 40.0 and changed[PLACE.id].log_bayes_factor < 1.0
+    assert 0.0 < less < nothing - 10.0 and little[PLACE.id].log_bayes_factor > 20.0
+    assert none == () and same[PLACE.id].log_bayes_factor == candidates[PLACE.id].log_bayes_factor
+
+
+def test_what_recordings_can_tell_is_less_where_places_are_uncertain(base: Base) -> None:
+    """Of the shift itself by the closed form of two normal errors, of nothing more than before."""
+    of, kept = ScoreTest(base).placed_mechanisms, list[np.ndarray]()
+    for one in (base, stated(base, 20.0), stated(base, 1e-3)):
+        test = ScoreTest(one)
+        scores = test.scores(base.rows, base.fit.points, base.population)
+        kept.append(test.of_candidates(scores)[1][0])
+    exact, uncertain, nearly = kept
+    np.testing.assert_allclose(nearly, exact, rtol=1e-4)
+    [own] = [k for k, one in enumerate(of) if one.mechanism is PLACE and one.shape.sensor == HIDDEN]
+    assert uncertain[own] == pytest.approx(1.0 / (1.0 / exact[own] + 20.0**2))
+    assert np.all(uncertain <= exact * (1.0 + 1e-9)) and np.median(uncertain / exact) < 1.0
