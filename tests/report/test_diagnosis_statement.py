@@ -132,6 +132,34 @@ def test_what_a_sensor_would_read_elsewhere_is_told_where_something_is_claimed(
     assert "only its odds allow" not in placed_about(found, 2.0)
 
 
+def test_which_way_a_sensor_stands_elsewhere_is_told() -> None:
+    found = diagnosis("sensor_place")
+    candidate, sensors = found.steps[0].candidate, found.problem.campaign.sensor_ids
+    places = np.array([float(name == candidate.best.shape.sensor) for name in sensors])
+    curves = tuple(replace(one, direction=Direction(places=places)) for one in candidate.curves)
+    step = replace(found.steps[0], candidate=replace(candidate, curves=curves))
+    assert "m: it stands further down than noted" in verdict(with_finding(found, steps=(step,)))["statement"]
+
+
+def test_a_sensor_that_stands_elsewhere_as_its_stated_error_allows_is_told() -> None:
+    """With where it stands, where nothing is claimed; one that may as well stand as noted is not."""
+    found, strong = diagnosis("nothing"), diagnosis("sensor_place")
+    assert verdict(found)["sensor_places"] == [] and "stated error" not in verdict(found)["statement"]
+    under, *rest = found.comparison.under_each
+    curves = [one.comparison.under_each[0].candidates["sensor_place"].best for one in (strong, found)]
+    moved = replace(found.comparison, under_each=(replace(under, places=tuple(curves)), *rest))
+    document = verdict(replace(found, comparison=moved))
+    (mean, sd), _ = (one.moments for one in curves)
+    first, second = document["sensor_places"]
+    assert (first["mean"], first["sd"], first["sensor"]) == (mean, sd, curves[0].shape.sensor)
+    assert first["log_bayes_factor"] > 6.0 > second["log_bayes_factor"]
+    said = f"{first['sensor']} probably stands {mean:.1f} ± {sd:.1f} m further down than noted"
+    assert said in document["statement"] and document["statement"].count("stated error") == 1
+    claimed = replace(strong.comparison.under_each[0], places=tuple(curves))
+    other = replace(strong.comparison, under_each=(claimed, *strong.comparison.under_each[1:]))
+    assert "probably stands" not in verdict(replace(strong, comparison=other))["statement"]
+
+
 def test_how_probably_what_is_named_begins_at_the_first_recording_is_told() -> None:
     found = diagnosis("tie")
     (step,) = found.steps
