@@ -27,7 +27,6 @@ from skred.diagnosis.discrepancy.profile import (
     Profile,
     alike,
     combined,
-    knot_by_knot,
     knots,
     log_evidence_of,
     priors_of,
@@ -267,7 +266,7 @@ def score_of_nothing(base: Base, kind: Kind) -> FloatArray:
 def by_knots_of(base: Base, kind: Kind, values: FloatArray) -> EventLikelihood:
     """Likelihoods with the value at each knot as a strength, beside what the base has."""
     strengths = np.append(base.strengths, values)
-    return EventLikelihood(knot_by_knot(base, kind, knots(base.setting)), base.rows, strengths)
+    return EventLikelihood(base.extended(*kind.each(base.setting)), base.rows, strengths)
 
 
 def test_the_score_of_no_force_is_that_of_the_evidence() -> None:

@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 from skred.campaign import Campaign, Status
 from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.compare.sensor_places import along_places, of_places, with_stated_places
+from skred.diagnosis.compare.sensor_places import shifts_beside, with_stated_places
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.coefficient import Base, curve_at
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
@@ -113,17 +113,30 @@ def stated(base: Base, sd_m: float, sensor: str = HIDDEN) -> Base:
 def test_stated_places_are_integrated_over_as_by_campaigns_that_note_them_elsewhere(base: Base) -> None:
     """By the trapezium rule over refits of such campaigns, which know nothing of moved sensors."""
     sd, step = 25.0, 5.0
-    shifts = np.arange(-70.0, -9.0, step)
+    shifts_m = np.arange(-70.0, -9.0, step)
     heights = [
         base_of(elsewhere(base.problem.campaign, HIDDEN, shift), "coulomb").fit.found.log_evidence
-        for shift in shifts
+        for shift in shifts_m
     ]
-    expected = np.logaddexp.reduce(np.array(heights) + norm.logpdf(shifts, scale=sd) + np.log(step))
+    expected = np.logaddexp.reduce(np.array(heights) + norm.logpdf(shifts_m, scale=sd) + np.log(step))
     expected -= base.with_nothing(USUAL).found.log_evidence
-    with ThreadPoolExecutor(1) as pool:
-        places = along_places(stated(base, sd), pool)
-        assert along_places(base, pool) == ()
-    assert expected > 30.0 and of_places(places) == pytest.approx(expected, abs=1.0)
+    shifts = shifts_beside(stated(base, sd))
+    assert not shifts_beside(base).places.errors
+    assert expected > 30.0 and shifts.log_factor == pytest.approx(expected, abs=1.0)
+    weights = np.exp(np.array(heights) - max(heights) + norm.logpdf(shifts_m, scale=sd))
+    mean = np.average(shifts_m, weights=weights)
+    spread = np.sqrt(np.average((shifts_m - mean) ** 2, weights=weights))
+    assert shifts.mean == pytest.approx([mean], abs=0.3 * spread)
+    assert shifts.sd == pytest.approx([spread], rel=0.2)
+
+
+def test_of_several_sensors_the_one_that_is_off_is_found(base: Base) -> None:
+    everywhere = base
+    for name in ("v01", "v02", "v03"):
+        everywhere = stated(everywhere, 40.0, name)
+    alone, together = shifts_beside(stated(base, 40.0)), shifts_beside(everywhere)
+    assert together.log_factor == pytest.approx(alone.log_factor, abs=6.0)  # two more take a little
+    assert np.all(np.abs(together.mean - [0.0, -40.6, 0.0]) < 2.0 * together.sd)
 
 
 def test_a_shift_that_stated_places_allow_for_is_no_finding(base: Base) -> None:
@@ -135,10 +148,10 @@ def test_a_shift_that_stated_places_allow_for_is_no_finding(base: Base) -> None:
         changed, _, of_nothing = with_stated_places(stated(base, 40.0), candidates, [], pool)
         little, _, of_less = with_stated_places(stated(base, 4.0), candidates, [], pool)
         same, _, none = with_stated_places(base, candidates, [], pool)
-    nothing, less = of_places(of_nothing), of_places(of_less)
+    nothing, less = of_nothing.log_factor, of_less.log_factor
     assert nothing > 40.0 and changed[PLACE.id].log_bayes_factor < 1.0
     assert 0.0 < less < nothing - 10.0 and little[PLACE.id].log_bayes_factor > 20.0
-    assert none == () and same[PLACE.id].log_bayes_factor == candidates[PLACE.id].log_bayes_factor
+    assert none.log_factor == 0.0 and same[PLACE.id].log_bayes_factor == candidates[PLACE.id].log_bayes_factor
 
 
 def test_what_recordings_can_tell_is_less_where_places_are_uncertain(base: Base) -> None:

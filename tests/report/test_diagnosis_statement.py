@@ -16,9 +16,11 @@ from skred.diagnosis.augment.step import Left
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import Decision
 from skred.diagnosis.compare.candidate import FORM, Candidate
+from skred.diagnosis.compare.sensor_places import Shifts
 from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.evidence.refit import Fit
+from skred.diagnosis.evidence.stated_places import StatedPlaces
 from skred.diagnosis.influence.influence import ReadingsLeftOut
 from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.verdict.document import verdict
@@ -141,23 +143,25 @@ def test_which_way_a_sensor_stands_elsewhere_is_told() -> None:
     assert "m: it stands further down than noted" in verdict(with_finding(found, steps=(step,)))["statement"]
 
 
-def test_a_sensor_that_stands_elsewhere_as_its_stated_error_allows_is_told() -> None:
-    """With where it stands, where nothing is claimed; one that may as well stand as noted is not."""
-    found, strong = diagnosis("nothing"), diagnosis("sensor_place")
-    assert verdict(found)["sensor_places"] == [] and "stated error" not in verdict(found)["statement"]
-    under, *rest = found.comparison.under_each
-    curves = [one.comparison.under_each[0].candidates["sensor_place"].best for one in (strong, found)]
-    moved = replace(found.comparison, under_each=(replace(under, places=tuple(curves)), *rest))
-    document = verdict(replace(found, comparison=moved))
-    (mean, sd), _ = (one.moments for one in curves)
-    first, second = document["sensor_places"]
-    assert (first["mean"], first["sd"], first["sensor"]) == (mean, sd, curves[0].shape.sensor)
-    assert first["log_bayes_factor"] > 6.0 > second["log_bayes_factor"]
-    said = f"{first['sensor']} probably stands {mean:.1f} ± {sd:.1f} m further down than noted"
-    assert said in document["statement"] and document["statement"].count("stated error") == 1
-    claimed = replace(strong.comparison.under_each[0], places=tuple(curves))
-    other = replace(strong.comparison, under_each=(claimed, *strong.comparison.under_each[1:]))
-    assert "probably stands" not in verdict(replace(strong, comparison=other))["statement"]
+def test_sensors_that_stand_elsewhere_as_their_stated_errors_allow_are_told() -> None:
+    """With where they stand, where nothing is claimed; none that may as well stand as noted."""
+    found, claimed = diagnosis("nothing"), diagnosis("sensor")
+    assert verdict(found)["sensor_places"] is None and "Stated errors" not in verdict(found)["statement"]
+    places = StatedPlaces((("LC", 40.0), ("CD", 20.0)))
+
+    def about(one: Diagnosis, log_factor: float) -> dict[str, object]:
+        shifts = Shifts(places, np.array([-31.0, 3.0]), np.array([9.5, 12.0]), log_factor)
+        under, *rest = one.comparison.under_each
+        comparison = replace(one.comparison, under_each=(replace(under, shifts=shifts), *rest))
+        return verdict(replace(one, comparison=comparison))
+
+    document = about(found, 14.2)
+    assert "LC probably stands 31.0 ± 9.5 m further up than noted (log" in document["statement"]
+    assert "CD probably" not in document["statement"] and "14.2 nats" in document["statement"]
+    assert document["sensor_places"]["log_bayes_factor"] == 14.2
+    assert [one["sensor"] for one in document["sensor_places"]["sensors"]] == ["LC", "CD"]
+    for little in (about(found, 2.0), about(claimed, 14.2)):
+        assert "probably stands" not in little["statement"] and little["sensor_places"] is not None
 
 
 def test_how_probably_what_is_named_begins_at_the_first_recording_is_told() -> None:

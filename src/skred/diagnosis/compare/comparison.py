@@ -25,7 +25,7 @@ from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import candidates_of, refine, screened_parts
 from skred.diagnosis.compare.residue import with_residues
 from skred.diagnosis.compare.screening import Tell, screened
-from skred.diagnosis.compare.sensor_places import along_places, of_places, with_stated_places
+from skred.diagnosis.compare.sensor_places import Shifts, shifts_beside, with_stated_places
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, alike, log_evidence_of, most_probable
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
@@ -56,15 +56,15 @@ class ComparisonUnderErrors:
     ----------
     profiles : list of Profile
         The force not in the list, of each kind; none under an error model that cannot count.
-    places : tuple of Curve
-        The shift of each sensor whose place has a stated error, beside nothing.
+    shifts : Shifts, optional
+        Of the sensors whose places have stated errors, beside nothing.
     """
 
     error_model: str
     base: Base
     candidates: dict[str, Candidate]
     profiles: list[Profile]
-    places: tuple[Curve, ...] = ()
+    shifts: Shifts | None = None
 
     @property
     def log_factors(self) -> dict[str, float]:
@@ -81,6 +81,11 @@ class ComparisonUnderErrors:
         """Standard error of each id's log Bayes factor, in nats; None where it was not sampled."""
         found = {name: one.error for name, one in self.candidates.items()}
         return found | ({UNLISTED: most_probable(self.profiles).error} if self.profiles else {})
+
+    @property
+    def of_places(self) -> float:
+        """What stated errors of sensors' places change in the log evidence of nothing, in nats."""
+        return 0.0 if self.shifts is None else self.shifts.log_factor
 
     def _factors(self, found: dict[str, float]) -> dict[str, float]:
         return found | ({UNLISTED: log_evidence_of(self.profiles)} if self.profiles else {}) | {NOTHING: 0.0}
@@ -164,7 +169,7 @@ def compare(base: Base, tell: Tell = lambda done, of: None) -> Comparison:
         under = _under_each({name: bases[name] for name in curves}, curves, height, pool)
     # The evidence of an error model that is left out counts for nothing and everything alike.
     listed = [candidate.mechanism for candidate in under[preferred].candidates.values()]
-    evidence = {name: heights[name] + of_places(one.places) for name, one in under.items()}
+    evidence = {name: heights[name] + one.of_places for name, one in under.items()}
     return Comparison(tuple(under[name] for name in curves), prior_odds(listed), evidence)
 
 
@@ -230,14 +235,14 @@ def _under_each(
     first = max(top, key=lambda name: top[name])
     found = {first: _under_errors(first, bases[first], curves[first], pool)}
     leads = max(found[first].candidates.values(), key=lambda one: one.log_bayes_factor).best
-    reached = height[first] + of_places(found[first].places) + max(found[first].log_factors.values())
+    reached = height[first] + found[first].of_places + max(found[first].log_factors.values())
     for name in curves.keys() - found.keys():
         there = curve_near(bases[name], leads, leads.shape)  # places were screened coarsely
         behind = height[first] + _most([leads]) - max(top[name], height[name] + _most([there]))
         if behind > COUNTS:
             candidates = candidates_of(screened_parts(curves[name]))
-            places = along_places(bases[name], pool)
-            found[name] = ComparisonUnderErrors(name, bases[name], candidates, [], places)
+            shifts = shifts_beside(bases[name])
+            found[name] = ComparisonUnderErrors(name, bases[name], candidates, [], shifts)
         else:
             found[name] = _under_errors(name, bases[name], curves[name], pool, reached - height[name])
     return found

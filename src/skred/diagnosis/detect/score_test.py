@@ -25,7 +25,7 @@ from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.linear_mixed_model import MeanPrior, Scores, efficient_scores, mean_prior
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED, prior_odds
 from skred.diagnosis.evidence.refit import MOST_NODES
-from skred.diagnosis.evidence.stated_places import stated_places
+from skred.diagnosis.evidence.stated_places import StatedPlaces, stated_places
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import PlacedMechanism, can_join, placed, shapes_of
 from skred.physics.mechanisms.spec import Direction, Setting
@@ -100,17 +100,17 @@ class ScoreTest:
             if candidate.with_speed:
                 by_scale.setdefault(candidate.direction.weakening_speed, []).append(candidate.direction)
         parts += list(by_scale.values())
-        places = [place.direction for place in self._places]
+        places = self._places.each(setting)
         return [self.base.extended(*places, *part) for part in parts]
 
     @cached_property
-    def _places(self) -> list[PlacedMechanism]:
-        return stated_places(self.base)
+    def _places(self) -> StatedPlaces:
+        return stated_places(self.base.problem)
 
     @property
     def _n_in(self) -> int:
         """Directions, the first of every part, that everything else leaves their share to."""
-        return len(self.base.directions) + len(self._places)
+        return len(self.base.directions) + len(self._places.errors)
 
     @cached_property
     def order(self) -> IntArray:
@@ -141,7 +141,7 @@ class ScoreTest:
     def scores_around(self, around: Modes, rows: Rows, population: Population) -> Scores:
         """The same from the tangents there."""
         free = np.zeros(len(self.base.directions))
-        precision = np.append(free, [place.scale**-2.0 for place in self._places])
+        precision = np.append(free, self._places.sd**-2.0)
         return efficient_scores(around, rows, population, self.prior, precision)
 
     def around(self, rows: Rows, points: FloatArray) -> Modes:

@@ -1,6 +1,6 @@
-"""Climbs to the maximum of the posterior of a force that is not in the list, under one prior.
+"""Climbs to the maximum of the posterior of many values together, as of a force that is not in the list.
 
-By Gauss-Newton steps. Score and information of the knots' values at the events' modes are efficient ones,
+By Gauss-Newton steps under one prior. Score and information of the values at the events' modes are efficient,
 with what events and population take of them taken out. Where fronts may have stopped or gone on, the evidence
 can rise another way. Its own score is by quadrature: it costs more, and is noisy where fronts are about to
 stop.
@@ -11,12 +11,12 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
 from skred.arrays import FloatArray
 from skred.diagnosis.discrepancy.explored import Expansion, prior_penalty
-from skred.diagnosis.discrepancy.profile import Kind, combined, knot_by_knot, knots
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, look_around
 from skred.diagnosis.evidence.expected_score import expected_score
@@ -24,31 +24,46 @@ from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.linear_mixed_model import efficient_scores, mean_prior
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
 from skred.diagnosis.evidence.tolerance import ARRIVED, MOST_ROUNDS, STEP_SHARES
+from skred.physics.mechanisms.spec import Direction, Setting
+
+
+class Values(Protocol):
+    """Values that are fitted together beside a law: what they are the strengths of."""
+
+    def each(self, setting: Setting) -> list[Direction]:
+        """A direction for each value."""
+
+    def together(self, setting: Setting, values: FloatArray) -> tuple[list[Direction], FloatArray]:
+        """All values in as few directions as may be, with their strengths."""
 
 
 def expanded_at(
-    base: Base, kind: Kind, values: FloatArray, start: tuple[Population, FloatArray]
+    base: Base, kind: Values, values: FloatArray, start: tuple[Population, FloatArray]
 ) -> Expansion:
-    """The log likelihood around some values of a profile, population and events refitted with them in.
+    """The log likelihood around some values, population and events refitted with them in.
 
     Parameters
     ----------
-    values : (n_free + n_knots,) array
-        Strengths of the base's last directions, if some are free too, then the profile in the kind's unit.
+    kind : Values
+        Such as a kind of profile, with a value at each knot.
+    values : (n_free + n_values,) array
+        Strengths of the base's last directions, if some are free too, then the values.
     start : (Population, points)
         Where the refit begins.
     """
     return _around(base, kind, values, _fit_at(base, kind, values, start))
 
 
-def climb(base: Base, kind: Kind, start: Expansion, cover: FloatArray, *, by_modes: bool = True) -> Expansion:
+def climb(
+    base: Base, kind: Values, start: Expansion, cover: FloatArray, *, by_modes: bool = True
+) -> Expansion:
     """The maximum of the posterior under one prior.
 
     Parameters
     ----------
     start : Expansion
         Around the values to begin from.
-    cover : (n_free + n_knots, n_free + n_knots) array
+    cover : (n_free + n_values, n_free + n_values) array
         Covariance of the values under the prior.
     by_modes : bool
         Whether steps follow the score at the events' modes; else that of the evidence itself, no farther than
@@ -87,43 +102,42 @@ def _arrived(maximum: Expansion, precision: FloatArray) -> Expansion:
     return replace(maximum, score=precision @ maximum.values)
 
 
-def _fit_at(base: Base, kind: Kind, values: FloatArray, start: tuple[Population, FloatArray]) -> Fit:
-    """Population and events with the profile in."""
-    extension, strengths = _with_profile(base, kind, values)
+def _fit_at(base: Base, kind: Values, values: FloatArray, start: tuple[Population, FloatArray]) -> Fit:
+    """Population and events with the values in."""
+    extension, strengths = _with_values(base, kind, values)
     return refit(extension, base.rows, strengths[None, :], start, Rounds(least=1))[0]
 
 
-def _with_profile(base: Base, kind: Kind, values: FloatArray) -> tuple[Extension, FloatArray]:
-    """The base law with the profile as one direction, and all strengths, (n_directions,)."""
-    at, held = knots(base.setting), _held(base, values)
-    free = len(values) - len(at)
-    extension = base.extended(combined(base.setting, kind, at, values[free:]))
-    return extension, np.concatenate([held, values[:free], [1.0]])
+def _with_values(base: Base, kind: Values, values: FloatArray) -> tuple[Extension, FloatArray]:
+    """The base law with the values in, and all strengths, (n_directions,)."""
+    free = len(values) - len(kind.each(base.setting))
+    directions, together = kind.together(base.setting, values[free:])
+    return base.extended(*directions), np.concatenate([_held(base, free), values[:free], together])
 
 
-def _held(base: Base, values: FloatArray) -> FloatArray:
+def _held(base: Base, free: int) -> FloatArray:
     """Strengths of the base's directions that are not free."""
-    return base.strengths[: len(base.strengths) - (len(values) - len(knots(base.setting)))]
+    return base.strengths[: len(base.strengths) - free]
 
 
-def _around(base: Base, kind: Kind, values: FloatArray, fit: Fit) -> Expansion:
-    """With efficient score and information of the knots' values at what they are."""
+def _around(base: Base, kind: Values, values: FloatArray, fit: Fit) -> Expansion:
+    """With efficient score and information of the values at what they are."""
     population, points = fit.start
-    by_knots = _by_knots(base, kind, values)
-    found = efficient_scores(look_around(by_knots, points), base.rows, population, mean_prior(base.law))
-    n_before = len(_held(base, values))
+    likelihood, n_before = _one_by_one(base, kind, values)
+    found = efficient_scores(look_around(likelihood, points), base.rows, population, mean_prior(base.law))
     return Expansion(values, fit, found.score[0, n_before:], found.information[0, n_before:, n_before:])
 
 
-def _score(base: Base, kind: Kind, there: Expansion) -> FloatArray:
+def _score(base: Base, kind: Values, there: Expansion) -> FloatArray:
     """Score of the log evidence by the values."""
-    extension, strengths = _with_profile(base, kind, there.values)
+    extension, strengths = _with_values(base, kind, there.values)
     likelihood = EventLikelihood(extension, base.rows, strengths)
-    score = expected_score(likelihood, _by_knots(base, kind, there.values), *there.fit.start)
-    return score[len(_held(base, there.values)) :]
+    each, n_before = _one_by_one(base, kind, there.values)
+    return expected_score(likelihood, each, *there.fit.start)[n_before:]
 
 
-def _by_knots(base: Base, kind: Kind, values: FloatArray) -> EventLikelihood:
-    """The events' likelihoods with the value at each knot as a strength."""
-    strengths = np.concatenate([_held(base, values), values])
-    return EventLikelihood(knot_by_knot(base, kind, knots(base.setting)), base.rows, strengths)
+def _one_by_one(base: Base, kind: Values, values: FloatArray) -> tuple[EventLikelihood, int]:
+    """The events' likelihoods with each value as a strength, and how many strengths are before them."""
+    each = kind.each(base.setting)
+    held = _held(base, len(values) - len(each))
+    return EventLikelihood(base.extended(*each), base.rows, np.concatenate([held, values])), len(held)

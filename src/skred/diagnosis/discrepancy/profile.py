@@ -22,7 +22,6 @@ from scipy.stats import multivariate_normal
 from skred.arrays import FloatArray
 from skred.diagnosis.evidence.adaptive_sampling import Mode
 from skred.diagnosis.evidence.coefficient import Base, Curve
-from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.refit import Fit
 from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import Direction, Setting
@@ -54,6 +53,14 @@ class Kind:
     amplitude: float
     share: float
     equation: str
+
+    def each(self, setting: Setting) -> list[Direction]:
+        """A direction for the value at each knot."""
+        return [entering(setting, self, row) for row in spline_basis(setting.terrain, knots(setting))]
+
+    def together(self, setting: Setting, values: FloatArray) -> tuple[list[Direction], FloatArray]:
+        """All values in one direction, with its strength: quicker than a knot each."""
+        return [combined(setting, self, knots(setting), values)], np.ones(1)
 
 
 @dataclass(frozen=True)
@@ -176,12 +183,6 @@ def spline_basis(terrain: Terrain, at: FloatArray) -> FloatArray:
     inside = (middle >= at[0]) & (middle <= at[-1])
     rows = [np.interp(middle, at, unit) * inside for unit in np.eye(len(at))]
     return np.array(rows)
-
-
-def knot_by_knot(base: Base, kind: Kind, at: FloatArray) -> Extension:
-    """The base law with the profile's value at each knot as a strength."""
-    added = [entering(base.setting, kind, row) for row in spline_basis(base.setting.terrain, at)]
-    return base.extended(*added)
 
 
 def combined(setting: Setting, kind: Kind, at: FloatArray, values: FloatArray) -> Direction:

@@ -16,7 +16,7 @@ import numpy as np
 
 from skred.arrays import FloatArray
 from skred.diagnosis.discrepancy.fit import mode_at
-from skred.diagnosis.discrepancy.profile import KINDS, Profile, knot_by_knot, log_prior_densities
+from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_prior_densities
 from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, weighted_draws
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.event_quadrature import USUAL
@@ -78,7 +78,7 @@ def gains(base: Base, profile: Profile, values: FloatArray, pool: Executor) -> F
 
 def _log_evidence(base: Base, profile: Profile, values: FloatArray) -> FloatArray:
     """At values of the profile, (n, n_knots)."""
-    extension = knot_by_knot(base, profile.kind, profile.knots_m)
+    extension = base.extended(*profile.kind.each(base.setting))
     # With as many nodes and rounds as the peak and nothing: what is left of integration errors is alike.
     fits = refit(extension, base.rows, base.given(values), profile.fit.start, Rounds(USUAL, least=1))
     return np.array([fit.found.log_evidence for fit in fits])

@@ -20,7 +20,7 @@ from skred.arrays import FloatArray, IntArray
 from skred.diagnosis.check.bootstrap_test import BootstrapTest, linear_test
 from skred.diagnosis.compare.comparison import ComparisonUnderErrors
 from skred.diagnosis.discrepancy.fit import fit_profile
-from skred.diagnosis.discrepancy.profile import Profile, knot_by_knot, most_probable, with_mean
+from skred.diagnosis.discrepancy.profile import Profile, most_probable, with_mean
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, event_modes
 from skred.diagnosis.evidence.event_quadrature import USUAL, event_nodes
@@ -137,7 +137,7 @@ def with_profile(base: Base, profile: Profile, rng: np.random.Generator) -> Left
 
     The profile's values are drawn by the Laplace approximation.
     """
-    wide = knot_by_knot(base, profile.kind, profile.knots_m)
+    wide = base.extended(*profile.kind.each(base.setting))
     values = rng.multivariate_normal(profile.mean, profile.covariance, DRAWS)
     return LeftOut(wide, _draws(base, with_mean(base, profile), base.given(values), rng))
 

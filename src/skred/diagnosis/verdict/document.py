@@ -173,7 +173,7 @@ def _more(found: Outcome) -> dict[str, Any]:
         "seconds": found.seconds,
     }
     if isinstance(found, NotDiagnosed):
-        return more | {"alarm_by": None, "influence": None, "conditional": None, "sensor_places": []}
+        return more | {"alarm_by": None, "influence": None, "conditional": None, "sensor_places": None}
     more |= {
         "alarm": found.alarm_by is not None,
         "alarm_by": found.alarm_by,

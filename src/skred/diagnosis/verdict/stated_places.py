@@ -6,11 +6,14 @@ import math
 from typing import Any
 
 import numpy as np
+from scipy.special import ndtri
 
 from skred.diagnosis.evidence.prior_odds import NOTHING
 from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.words import percent, plus_minus
+from skred.inference.influence_words import enumerated
+from skred.inference.intervals import ENDS
 
 
 def place_as_stated(found: Diagnosis) -> str:
@@ -37,33 +40,41 @@ def place_as_stated(found: Diagnosis) -> str:
 
 
 def moved_as_stated(found: Diagnosis) -> str:
-    """Sensors that recordings have elsewhere, as their stated errors allow, where nothing is claimed."""
-    if found.decision.verdict not in ("nothing_missing", "cannot_tell"):
+    """Sensors that recordings have elsewhere, as their stated errors allow, where nothing is claimed.
+
+    If stated errors explain something at all; those whose 90 % interval does not hold where they were noted.
+    """
+    places = places_document(found)
+    if places is None or found.decision.verdict not in ("nothing_missing", "cannot_tell"):
         return ""
-    elsewhere = [one for one in places_document(found) if one["log_bayes_factor"] > COUNTS]
-    return " ".join(
-        f"As its stated error allows, {one['sensor']} probably stands"
-        f" {plus_minus(abs(one['mean']), one['sd'], 'm')} further {_way(one['mean'])} than noted (log Bayes"
-        f" factor {one['log_bayes_factor']:.1f} nats)."
+    least = -float(ndtri(ENDS[0]))
+    elsewhere = [one for one in places["sensors"] if abs(one["mean"]) > least * one["sd"]]
+    if places["log_bayes_factor"] <= COUNTS or not elsewhere:
+        return ""
+    stand = [
+        f"{one['sensor']} probably stands {plus_minus(abs(one['mean']), one['sd'], one['unit'])} further"
+        f" {'down' if one['mean'] > 0.0 else 'up'} than noted"
         for one in elsewhere
+    ]
+    return (
+        f"Stated errors of sensors' places explain what would else be missing: {enumerated(stand)} (log Bayes"
+        f" factor {places['log_bayes_factor']:.1f} nats)."
     )
 
 
-def _way(shift: float) -> str:
-    return "down" if shift > 0.0 else "up"
-
-
-def places_document(found: Diagnosis) -> list[dict[str, Any]]:
-    """The shift of each sensor whose place has a stated error, with nothing added, as plain data."""
-    return [
-        {
-            "sensor": one.shape.sensor,
-            **dict(zip(("mean", "sd"), one.moments, strict=True)),
-            "unit": one.mechanism.strength.unit,
-            "log_bayes_factor": one.log_bayes_factor,
-        }
-        for one in found.comparison.leading(NOTHING).places
-    ]
+def places_document(found: Diagnosis) -> dict[str, Any] | None:
+    """Where sensors stand whose places have stated errors, with nothing added; None where there are none."""
+    shifts = found.comparison.leading(NOTHING).shifts
+    if shifts is None or not shifts.places.errors:
+        return None
+    numbers = zip(shifts.places.errors, shifts.mean, shifts.sd, strict=True)
+    return {
+        "log_bayes_factor": shifts.log_factor,
+        "sensors": [
+            {"sensor": sensor, "mean": float(mean), "sd": float(sd), "unit": "m"}
+            for (sensor, _), mean, sd in numbers
+        ],
+    }
 
 
 def _shift(found: Diagnosis, j: int) -> tuple[float, float]:
