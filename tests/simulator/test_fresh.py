@@ -75,11 +75,15 @@ def test_a_covariate_acts_on_them_as_on_the_trial() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["sensor_bias", "release_offset", "obstacle", "deposit_history"])
+@pytest.mark.parametrize(
+    "name", ["sensor_bias", "sensor_place", "release_offset", "obstacle", "deposit_history"]
+)
 def test_what_is_hidden_acts_on_them_too(name: str) -> None:
     truth = trial(305, "dense", name).source.truth
     further = draw_further(np.random.default_rng(5), truth, N_FRESH)
     assert np.array_equal(further.hidden.factor, truth.hidden.factor)
+    assert np.array_equal(further.hidden.shift_m, truth.hidden.shift_m)
+    assert truth.hidden.shift_m.any() == (name == "sensor_place")
     assert further.hidden.release_m == truth.hidden.release_m
     assert further.hidden.terms.shape[1:] == truth.hidden.terms.shape[1:]
     strongest = np.abs(truth.hidden.terms[:, :, 1]).max(initial=0.0)
