@@ -140,18 +140,21 @@ def test_of_several_sensors_the_one_that_is_off_is_found(base: Base) -> None:
 
 
 def test_a_shift_that_stated_places_allow_for_is_no_finding(base: Base) -> None:
-    strengths = np.array([-60.0, -50.0, -40.0, -30.0, -20.0, -10.0, 10.0])
+    """A fault and a stated error of one place are one shift, with both their variances."""
+    strengths = np.append(np.arange(-70.0, 0.0, 5.0), 10.0)
     found = curve_at(base, placed(PLACE, base.setting, Shape(sensor=HIDDEN)), strengths)
     candidates = {PLACE.id: Candidate(PLACE, (found,), np.zeros(1))}
-    assert candidates[PLACE.id].log_bayes_factor > 40.0
+    before = candidates[PLACE.id].log_bayes_factor
+    assert before > 40.0
     with ThreadPoolExecutor(1) as pool:
-        changed, _, of_nothing = with_stated_places(stated(base, 40.0), candidates, [], pool)
-        little, _, of_less = with_stated_places(stated(base, 4.0), candidates, [], pool)
+        for sd in (10.0, 20.0, 40.0):
+            changed, _, nothing = with_stated_places(stated(base, sd), candidates, [], pool)
+            of_error, of_both = (found.log_factor_of(scale=one) for one in (sd, np.hypot(sd, found.scale)))
+            assert nothing.log_factor == pytest.approx(of_error, abs=1.0)
+            assert changed[PLACE.id].log_bayes_factor == pytest.approx(of_both - of_error, abs=1.0)
+        assert changed[PLACE.id].log_bayes_factor < 1.0
         same, _, none = with_stated_places(base, candidates, [], pool)
-    nothing, less = of_nothing.log_factor, of_less.log_factor
-    assert nothing > 40.0 and changed[PLACE.id].log_bayes_factor < 1.0
-    assert 0.0 < less < nothing - 10.0 and little[PLACE.id].log_bayes_factor > 20.0
-    assert none.log_factor == 0.0 and same[PLACE.id].log_bayes_factor == candidates[PLACE.id].log_bayes_factor
+    assert none.log_factor == 0.0 and same[PLACE.id].log_bayes_factor == before
 
 
 def test_what_recordings_can_tell_is_less_where_places_are_uncertain(base: Base) -> None:

@@ -2,8 +2,7 @@
 
 A place is one unknown that all avalanches share, normal with its stated standard deviation. All shifts are
 fitted together beside a law, everything else refitted, and integrated over by the Laplace approximation. What
-that changes for a candidate, with its coefficient where it is by itself, is set against what it changes for
-nothing.
+that changes for a candidate, its coefficient fitted anew, is set against what it changes for nothing.
 """
 
 from __future__ import annotations
@@ -11,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from skred.arrays import FloatArray
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.discrepancy.climb import climb, expanded_at
-from skred.diagnosis.discrepancy.explored import laplace
+from skred.diagnosis.discrepancy.explored import Expansion, Laplace, laplace
 from skred.diagnosis.discrepancy.profile import Profile, with_mean
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.stated_places import StatedPlaces, stated_places
@@ -64,11 +64,8 @@ def with_stated_places(
         if not todo:
             break
         looked.update(todo)
-        laws = [
-            with_curve(base, found[key].best) if isinstance(key, str) else with_mean(base, forces[key])
-            for key in todo
-        ]
-        for key, beside in zip(todo, pool.map(shifts_beside, laws), strict=True):
+        fitted = [found[key] if isinstance(key, str) else forces[key] for key in todo]
+        for key, beside in zip(todo, pool.map(partial(_beside, base), fitted), strict=True):
             changed = beside.log_factor - nothing.log_factor
             if isinstance(key, str):
                 found[key] = replace(found[key], of_places=changed)
@@ -77,18 +74,38 @@ def with_stated_places(
     return found, forces, nothing
 
 
-def shifts_beside(base: Base) -> Shifts:
-    """The shifts of sensors beside a law; none, and nothing changed, where no place has a stated error."""
+def shifts_beside(base: Base, last: Curve | None = None) -> Shifts:
+    """The shifts of sensors beside a law; none, and nothing changed, where no place has a stated error.
+
+    Parameters
+    ----------
+    last : Curve, optional
+        Of the law's last direction, if its coefficient is to be fitted anew with the shifts, by its prior.
+    """
     places = stated_places(base.problem)
     if not places.errors:
         return Shifts(places, np.empty(0), np.empty(0), 0.0)
-    cover = np.diag(places.sd**2)
-    noted = expanded_at(base, places, np.zeros(len(places.errors)), base.fit.start)
-    there = laplace(climb(base, places, noted, cover), noted.fit.found.log_evidence, cover)
-    return Shifts(places, there.values, np.sqrt(np.diag(there.covariance)), there.log_factor())
+    free = 0 if last is None else 1
+    scales = places.sd if last is None else np.append(last.scale, places.sd)
+    values, cover = np.zeros(len(scales)), np.diag(scales**2)
+    values[:free] = base.strengths[len(base.strengths) - free :]
+    noted = expanded_at(base, places, values, base.fit.start)
+    height = noted.fit.found.log_evidence
+    exact = Expansion(values[:free], noted.fit, noted.score[:free], noted.information[:free, :free])
+    there = laplace(climb(base, places, noted, cover), height, cover)
+    changed = _log_evidence(there) - _log_evidence(laplace(exact, height, cover[:free, :free]))
+    return Shifts(places, there.values[free:], np.sqrt(np.diag(there.covariance)[free:]), changed)
 
 
-def with_curve(base: Base, curve: Curve) -> Base:
-    """The law with a mechanism in, as strong as is most probable."""
+def _log_evidence(of: Laplace) -> float:
+    return of.gain - of.prior_penalty - of.occam_penalty
+
+
+def _beside(base: Base, candidate: Candidate | Profile) -> Shifts:
+    """The shifts beside what was fitted: a mechanism as strong as it is with them, a force as it was."""
+    if isinstance(candidate, Profile):
+        return shifts_beside(with_mean(base, candidate))
+    curve = candidate.best
     top = int(np.argmax(curve.log_evidence + curve.log_prior(curve.strengths, curve.scale)))
-    return base.with_in(curve.direction, float(curve.strengths[top]), curve.fits[top])
+    law = base.with_in(curve.direction, float(curve.strengths[top]), curve.fits[top])
+    return shifts_beside(law, curve)
