@@ -38,6 +38,8 @@ class Case(NamedTuple):
     spans: bool = False
     sensors_m: tuple[float, float] = (0.0, 0.0)
     """How far downstream of where they are taken to be the sensors LC and CD are put."""
+    place_sd_m: tuple[float, float] | None = None
+    """To how many metres (sd) the places of LC and CD are stated to be known; None states nothing."""
     folds: int = 0
     """Parts of the avalanches without which the diagnosis is repeated; each one is then refitted without."""
 
@@ -55,6 +57,7 @@ CASES = (
     Case("pcm-sensors-up", "pcm", sensors_m=(-40.0, -20.0)),
     Case("pcm-sensors-down", "pcm", sensors_m=(40.0, 20.0)),
     Case("pcm-sensors-closer", "pcm", sensors_m=(40.0, -20.0)),
+    Case("pcm-places-stated", "pcm", place_sd_m=(40.0, 20.0)),
     Case("pcm-with-dam", "pcm", campaign="ryggfonn-with-dam"),
     *(Case(f"{law}{ryggfonn_page.UNSEEN}", law, folds=5) for law in ryggfonn_page.PUBLISHED),
 )
@@ -75,6 +78,8 @@ def campaign_of(case: Case) -> Any:
         else one
         for one in campaign.sensors
     ]
+    errors = {} if case.place_sd_m is None else dict(zip(MOVED, case.place_sd_m, strict=True))
+    sensors = [replace(one, place_sd_m=errors.get(one.id)) for one in sensors]
     return replace(campaign, sensors=tuple(sensors))
 
 

@@ -281,6 +281,7 @@ Base M2 under other choices:
 | `pcm-spans` | LC and CD are taken as the spans that they are, elsewhere as points |
 | `pcm-sensors-up`, `-down`, `-closer` | LC is moved by 40 m and CD by 20 m, as far as their places are \
 uncertain: both up, both down, towards each other |
+| `pcm-places-stated` | these 40 and 20 m are stated as errors (`place_sd_m`), a nuisance of every model |
 | `pcm-with-dam` | the surveyed terrain, with the dam in it |
 
 | case | verdict | p of the check | leading candidates, log Bayes factor | probability of `unlisted` | \

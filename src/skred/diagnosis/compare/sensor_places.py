@@ -17,7 +17,7 @@ import numpy as np
 from skred.arrays import FloatArray
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.discrepancy.climb import climb, expanded_at
-from skred.diagnosis.discrepancy.explored import Expansion, Laplace, laplace
+from skred.diagnosis.discrepancy.explored import Laplace, laplace, log_above_nil
 from skred.diagnosis.discrepancy.profile import Profile, with_mean
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.stated_places import StatedPlaces, stated_places
@@ -85,20 +85,26 @@ def shifts_beside(base: Base, last: Curve | None = None) -> Shifts:
     places = stated_places(base.problem)
     if not places.errors:
         return Shifts(places, np.empty(0), np.empty(0), 0.0)
+    there, within = _integrated(base, places, last)
+    if last is None:
+        exact = expanded_at(base, places, np.zeros(len(places.sd)), base.fit.start).fit.found.log_evidence
+    else:
+        _, exact = _integrated(base, StatedPlaces(()), last)
+    own = slice(len(there.values) - len(places.sd), None)
+    return Shifts(places, there.values[own], np.sqrt(np.diag(there.covariance)[own]), within - exact)
+
+
+def _integrated(base: Base, places: StatedPlaces, last: Curve | None) -> tuple[Laplace, float]:
+    """A law with shifts, perhaps with its last coefficient, integrated over; and its log evidence."""
     free = 0 if last is None else 1
     scales = places.sd if last is None else np.append(last.scale, places.sd)
     values, cover = np.zeros(len(scales)), np.diag(scales**2)
     values[:free] = base.strengths[len(base.strengths) - free :]
-    noted = expanded_at(base, places, values, base.fit.start)
-    height = noted.fit.found.log_evidence
-    exact = Expansion(values[:free], noted.fit, noted.score[:free], noted.information[:free, :free])
-    there = laplace(climb(base, places, noted, cover), height, cover)
-    changed = _log_evidence(there) - _log_evidence(laplace(exact, height, cover[:free, :free]))
-    return Shifts(places, there.values[free:], np.sqrt(np.diag(there.covariance)[free:]), changed)
-
-
-def _log_evidence(of: Laplace) -> float:
-    return of.gain - of.prior_penalty - of.occam_penalty
+    there = laplace(climb(base, places, expanded_at(base, places, values, base.fit.start), cover), 0.0, cover)
+    log_evidence = there.gain - there.prior_penalty - there.occam_penalty
+    if last is not None and not last.added.either_sign:
+        log_evidence += log_above_nil(float(there.values[0]), float(there.covariance[0, 0]))
+    return there, log_evidence
 
 
 def _beside(base: Base, candidate: Candidate | Profile) -> Shifts:

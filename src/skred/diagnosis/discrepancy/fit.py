@@ -6,7 +6,6 @@ Laplace approximation.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,6 +16,7 @@ from skred.diagnosis.discrepancy.explored import (
     Expansion,
     ExploredPriors,
     laplace,
+    log_above_nil,
     occam_penalty,
     prior_penalty,
 )
@@ -99,8 +99,8 @@ def fit_profile(
     values, cover, factor, modes = there.values, there.covariance, explored.log_factor, explored.modes
     if beside is not None:
         modes = ()  # of both together, and so of no force by itself
-        if not beside.added.either_sign:  # a half-normal prior is twice the normal one, above nil alone
-            factor += math.log(max(math.erfc(-values[0] / math.sqrt(2.0 * cover[0, 0])), 1e-300))
+        if not beside.added.either_sign:
+            factor += log_above_nil(float(values[0]), float(cover[0, 0]))
     gain, values, cover = fit.found.log_evidence - height, values[n_beside:], cover[n_beside:, n_beside:]
     return Profile(kind, prior, at, values, cover, factor, gain, fit, modes)
 
