@@ -108,6 +108,8 @@ def diagnose_case(case: Case, *, figures: bool = True) -> dict[str, Any]:
         document["outer_folds"] = outer_folds(
             problem, case.folds, settings.seed, lambda rest: diagnose(rest, law, settings, without), print
         )
+    if case.name != case.base_model:
+        document.pop("conditional", None)  # long, and of no variant on the page
     if isinstance(found, Diagnosis):
         document["prior_scales"] = {
             name: {str(factor): _best_factor(found.comparison, name, factor) for factor in PRIOR_FACTORS}

@@ -314,7 +314,7 @@ def test_how_well_places_are_known_is_kept(texts, folder_with, tmp_path):
     summary = campaign_summary(campaign)
     assert summary["places_known_to"] == {"upper": 40.0, "lower": 12.5}
     assert place_sentences(summary["places_known_to"])[0] == (
-        "upper: place known to ± 40 m; not yet part of the models"
+        "upper: place known to ± 40 m; odds of a diagnosis allow for it, calibrations do not"
     )
 
 

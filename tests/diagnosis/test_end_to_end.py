@@ -66,9 +66,9 @@ def test_a_program_can_follow_the_probabilities(which: str, request: pytest.Fixt
     factors, power = document["log_bayes_factors"], document["calibration"]["power"]
     assert document["calibration"]["version"] == 2 and 0.5 < power < 1.0
     prior = document["calibration"]["prior"]
-    faults = ("sensor_bias", "release_offset")
+    faults = ("sensor_bias", "release_offset", "sensor_place")
     assert prior["nothing"] == pytest.approx(0.5) and prior["unlisted"] == pytest.approx(0.05)
-    assert [prior[name] for name in faults] == pytest.approx([0.05, 0.05])
+    assert [prior[name] for name in faults] == pytest.approx([0.1 / 3.0] * 3)
     physics = [share for name, share in prior.items() if name not in ("nothing", "unlisted", *faults)]
     assert sum(physics) == pytest.approx(0.35) and set(prior) == set(factors)
     full = {name: share * np.exp(factors[name]) for name, share in prior.items()}

@@ -105,7 +105,7 @@ def test_efficient_scores_are_generalised_least_squares(n: int, n_groups: int) -
 @pytest.mark.parametrize("n_free", [1, 2])
 def test_what_is_in_already_takes_its_share(n_free: int) -> None:
     inputs = random_inputs(2, 2, seed=5)
-    found = efficient_scores(*inputs, n_free)
+    found = efficient_scores(*inputs, np.zeros(n_free))
     for group in range(2):
         score, information = dense(*inputs, group, n_free)
         assert_allclose(found.score[group], score, rtol=1e-7, atol=1e-9)
@@ -115,7 +115,7 @@ def test_what_is_in_already_takes_its_share(n_free: int) -> None:
 def test_units_of_what_is_in_already_do_not_matter() -> None:
     modes, *others = random_inputs(2, 2, seed=5)
     in_units = modes._replace(by_strengths=modes.by_strengths * np.array([1e8, 1.0, 1.0]))
-    found, expected = (efficient_scores(one, *others, 2) for one in (in_units, modes))
+    found, expected = (efficient_scores(one, *others, np.zeros(2)) for one in (in_units, modes))
     assert_allclose(found.score, expected.score, rtol=1e-9)
     assert_allclose(found.information, expected.information, rtol=1e-9)
 

@@ -70,7 +70,7 @@ def test_likelihoods_are_those_of_a_campaign_that_notes_it_there(
 
 def test_a_stop_is_as_far_from_the_noted_place_as_from_the_sensor() -> None:
     came, stayed = np.array([[True, False], [True, False]]), np.array([[False, True], [False, False]])
-    bounds = StopBounds(np.array([100.0, 200.0]), came, stayed)
+    bounds = StopBounds(np.array([100.0, 200.0]), came, stayed, 1000.0)
     stops, shifts = np.array([90.0, 125.0, 260.0]), np.tile([-10.0, 20.0], (3, 1))
     seen, slope = bounds.as_noted(stops, np.zeros(3, dtype=int), shifts)
     np.testing.assert_allclose(seen, [100.0, 100.0 + 35.0 * 100.0 / 130.0, 240.0])
@@ -81,7 +81,7 @@ def test_a_stop_is_as_far_from_the_noted_place_as_from_the_sensor() -> None:
 
 
 def test_another_sensor_may_tell_of_the_stop_once_one_is_moved() -> None:
-    bounds = StopBounds(np.array([100.0, 120.0]), np.array([[True, True]]), np.array([[False, False]]))
+    bounds = StopBounds(np.array([100.0, 120.0]), np.array([[True, True]]), np.array([[False, False]]), 1e3)
     lowest, _ = bounds.between(np.zeros(2, dtype=int), np.array([[0.0, -50.0], [90.0, 0.0]]))
     assert lowest.tolist() == [100.0, 190.0]
 

@@ -102,7 +102,8 @@ class Sensor:
     relative_sd, absolute_sd : float
         Standard deviation of a reading: a share of its value, and a part in the unit of the value.
     place_sd_m : float or None
-        How well its place along the track is known, m; None where that was not stated. No model uses it yet.
+        How well its place along the track is known, m; None where that was not stated. The odds of a
+        diagnosis allow for it.
     """
 
     id: str

@@ -181,6 +181,8 @@ def _sensor_place(rng: np.random.Generator, scene: Scene) -> Effect:
     # it stays where the typical avalanche comes by
     above = float(sensors.s_from_m[sensor]) - scene.place(0.05)
     below = scene.place(0.97) - float(sensors.s_to_m[sensor])
+    if (below if sign > 0 else above) < 10.0:
+        sign = -sign
     high = float(np.clip(below if sign > 0 else above, 10.0, 200.0))
     return Effect(
         "sensor_place", "shift", "m", 2.0, high, even(scene), sign=sign, target="place", sensor=sensor

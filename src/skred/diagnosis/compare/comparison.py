@@ -25,7 +25,7 @@ from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import candidates_of, refine, screened_parts
 from skred.diagnosis.compare.residue import with_residues
 from skred.diagnosis.compare.screening import Tell, screened
-from skred.diagnosis.compare.sensor_places import Shifts, shifts_beside, with_stated_places
+from skred.diagnosis.compare.sensor_places import Shifts, with_stated_places
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, alike, log_evidence_of, most_probable
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
@@ -235,14 +235,16 @@ def _under_each(
     first = max(top, key=lambda name: top[name])
     found = {first: _under_errors(first, bases[first], curves[first], pool)}
     leads = max(found[first].candidates.values(), key=lambda one: one.log_bayes_factor).best
-    reached = height[first] + found[first].of_places + max(found[first].log_factors.values())
+    reached = height[first] + max(found[first].log_factors.values())
+    if found[first].of_places:  # of exact places, which what is compared first has, that says nothing
+        reached = -math.inf
     for name in curves.keys() - found.keys():
         there = curve_near(bases[name], leads, leads.shape)  # places were screened coarsely
         behind = height[first] + _most([leads]) - max(top[name], height[name] + _most([there]))
         if behind > COUNTS:
             candidates = candidates_of(screened_parts(curves[name]))
-            shifts = shifts_beside(bases[name])
-            found[name] = ComparisonUnderErrors(name, bases[name], candidates, [], shifts)
+            # Stated places change nothing there: beside candidates that are only screened they are not known.
+            found[name] = ComparisonUnderErrors(name, bases[name], candidates, [])
         else:
             found[name] = _under_errors(name, bases[name], curves[name], pool, reached - height[name])
     return found

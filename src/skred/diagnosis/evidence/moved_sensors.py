@@ -25,11 +25,14 @@ class StopBounds(NamedTuple):
         Where the sensors end as noted; 0 for a runout.
     came, stayed : (n_events, n_sensors) boolean arrays
         Whether the front came by a sensor; whether it stopped above.
+    length_m : float
+        Of the track: no sensor is moved beyond its ends.
     """
 
     ends: FloatArray
     came: BoolArray
     stayed: BoolArray
+    length_m: float
 
     def between(self, events: IntArray, shifts: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Lowest place that a front came to and highest that it did not, (n,) each, of moved sensors.
@@ -40,7 +43,7 @@ class StopBounds(NamedTuple):
         shifts : (n, n_sensors) array, m
             How much further down than noted each sensor stands.
         """
-        there = self.ends + shifts
+        there = np.clip(self.ends + shifts, 0.0, self.length_m)
         lowest = np.where(self.came[events], there, -_FAR_M).max(axis=1, initial=-_FAR_M)
         highest = np.where(self.stayed[events], there, _FAR_M).min(axis=1, initial=_FAR_M)
         return lowest, np.maximum(highest, lowest + _LEAST_M)
@@ -64,4 +67,4 @@ class StopBounds(NamedTuple):
 def stop_bounds(problem: HierarchicalProblem) -> StopBounds:
     """Of the recordings of a campaign."""
     ends = [0.0 if place is None else place[1] for place in problem.sensor_places]
-    return StopBounds(np.array(ends), *fronts_seen(problem.campaign))
+    return StopBounds(np.array(ends), *fronts_seen(problem.campaign), problem.terrain.length_m)

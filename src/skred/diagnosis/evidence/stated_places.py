@@ -43,5 +43,8 @@ class StatedPlaces:
 
 def stated_places(problem: HierarchicalProblem) -> StatedPlaces:
     """Those of a campaign, perhaps none."""
-    sensors = [one for one in problem.campaign.sensors if not one.is_runout]
-    return StatedPlaces(tuple((one.id, one.place_sd_m) for one in sensors if one.place_sd_m is not None))
+    read = (problem.observed | problem.readings.bounded).any(axis=0)
+    sensors = [one for one, has in zip(problem.campaign.sensors, read, strict=True) if has]
+    return StatedPlaces(
+        tuple((one.id, one.place_sd_m) for one in sensors if one.place_sd_m and not one.is_runout)
+    )
