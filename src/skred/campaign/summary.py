@@ -32,7 +32,7 @@ def campaign_summary(campaign: Campaign) -> dict[str, Any]:
 
 
 def place_sentences(places_known_to: dict[str, float]) -> list[str]:
-    """How well the places of sensors are known, sensor by sensor; said, because calibrations do not use it yet."""
+    """How well the places of sensors are known, one by one; said, because calibrations do not use it yet."""
     return [
         f"{sensor}: place known to ± {sd:g} m; odds of a diagnosis allow for it, calibrations do not"
         for sensor, sd in places_known_to.items()
