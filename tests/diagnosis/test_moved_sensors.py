@@ -11,9 +11,13 @@ from scipy.stats import norm
 
 from skred.campaign import Campaign, Status
 from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.residue import Residue, residues
+from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.compare.sensor_places import shifts_beside, with_stated_places
 from skred.diagnosis.detect.score_test import ScoreTest
-from skred.diagnosis.evidence.coefficient import Base, curve_at
+from skred.diagnosis.discrepancy.fit import fit_profile
+from skred.diagnosis.discrepancy.profile import KINDS, Profile
+from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at, curve_near
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
 from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.extension import extended
@@ -25,7 +29,7 @@ from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Shape
 from tests.diagnosis.diagnosis_cases import base_of, trial
 
-PLACE = mechanisms()["sensor_place"]
+DRAG, PLACE = mechanisms()["turbulent_drag"], mechanisms()["sensor_place"]
 HIDDEN = "v02"
 
 
@@ -148,13 +152,66 @@ def test_a_shift_that_stated_places_allow_for_is_no_finding(base: Base) -> None:
     assert before > 40.0
     with ThreadPoolExecutor(1) as pool:
         for sd in (10.0, 20.0, 40.0):
-            changed, _, nothing = with_stated_places(stated(base, sd), candidates, [], pool)
+            changed, _, nothing = with_stated_places(stated(base, sd), candidates, [], [], pool)
             of_error, of_both = (found.log_factor_of(scale=one) for one in (sd, np.hypot(sd, found.scale)))
             assert nothing.log_factor == pytest.approx(of_error, abs=1.0)
             assert changed[PLACE.id].log_bayes_factor == pytest.approx(of_both - of_error, abs=1.0)
         assert changed[PLACE.id].log_bayes_factor < 1.0
-        same, _, none = with_stated_places(base, candidates, [], pool)
+        same, _, none = with_stated_places(base, candidates, [], [], pool)
     assert none.log_factor == 0.0 and same[PLACE.id].log_bayes_factor == before
+
+
+def test_what_only_makes_up_for_a_shift_has_no_more_than_where_the_sensor_stands_as_noted(base: Base) -> None:
+    """A force takes most of the shift as its own; drag would have to be below nil for it."""
+    there = base_of(elsewhere(base.problem.campaign, HIDDEN, -40.6), "coulomb")
+    found, expected = [
+        (curve(one, placed(DRAG, one.setting, Shape())), fit_profile(one, KINDS[0])) for one in (base, there)
+    ]
+    assert found[1].log_bayes_factor > 40.0
+    candidates = {DRAG.id: Candidate(DRAG, (found[0],), np.zeros(1))}
+    with ThreadPoolExecutor(1) as pool:
+        changed, [force], _ = with_stated_places(stated(base, 40.0), candidates, [found[1]], [found[1]], pool)
+    assert changed[DRAG.id].log_bayes_factor == pytest.approx(expected[0].log_bayes_factor, abs=1.0)
+    assert force.log_bayes_factor == pytest.approx(expected[1].log_bayes_factor, abs=1.0)
+
+
+@pytest.mark.slow
+def test_a_mechanism_beside_a_shift_is_integrated_over_as_by_campaigns_that_note_it_elsewhere() -> None:
+    """Drag and a sensor that stands 40 m above its place; alone, a force in its place, and both.
+
+    Where the sensor is noted the force has something to do beside drag; integrated over places it has not.
+    """
+    campaign = trial(9303, "sparse", "viscous_drag", "constant", 10.0).campaign
+    drag = mechanisms()["viscous_drag"]
+
+    def compared(base: Base) -> tuple[Curve, Residue, Profile]:
+        found = curve(base, placed(drag, base.setting, Shape()))
+        found = curve_near(base, found, found.shape)
+        [beside] = residues(base, [found], [-1e3], pool)
+        assert beside is not None
+        return found, beside, fit_profile(base, KINDS[0])
+
+    sd, step, heights = 40.0, 15.0, list[list[float]]()
+    shifts_m = np.arange(-90.0, 46.0, step)
+    with ThreadPoolExecutor(2) as pool:
+        for shift in shifts_m:
+            base = base_of(elsewhere(campaign, HIDDEN, 40.0 + shift), "constant")
+            alone, beside, force = compared(base)
+            factor = alone.log_bayes_factor
+            factors = [0.0, factor, factor + beside.log_factor, force.log_bayes_factor]
+            heights.append([base.with_nothing(USUAL).found.log_evidence + one for one in factors])
+        weights = norm.logpdf(shifts_m, scale=sd) + np.log(step)
+        nothing, *expected = np.logaddexp.reduce(np.array(heights) + weights[:, None], axis=0)
+        base = base_of(elsewhere(campaign, HIDDEN, 40.0), "constant")
+        alone, beside, force = compared(base)
+        assert beside.log_factor > 2.0
+        one = Candidate(drag, (alone,), np.zeros(1), residue=beside.log_factor, beside=beside.profile)
+        found, [force], _ = with_stated_places(stated(base, sd), {drag.id: one}, [force], [force], pool)
+    changed = found[drag.id]
+    assert changed.residue is not None and changed.residue < 0.0
+    assert changed.alone == pytest.approx(expected[0] - nothing, abs=1.0)
+    assert changed.alone + changed.residue == pytest.approx(expected[1] - nothing, abs=1.5)
+    assert force.log_bayes_factor == pytest.approx(expected[2] - nothing, abs=1.0)
 
 
 def test_what_recordings_can_tell_is_less_where_places_are_uncertain(base: Base) -> None:

@@ -17,7 +17,7 @@ from skred.campaign import Campaign
 from skred.diagnosis.compare.candidate import Candidate, log_gain, names_of_constants
 from skred.diagnosis.compare.comparison import compare, free_force
 from skred.diagnosis.compare.recomputed import recomputed
-from skred.diagnosis.compare.residue import with_residues
+from skred.diagnosis.compare.residue import Residue, with_residues
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.discrepancy.climb import climb
 from skred.diagnosis.discrepancy.explored import Expansion
@@ -151,9 +151,9 @@ def test_a_mechanism_that_is_overtaken_is_looked_at_too(monkeypatch: pytest.Monk
     }
     n_looked = list[int]()
 
-    def beside(base: Base, curves: list[object], least: object, pool: object) -> list[float | None]:
+    def beside(base: Base, curves: list[object], least: object, pool: object) -> list[Residue | None]:
         n_looked.append(len(curves))
-        return [29.0] * len(curves)
+        return [Residue(29.0, profiles[0])] * len(curves)
 
     monkeypatch.setattr("skred.diagnosis.compare.residue.residues", beside)
     with ThreadPoolExecutor(1) as pool:
@@ -178,8 +178,8 @@ def test_each_form_of_a_mechanism_has_a_residue_of_its_own(monkeypatch: pytest.M
     ]
     of_each = {(): 1.0, (("another", 1.0),): 8.0}
 
-    def beside(base: Base, curves: list[Curve], least: object, pool: object) -> list[float | None]:
-        return [of_each[one.shape.constants] for one in curves]
+    def beside(base: Base, curves: list[Curve], least: object, pool: object) -> list[Residue | None]:
+        return [Residue(of_each[one.shape.constants], profiles[0]) for one in curves]
 
     monkeypatch.setattr("skred.diagnosis.compare.residue.residues", beside)
     with ThreadPoolExecutor(1) as pool:

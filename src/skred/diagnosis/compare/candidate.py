@@ -11,6 +11,7 @@ import numpy as np
 
 from skred.arrays import FloatArray
 from skred.diagnosis.compare.ways import Looked, Ways, gains_over, over_ways
+from skred.diagnosis.discrepancy.profile import Profile
 from skred.diagnosis.evidence.coefficient import Curve
 from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING
 from skred.inference.between_events import PRIOR, BetweenEvents
@@ -67,6 +68,8 @@ class Candidate:
         Standard error of the log Bayes factor by importance sampling, in nats; None where not looked at.
     residue : float or None
         Log Bayes factor of a force not in the list beside it; None where not looked at.
+    beside : Profile or None
+        That force, of the most probable kind.
     looked : tuple of Looked
         Where avalanches may differ in the strength; none where that was not looked at.
     of_places : float
@@ -79,6 +82,7 @@ class Candidate:
     correction: float = 0.0
     error: float | None = None
     residue: float | None = None
+    beside: Profile | None = None
     looked: tuple[Looked, ...] = ()
     of_places: float = 0.0
 
@@ -165,6 +169,11 @@ class Candidate:
         )
         found = replace(self, looked=looked, correction=self.correction + float(after - before))
         return replace(found, error=found.leading.error if found.leading else None)
+
+    def with_places(self, alone: float, beside: float | None) -> Candidate:
+        """With what stated places change: for the mechanism, and for it with a force beside it, in nats."""
+        residue = None if self.residue is None or beside is None else self.residue + beside - alone
+        return replace(self, of_places=alone, residue=residue)
 
     def best_of_each(self, form: Callable[[Curve], Hashable]) -> list[tuple[Curve, float]]:
         """The best curve of each form that shapes have, and the log of the form's posterior probability.

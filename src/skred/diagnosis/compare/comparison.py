@@ -272,8 +272,9 @@ def _under_errors(
     candidates = with_ways(base, candidates, pool, best)
     profiles = list(fitted)
     candidates = with_residues(base, candidates, profiles, pool, best)
-    candidates, profiles = recomputed(base, candidates, profiles, pool, best)
-    return ComparisonUnderErrors(error_model, base, *with_stated_places(base, candidates, profiles, pool))
+    candidates, again = recomputed(base, candidates, profiles, pool, best)
+    candidates, again, shifts = with_stated_places(base, candidates, again, profiles, pool)
+    return ComparisonUnderErrors(error_model, base, candidates, again, shifts)
 
 
 def worth_comparing(curves: Sequence[Curve], behind: float) -> list[Curve]:

@@ -14,15 +14,38 @@ from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
 from itertools import batched
+from typing import NamedTuple
 
 import numpy as np
 
 from skred.diagnosis.compare.candidate import Candidate, names_of_constants
 from skred.diagnosis.discrepancy.fit import fit_profile
-from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, knots, log_evidence_of
+from skred.diagnosis.discrepancy.profile import (
+    KINDS,
+    Kind,
+    Profile,
+    knots,
+    log_evidence_of,
+    most_probable,
+)
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms.spec import Group
+
+
+class Residue(NamedTuple):
+    """A force not in the list beside a mechanism.
+
+    Attributes
+    ----------
+    log_factor : float
+        Log Bayes factor against the mechanism alone.
+    profile : Profile
+        Of the most probable kind.
+    """
+
+    log_factor: float
+    profile: Profile
 
 
 def with_residues(
@@ -57,21 +80,23 @@ def with_residues(
         forms = [(one, *form) for one in looked for form in one.best_of_each(names_of_constants)]
         least = [counts - one.alone - log_share for one, _, log_share in forms]
         computed = residues(base, [curve for _, curve, _ in forms], least, pool)
-        beside = defaultdict[str, list[float]](list)
+        beside = defaultdict[str, list[Residue]](list)
         for (one, _, log_share), residue in zip(forms, computed, strict=True):
             # What a mechanism leaves is no residue if it is more than what it explains.
-            if residue is not None and residue < one.log_bayes_factor:
-                beside[one.mechanism.id].append(log_share + residue)
+            if residue is not None and residue.log_factor < one.log_bayes_factor:
+                beside[one.mechanism.id].append(residue._replace(log_factor=log_share + residue.log_factor))
         for name, parts in beside.items():
-            found[name] = replace(found[name], residue=float(np.logaddexp.reduce(parts)))
+            together = float(np.logaddexp.reduce([one.log_factor for one in parts]))
+            best_form = max(parts, key=lambda one: one.log_factor)
+            found[name] = replace(found[name], residue=together, beside=best_form.profile)
             highest = max(highest, found[name].log_bayes_factor)
     return found
 
 
 def residues(
     base: Base, curves: Sequence[Curve], least: Sequence[float], pool: Executor
-) -> list[float | None]:
-    """Log Bayes factors of a force not in the list beside mechanisms, against these alone.
+) -> list[Residue | None]:
+    """Forces not in the list beside mechanisms, against these alone.
 
     None where that is less than what counts, or where a step leads to what no front can do, as a drag far
     below nil.
@@ -85,10 +110,15 @@ def residues(
     fits = batched(pool.map(partial(_fit_beside, base), *zip(*jobs, strict=True)), len(KINDS))
     fitted = [[one for one in profiles if one is not None] for profiles in fits]
     found = [
-        log_evidence_of(profiles) - curve.log_bayes_factor if len(profiles) == len(KINDS) else -math.inf
+        Residue(log_evidence_of(profiles) - curve.log_bayes_factor, most_probable(profiles))
+        if len(profiles) == len(KINDS)
+        else None
         for curve, profiles in zip(curves, fitted, strict=True)
     ]
-    return [own if own > lowest else None for own, lowest in zip(found, least, strict=True)]
+    return [
+        own if own is not None and own.log_factor > lowest else None
+        for own, lowest in zip(found, least, strict=True)
+    ]
 
 
 def _fit_beside(base: Base, curve: Curve, least: float, kind: Kind) -> Profile | None:

@@ -17,10 +17,11 @@ import numpy as np
 from skred.arrays import FloatArray
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.discrepancy.climb import climb, expanded_at
-from skred.diagnosis.discrepancy.explored import Laplace, laplace, log_above_nil
-from skred.diagnosis.discrepancy.profile import Profile, with_mean
+from skred.diagnosis.discrepancy.explored import Expansion, Laplace, laplace, log_above_nil
+from skred.diagnosis.discrepancy.fit import Start, fit_profile
+from skred.diagnosis.discrepancy.profile import Profile
 from skred.diagnosis.evidence.coefficient import Base, Curve
-from skred.diagnosis.evidence.stated_places import StatedPlaces, stated_places
+from skred.diagnosis.evidence.stated_places import EXACT, StatedPlaces, stated_places
 from skred.diagnosis.evidence.tolerance import COUNTS
 
 
@@ -44,9 +45,20 @@ class Shifts:
 
 
 def with_stated_places(
-    base: Base, candidates: Mapping[str, Candidate], profiles: Sequence[Profile], pool: Executor
+    base: Base,
+    candidates: Mapping[str, Candidate],
+    profiles: Sequence[Profile],
+    by_laplace: Sequence[Profile],
+    pool: Executor,
 ) -> tuple[dict[str, Candidate], list[Profile], Shifts]:
     """Candidates and profiles under one error model, with stated places in the evidence of what may count.
+
+    Parameters
+    ----------
+    profiles : sequence of Profile
+        Such as may have sampled evidence.
+    by_laplace : sequence of Profile
+        The same by the Laplace approximation: what it lacks, it lacks with shifts as well.
 
     Returns
     -------
@@ -64,54 +76,98 @@ def with_stated_places(
         if not todo:
             break
         looked.update(todo)
-        fitted = [found[key] if isinstance(key, str) else forces[key] for key in todo]
-        for key, beside in zip(todo, pool.map(partial(_beside, base), fitted), strict=True):
-            changed = beside.log_factor - nothing.log_factor
+        fitted = [found[key] if isinstance(key, str) else by_laplace[key] for key in todo]
+        for key, changed in zip(todo, pool.map(partial(_changes, base, nothing), fitted), strict=True):
             if isinstance(key, str):
-                found[key] = replace(found[key], of_places=changed)
+                found[key] = found[key].with_places(*changed)
             else:
-                forces[key] = replace(forces[key], log_bayes_factor=forces[key].log_bayes_factor + changed)
+                forces[key] = replace(forces[key], log_bayes_factor=forces[key].log_bayes_factor + changed[0])
     return found, forces, nothing
 
 
-def shifts_beside(base: Base, last: Curve | None = None) -> Shifts:
-    """The shifts of sensors beside a law; none, and nothing changed, where no place has a stated error.
-
-    Parameters
-    ----------
-    last : Curve, optional
-        Of the law's last direction, if its coefficient is to be fitted anew with the shifts, by its prior.
-    """
+def shifts_beside(base: Base) -> Shifts:
+    """The shifts of sensors beside a law; none, and nothing changed, where no place has a stated error."""
     places = stated_places(base.problem)
     if not places.errors:
         return Shifts(places, np.empty(0), np.empty(0), 0.0)
-    there, within = _integrated(base, places, last)
-    if last is None:
-        exact = expanded_at(base, places, np.zeros(len(places.sd)), base.fit.start).fit.found.log_evidence
-    else:
-        _, exact = _integrated(base, StatedPlaces(()), last)
-    own = slice(len(there.values) - len(places.sd), None)
-    return Shifts(places, there.values[own], np.sqrt(np.diag(there.covariance)[own]), within - exact)
+    cover, start = np.diag(places.sd**2), expanded_at(base, places, np.zeros(len(places.sd)), base.fit.start)
+    there = laplace(_maximum(base, places, start, cover), start.fit.found.log_evidence, cover)
+    return Shifts(places, there.values, np.sqrt(np.diag(there.covariance)), _log_factor(there))
 
 
-def _integrated(base: Base, places: StatedPlaces, last: Curve | None) -> tuple[Laplace, float]:
-    """A law with shifts, perhaps with its last coefficient, integrated over; and its log evidence."""
-    free = 0 if last is None else 1
-    scales = places.sd if last is None else np.append(last.scale, places.sd)
-    values, cover = np.zeros(len(scales)), np.diag(scales**2)
-    values[:free] = base.strengths[len(base.strengths) - free :]
-    there = laplace(climb(base, places, expanded_at(base, places, values, base.fit.start), cover), 0.0, cover)
-    log_evidence = there.gain - there.prior_penalty - there.occam_penalty
-    if last is not None and not last.added.either_sign:
-        log_evidence += log_above_nil(float(there.values[0]), float(there.covariance[0, 0]))
-    return there, log_evidence
+def _maximum(law: Base, places: StatedPlaces, start: Expansion, cover: FloatArray) -> Expansion:
+    """The maximum of the evidence: where fronts stop near a sensor, its shift leads on beyond it."""
+    return climb(law, places, climb(law, places, start, cover), cover, by_modes=False)
 
 
-def _beside(base: Base, candidate: Candidate | Profile) -> Shifts:
-    """The shifts beside what was fitted: a mechanism as strong as it is with them, a force as it was."""
+def _log_factor(there: Laplace) -> float:
+    """Log evidence, against that of what the gain is over."""
+    return there.gain - there.prior_penalty - there.occam_penalty
+
+
+def _changes(base: Base, nothing: Shifts, candidate: Candidate | Profile) -> tuple[float, float | None]:
+    """What stated places change for what was fitted, less what they change for nothing, in nats.
+
+    Everything is fitted anew. The second is for a mechanism with the force beside it, None where there is
+    none, or where a step leads to what no front can do.
+    """
     if isinstance(candidate, Profile):
-        return shifts_beside(with_mean(base, candidate))
-    curve = candidate.best
+        start = np.append(np.zeros(len(nothing.mean)), candidate.mean), candidate.fit.start
+        return _of_force(base, nothing, candidate, start), None
+    curve, beside = candidate.best, candidate.beside
     top = int(np.argmax(curve.log_evidence + curve.log_prior(curve.strengths, curve.scale)))
     law = base.with_in(curve.direction, float(curve.strengths[top]), curve.fits[top])
-    return shifts_beside(law, curve)
+    there, within = _with_coefficient(law, curve, nothing.places, nothing.mean)
+    _, exact = _with_coefficient(law, curve, EXACT, np.empty(0))
+    alone = within - nothing.log_factor - exact
+    if beside is None:
+        return alone, None
+    start = np.append(there.values, np.zeros(len(beside.mean))), there.fit.start
+    try:
+        return alone, _of_force(base, nothing, beside, start, curve)
+    except np.linalg.LinAlgError:
+        return alone, None
+
+
+def _with_coefficient(
+    law: Base, curve: Curve, places: StatedPlaces, shifts_m: FloatArray
+) -> tuple[Expansion, float]:
+    """A law with shifts, its last coefficient fitted anew with them; and its log evidence.
+
+    Parameters
+    ----------
+    curve : Curve
+        Of the law's last direction.
+    shifts_m : (n,) array
+        The shifts beside nothing.
+    """
+    cover = np.diag(np.append(curve.scale, places.sd) ** 2)
+    start = np.append(law.strengths[-1], np.zeros(len(places.sd)))
+    found = _maximum(law, places, expanded_at(law, places, start, law.fit.start), cover)
+    there = laplace(found, 0.0, cover)
+    if curve.added.either_sign:
+        return found, _log_factor(there)
+    if there.values[0] < 0.0:  # where no front goes: from nil then, by score and information there
+        found = expanded_at(law, places, np.append(0.0, shifts_m), law.fit.start)
+        there = laplace(found, 0.0, cover)
+    above_nil = log_above_nil(float(there.values[0]), float(there.covariance[0, 0]))
+    return found, _log_factor(there) + above_nil
+
+
+def _of_force(
+    base: Base, nothing: Shifts, force: Profile, start: Start, beside: Curve | None = None
+) -> float:
+    """What stated places change for a force by the Laplace approximation, less what they do for nothing.
+
+    Parameters
+    ----------
+    start : (values, (Population, points))
+        Where to begin: the coefficient of a mechanism beside it if there is one, shifts, the force.
+    """
+    directions = [] if beside is None else [beside.direction]
+    directions += nothing.places.each(base.setting)
+    strengths = np.append(base.strengths, np.zeros(len(directions)))
+    wide = replace(base, directions=(*base.directions, *directions), strengths=strengths)
+    least = nothing.log_factor
+    again = fit_profile(wide, force.kind, start, beside=beside, shifts=nothing.places, least=least)
+    return again.log_bayes_factor - force.log_bayes_factor - nothing.log_factor

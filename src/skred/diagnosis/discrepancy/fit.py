@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from skred.arrays import FloatArray
 from skred.diagnosis.discrepancy.climb import climb, expanded_at
@@ -33,6 +34,7 @@ from skred.diagnosis.discrepancy.profile import (
 from skred.diagnosis.evidence.adaptive_sampling import Mode
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import Population
+from skred.diagnosis.evidence.stated_places import EXACT, StatedPlaces
 from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
 
 Start = tuple[FloatArray, tuple[Population, FloatArray]]
@@ -48,6 +50,7 @@ def fit_profile(
     near: Start | None = None,
     again: Prior | None = None,
     beside: Curve | None = None,
+    shifts: StatedPlaces = EXACT,
     least: float = 0.0,
 ) -> Profile:
     """Fit the profile by Gauss-Newton steps; evidence by quadrature at the maximum.
@@ -66,13 +69,17 @@ def fit_profile(
         Under which to climb first: `near` is what was found for it by all of some avalanches, of which the
         base has a part. Fewer priors are climbed under then, and from one start each.
     beside : Curve, optional
-        Of the base's last direction, if its strength is to be fitted too: the first of all values, with its
-        own prior. The evidence is that of both against neither then.
+        Of the base's last direction but shifts, if its strength is to be fitted too: the first of all values,
+        with its own prior. The evidence is that of both against neither then.
+    shifts : StatedPlaces, optional
+        Of the base's last directions, of sensors whose places have stated errors: values after that, and in
+        the evidence as well.
     least : float
         Log Bayes factor below which none counts: that of no force, or more where something else leads.
         Climbs end where even the approximations of priors not climbed under have less.
     """
-    at, n_beside = knots(base.setting), 0 if beside is None else 1
+    at, scales = knots(base.setting), np.append([] if beside is None else [beside.scale], shifts.sd)
+    n_beside = len(scales)
     # Nothing like everything else, so that what is left of integration errors is the same there.
     none = np.zeros(n_beside + len(at))
     starts = [expanded_at(base, kind, none, base.fit.start)]
@@ -80,7 +87,7 @@ def fit_profile(
     if near is not None:
         starts.append(expanded_at(base, kind, *near))
     shares = priors_of(kind, at)
-    covers = {prior: _with_one_more(beside, prior.cover(at)) for prior in shares}
+    covers = {prior: block_diag(np.diag(scales**2), prior.cover(at)) for prior in shares}
     explored = ExploredPriors(height, shares, covers, least)
     if again is None:
         waiting, maximum_under, most = _first(kind, starts[-1], explored), _maximum_under, _PRIORS_TRIED
@@ -97,21 +104,12 @@ def fit_profile(
     prior = max(explored.maxima, key=explored.factor)
     fit, there = explored.maxima[prior].fit, explored.approximation(prior)
     values, cover, factor, modes = there.values, there.covariance, explored.log_factor, explored.modes
-    if beside is not None:
-        modes = ()  # of both together, and so of no force by itself
-        if not beside.added.either_sign:
-            factor += log_above_nil(float(values[0]), float(cover[0, 0]))
+    if n_beside:
+        modes = ()  # of all together, and so of no force by itself
+    if beside is not None and not beside.added.either_sign:
+        factor += log_above_nil(float(values[0]), float(cover[0, 0]))
     gain, values, cover = fit.found.log_evidence - height, values[n_beside:], cover[n_beside:, n_beside:]
     return Profile(kind, prior, at, values, cover, factor, gain, fit, modes)
-
-
-def _with_one_more(beside: Curve | None, cover: FloatArray) -> FloatArray:
-    """Covariance of a profile's values, and of the strength beside it before them if there is one."""
-    if beside is None:
-        return cover
-    wider = np.pad(cover, ((1, 0), (1, 0)))
-    wider[0, 0] = beside.scale**2
-    return wider
 
 
 def mode_at(base: Base, profile: Profile, values: FloatArray) -> Mode:

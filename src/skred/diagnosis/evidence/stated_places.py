@@ -41,6 +41,10 @@ class StatedPlaces:
         return self.each(setting), values
 
 
+EXACT = StatedPlaces(())
+"""Where no place has a stated error."""
+
+
 def stated_places(problem: HierarchicalProblem) -> StatedPlaces:
     """Those of a campaign, perhaps none."""
     read = (problem.observed | problem.readings.bounded).any(axis=0)
