@@ -191,7 +191,7 @@ def test_a_mechanism_beside_a_shift_is_integrated_over_as_by_campaigns_that_note
         assert beside is not None
         return found, beside, fit_profile(base, KINDS[0])
 
-    sd, step, heights = 40.0, 15.0, list[list[float]]()
+    sd, step, heights, means = 40.0, 15.0, list[list[float]](), list[float]()
     shifts_m = np.arange(-90.0, 46.0, step)
     with ThreadPoolExecutor(2) as pool:
         for shift in shifts_m:
@@ -199,6 +199,7 @@ def test_a_mechanism_beside_a_shift_is_integrated_over_as_by_campaigns_that_note
             alone, beside, force = compared(base)
             factor = alone.log_bayes_factor
             factors = [0.0, factor, factor + beside.log_factor, force.log_bayes_factor]
+            means.append(alone.moments[0])
             heights.append([base.with_nothing(USUAL).found.log_evidence + one for one in factors])
         weights = norm.logpdf(shifts_m, scale=sd) + np.log(step)
         nothing, *expected = np.logaddexp.reduce(np.array(heights) + weights[:, None], axis=0)
@@ -212,6 +213,12 @@ def test_a_mechanism_beside_a_shift_is_integrated_over_as_by_campaigns_that_note
     assert changed.alone == pytest.approx(expected[0] - nothing, abs=1.0)
     assert changed.alone + changed.residue == pytest.approx(expected[1] - nothing, abs=1.5)
     assert force.log_bayes_factor == pytest.approx(expected[2] - nothing, abs=1.0)
+    # Its strength is what the campaigns have, each as much as with the mechanism it has evidence.
+    share = np.exp(np.array([row[1] for row in heights]) + weights - expected[0])
+    mean = float(share @ means)
+    strength = changed.strength_with_places
+    assert strength is not None and strength.mean == pytest.approx(mean, rel=0.1)
+    assert alone.moments[0] < 0.8 * mean  # with the place taken as exact
 
 
 def test_what_recordings_can_tell_is_less_where_places_are_uncertain(base: Base) -> None:

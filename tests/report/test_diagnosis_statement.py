@@ -15,7 +15,7 @@ from skred.diagnosis.augment.coefficient import strength_of
 from skred.diagnosis.augment.step import Left
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import Decision
-from skred.diagnosis.compare.candidate import FORM, Candidate
+from skred.diagnosis.compare.candidate import FORM, Candidate, Strength
 from skred.diagnosis.compare.sensor_places import Shifts
 from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
@@ -162,6 +162,26 @@ def test_sensors_that_stand_elsewhere_as_their_stated_errors_allow_are_told() ->
     assert [one["sensor"] for one in document["sensor_places"]["sensors"]] == ["LC", "CD"]
     for little in (about(found, 2.0), about(claimed, 14.2)):
         assert "probably stands" not in little["statement"] and little["sensor_places"] is not None
+
+
+def test_a_strength_is_told_with_the_places_of_sensors_fitted_as_well() -> None:
+    found = diagnosis("tie")
+    (step,) = found.steps
+    assert "where sensors stand" not in verdict(found)["statement"]
+    candidate = replace(step.candidate, strength_with_places=Strength(1.25, 0.5))
+    under, *rest = found.comparison.under_each
+    candidates = under.candidates | {candidate.mechanism.id: candidate}
+    comparison = replace(found.comparison, under_each=(replace(under, candidates=candidates), *rest))
+    document = verdict(
+        with_finding(
+            replace(found, comparison=comparison),
+            steps=(replace(step, candidate=candidate, comparison=comparison),),
+        )
+    )
+    size = plus_minus(1.25, 0.5, candidate.mechanism.strength.unit)
+    assert f"as their stated errors allow, it is {size}." in document["statement"]
+    [row] = [one for one in document["candidates"] if one["id"] == candidate.mechanism.id]
+    assert row["strength_with_places"] == {"mean": 1.25, "sd": 0.5}
 
 
 def test_how_probably_what_is_named_begins_at_the_first_recording_is_told() -> None:

@@ -74,6 +74,9 @@ class Candidate:
         Where avalanches may differ in the strength; none where that was not looked at.
     of_places : float
         What stated errors of sensors' places change, less what they change for nothing, in nats.
+    strength_with_places : Strength or None
+        As `strength`, the shifts of such sensors fitted together with it; None where there are none, or where
+        it would be below nil.
     """
 
     mechanism: Mechanism
@@ -85,6 +88,7 @@ class Candidate:
     beside: Profile | None = None
     looked: tuple[Looked, ...] = ()
     of_places: float = 0.0
+    strength_with_places: Strength | None = None
 
     @property
     def log_factors(self) -> FloatArray:
@@ -170,10 +174,14 @@ class Candidate:
         found = replace(self, looked=looked, correction=self.correction + float(after - before))
         return replace(found, error=found.leading.error if found.leading else None)
 
-    def with_places(self, alone: float, beside: float | None) -> Candidate:
-        """With what stated places change: for the mechanism, and for it with a force beside it, in nats."""
+    def with_places(self, alone: float, beside: float | None, strength: Strength | None) -> Candidate:
+        """With what stated places change: for the mechanism, for it with a force beside it (both in nats).
+
+        And with its strength at the best shape.
+        """
         residue = None if self.residue is None or beside is None else self.residue + beside - alone
-        return replace(self, of_places=alone, residue=residue)
+        everywhere = None if strength is None else self.over_places(*strength)
+        return replace(self, of_places=alone, residue=residue, strength_with_places=everywhere)
 
     def best_of_each(self, form: Callable[[Curve], Hashable]) -> list[tuple[Curve, float]]:
         """The best curve of each form that shapes have, and the log of the form's posterior probability.

@@ -7,15 +7,17 @@ that changes for a candidate, its coefficient fitted anew, is set against what i
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from skred.arrays import FloatArray
-from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.candidate import Candidate, Strength
 from skred.diagnosis.discrepancy.climb import climb, expanded_at
 from skred.diagnosis.discrepancy.explored import Expansion, Laplace, laplace, log_above_nil
 from skred.diagnosis.discrepancy.fit import Start, fit_profile
@@ -81,7 +83,9 @@ def with_stated_places(
             if isinstance(key, str):
                 found[key] = found[key].with_places(*changed)
             else:
-                forces[key] = replace(forces[key], log_bayes_factor=forces[key].log_bayes_factor + changed[0])
+                forces[key] = replace(
+                    forces[key], log_bayes_factor=forces[key].log_bayes_factor + changed.alone
+                )
     return found, forces, nothing
 
 
@@ -105,34 +109,47 @@ def _log_factor(there: Laplace) -> float:
     return there.gain - there.prior_penalty - there.occam_penalty
 
 
-def _changes(base: Base, nothing: Shifts, candidate: Candidate | Profile) -> tuple[float, float | None]:
+class _Changed(NamedTuple):
     """What stated places change for what was fitted, less what they change for nothing, in nats.
 
-    Everything is fitted anew. The second is for a mechanism with the force beside it, None where there is
-    none, or where a step leads to what no front can do.
+    Attributes
+    ----------
+    beside : float or None
+        For a mechanism with the force beside it; None where there is none, or where a step leads to what no
+        front can do.
+    strength : Strength or None
+        Of a mechanism at its best shape.
     """
+
+    alone: float
+    beside: float | None = None
+    strength: Strength | None = None
+
+
+def _changes(base: Base, nothing: Shifts, candidate: Candidate | Profile) -> _Changed:
+    """With everything fitted anew."""
     if isinstance(candidate, Profile):
         start = np.append(np.zeros(len(nothing.mean)), candidate.mean), candidate.fit.start
-        return _of_force(base, nothing, candidate, start), None
+        return _Changed(_of_force(base, nothing, candidate, start))
     curve, beside = candidate.best, candidate.beside
     top = int(np.argmax(curve.log_evidence + curve.log_prior(curve.strengths, curve.scale)))
     law = base.with_in(curve.direction, float(curve.strengths[top]), curve.fits[top])
-    there, within = _with_coefficient(law, curve, nothing.places, nothing.mean)
-    _, exact = _with_coefficient(law, curve, EXACT, np.empty(0))
-    alone = within - nothing.log_factor - exact
+    found, within, strength = _with_coefficient(law, curve, nothing.places, nothing.mean)
+    _, exact, _ = _with_coefficient(law, curve, EXACT, np.empty(0))
+    changed = _Changed(within - nothing.log_factor - exact, strength=strength)
     if beside is None:
-        return alone, None
-    start = np.append(there.values, np.zeros(len(beside.mean))), there.fit.start
+        return changed
+    start = np.append(found.values, np.zeros(len(beside.mean))), found.fit.start
     try:
-        return alone, _of_force(base, nothing, beside, start, curve)
+        return changed._replace(beside=_of_force(base, nothing, beside, start, curve))
     except np.linalg.LinAlgError:
-        return alone, None
+        return changed
 
 
 def _with_coefficient(
     law: Base, curve: Curve, places: StatedPlaces, shifts_m: FloatArray
-) -> tuple[Expansion, float]:
-    """A law with shifts, its last coefficient fitted anew with them; and its log evidence.
+) -> tuple[Expansion, float, Strength | None]:
+    """A law with shifts, its last coefficient fitted anew with them; its log evidence; the coefficient.
 
     Parameters
     ----------
@@ -145,13 +162,16 @@ def _with_coefficient(
     start = np.append(law.strengths[-1], np.zeros(len(places.sd)))
     found = _maximum(law, places, expanded_at(law, places, start, law.fit.start), cover)
     there = laplace(found, 0.0, cover)
+    strength = Strength(float(there.values[0]), math.sqrt(float(there.covariance[0, 0])))
     if curve.added.either_sign:
-        return found, _log_factor(there)
-    if there.values[0] < 0.0:  # where no front goes: from nil then, by score and information there
-        found = expanded_at(law, places, np.append(0.0, shifts_m), law.fit.start)
-        there = laplace(found, 0.0, cover)
+        return found, _log_factor(there), strength
+    if strength.mean > 0.0:
+        return found, _log_factor(there) + log_above_nil(strength.mean, strength.sd**2), strength
+    # Where no front goes: from nil then, by score and information there.
+    found = expanded_at(law, places, np.append(0.0, shifts_m), law.fit.start)
+    there = laplace(found, 0.0, cover)
     above_nil = log_above_nil(float(there.values[0]), float(there.covariance[0, 0]))
-    return found, _log_factor(there) + above_nil
+    return found, _log_factor(there) + above_nil, None
 
 
 def _of_force(

@@ -109,6 +109,7 @@ def candidate_documents(found: Diagnosis, comparison: Comparison) -> list[dict[s
 def _candidate(candidate: Candidate, log_factor: float) -> dict[str, Any]:
     """One mechanism in a comparison, where and how strong it is if it is there."""
     strength, shape = candidate.mechanism.strength, candidate.best.shape
+    of_places = candidate.strength_with_places
     return {
         "id": candidate.mechanism.id,
         **kind_of(candidate.mechanism),
@@ -124,4 +125,5 @@ def _candidate(candidate: Candidate, log_factor: float) -> dict[str, Any]:
         "sensor": shape.sensor,
         "log_bayes_factor_se": candidate.error,
         "residue": candidate.residue,
+        "strength_with_places": None if of_places is None else of_places._asdict(),
     }

@@ -62,6 +62,16 @@ def moved_as_stated(found: Diagnosis) -> str:
     )
 
 
+def strength_with_places(found: Diagnosis) -> str:
+    """How strong what is named is with shifts of sensors fitted as well, where places have stated errors."""
+    candidate = found.steps[0].candidate
+    strength, unit = candidate.strength_with_places, candidate.mechanism.strength.unit
+    if strength is None:
+        return ""
+    size = plus_minus(*strength, unit)
+    return f"Fitted together with where sensors stand, as their stated errors allow, it is {size}."
+
+
 def places_document(found: Diagnosis) -> dict[str, Any] | None:
     """Where sensors stand whose places have stated errors, with nothing added; None where there are none."""
     shifts = found.comparison.leading(NOTHING).shifts

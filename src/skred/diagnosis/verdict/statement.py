@@ -17,7 +17,7 @@ from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.between import between_sentence
 from skred.diagnosis.verdict.hangs_on import carried, hangs_on
 from skred.diagnosis.verdict.improvement import improvement
-from skred.diagnosis.verdict.stated_places import moved_as_stated, place_as_stated
+from skred.diagnosis.verdict.stated_places import moved_as_stated, place_as_stated, strength_with_places
 from skred.diagnosis.words import TOLD_FROM, percent, plus_minus
 from skred.inference.influence_words import enumerated
 from skred.physics.mechanisms import mechanisms
@@ -110,6 +110,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         f"Its {strength['parameter'].replace('_', ' ')} is"
         f" {plus_minus(strength['mean'], strength['sd'], strength['unit'])}"
         f"{_in_words(found, strength['mean'])}.",
+        strength_with_places(found),
         _begins(found.steps[0]),
         between_sentence(strength),
         _compensated(first["constants"]),
