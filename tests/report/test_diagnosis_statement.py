@@ -127,11 +127,11 @@ def test_what_a_sensor_would_read_elsewhere_is_told_where_something_is_claimed(
 ) -> None:
     """10 % otherwise 20 m off; 2 m off it is less than what errors of its readings leave open."""
     found = diagnosis(kind)
-    assert "only its odds allow" not in verdict(found)["statement"]
+    assert "its calibration takes places" not in verdict(found)["statement"]
     said, sensor = placed_about(found, 20.0), found.problem.campaign.sensor_ids[0]
     words = f"{sensor}, whose place is known to 20 m (sd), would read 10 % faster or slower so far up or down"
-    assert (words in said) is claimed and ("only its odds allow" in said) is claimed
-    assert "only its odds allow" not in placed_about(found, 2.0)
+    assert (words in said) is claimed and ("its calibration takes places" in said) is claimed
+    assert "its calibration takes places" not in placed_about(found, 2.0)
 
 
 def test_which_way_a_sensor_stands_elsewhere_is_told() -> None:

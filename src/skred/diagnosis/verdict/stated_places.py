@@ -34,7 +34,7 @@ def place_as_stated(found: Diagnosis) -> str:
     sensor = problem.campaign.sensors[most]
     how = f"{percent(share)} faster or slower" if share < 1.0 else "something else"
     return (
-        f"only its odds allow for stated errors of sensors' places: {sensor.id}, whose place is known to"
+        f"its calibration takes places of sensors as exact: {sensor.id}, whose place is known to"
         f" {sensor.place_sd_m:g} m (sd), would read {how} so far up or down"
     )
 
