@@ -206,7 +206,7 @@ def test_a_mechanism_beside_a_shift_is_integrated_over_as_by_campaigns_that_note
         base = base_of(elsewhere(campaign, HIDDEN, 40.0), "constant")
         alone, beside, force = compared(base)
         assert beside.log_factor > 2.0
-        one = Candidate(drag, (alone,), np.zeros(1), residue=beside.log_factor, beside=beside.profile)
+        one = Candidate(drag, (alone,), np.zeros(1), residue=beside.log_factor, beside=beside.beside)
         found, [force], _ = with_stated_places(stated(base, sd), {drag.id: one}, [force], [force], pool)
     changed = found[drag.id]
     assert changed.residue is not None and changed.residue < 0.0

@@ -14,7 +14,7 @@ from rolling_cases import entering, rolling, speed
 from scipy.stats import norm
 
 from skred.campaign import Campaign
-from skred.diagnosis.compare.candidate import Candidate, log_gain, names_of_constants
+from skred.diagnosis.compare.candidate import Beside, Candidate, log_gain, names_of_constants
 from skred.diagnosis.compare.comparison import compare, free_force
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.residue import Residue, with_residues
@@ -153,7 +153,7 @@ def test_a_mechanism_that_is_overtaken_is_looked_at_too(monkeypatch: pytest.Monk
 
     def beside(base: Base, curves: list[object], least: object, pool: object) -> list[Residue | None]:
         n_looked.append(len(curves))
-        return [Residue(29.0, profiles[0])] * len(curves)
+        return [Residue(29.0, Beside(drag.best, tuple(profiles)))] * len(curves)
 
     monkeypatch.setattr("skred.diagnosis.compare.residue.residues", beside)
     with ThreadPoolExecutor(1) as pool:
@@ -179,7 +179,7 @@ def test_each_form_of_a_mechanism_has_a_residue_of_its_own(monkeypatch: pytest.M
     of_each = {(): 1.0, (("another", 1.0),): 8.0}
 
     def beside(base: Base, curves: list[Curve], least: object, pool: object) -> list[Residue | None]:
-        return [Residue(of_each[one.shape.constants], profiles[0]) for one in curves]
+        return [Residue(of_each[one.shape.constants], Beside(one, tuple(profiles))) for one in curves]
 
     monkeypatch.setattr("skred.diagnosis.compare.residue.residues", beside)
     with ThreadPoolExecutor(1) as pool:
@@ -203,6 +203,15 @@ def test_what_laplace_lacks_of_the_force_is_added_beside_a_mechanism(monkeypatch
     assert 4.9 < lacked <= 5.0
     assert beside[DRAG.id].residue == pytest.approx(30.0 + lacked)
     assert alone[DRAG.id].residue is None
+
+
+def test_what_stated_places_leave_of_a_mechanism_decides_whether_a_force_counts_beside_it() -> None:
+    """One that explains nothing any more does not inherit what such a force explains."""
+    _, drag, _ = fitted(rolling(2.4e-4, n_events=6))
+    one = replace(drag, correction=20.0 - drag.alone, residue=10.0)
+    still, nothing_left = one.with_places(-8.0, -12.0, None), one.with_places(-22.0, -18.0, None)
+    assert still.alone == pytest.approx(12.0) and still.residue == pytest.approx(6.0)
+    assert nothing_left.residue is None and nothing_left.log_bayes_factor == pytest.approx(-2.0)
 
 
 def test_what_a_force_beside_adds() -> None:

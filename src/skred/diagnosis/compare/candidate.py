@@ -44,6 +44,21 @@ def log_gain(residue: float | None, gains: Mapping[BetweenEvents, float] | None 
     return float(np.logaddexp(math.log1p(-BESIDE) + own, math.log(BESIDE) + residue))
 
 
+class Beside(NamedTuple):
+    """A force not in the list beside a mechanism.
+
+    Attributes
+    ----------
+    curve : Curve
+        Of the mechanism's shape.
+    profiles : tuple of Profile
+        Of each kind, the evidence that of both against neither.
+    """
+
+    curve: Curve
+    profiles: tuple[Profile, ...]
+
+
 class Strength(NamedTuple):
     """Posterior mean and standard deviation of a strength, in its unit."""
 
@@ -68,8 +83,8 @@ class Candidate:
         Standard error of the log Bayes factor by importance sampling, in nats; None where not looked at.
     residue : float or None
         Log Bayes factor of a force not in the list beside it; None where not looked at.
-    beside : Profile or None
-        That force, of the most probable kind.
+    beside : Beside or None
+        That force beside the most probable form of the mechanism's shapes.
     looked : tuple of Looked
         Where avalanches may differ in the strength; none where that was not looked at.
     of_places : float
@@ -85,7 +100,7 @@ class Candidate:
     correction: float = 0.0
     error: float | None = None
     residue: float | None = None
-    beside: Profile | None = None
+    beside: Beside | None = None
     looked: tuple[Looked, ...] = ()
     of_places: float = 0.0
     strength_with_places: Strength | None = None
@@ -177,11 +192,15 @@ class Candidate:
     def with_places(self, alone: float, beside: float | None, strength: Strength | None) -> Candidate:
         """With what stated places change: for the mechanism, for it with a force beside it (both in nats).
 
-        And with its strength at the best shape.
+        And with its strength at the best shape. What it leaves then is no residue any more where that is more
+        than what it explains.
         """
-        residue = None if self.residue is None or beside is None else self.residue + beside - alone
         everywhere = None if strength is None else self.over_places(*strength)
-        return replace(self, of_places=alone, residue=residue, strength_with_places=everywhere)
+        found = replace(self, of_places=alone, residue=None, strength_with_places=everywhere)
+        if self.residue is None or beside is None:
+            return found
+        residue = self.residue + beside - alone
+        return replace(found, residue=residue) if residue < found.log_bayes_factor else found
 
     def best_of_each(self, form: Callable[[Curve], Hashable]) -> list[tuple[Curve, float]]:
         """The best curve of each form that shapes have, and the log of the form's posterior probability.

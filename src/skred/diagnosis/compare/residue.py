@@ -18,34 +18,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skred.diagnosis.compare.candidate import Candidate, names_of_constants
+from skred.diagnosis.compare.candidate import Beside, Candidate, names_of_constants
 from skred.diagnosis.discrepancy.fit import fit_profile
-from skred.diagnosis.discrepancy.profile import (
-    KINDS,
-    Kind,
-    Profile,
-    knots,
-    log_evidence_of,
-    most_probable,
-)
+from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, knots, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms.spec import Group
 
 
 class Residue(NamedTuple):
-    """A force not in the list beside a mechanism.
-
-    Attributes
-    ----------
-    log_factor : float
-        Log Bayes factor against the mechanism alone.
-    profile : Profile
-        Of the most probable kind.
-    """
+    """A force not in the list beside a mechanism, and its log Bayes factor against the mechanism alone."""
 
     log_factor: float
-    profile: Profile
+    beside: Beside
 
 
 def with_residues(
@@ -88,7 +73,7 @@ def with_residues(
         for name, parts in beside.items():
             together = float(np.logaddexp.reduce([one.log_factor for one in parts]))
             best_form = max(parts, key=lambda one: one.log_factor)
-            found[name] = replace(found[name], residue=together, beside=best_form.profile)
+            found[name] = replace(found[name], residue=together, beside=best_form.beside)
             highest = max(highest, found[name].log_bayes_factor)
     return found
 
@@ -110,7 +95,7 @@ def residues(
     fits = batched(pool.map(partial(_fit_beside, base), *zip(*jobs, strict=True)), len(KINDS))
     fitted = [[one for one in profiles if one is not None] for profiles in fits]
     found = [
-        Residue(log_evidence_of(profiles) - curve.log_bayes_factor, most_probable(profiles))
+        Residue(log_evidence_of(profiles) - curve.log_bayes_factor, Beside(curve, tuple(profiles)))
         if len(profiles) == len(KINDS)
         else None
         for curve, profiles in zip(curves, fitted, strict=True)

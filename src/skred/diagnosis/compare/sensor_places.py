@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
@@ -21,7 +22,7 @@ from skred.diagnosis.compare.candidate import Candidate, Strength
 from skred.diagnosis.discrepancy.climb import climb, expanded_at
 from skred.diagnosis.discrepancy.explored import Expansion, Laplace, laplace, log_above_nil
 from skred.diagnosis.discrepancy.fit import Start, fit_profile
-from skred.diagnosis.discrepancy.profile import Profile
+from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.stated_places import EXACT, StatedPlaces, stated_places
 from skred.diagnosis.evidence.tolerance import COUNTS
@@ -130,54 +131,57 @@ def _changes(base: Base, nothing: Shifts, candidate: Candidate | Profile) -> _Ch
     """With everything fitted anew."""
     if isinstance(candidate, Profile):
         start = np.append(np.zeros(len(nothing.mean)), candidate.mean), candidate.fit.start
-        return _Changed(_of_force(base, nothing, candidate, start))
-    curve, beside = candidate.best, candidate.beside
-    top = int(np.argmax(curve.log_evidence + curve.log_prior(curve.strengths, curve.scale)))
-    law = base.with_in(curve.direction, float(curve.strengths[top]), curve.fits[top])
-    found, within, strength = _with_coefficient(law, curve, nothing.places, nothing.mean)
-    _, exact, _ = _with_coefficient(law, curve, EXACT, np.empty(0))
+        return _Changed(_with_force(base, nothing, candidate, start) - candidate.log_bayes_factor)
+    _, within, strength = _with_coefficient(base, candidate.best, nothing.places, nothing.mean)
+    _, exact, _ = _with_coefficient(base, candidate.best, EXACT, np.empty(0))
     changed = _Changed(within - nothing.log_factor - exact, strength=strength)
-    if beside is None:
+    if candidate.beside is None:
         return changed
-    start = np.append(found.values, np.zeros(len(beside.mean))), found.fit.start
+    curve, profiles = candidate.beside
+    found, _, _ = _with_coefficient(base, curve, nothing.places, nothing.mean)
+    start = np.append(found.values, np.zeros_like(profiles[0].mean)), found.fit.start
     try:
-        return changed._replace(beside=_of_force(base, nothing, beside, start, curve))
+        again = [_with_force(base, nothing, one, start, curve) for one in profiles]
     except np.linalg.LinAlgError:
         return changed
+    both = log_evidence_of(
+        [replace(one, log_bayes_factor=new) for one, new in zip(profiles, again, strict=True)]
+    )
+    return changed._replace(beside=both - log_evidence_of(profiles))
 
 
 def _with_coefficient(
-    law: Base, curve: Curve, places: StatedPlaces, shifts_m: FloatArray
+    base: Base, curve: Curve, places: StatedPlaces, shifts_m: FloatArray
 ) -> tuple[Expansion, float, Strength | None]:
-    """A law with shifts, its last coefficient fitted anew with them; its log evidence; the coefficient.
+    """The law with shifts and a mechanism, its coefficient fitted with them; log evidence; the coefficient.
 
     Parameters
     ----------
-    curve : Curve
-        Of the law's last direction.
     shifts_m : (n,) array
         The shifts beside nothing.
     """
+    top = int(np.argmax(curve.log_evidence + curve.log_prior(curve.strengths, curve.scale)))
+    law = base.with_in(curve.direction, float(curve.strengths[top]), curve.fits[top])
     cover = np.diag(np.append(curve.scale, places.sd) ** 2)
     start = np.append(law.strengths[-1], np.zeros(len(places.sd)))
-    found = _maximum(law, places, expanded_at(law, places, start, law.fit.start), cover)
+    found, one_sided = expanded_at(law, places, start, law.fit.start), not curve.added.either_sign
+    with suppress(np.linalg.LinAlgError):  # a step can lead to what no front can do, as a drag far below nil
+        found = _maximum(law, places, found, cover)
     there = laplace(found, 0.0, cover)
     strength = Strength(float(there.values[0]), math.sqrt(float(there.covariance[0, 0])))
-    if curve.added.either_sign:
-        return found, _log_factor(there), strength
-    if strength.mean > 0.0:
-        return found, _log_factor(there) + log_above_nil(strength.mean, strength.sd**2), strength
-    # Where no front goes: from nil then, by score and information there.
-    found = expanded_at(law, places, np.append(0.0, shifts_m), law.fit.start)
-    there = laplace(found, 0.0, cover)
-    above_nil = log_above_nil(float(there.values[0]), float(there.covariance[0, 0]))
-    return found, _log_factor(there) + above_nil, None
+    if one_sided and strength.mean <= 0.0:  # where no front goes: from nil, by the score there
+        found = expanded_at(law, places, np.append(0.0, shifts_m), law.fit.start)
+        there = laplace(found, 0.0, cover)
+    log_evidence = _log_factor(there)
+    if one_sided:
+        log_evidence += log_above_nil(float(there.values[0]), float(there.covariance[0, 0]))
+    return found, log_evidence, None if one_sided and strength.mean <= 0.0 else strength
 
 
-def _of_force(
+def _with_force(
     base: Base, nothing: Shifts, force: Profile, start: Start, beside: Curve | None = None
 ) -> float:
-    """What stated places change for a force by the Laplace approximation, less what they do for nothing.
+    """Log Bayes factor of a force of one kind against nothing, both with shifts, by Laplace.
 
     Parameters
     ----------
@@ -190,4 +194,4 @@ def _of_force(
     wide = replace(base, directions=(*base.directions, *directions), strengths=strengths)
     least = nothing.log_factor
     again = fit_profile(wide, force.kind, start, beside=beside, shifts=nothing.places, least=least)
-    return again.log_bayes_factor - force.log_bayes_factor - nothing.log_factor
+    return again.log_bayes_factor - nothing.log_factor

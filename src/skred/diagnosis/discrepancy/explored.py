@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from skred.arrays import FloatArray
 from skred.diagnosis.discrepancy.profile import Prior
@@ -205,4 +206,4 @@ def occam_penalty(maximum: Expansion, cover: FloatArray) -> float:
 
 def log_above_nil(value: float, variance: float) -> float:
     """What a half-normal prior adds to the log evidence under the normal one: twice that, above nil alone."""
-    return math.log(max(math.erfc(-value / math.sqrt(2.0 * variance)), 1e-300))
+    return math.log(2.0) + float(log_ndtr(value / math.sqrt(variance)))
