@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from skred.arrays import FloatArray
 from skred.diagnosis.discrepancy.climb import climb, expanded_at
@@ -87,7 +86,7 @@ def fit_profile(
     if near is not None:
         starts.append(expanded_at(base, kind, *near))
     shares = priors_of(kind, at)
-    covers = {prior: block_diag(np.diag(scales**2), prior.cover(at)) for prior in shares}
+    covers = {prior: _with_more(scales, prior.cover(at)) for prior in shares}
     explored = ExploredPriors(height, shares, covers, least)
     if again is None:
         waiting, maximum_under, most = _first(kind, starts[-1], explored), _maximum_under, _PRIORS_TRIED
@@ -110,6 +109,14 @@ def fit_profile(
         factor += log_above_nil(float(values[0]), float(cover[0, 0]))
     gain, values, cover = fit.found.log_evidence - height, values[n_beside:], cover[n_beside:, n_beside:]
     return Profile(kind, prior, at, values, cover, factor, gain, fit, modes)
+
+
+def _with_more(scales: FloatArray, cover: FloatArray) -> FloatArray:
+    """Covariance of a profile's values, and of values before them that are independent of each other."""
+    n = len(scales)
+    wider = np.pad(cover, ((n, 0), (n, 0)))
+    wider[:n, :n] = np.diag(scales**2)
+    return wider
 
 
 def mode_at(base: Base, profile: Profile, values: FloatArray) -> Mode:
