@@ -132,13 +132,14 @@ def _changes(base: Base, nothing: Shifts, candidate: Candidate | Profile) -> _Ch
     if isinstance(candidate, Profile):
         start = np.append(np.zeros(len(nothing.mean)), candidate.mean), candidate.fit.start
         return _Changed(_with_force(base, nothing, candidate, start) - candidate.log_bayes_factor)
-    _, within, strength = _with_coefficient(base, candidate.best, nothing.places, nothing.mean)
+    found, within, strength = _with_coefficient(base, candidate.best, nothing.places, nothing.mean)
     _, exact, _ = _with_coefficient(base, candidate.best, EXACT, np.empty(0))
     changed = _Changed(within - nothing.log_factor - exact, strength=strength)
     if candidate.beside is None:
         return changed
     curve, profiles = candidate.beside
-    found, _, _ = _with_coefficient(base, curve, nothing.places, nothing.mean)
+    if curve is not candidate.best:
+        found, _, _ = _with_coefficient(base, curve, nothing.places, nothing.mean)
     start = np.append(found.values, np.zeros_like(profiles[0].mean)), found.fit.start
     try:
         again = [_with_force(base, nothing, one, start, curve) for one in profiles]
