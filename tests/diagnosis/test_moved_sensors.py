@@ -27,7 +27,7 @@ from skred.diagnosis.evidence.moved_sensors import StopBounds
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
-from skred.physics.mechanisms.placed import placed
+from skred.physics.mechanisms.placed import placed, shapes_of
 from skred.physics.mechanisms.spec import Shape
 from tests.diagnosis.diagnosis_cases import base_of, trial
 
@@ -181,6 +181,19 @@ def test_what_only_makes_up_for_a_shift_has_no_more_than_where_the_sensor_stands
         changed, [force], _ = with_stated_places(stated(base, 40.0), candidates, [found[1]], [found[1]], pool)
     assert changed[DRAG.id].log_bayes_factor == pytest.approx(expected[0].log_bayes_factor, abs=1.0)
     assert force.log_bayes_factor == pytest.approx(expected[1].log_bayes_factor, abs=1.0)
+
+
+def test_recordings_that_contradict_where_a_sensor_is_noted_are_no_evidence_of_a_mechanism() -> None:
+    """By its readings fronts came to where they are known not to have come: no score leads from there."""
+    campaign = trial(9302, "sparse", "segment_friction", "coulomb", 10.0).campaign
+    noted = stated(base_of(elsewhere(campaign, HIDDEN, 40.0), "coulomb", "scaled"), 40.0)
+    weakening = mechanisms()["velocity_weakening"]
+    for shape in shapes_of(weakening, noted.setting):
+        found = curve(noted, placed(weakening, noted.setting, shape))
+        candidates = {weakening.id: Candidate(weakening, (found,), np.zeros(1))}
+        with ThreadPoolExecutor(1) as pool:
+            changed, _, _ = with_stated_places(noted, candidates, [], [], pool)
+        assert changed[weakening.id].log_bayes_factor < 10.0
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ import numpy as np
 
 from skred.arrays import FloatArray
 from skred.diagnosis.compare.candidate import Candidate, Strength
-from skred.diagnosis.discrepancy.climb import climb, expanded_at
+from skred.diagnosis.discrepancy.climb import arrived, climb, expanded_at
 from skred.diagnosis.discrepancy.explored import Expansion, Laplace, laplace, log_above_nil
 from skred.diagnosis.discrepancy.fit import Start, fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of
@@ -133,7 +133,9 @@ def _changes(base: Base, nothing: Shifts, candidate: Candidate | Profile) -> _Ch
         start = np.append(np.zeros(len(nothing.mean)), candidate.mean), candidate.fit.start
         return _Changed(_with_force(base, nothing, candidate, start) - candidate.log_bayes_factor)
     found, within, strength = _with_coefficient(base, candidate.best, nothing.places, nothing.mean)
-    _, exact, _ = _with_coefficient(base, candidate.best, EXACT, np.empty(0))
+    at_exact, exact, usual = _with_coefficient(base, candidate.best, EXACT, np.empty(0))
+    if usual is None:  # the curve says what the expansion at nil cannot
+        exact = at_exact.fit.found.log_evidence + candidate.best.log_bayes_factor
     changed = _Changed(within - nothing.log_factor - exact, strength=strength)
     if candidate.beside is None:
         return changed
@@ -168,11 +170,11 @@ def _with_coefficient(
     found, one_sided = expanded_at(law, places, start, law.fit.start), not curve.added.either_sign
     with suppress(np.linalg.LinAlgError):  # a step can lead to what no front can do, as a drag far below nil
         found = _maximum(law, places, found, cover)
-    there = laplace(found, 0.0, cover)
-    strength = Strength(float(there.values[0]), math.sqrt(float(there.covariance[0, 0])))
-    if one_sided and strength.mean <= 0.0:  # where no front goes: from nil, by the score there
+    if one_sided and found.values[0] <= 0.0:  # where no front goes
         found = expanded_at(law, places, np.append(0.0, shifts_m), law.fit.start)
-        there = laplace(found, 0.0, cover)
+    # No score is followed to where nothing was computed: where fronts stop it can be any number.
+    there = laplace(arrived(found, np.linalg.inv(cover)), 0.0, cover)
+    strength = Strength(float(there.values[0]), math.sqrt(float(there.covariance[0, 0])))
     log_evidence = _log_factor(there)
     if one_sided:
         log_evidence += log_above_nil(float(there.values[0]), float(there.covariance[0, 0]))

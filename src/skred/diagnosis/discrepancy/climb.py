@@ -81,7 +81,7 @@ def climb(
         rise, bend = float(step @ slope), float(step @ curvature @ step)
         for share in STEP_SHARES:
             if share * rise - 0.5 * share**2 * bend < ARRIVED:
-                return _arrived(maximum, precision)
+                return arrived(maximum, precision)
             values, gained = maximum.values + share * step, -math.inf
             # A step can lead to what no front can do, as a drag far below nil.
             with suppress(np.linalg.LinAlgError):
@@ -94,10 +94,10 @@ def climb(
         maximum = _around(base, kind, values, fit)
         if gained < ARRIVED:
             break
-    return _arrived(maximum, precision)
+    return arrived(maximum, precision)
 
 
-def _arrived(maximum: Expansion, precision: FloatArray) -> Expansion:
+def arrived(maximum: Expansion, precision: FloatArray) -> Expansion:
     """A maximum that was climbed to: a score that is left over, at kinks where fronts stop, leads nowhere."""
     return replace(maximum, score=precision @ maximum.values)
 
