@@ -24,6 +24,7 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_r
 from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.moved_sensors import StopBounds
+from skred.inference.error_model import FrontsSeen
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
@@ -76,7 +77,8 @@ def test_likelihoods_are_those_of_a_campaign_that_notes_it_there(
 
 def test_a_stop_is_as_far_from_the_noted_place_as_from_the_sensor() -> None:
     came, stayed = np.array([[True, False], [True, False]]), np.array([[False, True], [False, False]])
-    bounds = StopBounds(np.array([100.0, 200.0]), came, stayed, 1000.0)
+    places = np.array([100.0, 200.0])
+    bounds = StopBounds(places, places, FrontsSeen(came, stayed, np.full(2, np.inf)), 1000.0)
     stops, shifts = np.array([90.0, 125.0, 260.0]), np.tile([-10.0, 20.0], (3, 1))
     seen, slope = bounds.as_noted(stops, np.zeros(3, dtype=int), shifts)
     np.testing.assert_allclose(seen, [100.0, 100.0 + 35.0 * 100.0 / 130.0, 240.0])
@@ -87,7 +89,9 @@ def test_a_stop_is_as_far_from_the_noted_place_as_from_the_sensor() -> None:
 
 
 def test_another_sensor_may_tell_of_the_stop_once_one_is_moved() -> None:
-    bounds = StopBounds(np.array([100.0, 120.0]), np.array([[True, True]]), np.array([[False, False]]), 1e3)
+    places = np.array([100.0, 120.0])
+    fronts = FrontsSeen(np.array([[True, True]]), np.array([[False, False]]), np.array([np.inf]))
+    bounds = StopBounds(places, places, fronts, 1e3)
     lowest, _ = bounds.between(np.zeros(2, dtype=int), np.array([[0.0, -50.0], [90.0, 0.0]]))
     assert lowest.tolist() == [100.0, 190.0]
 
@@ -183,17 +187,31 @@ def test_what_only_makes_up_for_a_shift_has_no_more_than_where_the_sensor_stands
     assert force.log_bayes_factor == pytest.approx(expected[1].log_bayes_factor, abs=1.0)
 
 
-def test_recordings_that_contradict_where_a_sensor_is_noted_are_no_evidence_of_a_mechanism() -> None:
-    """By its readings fronts came to where they are known not to have come: no score leads from there."""
+def test_a_span_that_is_noted_to_end_below_a_sensor_that_its_fronts_did_not_reach() -> None:
+    """As if they had come there and had not: but with its place known to 40 m all is as where it stands."""
     campaign = trial(9302, "sparse", "segment_friction", "coulomb", 10.0).campaign
-    noted = stated(base_of(elsewhere(campaign, HIDDEN, 40.0), "coulomb", "scaled"), 40.0)
-    weakening = mechanisms()["velocity_weakening"]
-    for shape in shapes_of(weakening, noted.setting):
-        found = curve(noted, placed(weakening, noted.setting, shape))
-        candidates = {weakening.id: Candidate(weakening, (found,), np.zeros(1))}
-        with ThreadPoolExecutor(1) as pool:
-            changed, _, _ = with_stated_places(noted, candidates, [], [], pool)
-        assert changed[weakening.id].log_bayes_factor < 10.0
+    elsewhere_noted = elsewhere(campaign, HIDDEN, 40.0)
+    assert elsewhere_noted.sensors[1].s_to_m > elsewhere_noted.sensors[2].s_to_m
+    there, noted = (base_of(one, "coulomb", "scaled") for one in (campaign, elsewhere_noted))
+    candidates, expected = dict[str, Candidate](), dict[str, float]()
+    for id_ in ("segment_friction", "velocity_weakening", "turbulent_drag"):
+        mechanism = mechanisms()[id_]
+        shapes = shapes_of(mechanism, there.setting)
+        known = max(
+            (curve(there, placed(mechanism, there.setting, shape)) for shape in shapes),
+            key=lambda one: one.log_bayes_factor,
+        )
+        expected[id_] = known.log_bayes_factor
+        one = curve(noted, placed(mechanism, noted.setting, known.shape))
+        candidates[id_] = Candidate(mechanism, (one,), np.zeros(1))
+    forces = [fit_profile(one, KINDS[0]) for one in (there, noted)]
+    with ThreadPoolExecutor(1) as pool:
+        noted = stated(noted, 40.0)
+        found, [force], shifts = with_stated_places(noted, candidates, forces[1:], forces[1:], pool)
+    assert shifts.mean == pytest.approx([-40.0], abs=2.0 * shifts.sd[0])
+    assert {id_: one.alone for id_, one in found.items()} == pytest.approx(expected, abs=2.5)
+    assert force.log_bayes_factor == pytest.approx(forces[0].log_bayes_factor, abs=2.5)
+    assert expected["segment_friction"] > 15.0
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from error_cases import standardised_errors, within_binomial_limits
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skred.campaign import Campaign, Sensor, Status, find_campaign, read_campaign
-from skred.inference.error_model import ERROR_MODELS, event_readings
+from skred.inference.error_model import ERROR_MODELS, FrontsSeen, event_readings
 
 CAMPAIGN = read_campaign(find_campaign("ryggfonn"))
 
@@ -78,6 +78,20 @@ def test_where_a_front_stopped() -> None:
     passed = campaign.sensors[0]
     last = replace(campaign, sensors=(replace(passed, s_from_m=500.0, s_to_m=600.0), *campaign.sensors[1:]))
     assert event_readings(last).reached[3] == 1850.0
+
+
+def test_a_span_above_the_end_of_which_a_front_stopped_was_read_up_to_its_stop() -> None:
+    """As the format allows it: over a span that begins above a stop, or above a sensor not reached."""
+    begins, ends = np.array([100.0, 180.0, 150.0]), np.array([100.0, 260.0, 200.0])
+    fronts = FrontsSeen(
+        came=np.array([[1, 1, 0], [1, 1, 0], [0, 1, 1], [1, 0, 0], [1, 1, 0]], dtype=bool),
+        stayed=np.array([[0, 0, 1], [0, 0, 0], [0, 0, 0], [0, 1, 1], [0, 0, 0]], dtype=bool),
+        stops=np.array([np.inf, np.inf, 265.0, 120.0, 240.0]),
+    )
+    reached, not_reached = fronts.between(begins, ends)
+    assert_array_equal(reached, [180.0, 260.0, 260.0, 100.0, 180.0])
+    assert_array_equal(not_reached, [200.0, np.inf, np.inf, 200.0, np.inf])
+    assert_array_equal(fronts.take(np.array([4, 4])).between(begins, ends)[0], [180.0, 180.0])
 
 
 def test_readings_in_any_order_of_sensors() -> None:

@@ -198,13 +198,49 @@ class EventReadings(NamedTuple):
         return sd
 
 
-def fronts_seen(campaign: Campaign) -> tuple[BoolArray, BoolArray]:
-    """By which sensors fronts came, and above which they stopped, (n_events, n_sensors) each."""
-    observed, least = np.asarray(campaign.status == Status.OBSERVED), campaign.bounds[0]
+class FrontsSeen(NamedTuple):
+    """What is known of where fronts came to, made by `fronts_seen`.
+
+    Attributes
+    ----------
+    came, stayed : (n_events, n_sensors) boolean arrays
+        Whether the front came by a sensor; whether it stopped above.
+    stops : (n_events,) array, m
+        Where it was recorded to have stopped at most, inf where it was not.
+    """
+
+    came: BoolArray
+    stayed: BoolArray
+    stops: FloatArray
+
+    def take(self, events: IntArray) -> FrontsSeen:
+        """Those of some events, in this order, perhaps repeated."""
+        return FrontsSeen(self.came[events], self.stayed[events], self.stops[events])
+
+    def between(self, begins: FloatArray, ends: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Lowest place that each came to, or -inf, and highest that it did not, or inf, (n_events,) each.
+
+        A front came to the end of a span that it was read over. Where it is known to have stopped above that,
+        it was read up to there, and came to the beginning.
+
+        Parameters
+        ----------
+        begins, ends : (n_sensors,) or (n_events, n_sensors) arrays, m
+            Of the sensors; of a runout anything.
+        """
+        highest = np.where(self.stayed, ends, np.inf).min(axis=1, initial=np.inf)
+        passed = np.where(ends < np.minimum(highest, self.stops)[:, None], ends, begins)
+        return np.where(self.came, passed, -np.inf).max(axis=1, initial=-np.inf), highest
+
+
+def fronts_seen(campaign: Campaign) -> FrontsSeen:
+    """By which sensors fronts came, above which they stopped, and where they were recorded to."""
+    observed, (least, most) = np.asarray(campaign.status == Status.OBSERVED), campaign.bounds
     is_velocity = np.array([not sensor.is_runout for sensor in campaign.sensors])
     came = (observed & (np.nan_to_num(campaign.values) > 0.0)) | (least > 0.0)
     stayed = np.asarray(campaign.status == Status.NOT_REACHED)
-    return came & is_velocity, stayed & is_velocity
+    stops = np.where(observed, campaign.values, most)[:, ~is_velocity].min(axis=1, initial=np.inf)
+    return FrontsSeen(came & is_velocity, stayed & is_velocity, stops)
 
 
 def event_readings(campaign: Campaign, place_sd_m: float = PLACE_SD_M) -> EventReadings:
@@ -213,10 +249,9 @@ def event_readings(campaign: Campaign, place_sd_m: float = PLACE_SD_M) -> EventR
     values = np.where(observed, campaign.values, 0.0)
     sensors = campaign.sensors
     is_velocity = np.array([not sensor.is_runout for sensor in sensors])
-    ends = np.array([np.nan if sensor.is_runout else sensor.s_to_m for sensor in sensors], dtype=float)
+    places = np.array([(sensor.s_from_m, sensor.s_to_m) for sensor in sensors], dtype=float)
     least, most = campaign.bounds
     known = observed | np.isfinite(least) | np.isfinite(most)
-    came, stayed = fronts_seen(campaign)
     return EventReadings(
         values,
         observed,
@@ -224,8 +259,7 @@ def event_readings(campaign: Campaign, place_sd_m: float = PLACE_SD_M) -> EventR
         np.array([sensor.relative_sd for sensor in sensors], dtype=float),
         np.array([sensor.absolute_sd for sensor in sensors], dtype=float),
         is_velocity,
-        np.where(came, ends, -np.inf).max(axis=1, initial=-np.inf),
-        np.where(stayed, ends, np.inf).min(axis=1, initial=np.inf),
+        *fronts_seen(campaign).between(*places.T),
         float(place_sd_m),
         least,
         most,

@@ -25,7 +25,6 @@ from skred.diagnosis.discrepancy.fit import Start, fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.stated_places import EXACT, StatedPlaces, stated_places
-from skred.diagnosis.evidence.tolerance import COUNTS
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +53,7 @@ def with_stated_places(
     by_laplace: Sequence[Profile],
     pool: Executor,
 ) -> tuple[dict[str, Candidate], list[Profile], Shifts]:
-    """Candidates and profiles under one error model, with stated places in the evidence of what may count.
+    """Candidates and profiles under one error model, with stated places in their evidence.
 
     Parameters
     ----------
@@ -69,24 +68,20 @@ def with_stated_places(
     shifts : Shifts
         Of the sensors beside nothing.
     """
-    found, forces, nothing = dict(candidates), list(profiles), shifts_beside(base)
-    looked = set[str | int]()
-    while nothing.places.errors:
-        heights: dict[str | int, float] = {name: one.log_bayes_factor for name, one in found.items()}
-        heights |= {k: one.log_bayes_factor for k, one in enumerate(forces)}
-        least = max(0.0, *heights.values()) - COUNTS
-        todo = [key for key, height in heights.items() if height > least and key not in looked]
-        if not todo:
-            break
-        looked.update(todo)
-        fitted = [found[key] if isinstance(key, str) else by_laplace[key] for key in todo]
-        for key, changed in zip(todo, pool.map(partial(_changes, base, nothing), fitted), strict=True):
-            if isinstance(key, str):
-                found[key] = found[key].with_places(*changed)
-            else:
-                forces[key] = replace(
-                    forces[key], log_bayes_factor=forces[key].log_bayes_factor + changed.alone
-                )
+    nothing = shifts_beside(base)
+    if not nothing.places.errors:
+        return dict(candidates), list(profiles), nothing
+    # All of them: what is far behind with exact places may be so for a shift alone.
+    fitted: list[Candidate | Profile] = [*candidates.values(), *by_laplace]
+    changed = list(pool.map(partial(_changes, base, nothing), fitted))
+    found = {
+        name: one.with_places(*change)
+        for (name, one), change in zip(candidates.items(), changed, strict=False)
+    }
+    forces = [
+        replace(one, log_bayes_factor=one.log_bayes_factor + change.alone)
+        for one, change in zip(profiles, changed[len(found) :], strict=True)
+    ]
     return found, forces, nothing
 
 

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skred.arrays import BoolArray, FloatArray, IntArray
-from skred.inference.error_model import fronts_seen
+from skred.arrays import FloatArray, IntArray
+from skred.inference.error_model import FrontsSeen, fronts_seen
 from skred.inference.hierarchical.problem import HierarchicalProblem
 
 _FAR_M = 1e7
@@ -21,17 +21,16 @@ class StopBounds(NamedTuple):
 
     Attributes
     ----------
-    ends : (n_sensors,) array, m
-        Where the sensors end as noted; 0 for a runout.
-    came, stayed : (n_events, n_sensors) boolean arrays
-        Whether the front came by a sensor; whether it stopped above.
+    begins, ends : (n_sensors,) arrays, m
+        Of the sensors as noted; 0 for a runout.
+    fronts : FrontsSeen
     length_m : float
         Of the track: no sensor is moved beyond its ends.
     """
 
+    begins: FloatArray
     ends: FloatArray
-    came: BoolArray
-    stayed: BoolArray
+    fronts: FrontsSeen
     length_m: float
 
     def between(self, events: IntArray, shifts: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -43,9 +42,9 @@ class StopBounds(NamedTuple):
         shifts : (n, n_sensors) array, m
             How much further down than noted each sensor stands.
         """
-        there = np.clip(self.ends + shifts, 0.0, self.length_m)
-        lowest = np.where(self.came[events], there, -_FAR_M).max(axis=1, initial=-_FAR_M)
-        highest = np.where(self.stayed[events], there, _FAR_M).min(axis=1, initial=_FAR_M)
+        begins, ends = (np.clip(places + shifts, 0.0, self.length_m) for places in (self.begins, self.ends))
+        lowest, highest = self.fronts.take(events).between(begins, ends)
+        lowest, highest = np.maximum(lowest, -_FAR_M), np.minimum(highest, _FAR_M)
         return lowest, np.maximum(highest, lowest + _LEAST_M)
 
     def as_noted(
@@ -66,5 +65,5 @@ class StopBounds(NamedTuple):
 
 def stop_bounds(problem: HierarchicalProblem) -> StopBounds:
     """Of the recordings of a campaign."""
-    ends = [0.0 if place is None else place[1] for place in problem.sensor_places]
-    return StopBounds(np.array(ends), *fronts_seen(problem.campaign), problem.terrain.length_m)
+    begins, ends = np.array([place or (0.0, 0.0) for place in problem.sensor_places]).T
+    return StopBounds(begins, ends, fronts_seen(problem.campaign), problem.terrain.length_m)
