@@ -8,7 +8,7 @@ from skred.arrays import FloatArray, IntArray
 from skred.campaign import Status
 from skred.diagnosis.evidence.conditional_map import Rows
 from skred.diagnosis.evidence.extension import Extension
-from skred.inference.error_model import EventReadings
+from skred.inference.error_model import EventReadings, FrontsSeen
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.kernel.inputs import VELOCITY_TO_STOP
 
@@ -67,7 +67,7 @@ def _read(
     stop = predictions[:, -1]
     seen_stop = stop + readings.place_sd * rng.standard_normal(n)
     sensors = problem.sensors[:-1]
-    ends = np.where(velocity, sensors[:, 2], -np.inf)
+    begins, ends = np.where(velocity, sensors[:, 1:3].T, -np.inf)
     spans = sensors[:, 0] == VELOCITY_TO_STOP
     passed = seen_stop[:, None] > ends[None, :]
     passed &= np.where(spans[None, :] | ~velocity[None, :], True, predictions[:, :-1] > 0.0)
@@ -76,16 +76,18 @@ def _read(
     drawn = problem.error_model.draw(prediction, readings.sd(event, prediction), velocity, rng)
     values = np.where(observed, drawn, 0.0)
     least, most = _sides(np.where(passed, drawn, 0.0), readings.least[event], readings.most[event])
-    moved = velocity[None, :] & ((values > 0.0) | (least > 0.0))
-    stopped = recorded & velocity[None, :] & ~passed
+    came = velocity[None, :] & ((values > 0.0) | (least > 0.0))
+    stayed = recorded & velocity[None, :] & ~passed
+    stops = np.where(observed, values, most)[:, ~velocity].min(axis=1, initial=np.inf)
+    reached, not_reached = FrontsSeen(came, stayed, stops).between(begins, ends)
     return readings._replace(
         values=values,
         observed=observed,
         stated_sd=np.where(observed | bounded, readings.stated_sd[event], 0.0),
         least=least,
         most=most,
-        reached=np.where(moved, ends, -np.inf).max(axis=1, initial=-np.inf),
-        not_reached=np.where(stopped, ends, np.inf).min(axis=1, initial=np.inf),
+        reached=reached,
+        not_reached=not_reached,
     )
 
 
