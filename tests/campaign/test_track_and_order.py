@@ -223,3 +223,16 @@ def test_an_event_with_two_unknowns_of_its_release(folder_with):
     events += "first,0,5,3,1\nsecond,10,,3,1\nthird,5,2,,\n"
     hints = hints_of(read_campaign(folder_with({"events.csv": events, "track.csv": long_track(parabola)})))
     assert len(hints) == 1 and hints[0].startswith("events.csv, column release_speed_sd_m_s: 1 events")
+
+
+def test_a_span_read_over_by_fronts_that_did_not_reach_a_sensor_within_it(folder_with):
+    sensors = "sensor,quantity,s_from_m,s_to_m,relative_sd,absolute_sd\n"
+    sensors += "span,front_velocity,100,250,0.1,1\npoint,front_velocity,200,200,0.1,1\n"
+    files = {"sensors.csv": sensors, "track.csv": long_track(parabola)}
+    header, stopped = "event,sensor,value,status\n", "first,span,20,observed\nfirst,point,,not_reached\n"
+    others = "second,span,,not_reached\nsecond,point,8,observed\n"
+    others += "third,span,12,observed\nthird,point,9,observed\n"
+    (hint,) = hints_of(read_campaign(folder_with(files | {"recordings.csv": header + stopped + others})))
+    assert hint.startswith("sensors.csv, column s_to_m: 'span' has a speed, down to s = 250 m, of 1 fronts")
+    assert "(first event 'first', 'point' at s = 200 m)" in hint
+    assert not hints_of(read_campaign(folder_with(files | {"recordings.csv": header + others})))

@@ -6,13 +6,18 @@ import numpy as np
 
 from skred.campaign.problems import Problem
 from skred.campaign.records import Campaign, Status, Track
-from skred.campaign.rules import EVENTS
+from skred.campaign.rules import EVENTS, SENSORS
 from skred.campaign.track_rules import TRACK
 
 
 def campaign_hints(campaign: Campaign) -> list[Problem]:
     """What is odd about a campaign, without any model of its terrain."""
-    return [*start_hints(campaign.track), *_short_track(campaign), *_two_unknowns(campaign)]
+    return [
+        *start_hints(campaign.track),
+        *_short_track(campaign),
+        *_two_unknowns(campaign),
+        *_stopped_inside(campaign),
+    ]
 
 
 def start_hints(track: Track) -> list[Problem]:
@@ -60,3 +65,23 @@ def _two_unknowns(campaign: Campaign) -> list[Problem]:
         " what is uncertain"
     )
     return [Problem(EVENTS, None, "release_speed_sd_m_s", None, message)]
+
+
+def _stopped_inside(campaign: Campaign) -> list[Problem]:
+    """Whether fronts were read over a span, and did not come to another sensor within it."""
+    speeds = np.where(campaign.status == Status.OBSERVED, campaign.values, campaign.bounds[0])
+    stayed = campaign.status == Status.NOT_REACHED
+    ends = np.array([np.nan if sensor.is_runout else sensor.s_to_m for sensor in campaign.sensors])
+    problems = []
+    for sensor, speed, end in zip(campaign.sensors, speeds.T, ends, strict=True):
+        stopped = (speed > 0.0)[:, None] & stayed & (ends <= end)
+        if stopped.any():
+            event, other = np.argwhere(stopped)[0]
+            message = (
+                f"'{sensor.id}' has a speed, down to s = {end:.4g} m, of {stopped.any(axis=1).sum()} fronts "
+                "that did not reach another sensor above its end (first event "
+                f"'{campaign.event_ids[event]}', '{campaign.sensors[other].id}' at s = {ends[other]:.4g} m); "
+                "they count as read up to where they stopped: check the places if they came to the end"
+            )
+            problems.append(Problem(SENSORS, None, "s_to_m", None, message))
+    return problems
