@@ -236,3 +236,17 @@ def test_a_span_read_over_by_fronts_that_did_not_reach_a_sensor_within_it(folder
     assert hint.startswith("sensors.csv, column s_to_m: 'span' has a speed, down to s = 250 m, of 1 fronts")
     assert "(first event 'first', 'point' at s = 200 m)" in hint
     assert not hints_of(read_campaign(folder_with(files | {"recordings.csv": header + others})))
+
+
+@pytest.mark.parametrize("row", ["180,12,observed", "200,12,observed", "260,12,at_least"])
+def test_a_runout_below_a_sensor_that_was_not_reached(row, folder_with):
+    sensors = "sensor,quantity,s_from_m,s_to_m,relative_sd,absolute_sd\n"
+    sensors += "point,front_velocity,150,150,0.1,1\nstop,runout,,,0,10\n"
+    readings = "event,sensor,value,sd,status\nfirst,point,,,not_reached\n"
+    readings += f"first,stop,{row}\nsecond,point,9,,observed\nsecond,stop,290,,observed\n"
+    files = {"sensors.csv": sensors, "track.csv": long_track(parabola), "recordings.csv": readings}
+    hints = hints_of(read_campaign(folder_with(files)))
+    assert bool(hints) == (row != "180,12,observed")
+    if hints:
+        assert hints[0].startswith("recordings.csv, column status: 1 avalanches have a runout more than 4 sd")
+        assert "(first event 'first', 'point' at s = 150 m)" in hints[0]

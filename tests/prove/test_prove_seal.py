@@ -15,9 +15,9 @@ from skred.campaign import read_campaign
 from skred.errors import InputError
 from skred.prove.folder import ProofFolder, read_object, write_once
 from skred.prove.hashes import canonical, document_sha256, files_sha256, source_sha256
-from skred.prove.ledger import read_ledger, trial_names
+from skred.prove.ledger import code_identity, read_ledger, trial_names
 from skred.prove.plan import FIRST_SEED, Plan, asked, diagnosis_settings, random_seed
-from skred.prove.seal import seal
+from skred.prove.seal import seal, seal_trial
 
 
 def test_every_trial_has_its_seed_and_kind() -> None:
@@ -136,6 +136,19 @@ def test_sealing_goes_on_where_it_was_ended(proof: ProofFolder) -> None:
     changed = {file for file in before if before[file] != after.get(file)}
     assert changed <= {"ledger.json", "sealed/trial-0002.json"}  # another salt, nothing else
     assert before.keys() == after.keys() and "sealed/trial-0001.json" not in changed
+
+
+def test_a_campaign_that_the_loader_refuses_is_drawn_anew(tmp_path: Path) -> None:
+    """A reading with heavy tails: of a further avalanche of this seed, above the speed of a free fall."""
+    plan = {"settings": {"plan": {"n": 60}}, "code": code_identity()}
+    drawn = {"seed": 1_695_081_616, "kind": "dense", "hidden": "nasty"}
+    seal_trial({"folder": str(tmp_path), "trial": "trial-0001", "asked": drawn, **plan})
+    proof = ProofFolder(tmp_path)
+    sealed = read_object(proof.sealed("trial-0001"))
+    assert sealed["asked"] == drawn | {"seed": drawn["seed"] + 60}
+    assert sealed["truth"]["seed"] == drawn["seed"] + 60
+    for folder in (proof.campaign("trial-0001"), proof.fresh("trial-0001")):
+        assert read_campaign(folder).n_events
 
 
 def test_a_ledger_is_never_changed(proof: ProofFolder) -> None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from skred.campaign.order_rules import LARGEST_SDS
 from skred.campaign.problems import Problem
 from skred.campaign.records import Campaign, Status, Track
-from skred.campaign.rules import EVENTS, SENSORS
+from skred.campaign.rules import EVENTS, RECORDINGS, SENSORS
 from skred.campaign.track_rules import TRACK
 
 
@@ -17,6 +18,7 @@ def campaign_hints(campaign: Campaign) -> list[Problem]:
         *_short_track(campaign),
         *_two_unknowns(campaign),
         *_stopped_inside(campaign),
+        *_stopped_below(campaign),
     ]
 
 
@@ -40,9 +42,7 @@ def _short_track(campaign: Campaign) -> list[Problem]:
         return []
     stops = np.where(known, np.fmax(campaign.values, campaign.values_to), -np.inf)
     event, sensor = np.unravel_index(int(stops.argmax()), stops.shape)
-    one, stop = campaign.sensors[sensor], float(stops[event, sensor])
-    stated = float(campaign.stated_sd[event, sensor])
-    sd = stated if np.isfinite(stated) else float(np.hypot(one.relative_sd * stop, one.absolute_sd))
+    stop, sd = float(stops[event, sensor]), float(campaign.sd_as_stated()[event, sensor])
     below = campaign.track.length_m - stop
     if below >= sd:
         return []
@@ -85,3 +85,23 @@ def _stopped_inside(campaign: Campaign) -> list[Problem]:
             )
             problems.append(Problem(SENSORS, None, "s_to_m", None, message))
     return problems
+
+
+def _stopped_below(campaign: Campaign) -> list[Problem]:
+    """Whether runouts are below sensors that their fronts did not reach, by more than their errors."""
+    runouts = [sensor.is_runout for sensor in campaign.sensors]
+    seen = np.isin(campaign.status, (Status.OBSERVED, Status.AT_LEAST, Status.BETWEEN)) & runouts
+    least = np.where(seen, campaign.values - LARGEST_SDS * campaign.sd_as_stated(), -np.inf)
+    ends = np.array([np.nan if sensor.is_runout else sensor.s_to_m for sensor in campaign.sensors])
+    stayed = campaign.status == Status.NOT_REACHED
+    below = stayed & (ends < least.max(axis=1, initial=-np.inf)[:, None])
+    if not below.any():
+        return []
+    event, sensor = np.argwhere(below)[0]
+    n, first, other = below.any(axis=1).sum(), campaign.event_ids[event], campaign.sensors[sensor].id
+    message = (
+        f"{n} avalanches have a runout more than {LARGEST_SDS:g} sd below a sensor that they did not reach "
+        f"(first event '{first}', '{other}' at s = {ends[sensor]:.4g} m): write 'missing' where it only "
+        "recorded nothing, else correct one of the two"
+    )
+    return [Problem(RECORDINGS, None, "status", None, message)]

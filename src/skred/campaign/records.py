@@ -245,18 +245,18 @@ class Campaign:
         """Ids of the sensors, in the order of the columns."""
         return tuple(sensor.id for sensor in self.sensors)
 
-    def reading_sd(self) -> FloatArray:
-        """Give the standard deviation of each reading.
+    def sd_as_stated(self) -> FloatArray:
+        """Give the standard deviation of each reading or bound, (n_events, n_sensors); NaN where neither is.
 
-        Returns
-        -------
-        (n_events, n_sensors) array
-            The stated one, else sqrt((relative_sd value)^2 + absolute_sd^2); NaN where nothing was observed.
+        The stated one, else sqrt((relative_sd value)^2 + absolute_sd^2).
         """
         relative = np.array([sensor.relative_sd for sensor in self.sensors])
         absolute = np.array([sensor.absolute_sd for sensor in self.sensors])
-        sd = np.where(np.isnan(self.stated_sd), np.hypot(relative * self.values, absolute), self.stated_sd)
-        return np.where(self.status == Status.OBSERVED, sd, np.nan)
+        return np.where(np.isnan(self.stated_sd), np.hypot(relative * self.values, absolute), self.stated_sd)
+
+    def reading_sd(self) -> FloatArray:
+        """Give the standard deviation of each reading, (n_events, n_sensors); NaN where none was observed."""
+        return np.where(self.status == Status.OBSERVED, self.sd_as_stated(), np.nan)
 
     def fingerprint(self) -> str:
         """Give the SHA-256 of the content, as hexadecimal digits.

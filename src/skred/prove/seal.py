@@ -125,35 +125,46 @@ def seal_trial(job: dict[str, Any]) -> dict[str, Any]:
     dict
         The name of the trial.
     """
-    from skred.campaign import write_campaign
-
     require_same_code(job["code"], f"{job['folder']}, on this worker")
     folder, name = ProofFolder(Path(job["folder"])), job["trial"]
-    for unfinished in (folder.trial(name), folder.fresh(name)):
-        shutil.rmtree(unfinished, ignore_errors=True)
-    trial, what = _drawn(job["asked"], job["settings"]["plan"]["n"])
-    write_campaign(trial.campaign, folder.campaign(name))
-    fresh = getattr(trial, "fresh", None)
-    if fresh is not None:
-        write_campaign(fresh, folder.fresh(name))
+    trial, what = _drawn(job["asked"], job["settings"]["plan"]["n"], folder, name)
     request = {"base_model": trial.truth["base_model"]}
     write_text(folder.request(name), json.dumps(request) + "\n")
     write_once(folder.sealed(name), _sealed(folder, name, job, what, trial.truth))
     return {"trial": name}
 
 
-def _drawn(what: dict[str, Any], n: int) -> tuple[Trial, dict[str, Any]]:
-    """A trial; where a seed allows nothing plausible, the next seed that belongs to no other trial."""
+def _drawn(what: dict[str, Any], n: int, folder: ProofFolder, name: str) -> tuple[Trial, dict[str, Any]]:
+    """A trial with its campaigns written; else the next seed that belongs to no other trial.
+
+    A seed may allow nothing plausible. Or a reading may be so far off that no campaign may have it, such as
+    one of heavy tails above the speed of a free fall.
+    """
+    from skred.campaign import CampaignError
     from skred.simulator.draw import draw_trial
 
     for number in range(_MOST_DRAWS):
         seed = what["seed"] + number * n
         try:
-            return draw_trial(seed, kind=what["kind"], hidden=what["hidden"]), what | {"seed": seed}
-        except RuntimeError:
+            trial = draw_trial(seed, kind=what["kind"], hidden=what["hidden"])
+            _write(trial, folder, name)
+            return trial, what | {"seed": seed}
+        except (RuntimeError, CampaignError):
             if number + 1 == _MOST_DRAWS:
                 raise
     raise AssertionError
+
+
+def _write(trial: Trial, folder: ProofFolder, name: str) -> None:
+    """The campaign, and the further avalanches that gains are measured by."""
+    from skred.campaign import write_campaign
+
+    for unfinished in (folder.trial(name), folder.fresh(name)):
+        shutil.rmtree(unfinished, ignore_errors=True)
+    write_campaign(trial.campaign, folder.campaign(name))
+    fresh = getattr(trial, "fresh", None)
+    if fresh is not None:
+        write_campaign(fresh, folder.fresh(name))
 
 
 def _sealed(
