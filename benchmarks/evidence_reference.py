@@ -141,10 +141,13 @@ def main(
 
 
 def _kept(record: dict[str, Any]) -> dict[str, Any]:
-    """What the result has of a pair: in digits that matter, of shapes what they have."""
-    shapes = [{key: value for key, value in one.items() if value} for one in record["shapes"]]
-    kept: dict[str, Any] = rounded(record | {"shapes": shapes}, DIGITS)
-    return kept
+    """What the result has of a pair: in digits that matter, and of shapes all that they have.
+
+    Shapes are what the diagnosis is asked again about: half a metre of an obstacle can be a nat.
+    """
+    shapes = [{key: value for key, value in one.items() if value is not None} for one in record["shapes"]]
+    kept: dict[str, Any] = rounded(record, DIGITS)
+    return kept | {"shapes": shapes}
 
 
 def _line(record: dict[str, Any]) -> str:

@@ -78,7 +78,8 @@ def test_likelihoods_are_those_of_a_campaign_that_notes_it_there(
 def test_a_stop_is_as_far_from_the_noted_place_as_from_the_sensor() -> None:
     came, stayed = np.array([[True, False], [True, False]]), np.array([[False, True], [False, False]])
     places = np.array([100.0, 200.0])
-    bounds = StopBounds(places, places, FrontsSeen(came, stayed, np.full(2, np.inf)), 1000.0)
+    fronts = FrontsSeen(came, stayed, np.zeros_like(came), np.full(2, np.inf), places, places)
+    bounds = StopBounds(fronts, 1000.0)
     stops, shifts = np.array([90.0, 125.0, 260.0]), np.tile([-10.0, 20.0], (3, 1))
     seen, slope = bounds.as_noted(stops, np.zeros(3, dtype=int), shifts)
     np.testing.assert_allclose(seen, [100.0, 100.0 + 35.0 * 100.0 / 130.0, 240.0])
@@ -90,10 +91,18 @@ def test_a_stop_is_as_far_from_the_noted_place_as_from_the_sensor() -> None:
 
 def test_another_sensor_may_tell_of_the_stop_once_one_is_moved() -> None:
     places = np.array([100.0, 120.0])
-    fronts = FrontsSeen(np.array([[True, True]]), np.array([[False, False]]), np.array([np.inf]))
-    bounds = StopBounds(places, places, fronts, 1e3)
+    none = np.zeros((1, 2), dtype=bool)
+    bounds = StopBounds(FrontsSeen(~none, none, none, np.array([np.inf]), places, places), 1e3)
     lowest, _ = bounds.between(np.zeros(2, dtype=int), np.array([[0.0, -50.0], [90.0, 0.0]]))
     assert lowest.tolist() == [100.0, 190.0]
+
+
+def test_a_span_is_moved_as_a_whole_up_to_the_end_of_the_track() -> None:
+    """As the kernel moves it: here by ten metres of sixty, and its front was read up to its stop."""
+    came, none = np.ones((1, 1), dtype=bool), np.zeros((1, 1), dtype=bool)
+    fronts = FrontsSeen(came, none, none, np.array([995.0]), np.array([900.0]), np.array([990.0]))
+    lowest, _ = StopBounds(fronts, 1000.0).between(np.zeros(1, dtype=int), np.array([[60.0]]))
+    assert lowest.tolist() == [910.0]
 
 
 def test_it_is_found_where_it_is(base: Base) -> None:

@@ -10,7 +10,7 @@ from error_cases import standardised_errors, within_binomial_limits
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skred.campaign import Campaign, Sensor, Status, find_campaign, read_campaign
-from skred.inference.error_model import ERROR_MODELS, FrontsSeen, event_readings
+from skred.inference.error_model import ERROR_MODELS, event_readings, fronts_seen
 
 CAMPAIGN = read_campaign(find_campaign("ryggfonn"))
 
@@ -69,7 +69,7 @@ def test_readings_are_what_the_campaign_says() -> None:
 
 
 def test_where_a_front_stopped() -> None:
-    """A speed above 0 was reached, to the end of its span; a speed of 0 tells nothing; nor does a runout."""
+    """A speed above 0 was reached, to the end of its span; a speed of 0 tells nothing."""
     campaign = with_a_span()
     readings = event_readings(campaign)
     # 19970208: past the last gate. 19920311: 0 at the first, not at the span. 19970417: 0 at the last.
@@ -81,17 +81,44 @@ def test_where_a_front_stopped() -> None:
 
 
 def test_a_span_above_the_end_of_which_a_front_stopped_was_read_up_to_its_stop() -> None:
-    """As the format allows it: over a span that begins above a stop, or above a sensor not reached."""
-    begins, ends = np.array([100.0, 180.0, 150.0]), np.array([100.0, 260.0, 200.0])
-    fronts = FrontsSeen(
-        came=np.array([[1, 1, 0], [1, 1, 0], [0, 1, 1], [1, 0, 0], [1, 1, 0]], dtype=bool),
-        stayed=np.array([[0, 0, 1], [0, 0, 0], [0, 0, 0], [0, 1, 1], [0, 0, 0]], dtype=bool),
-        stops=np.array([np.inf, np.inf, 265.0, 120.0, 240.0]),
+    """As the format allows it: over a span that begins above a stop, or above a sensor not reached.
+
+    By a runout, an upper bound of one or the lower of two, and by a point where the front was read to stand;
+    not by a lower bound, and not where it stopped at the end itself.
+    """
+    point, runout = CAMPAIGN.sensors[0], CAMPAIGN.sensors[-1]
+    sensors = (
+        replace(point, id="span", s_from_m=180.0, s_to_m=260.0),
+        replace(point, id="point", s_from_m=200.0, s_to_m=200.0),
+        runout,
+        replace(runout, id="again"),
     )
-    reached, not_reached = fronts.between(begins, ends)
-    assert_array_equal(reached, [180.0, 260.0, 260.0, 100.0, 180.0])
-    assert_array_equal(not_reached, [200.0, np.inf, np.inf, 200.0, np.inf])
-    assert_array_equal(fronts.take(np.array([4, 4])).between(begins, ends)[0], [180.0, 180.0])
+    none, stop, see = np.nan, Status.NOT_REACHED, Status.OBSERVED
+    rows: list[tuple[list[float], list[int], float]] = [
+        ([9.0, none, none, none], [see, stop, Status.MISSING, Status.MISSING], 180.0),
+        ([9.0, 8.0, none, none], [see, see, Status.MISSING, Status.MISSING], 260.0),
+        ([9.0, 0.0, none, none], [see, see, Status.MISSING, Status.MISSING], 180.0),
+        ([9.0, none, 250.0, none], [see, Status.MISSING, see, Status.MISSING], 180.0),
+        ([9.0, none, 260.0, none], [see, Status.MISSING, see, Status.MISSING], 260.0),
+        ([9.0, none, 300.0, 240.0], [see, Status.MISSING, see, see], 180.0),
+        ([9.0, none, 250.0, none], [see, Status.MISSING, Status.AT_MOST, Status.MISSING], 180.0),
+        ([9.0, none, 250.0, none], [see, Status.MISSING, Status.AT_LEAST, Status.MISSING], 260.0),
+        ([0.0, 8.0, none, none], [see, see, Status.MISSING, Status.MISSING], 200.0),
+    ]
+    campaign = replace(
+        CAMPAIGN,
+        sensors=sensors,
+        events=tuple(replace(CAMPAIGN.events[0], id=f"e{k}") for k in range(len(rows))),
+        values=np.array([row[0] for row in rows]),
+        status=np.array([row[1] for row in rows]),
+        stated_sd=np.full((len(rows), 4), np.nan),
+        values_to=np.empty(0),
+    )
+    readings = event_readings(campaign)
+    assert_array_equal(readings.reached, [row[2] for row in rows])
+    assert_array_equal(readings.not_reached, [200.0, *[np.inf] * (len(rows) - 1)])
+    some = fronts_seen(campaign).take(np.array([4, 3]))
+    assert_array_equal(some.between()[0], [260.0, 180.0])
 
 
 def test_readings_in_any_order_of_sensors() -> None:

@@ -42,7 +42,9 @@ def _short_track(campaign: Campaign) -> list[Problem]:
         return []
     stops = np.where(known, np.fmax(campaign.values, campaign.values_to), -np.inf)
     event, sensor = np.unravel_index(int(stops.argmax()), stops.shape)
-    stop, sd = float(stops[event, sensor]), float(campaign.sd_as_stated()[event, sensor])
+    one, stop = campaign.sensors[sensor], float(stops[event, sensor])
+    stated = float(campaign.stated_sd[event, sensor])
+    sd = stated if np.isfinite(stated) else float(np.hypot(one.relative_sd * stop, one.absolute_sd))
     below = campaign.track.length_m - stop
     if below >= sd:
         return []
@@ -79,7 +81,7 @@ def _stopped_inside(campaign: Campaign) -> list[Problem]:
             event, other = np.argwhere(stopped)[0]
             message = (
                 f"'{sensor.id}' has a speed, down to s = {end:.4g} m, of {stopped.any(axis=1).sum()} fronts "
-                "that did not reach another sensor above its end (first event "
+                "that did not reach another sensor above its end, or at it (first event "
                 f"'{campaign.event_ids[event]}', '{campaign.sensors[other].id}' at s = {ends[other]:.4g} m); "
                 "they count as read up to where they stopped: check the places if they came to the end"
             )
@@ -91,7 +93,7 @@ def _stopped_below(campaign: Campaign) -> list[Problem]:
     """Whether runouts are below sensors that their fronts did not reach, by more than their errors."""
     runouts = [sensor.is_runout for sensor in campaign.sensors]
     seen = np.isin(campaign.status, (Status.OBSERVED, Status.AT_LEAST, Status.BETWEEN)) & runouts
-    least = np.where(seen, campaign.values - LARGEST_SDS * campaign.sd_as_stated(), -np.inf)
+    least = np.where(seen, campaign.values - LARGEST_SDS * campaign.stated_or_usual_sd(), -np.inf)
     ends = np.array([np.nan if sensor.is_runout else sensor.s_to_m for sensor in campaign.sensors])
     stayed = campaign.status == Status.NOT_REACHED
     below = stayed & (ends < least.max(axis=1, initial=-np.inf)[:, None])

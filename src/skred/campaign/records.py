@@ -245,10 +245,11 @@ class Campaign:
         """Ids of the sensors, in the order of the columns."""
         return tuple(sensor.id for sensor in self.sensors)
 
-    def sd_as_stated(self) -> FloatArray:
-        """Give the standard deviation of each reading or bound, (n_events, n_sensors); NaN where neither is.
+    def stated_or_usual_sd(self) -> FloatArray:
+        """Give the standard deviation of each reading or bound, (n_events, n_sensors).
 
-        The stated one, else sqrt((relative_sd value)^2 + absolute_sd^2).
+        The stated one, else sqrt((relative_sd value)^2 + absolute_sd^2), NaN without a value; of an interval
+        by its lower bound.
         """
         relative = np.array([sensor.relative_sd for sensor in self.sensors])
         absolute = np.array([sensor.absolute_sd for sensor in self.sensors])
@@ -256,7 +257,7 @@ class Campaign:
 
     def reading_sd(self) -> FloatArray:
         """Give the standard deviation of each reading, (n_events, n_sensors); NaN where none was observed."""
-        return np.where(self.status == Status.OBSERVED, self.sd_as_stated(), np.nan)
+        return np.where(self.status == Status.OBSERVED, self.stated_or_usual_sd(), np.nan)
 
     def fingerprint(self) -> str:
         """Give the SHA-256 of the content, as hexadecimal digits.

@@ -203,44 +203,59 @@ class FrontsSeen(NamedTuple):
 
     Attributes
     ----------
-    came, stayed : (n_events, n_sensors) boolean arrays
-        Whether the front came by a sensor; whether it stopped above.
+    came, stayed, halted : (n_events, n_sensors) boolean arrays
+        Whether the front came by a sensor; whether it stopped above; whether it was read to stand there.
     stops : (n_events,) array, m
         Where it was recorded to have stopped at most, inf where it was not.
+    begins, ends : (n_sensors,) or (n_events, n_sensors) arrays, m
+        Of the sensors; of a runout anything.
     """
 
     came: BoolArray
     stayed: BoolArray
+    halted: BoolArray
     stops: FloatArray
+    begins: FloatArray
+    ends: FloatArray
 
     def take(self, events: IntArray) -> FrontsSeen:
-        """Those of some events, in this order, perhaps repeated."""
-        return FrontsSeen(self.came[events], self.stayed[events], self.stops[events])
+        """Those of some events, in this order, perhaps repeated; sensors stand where they do for all."""
+        came, stayed, halted = self.came[events], self.stayed[events], self.halted[events]
+        return FrontsSeen(came, stayed, halted, self.stops[events], self.begins, self.ends)
 
-    def between(self, begins: FloatArray, ends: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Lowest place that each came to, or -inf, and highest that it did not, or inf, (n_events,) each.
+    @property
+    def come_to(self) -> FloatArray:
+        """Place that a front came to by each sensor, -inf where it shows none, (n_events, n_sensors).
 
-        A front came to the end of a span that it was read over. Where it is known to have stopped above that,
-        it was read up to there, and came to the beginning.
-
-        Parameters
-        ----------
-        begins, ends : (n_sensors,) or (n_events, n_sensors) arrays, m
-            Of the sensors; of a runout anything.
+        The end of a span that it was read over. Where it is known to have stopped above that, it was read up
+        to there, and came to the beginning.
         """
-        highest = np.where(self.stayed, ends, np.inf).min(axis=1, initial=np.inf)
-        passed = np.where(ends < np.minimum(highest, self.stops)[:, None], ends, begins)
-        return np.where(self.came, passed, -np.inf).max(axis=1, initial=-np.inf), highest
+        highest = np.where(self.stayed, self.ends, np.inf).min(axis=1, initial=np.inf)
+        seen = np.where(self.halted, self.ends, np.inf).min(axis=1, initial=np.inf)
+        whole = (self.ends < highest[:, None]) & (self.ends <= np.minimum(seen, self.stops)[:, None])
+        return np.where(self.came, np.where(whole, self.ends, self.begins), -np.inf)
+
+    def between(self) -> tuple[FloatArray, FloatArray]:
+        """Lowest place that each came to, or -inf, and highest that it did not, or inf, (n_events,) each."""
+        highest = np.where(self.stayed, self.ends, np.inf).min(axis=1, initial=np.inf)
+        return self.come_to.max(axis=1, initial=-np.inf), highest
 
 
 def fronts_seen(campaign: Campaign) -> FrontsSeen:
-    """By which sensors fronts came, above which they stopped, and where they were recorded to."""
+    """By which sensors fronts came, above which they stopped, and where they were seen to."""
     observed, (least, most) = np.asarray(campaign.status == Status.OBSERVED), campaign.bounds
-    is_velocity = np.array([not sensor.is_runout for sensor in campaign.sensors])
-    came = (observed & (np.nan_to_num(campaign.values) > 0.0)) | (least > 0.0)
-    stayed = np.asarray(campaign.status == Status.NOT_REACHED)
-    stops = np.where(observed, campaign.values, most)[:, ~is_velocity].min(axis=1, initial=np.inf)
-    return FrontsSeen(came & is_velocity, stayed & is_velocity, stops)
+    velocity = np.array([not sensor.is_runout for sensor in campaign.sensors])
+    begins, ends = np.array([(one.s_from_m, one.s_to_m) for one in campaign.sensors], dtype=float).T
+    speeds = np.where(observed, campaign.values, least)
+    stops = np.where(observed, campaign.values, most)[:, ~velocity].min(axis=1, initial=np.inf)
+    return FrontsSeen(
+        came=(speeds > 0.0) & velocity,
+        stayed=np.asarray(campaign.status == Status.NOT_REACHED) & velocity,
+        halted=observed & (campaign.values == 0.0) & velocity,
+        stops=stops,
+        begins=begins,
+        ends=ends,
+    )
 
 
 def event_readings(campaign: Campaign, place_sd_m: float = PLACE_SD_M) -> EventReadings:
@@ -249,7 +264,6 @@ def event_readings(campaign: Campaign, place_sd_m: float = PLACE_SD_M) -> EventR
     values = np.where(observed, campaign.values, 0.0)
     sensors = campaign.sensors
     is_velocity = np.array([not sensor.is_runout for sensor in sensors])
-    places = np.array([(sensor.s_from_m, sensor.s_to_m) for sensor in sensors], dtype=float)
     least, most = campaign.bounds
     known = observed | np.isfinite(least) | np.isfinite(most)
     return EventReadings(
@@ -259,7 +273,7 @@ def event_readings(campaign: Campaign, place_sd_m: float = PLACE_SD_M) -> EventR
         np.array([sensor.relative_sd for sensor in sensors], dtype=float),
         np.array([sensor.absolute_sd for sensor in sensors], dtype=float),
         is_velocity,
-        *fronts_seen(campaign).between(*places.T),
+        *fronts_seen(campaign).between(),
         float(place_sd_m),
         least,
         most,

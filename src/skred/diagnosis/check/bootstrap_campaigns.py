@@ -8,7 +8,7 @@ from skred.arrays import FloatArray, IntArray
 from skred.campaign import Status
 from skred.diagnosis.evidence.conditional_map import Rows
 from skred.diagnosis.evidence.extension import Extension
-from skred.inference.error_model import EventReadings, FrontsSeen
+from skred.inference.error_model import EventReadings, FrontsSeen, fronts_seen
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.physics.kernel.inputs import VELOCITY_TO_STOP
 
@@ -67,19 +67,26 @@ def _read(
     stop = predictions[:, -1]
     seen_stop = stop + readings.place_sd * rng.standard_normal(n)
     sensors = problem.sensors[:-1]
-    begins, ends = np.where(velocity, sensors[:, 1:3].T, -np.inf)
+    seen = fronts_seen(problem.campaign)
+    # An instrument that reads fronts up to where they stop within its span does so in a replica as well.
+    to = np.where(seen.came, seen.come_to, np.where(velocity, seen.ends, -np.inf))[event]
     spans = sensors[:, 0] == VELOCITY_TO_STOP
-    passed = seen_stop[:, None] > ends[None, :]
+    passed = seen_stop[:, None] > to
     passed &= np.where(spans[None, :] | ~velocity[None, :], True, predictions[:, :-1] > 0.0)
     observed = recorded & passed
     prediction = predictions[:, :-1]
     drawn = problem.error_model.draw(prediction, readings.sd(event, prediction), velocity, rng)
     values = np.where(observed, drawn, 0.0)
     least, most = _sides(np.where(passed, drawn, 0.0), readings.least[event], readings.most[event])
-    came = velocity[None, :] & ((values > 0.0) | (least > 0.0))
-    stayed = recorded & velocity[None, :] & ~passed
-    stops = np.where(observed, values, most)[:, ~velocity].min(axis=1, initial=np.inf)
-    reached, not_reached = FrontsSeen(came, stayed, stops).between(begins, ends)
+    replica = FrontsSeen(
+        came=velocity & ((values > 0.0) | (least > 0.0)),
+        stayed=recorded & velocity & ~passed,
+        halted=observed & velocity & (values == 0.0),
+        stops=np.where(observed, values, most)[:, ~velocity].min(axis=1, initial=np.inf),
+        begins=seen.begins,
+        ends=seen.ends,
+    )
+    reached, not_reached = replica.between()
     return readings._replace(
         values=values,
         observed=observed,

@@ -19,11 +19,13 @@ import numpy as np
 
 from skred.arrays import FloatArray
 from skred.diagnosis.compare.candidate import Candidate, Strength
-from skred.diagnosis.discrepancy.climb import arrived, climb, expanded_at
+from skred.diagnosis.compare.screening import curve as curve_of
+from skred.diagnosis.discrepancy.climb import arrived, climb, expanded_at, highest
 from skred.diagnosis.discrepancy.explored import Expansion, Laplace, laplace, log_above_nil
 from skred.diagnosis.discrepancy.fit import Start, fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.diagnosis.evidence.refit import Fit
 from skred.diagnosis.evidence.stated_places import EXACT, StatedPlaces, stated_places
 
 
@@ -38,12 +40,22 @@ class Shifts:
         How much further down than noted [m].
     log_factor : float
         What the stated errors change in the log evidence of the law, in nats.
+    fit : Fit
+        Of the law with these shifts.
     """
 
     places: StatedPlaces
     mean: FloatArray
     sd: FloatArray
     log_factor: float
+    fit: Fit
+
+    def into(self, base: Base) -> Base:
+        """The law with these shifts in."""
+        directions = (*base.directions, *self.places.each(base.setting))
+        return replace(
+            base, directions=directions, strengths=np.append(base.strengths, self.mean), fit=self.fit
+        )
 
 
 def with_stated_places(
@@ -73,7 +85,7 @@ def with_stated_places(
         return dict(candidates), list(profiles), nothing
     # All of them: what is far behind with exact places may be so for a shift alone.
     fitted: list[Candidate | Profile] = [*candidates.values(), *by_laplace]
-    changed = list(pool.map(partial(_changes, base, nothing), fitted))
+    changed = list(pool.map(partial(_changed, base, nothing), fitted))
     found = {
         name: one.with_places(*change)
         for (name, one), change in zip(candidates.items(), changed, strict=False)
@@ -89,10 +101,17 @@ def shifts_beside(base: Base) -> Shifts:
     """The shifts of sensors beside a law; none, and nothing changed, where no place has a stated error."""
     places = stated_places(base.problem)
     if not places.errors:
-        return Shifts(places, np.empty(0), np.empty(0), 0.0)
+        return _exactly(base)
     cover, start = np.diag(places.sd**2), expanded_at(base, places, np.zeros(len(places.sd)), base.fit.start)
-    there = laplace(_maximum(base, places, start, cover), start.fit.found.log_evidence, cover)
-    return Shifts(places, there.values, np.sqrt(np.diag(there.covariance)), _log_factor(there))
+    found = _maximum(base, places, start, cover)
+    there = laplace(found, start.fit.found.log_evidence, cover)
+    sd = np.sqrt(np.diag(there.covariance))
+    return Shifts(places, there.values, sd, _log_factor(there), found.fit)
+
+
+def _exactly(base: Base) -> Shifts:
+    """No shifts."""
+    return Shifts(EXACT, np.empty(0), np.empty(0), 0.0, base.fit)
 
 
 def _maximum(law: Base, places: StatedPlaces, start: Expansion, cover: FloatArray) -> Expansion:
@@ -122,13 +141,21 @@ class _Changed(NamedTuple):
     strength: Strength | None = None
 
 
-def _changes(base: Base, nothing: Shifts, candidate: Candidate | Profile) -> _Changed:
-    """With everything fitted anew."""
+def _changed(base: Base, nothing: Shifts, candidate: Candidate | Profile) -> _Changed:
+    """With everything fitted anew; as if shifts gave it nothing where that breaks down."""
+    try:
+        return _fitted_anew(base, nothing, candidate)
+    except np.linalg.LinAlgError:
+        return _Changed(-nothing.log_factor)
+
+
+def _fitted_anew(base: Base, nothing: Shifts, candidate: Candidate | Profile) -> _Changed:
+    """What shifts change."""
     if isinstance(candidate, Profile):
         start = np.append(np.zeros(len(nothing.mean)), candidate.mean), candidate.fit.start
         return _Changed(_with_force(base, nothing, candidate, start) - candidate.log_bayes_factor)
-    found, within, strength = _with_coefficient(base, candidate.best, nothing.places, nothing.mean)
-    at_exact, exact, usual = _with_coefficient(base, candidate.best, EXACT, np.empty(0))
+    found, within, strength = _with_coefficient(base, candidate.best, nothing)
+    at_exact, exact, usual = _with_coefficient(base, candidate.best, _exactly(base))
     if usual is None:  # the curve says what the expansion at nil cannot
         exact = at_exact.fit.found.log_evidence + candidate.best.log_bayes_factor
     changed = _Changed(within - nothing.log_factor - exact, strength=strength)
@@ -136,7 +163,7 @@ def _changes(base: Base, nothing: Shifts, candidate: Candidate | Profile) -> _Ch
         return changed
     curve, profiles = candidate.beside
     if curve is not candidate.best:
-        found, _, _ = _with_coefficient(base, curve, nothing.places, nothing.mean)
+        found, _, _ = _with_coefficient(base, curve, nothing)
     start = np.append(found.values, np.zeros_like(profiles[0].mean)), found.fit.start
     try:
         again = [_with_force(base, nothing, one, start, curve) for one in profiles]
@@ -148,32 +175,43 @@ def _changes(base: Base, nothing: Shifts, candidate: Candidate | Profile) -> _Ch
     return changed._replace(beside=both - log_evidence_of(profiles))
 
 
-def _with_coefficient(
-    base: Base, curve: Curve, places: StatedPlaces, shifts_m: FloatArray
-) -> tuple[Expansion, float, Strength | None]:
+def _with_coefficient(base: Base, curve: Curve, nothing: Shifts) -> tuple[Expansion, float, Strength | None]:
     """The law with shifts and a mechanism, its coefficient fitted with them; log evidence; the coefficient.
 
     Parameters
     ----------
-    shifts_m : (n,) array
-        The shifts beside nothing.
+    nothing : Shifts
+        Beside nothing.
     """
-    top = int(np.argmax(curve.log_evidence + curve.log_prior(curve.strengths, curve.scale)))
-    law = base.with_in(curve.direction, float(curve.strengths[top]), curve.fits[top])
+    places, one_sided = nothing.places, not curve.added.either_sign
+    strength, fit = _top(curve)
+    law = base.with_in(curve.direction, strength, fit)
     cover = np.diag(np.append(curve.scale, places.sd) ** 2)
-    start = np.append(law.strengths[-1], np.zeros(len(places.sd)))
-    found, one_sided = expanded_at(law, places, start, law.fit.start), not curve.added.either_sign
-    with suppress(np.linalg.LinAlgError):  # a step can lead to what no front can do, as a drag far below nil
-        found = _maximum(law, places, found, cover)
+    values = [(np.append(strength, np.zeros_like(nothing.mean)), fit)]
+    if places.errors:  # where sensors stand as beside nothing, the coefficient may be another
+        strength, fit = _top(curve_of(nothing.into(base), curve))
+        values.append((np.append(strength, nothing.mean), fit))
+    starts = [expanded_at(law, places, one, fit.start) for one, fit in values]
+    ends = list(starts)
+    for start in starts:  # a step can lead to what no front can do, as a drag far below nil
+        with suppress(np.linalg.LinAlgError):
+            ends.append(_maximum(law, places, start, cover))
+    found = highest(ends, cover)
     if one_sided and found.values[0] <= 0.0:  # where no front goes
-        found = expanded_at(law, places, np.append(0.0, shifts_m), law.fit.start)
+        found = expanded_at(law, places, np.append(0.0, nothing.mean), law.fit.start)
     # No score is followed to where nothing was computed: where fronts stop it can be any number.
     there = laplace(arrived(found, np.linalg.inv(cover)), 0.0, cover)
-    strength = Strength(float(there.values[0]), math.sqrt(float(there.covariance[0, 0])))
+    moments = Strength(float(there.values[0]), math.sqrt(float(there.covariance[0, 0])))
     log_evidence = _log_factor(there)
     if one_sided:
         log_evidence += log_above_nil(float(there.values[0]), float(there.covariance[0, 0]))
-    return found, log_evidence, None if one_sided and strength.mean <= 0.0 else strength
+    return found, log_evidence, None if one_sided and moments.mean <= 0.0 else moments
+
+
+def _top(curve: Curve) -> tuple[float, Fit]:
+    """The most probable of a curve's strengths, and the fit there."""
+    top = int(np.argmax(curve.log_evidence + curve.log_prior(curve.strengths, curve.scale)))
+    return float(curve.strengths[top]), curve.fits[top]
 
 
 def _with_force(

@@ -9,6 +9,7 @@ stop.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Protocol
@@ -95,6 +96,12 @@ def climb(
         if gained < ARRIVED:
             break
     return arrived(maximum, precision)
+
+
+def highest(maxima: Sequence[Expansion], cover: FloatArray) -> Expansion:
+    """The one with the highest posterior under a prior."""
+    precision = np.linalg.inv(cover)
+    return max(maxima, key=lambda one: one.fit.found.log_evidence - prior_penalty(one.values, precision))
 
 
 def arrived(maximum: Expansion, precision: FloatArray) -> Expansion:

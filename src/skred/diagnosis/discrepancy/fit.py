@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from skred.arrays import FloatArray
-from skred.diagnosis.discrepancy.climb import climb, expanded_at
+from skred.diagnosis.discrepancy.climb import climb, expanded_at, highest
 from skred.diagnosis.discrepancy.explored import (
     Expansion,
     ExploredPriors,
@@ -130,12 +130,6 @@ def mode_at(base: Base, profile: Profile, values: FloatArray) -> Mode:
     return Mode(there.values, there.covariance)
 
 
-def _highest(maxima: Sequence[Expansion], cover: FloatArray) -> Expansion:
-    """The one with the highest posterior under a prior."""
-    precision = np.linalg.inv(cover)
-    return max(maxima, key=lambda one: one.fit.found.log_evidence - prior_penalty(one.values, precision))
-
-
 def _first(kind: Kind, start: Expansion, explored: ExploredPriors) -> list[Prior]:
     """Under which priors to climb in any case, the last one first: the usual one, and perhaps one more.
 
@@ -158,17 +152,17 @@ def _maximum_under(base: Base, kind: Kind, starts: Sequence[Expansion], cover: F
     Sharp edges of a listed shape cost more under a smooth prior than they gain; but where recordings are far
     from what no force does, there may be no other way up.
     """
-    first = _highest(starts, cover)
+    first = highest(starts, cover)
     found = climb(base, kind, first, cover)
     best = max(starts, key=lambda one: one.fit.found.log_evidence)
     if best is first or best.fit.found.log_evidence < found.fit.found.log_evidence + DECIDES_NOTHING:
         return found
-    return _highest([found, climb(base, kind, best, cover)], cover)
+    return highest([found, climb(base, kind, best, cover)], cover)
 
 
 def _maximum_from_one(base: Base, kind: Kind, starts: Sequence[Expansion], cover: FloatArray) -> Expansion:
     """The maximum under a prior, from the start with the highest posterior."""
-    return climb(base, kind, _highest(starts, cover), cover)
+    return climb(base, kind, highest(starts, cover), cover)
 
 
 def as_profile(base: Base, kind: Kind, near: Curve) -> Start:

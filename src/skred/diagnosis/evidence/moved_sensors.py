@@ -21,15 +21,12 @@ class StopBounds(NamedTuple):
 
     Attributes
     ----------
-    begins, ends : (n_sensors,) arrays, m
-        Of the sensors as noted; 0 for a runout.
     fronts : FrontsSeen
+        Of the sensors as noted; places of a runout are 0.
     length_m : float
         Of the track: no sensor is moved beyond its ends.
     """
 
-    begins: FloatArray
-    ends: FloatArray
     fronts: FrontsSeen
     length_m: float
 
@@ -42,8 +39,12 @@ class StopBounds(NamedTuple):
         shifts : (n, n_sensors) array, m
             How much further down than noted each sensor stands.
         """
-        begins, ends = (np.clip(places + shifts, 0.0, self.length_m) for places in (self.begins, self.ends))
-        lowest, highest = self.fronts.take(events).between(begins, ends)
+        noted = self.fronts.take(events)
+        by = np.clip(
+            shifts, -noted.begins, self.length_m - noted.ends
+        )  # a span as a whole, as the kernel does
+        moved = noted._replace(begins=noted.begins + by, ends=noted.ends + by)
+        lowest, highest = moved.between()
         lowest, highest = np.maximum(lowest, -_FAR_M), np.minimum(highest, _FAR_M)
         return lowest, np.maximum(highest, lowest + _LEAST_M)
 
@@ -55,7 +56,7 @@ class StopBounds(NamedTuple):
         As far beyond a noted place as they are beyond the sensor itself; between two this changes evenly.
         """
         lowest, highest = self.between(events, shifts)
-        noted_lowest, noted_highest = self.between(events, np.zeros((1, len(self.ends))))
+        noted_lowest, noted_highest = self.between(events, np.zeros((1, len(self.fronts.ends))))
         above, below = noted_lowest - lowest, noted_highest - highest
         share = np.clip((stops - lowest) / (highest - lowest), 0.0, 1.0)
         inside = (share > 0.0) & (share < 1.0)
@@ -65,5 +66,6 @@ class StopBounds(NamedTuple):
 
 def stop_bounds(problem: HierarchicalProblem) -> StopBounds:
     """Of the recordings of a campaign."""
-    begins, ends = np.array([place or (0.0, 0.0) for place in problem.sensor_places]).T
-    return StopBounds(begins, ends, fronts_seen(problem.campaign), problem.terrain.length_m)
+    fronts = fronts_seen(problem.campaign)
+    begins, ends = (np.nan_to_num(places, nan=0.0) for places in (fronts.begins, fronts.ends))
+    return StopBounds(fronts._replace(begins=begins, ends=ends), problem.terrain.length_m)

@@ -24,7 +24,7 @@ from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.predict.draws import Draws, LeftOut
 from skred.diagnosis.predict.event_proposal import Sample, sample
 from skred.diagnosis.predict.held_out import HeldOut
-from skred.inference.error_model import ErrorModel, EventReadings
+from skred.inference.error_model import ErrorModel, EventReadings, fronts_seen
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import ENDS
 from skred.inference.reading_density import log_likelihoods
@@ -141,13 +141,12 @@ def readings_of(problem: HierarchicalProblem, event: int, sets: BoolArray) -> Ev
     Bounds of a reading and places where it did not come are not among them: they may lie below.
     """
     readings = problem.readings
-    _, ends = sensor_ends(problem)
-    moved = sets & readings.is_velocity & (readings.values[event] > 0.0)
+    come_to = fronts_seen(problem.campaign).come_to[event]
     return readings.take(np.full(len(sets), event))._replace(
         observed=sets,
         least=np.full(sets.shape, -np.inf),
         most=np.full(sets.shape, np.inf),
-        reached=np.where(moved, ends, -np.inf).max(axis=1, initial=-np.inf),
+        reached=np.where(sets, come_to, -np.inf).max(axis=1, initial=-np.inf),
         not_reached=np.full(len(sets), np.inf),
     )
 
