@@ -40,9 +40,8 @@ class StopBounds(NamedTuple):
             How much further down than noted each sensor stands.
         """
         noted = self.fronts.take(events)
-        by = np.clip(
-            shifts, -noted.begins, self.length_m - noted.ends
-        )  # a span as a whole, as the kernel does
+        # A span is moved as a whole, as the kernel does.
+        by = np.clip(shifts, -noted.begins, self.length_m - noted.ends)
         moved = noted._replace(begins=noted.begins + by, ends=noted.ends + by)
         lowest, highest = moved.between()
         lowest, highest = np.maximum(lowest, -_FAR_M), np.minimum(highest, _FAR_M)
