@@ -73,7 +73,7 @@ def build_tables(
     covariances = np.stack([fit.found.covariance for fit in fits])
     wider = np.exp(np.minimum(np.sqrt(np.einsum("tii->ti", covariances)[:, n : 2 * n]), 0.7))
     wide = population.covariance * wider[:, :, None] * wider[:, None, :]
-    wide = wide + np.clip(covariances[:, :n, :n], -1.0, 1.0)
+    wide = wide + _at_most_one(covariances[:, :n, :n])
     reference = base.population if visited is None else base.population.with_more(visited)
     around = Population(population.mean, wide)
 
@@ -85,6 +85,12 @@ def build_tables(
     spreads, modes = zip(*side_by_side(spread, _lots(n_tables, n_events, budget)), strict=True)
     nodes, points = Spread.joined(spreads), np.concatenate(modes).reshape(n_tables, n_events, n + 1)
     return Tables(located, nodes.nodes, nodes.points[:, :, n].ravel(), points, budget)
+
+
+def _at_most_one(covariances: FloatArray) -> FloatArray:
+    """Covariances of logarithms whose standard deviations are 1 at most, correlations as they are."""
+    least = 1.0 / np.maximum(np.sqrt(np.einsum("tii->ti", covariances)), 1.0)
+    return covariances * least[:, :, None] * least[:, None, :]
 
 
 def wide_tables(base: Base, curve: Curve, found: Evidence, budget: Budget) -> Tables:
