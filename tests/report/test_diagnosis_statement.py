@@ -17,9 +17,10 @@ from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import Decision
 from skred.diagnosis.compare.candidate import FORM, Candidate, Strength
 from skred.diagnosis.compare.sensor_places import Shifts
+from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
-from skred.diagnosis.evidence.refit import Fit
+from skred.diagnosis.evidence.refit import Fit, unfitted
 from skred.diagnosis.evidence.stated_places import StatedPlaces
 from skred.diagnosis.influence.influence import ReadingsLeftOut
 from skred.diagnosis.outcome import Diagnosis
@@ -148,10 +149,12 @@ def test_sensors_that_stand_elsewhere_as_their_stated_errors_allow_are_told() ->
     found, claimed = diagnosis("nothing"), diagnosis("sensor")
     assert verdict(found)["sensor_places"] is None and "Stated errors" not in verdict(found)["statement"]
     places = StatedPlaces((("LC", 40.0), ("CD", 20.0)))
+    fit = Fit(unfitted(Population(np.zeros((1, 2)), np.eye(2)[None])), np.zeros((22, 3)))  # none is told of
 
     def about(one: Diagnosis, log_factor: float) -> dict[str, object]:
-        shifts = Shifts(places, np.array([-31.0, 3.0]), np.array([9.5, 12.0]), log_factor)
         under, *rest = one.comparison.under_each
+        mean, sd = np.array([-31.0, 3.0]), np.array([9.5, 12.0])
+        shifts = Shifts(places, mean, sd, log_factor, fit)
         comparison = replace(one.comparison, under_each=(replace(under, shifts=shifts), *rest))
         return verdict(replace(one, comparison=comparison))
 
