@@ -224,21 +224,25 @@ class FrontsSeen(NamedTuple):
         return FrontsSeen(came, stayed, halted, self.stops[events], self.begins, self.ends)
 
     @property
+    def not_come_to(self) -> FloatArray:
+        """Highest place that each front did not come to, inf where none is known, (n_events,)."""
+        return np.where(self.stayed, self.ends, np.inf).min(axis=1, initial=np.inf)
+
+    @property
     def come_to(self) -> FloatArray:
         """Place that a front came to by each sensor, -inf where it shows none, (n_events, n_sensors).
 
         The end of a span that it was read over. Where it is known to have stopped above that, it was read up
         to there, and came to the beginning.
         """
-        highest = np.where(self.stayed, self.ends, np.inf).min(axis=1, initial=np.inf)
+        highest = self.not_come_to
         seen = np.where(self.halted, self.ends, np.inf).min(axis=1, initial=np.inf)
         whole = (self.ends < highest[:, None]) & (self.ends <= np.minimum(seen, self.stops)[:, None])
         return np.where(self.came, np.where(whole, self.ends, self.begins), -np.inf)
 
     def between(self) -> tuple[FloatArray, FloatArray]:
         """Lowest place that each came to, or -inf, and highest that it did not, or inf, (n_events,) each."""
-        highest = np.where(self.stayed, self.ends, np.inf).min(axis=1, initial=np.inf)
-        return self.come_to.max(axis=1, initial=-np.inf), highest
+        return self.come_to.max(axis=1, initial=-np.inf), self.not_come_to
 
 
 def fronts_seen(campaign: Campaign) -> FrontsSeen:
