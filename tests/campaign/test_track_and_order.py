@@ -222,7 +222,7 @@ def test_an_event_with_two_unknowns_of_its_release(folder_with):
     events = "event,release_s_m,release_sd_m,release_speed_m_s,release_speed_sd_m_s\n"
     events += "first,0,5,3,1\nsecond,10,,3,1\nthird,5,2,,\n"
     hints = hints_of(read_campaign(folder_with({"events.csv": events, "track.csv": long_track(parabola)})))
-    assert len(hints) == 1 and hints[0].startswith("events.csv, column release_speed_sd_m_s: 1 events")
+    assert len(hints) == 1 and hints[0].startswith("events.csv, column release_speed_sd_m_s: events that")
 
 
 def test_a_span_read_over_by_fronts_that_did_not_reach_a_sensor_within_it(folder_with):
@@ -233,8 +233,10 @@ def test_a_span_read_over_by_fronts_that_did_not_reach_a_sensor_within_it(folder
     others = "second,span,,not_reached\nsecond,point,8,observed\n"
     others += "third,span,12,observed\nthird,point,9,observed\n"
     (hint,) = hints_of(read_campaign(folder_with(files | {"recordings.csv": header + stopped + others})))
-    assert hint.startswith("sensors.csv, column s_to_m: 'span' has a speed, down to s = 250 m, of 1 fronts")
-    assert "(first event 'first', 'point' at s = 200 m)" in hint
+    assert hint.startswith(
+        "sensors.csv, column s_to_m: 'span' has a speed, down to s = 250 m, of fronts that "
+    )
+    assert "or at it: 1 (first event 'first', 'point' at s = 200 m)" in hint
     assert not hints_of(read_campaign(folder_with(files | {"recordings.csv": header + others})))
 
 
@@ -248,5 +250,5 @@ def test_a_runout_below_a_sensor_that_was_not_reached(row, folder_with):
     hints = hints_of(read_campaign(folder_with(files)))
     assert bool(hints) == (row != "180,12,observed")
     if hints:
-        assert hints[0].startswith("recordings.csv, column status: 1 avalanches have a runout more than 4 sd")
+        assert hints[0].startswith("recordings.csv, column status: runouts more than 4 sd")
         assert "(first event 'first', 'point' at s = 150 m)" in hints[0]

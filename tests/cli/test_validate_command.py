@@ -26,7 +26,7 @@ def test_a_good_campaign():
     assert done.returncode == 0
     assert "22" in done.stdout
     assert "78 observed, 7 not reached, 3 missing" in done.stdout
-    assert "4, one of them the runout" in done.stdout
+    assert "no problems" in done.stdout and "3 of front speed, and the runout" in done.stdout
     assert done.stderr == ""
 
 
@@ -38,6 +38,18 @@ def test_json_and_quiet():
     assert document["reference_s_m"] == 1943.5
     done, _ = skred("validate", "ryggfonn", "--quiet")
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_warnings_are_counted_and_unknown_covariates_too(texts, folder_with):
+    """What only looks odd is told below the table, which does not say that there is nothing."""
+    track = texts["track.csv"].replace("x_m,z_m\n0,", "x_m,z_m\n1,")
+    events = texts["events.csv"].splitlines()
+    events = [events[0] + ",size_1", *(f"{line},{'' if k else 3}" for k, line in enumerate(events[1:]))]
+    folder = folder_with({"track.csv": track, "events.csv": "\n".join(events)})
+    done, _ = skred("validate", str(folder))
+    assert done.returncode == 0 and "no problems" not in done.stdout
+    assert "can be read; 1 warning below" in done.stdout and done.stdout.count("warning: ") == 1
+    assert "size_1 (known for 1)" in done.stdout
 
 
 def test_a_bad_campaign(texts, folder_with):

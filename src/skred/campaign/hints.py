@@ -62,7 +62,7 @@ def _two_unknowns(campaign: Campaign) -> list[Problem]:
     if not both:
         return []
     message = (
-        f"{len(both)} events have a release_sd_m too (first '{both[0]}'); the models vary one of"
+        f"events that have a release_sd_m too: {len(both)} (first '{both[0]}'); the models vary one of"
         " the two, the place, and take the speed as exact: leave release_sd_m empty where the speed is"
         " what is uncertain"
     )
@@ -80,8 +80,8 @@ def _stopped_inside(campaign: Campaign) -> list[Problem]:
         if stopped.any():
             event, other = np.argwhere(stopped)[0]
             message = (
-                f"'{sensor.id}' has a speed, down to s = {end:.4g} m, of {stopped.any(axis=1).sum()} fronts "
-                "that did not reach another sensor above its end, or at it (first event "
+                f"'{sensor.id}' has a speed, down to s = {end:.4g} m, of fronts that did not reach another "
+                f"sensor above its end, or at it: {stopped.any(axis=1).sum()} (first event "
                 f"'{campaign.event_ids[event]}', '{campaign.sensors[other].id}' at s = {ends[other]:.4g} m); "
                 "they count as read up to where they stopped: check the places if they came to the end"
             )
@@ -102,8 +102,8 @@ def _stopped_below(campaign: Campaign) -> list[Problem]:
     event, sensor = np.argwhere(below)[0]
     n, first, other = below.any(axis=1).sum(), campaign.event_ids[event], campaign.sensors[sensor].id
     message = (
-        f"{n} avalanches have a runout more than {LARGEST_SDS:g} sd below a sensor that they did not reach "
-        f"(first event '{first}', '{other}' at s = {ends[sensor]:.4g} m): write 'missing' where it only "
-        "recorded nothing, else correct one of the two"
+        f"runouts more than {LARGEST_SDS:g} sd below a sensor that was not reached: {n} "
+        f"(first event '{first}', '{other}' at s = {ends[sensor]:.4g} m); write 'missing' where the sensor "
+        "only recorded nothing, correct what is wrong, or leave two honest readings as they are"
     )
     return [Problem(RECORDINGS, None, "status", None, message)]

@@ -175,7 +175,8 @@ def _size_problems(
     if sensor.is_runout:
         return _off_track(RECORDINGS, row, column, value, length_m)
     if value < 0:
-        return [problem_at(RECORDINGS, row, column, "a front velocity is not negative; correct it")]
+        message = "a front velocity is not negative; correct it, or write 'at_most' the least it can show"
+        return [problem_at(RECORDINGS, row, column, message)]
     if value > FASTEST_M_S:
         message = f"expected a front velocity of at most {FASTEST_M_S:g} m/s; correct it, or write it in m/s"
         return [problem_at(RECORDINGS, row, column, message)]

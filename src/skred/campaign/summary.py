@@ -24,11 +24,19 @@ def campaign_summary(campaign: Campaign) -> dict[str, Any]:
             sensor.id: sensor.place_sd_m for sensor in campaign.sensors if sensor.place_sd_m is not None
         },
         "covariates": sorted({name for event in campaign.events for name in event.covariates}),
+        "covariates_known": _known(campaign),
         "track_points": len(campaign.track.x_m),
         "track_length_m": campaign.track.length_m,
         "reference_s_m": campaign.reference_s_m,
         "fingerprint": campaign.fingerprint(),
     }
+
+
+def _known(campaign: Campaign) -> dict[str, int]:
+    """For how many events each covariate is known."""
+    covariates = [event.covariates for event in campaign.events]
+    names = sorted({name for one in covariates for name in one})
+    return {name: sum(one.get(name) is not None for one in covariates) for name in names}
 
 
 def place_sentences(places_known_to: dict[str, float]) -> list[str]:
@@ -46,9 +54,17 @@ def _events(summary: dict[str, Any]) -> str:
 
 
 def _sensors(summary: dict[str, Any]) -> str:
-    """How many sensors, whether the runout is one of them, and how well places are known."""
-    stops = ", one of them the runout" if summary["runouts"] else ""
-    return "\n".join([f"{summary['sensors']}{stops}", *place_sentences(summary["places_known_to"])])
+    """How many sensors of speed, whether runouts are there too, and how well places are known."""
+    stops = ", and the runout" if summary["runouts"] else ""
+    of_speed = f"{summary['sensors'] - summary['runouts']} of front speed{stops}"
+    return "\n".join([of_speed, *place_sentences(summary["places_known_to"])])
+
+
+def _covariates(summary: dict[str, Any]) -> str:
+    """The covariates, and for how many events those are known that are not known for all."""
+    known = summary["covariates_known"].items()
+    each = [name if n == summary["events"] else f"{name} (known for {n})" for name, n in known]
+    return ", ".join(each) or "none"
 
 
 def _smoothing(cost: dict[str, float] | None) -> str | None:
@@ -57,13 +73,16 @@ def _smoothing(cost: dict[str, float] | None) -> str | None:
         return None
     return (
         f"by {cost['smoothing_m']:.3g} m: changes the fall between releases and sensors by up to "
-        f"{cost['change_of_fall_m']:.2g} m; steepest slope {cost['steepest_deg']:.1f} degrees, smoothed "
-        f"{cost['steepest_smoothed_deg']:.1f}"
+        f"{cost['change_of_fall_m']:.2g} m, and the length by {cost['change_of_length_m']:.2g} m; steepest "
+        f"slope {cost['steepest_deg']:.1f} degrees, smoothed {cost['steepest_smoothed_deg']:.1f}"
     )
 
 
-def summary_table(summary: dict[str, Any]) -> Table:
+def summary_table(summary: dict[str, Any], n_warnings: int) -> Table:
     """Show a summary as a table; ``smoothing`` in it, if it is there, says what that changes of the track."""
+    found = "no problems"
+    if n_warnings:
+        found = f"can be read; {n_warnings} warning{'s' if n_warnings > 1 else ''} below"
     usual = [status.name.lower() for status in Status if not status.is_bound]
     readings = ", ".join(
         f"{count} {status.replace('_', ' ')}"
@@ -72,11 +91,11 @@ def summary_table(summary: dict[str, Any]) -> Table:
     )
     reference = summary["reference_s_m"]
     rows = {
-        "campaign": f"{summary['name']} ({summary['origin']}): no problems",
+        "campaign": f"{summary['name']} ({summary['origin']}): {found}",
         "events": _events(summary),
         "sensors": _sensors(summary),
         "readings": readings,
-        "covariates": ", ".join(summary["covariates"]) or "none",
+        "covariates": _covariates(summary),
         "track": f"{summary['track_length_m']:.1f} m, {summary['track_points']} points",
         "smoothing": _smoothing(summary.get("smoothing")),
         "reference": "none" if reference is None else f"s = {reference:.1f} m",

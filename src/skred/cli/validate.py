@@ -37,7 +37,7 @@ def validate(campaign: Campaigns, /, *, as_json: Json = False, quiet: Quiet = Fa
         from rich.text import Text
 
         console = Console()
-        console.print(summary_table(summary))
+        console.print(summary_table(summary, len(hints)))
         for hint in hints:
             console.print(Text(f"warning: {hint}"), soft_wrap=True)
     return DONE

@@ -48,9 +48,7 @@ def campaign_places(campaign: Campaign) -> FloatArray:
 
 def _longer(track: Track, terrain: Terrain, file: str) -> list[Problem]:
     """Whether the polyline zigzags about the smoothed track."""
-    length = np.diff(terrain.edge_s_m)
-    x = np.interp(terrain.edge_s_m, track.s_m, track.x_m)
-    smooth = float(np.hypot(np.diff(x), terrain.sin_slope * length).sum())
+    smooth = _smoothed_length_m(track, terrain)
     if track.length_m <= (1.0 + MOST_LONGER) * smooth:
         return []
     more = 100.0 * (track.length_m / smooth - 1.0)
@@ -59,6 +57,12 @@ def _longer(track: Track, terrain: Terrain, file: str) -> list[Problem]:
         " places s are too large by that; give fewer points, or smoother ones"
     )
     return [Problem(file, None, None, None, message)]
+
+
+def _smoothed_length_m(track: Track, terrain: Terrain) -> float:
+    """Length of the smoothed track [m]."""
+    x = np.interp(terrain.edge_s_m, track.s_m, track.x_m)
+    return float(np.hypot(np.diff(x), terrain.sin_slope * np.diff(terrain.edge_s_m)).sum())
 
 
 @dataclass(frozen=True)
@@ -70,12 +74,15 @@ class SmoothingCost:
     smoothing_m : float
     change_of_fall_m : float
         Largest change of the fall between two places.
+    change_of_length_m : float
+        By which the polyline that places are counted along is longer.
     steepest_deg, steepest_smoothed_deg : float
         Largest slope angle, as given and smoothed.
     """
 
     smoothing_m: float
     change_of_fall_m: float
+    change_of_length_m: float
     steepest_deg: float
     steepest_smoothed_deg: float
 
@@ -96,6 +103,7 @@ def smoothing_cost(track: Track, terrain: Terrain, places_m: FloatArray) -> Smoo
     return SmoothingCost(
         terrain.smoothing_m,
         float(np.ptp(smoothed - given)) if given.size else 0.0,
+        track.length_m - _smoothed_length_m(track, terrain),
         float(np.degrees(slopes.max())),
         float(np.degrees(terrain.slope_rad.max())),
     )
