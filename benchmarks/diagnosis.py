@@ -24,22 +24,15 @@ from skred.output import write_json
 from skred.prove.scorecard import DIAGNOSIS, scorecard
 
 
-def _settings(replicas: int) -> dict[str, Any]:
-    """A user's, but for the number of clean campaigns simulated."""
+def diagnose_one(trial: Path, out: Path) -> dict[str, Any]:
+    """Verdict of one trial, from its campaign folder and its base law only, by a user's settings."""
     from skred.prove.plan import diagnosis_settings
-
-    settings = diagnosis_settings(quick=False)
-    return settings | {"effort": {**settings["effort"], "replicas": replicas}}
-
-
-def diagnose_one(trial: Path, out: Path, replicas: int) -> dict[str, Any]:
-    """Verdict of one trial, from its campaign folder and its base law only."""
     from skred.prove.task import diagnose_campaign
 
     started, cpu = time.monotonic(), time.process_time()
     request = json.loads((trial / "request.json").read_text(encoding="utf-8"))
     try:
-        document = diagnose_campaign(trial / "campaign", request["base_model"], _settings(replicas))
+        document = diagnose_campaign(trial / "campaign", request["base_model"], diagnosis_settings(False))
     except Exception as error:  # a crash is an answer, and a wrong one
         document = {"verdict": "crash", "error": repr(error), "traceback": traceback.format_exc()}
     document |= {"wall_seconds": time.monotonic() - started, "cpu_seconds": time.process_time() - cpu}
@@ -70,7 +63,6 @@ def main(
     *,
     trials: Annotated[Path, cyclopts.Parameter(help="Folder made by `benchmarks.development_set`.")],
     workers: Annotated[int, cyclopts.Parameter(help="Trials diagnosed at a time.")] = 1,
-    replicas: Annotated[int, cyclopts.Parameter(help="Clean campaigns simulated for each check.")] = 120,
     out: Annotated[Path | None, cyclopts.Parameter(name="--json", help="File for the scores.")] = None,
 ) -> None:
     """Diagnose what is not diagnosed yet, and score all."""
@@ -81,7 +73,7 @@ def main(
     ]
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         jobs = {
-            pool.submit(diagnose_one, folder, verdicts / f"{folder.name}.json", replicas): folder.name
+            pool.submit(diagnose_one, folder, verdicts / f"{folder.name}.json"): folder.name
             for folder in todo
         }
         for number, job in enumerate(as_completed(jobs), 1):
@@ -95,7 +87,7 @@ def main(
             measured = f"{bar['measured']:.2f}, n = {bar['n']}"
             print(f"{bar['goal']}: {bar['what']}: {measured}: {bar['status']}")
     if out is not None:
-        write(out, {key: found[key] for key in KEPT} | {"settings": _settings(replicas)})
+        write(out, {key: found[key] for key in KEPT})
 
 
 if __name__ == "__main__":

@@ -30,7 +30,7 @@ from skred.diagnosis.augment.problem import as_diagnosed
 from skred.diagnosis.compare.comparison import Comparison, compare
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS
-from skred.diagnosis.effort import REPLICAS, SAMPLING
+from skred.diagnosis.effort import SAMPLING
 from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.population_draws import population_draws, typical
 from skred.diagnosis.evidence.prior_odds import NOTHING, POWER, UNLISTED, prior_odds, stated
@@ -62,7 +62,7 @@ def base_and_draws(campaign: Campaign, law_id: str) -> tuple[Base, tuple[FloatAr
     if not calibration.gate.passed:
         return None
     assert isinstance(calibration.problem, HierarchicalProblem)
-    draws = population_draws(calibration, REPLICAS, 0)
+    draws = population_draws(calibration, 0)
     return fit_base(calibration.problem, law, typical(draws)), draws
 
 

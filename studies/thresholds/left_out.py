@@ -39,7 +39,7 @@ def main(*, law: str = "pcm", errors: str = "scaled", seed: int = 0) -> None:
         "smoothed weights": held_out(calibration, seed),
         "refits by sampling": held_out(calibration, seed, exact=True),
         "refits by importance draws": base_left_out(
-            fit_base(used, base_law, typical(population_draws(calibration, 120, seed))), seed
+            fit_base(used, base_law, typical(population_draws(calibration, seed))), seed
         ),
     }
     found = {

@@ -26,7 +26,6 @@ from skred.diagnosis.detect.detectability import identify
 from skred.diagnosis.detect.run import base_of, identify_document, identify_to
 from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.effort import SAMPLING, Effort
-from skred.diagnosis.limits import FEWEST_CLEAN
 from skred.inference.calibrate import calibrate
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.physics.laws import load_law
@@ -321,17 +320,15 @@ def test_a_diagnosis_is_told_with_its_statement(few: Path, capsys: pytest.Captur
     ("words", "expected"),
     [
         ([], Effort()),
-        (["--quick"], Effort(FEWEST_CLEAN, 1)),
-        (["--quick", "--max-mechanisms", "2"], Effort(FEWEST_CLEAN, 2)),
-        (["--max-mechanisms", "1", "--exact-loo"], Effort(Effort().replicas, 1, exact_loo=True)),
+        (["--quick"], Effort(1)),
+        (["--quick", "--max-mechanisms", "2"], Effort(2)),
+        (["--max-mechanisms", "1", "--exact-loo"], Effort(1, exact_loo=True)),
     ],
 )
 def test_how_much_is_computed(words: list[str], expected: Effort, few: Path) -> None:
     _, given, _ = app.parse_args(["diagnose", "few", *words])
     assert given.arguments.get("diagnosing", DIAGNOSING).effort() == expected
     assert run(["diagnose", "few", *words, "--out", "told", "--quiet"]) == 0
-    settings = json.loads((few / "told" / "verdict.json").read_text())["settings"]
-    assert settings["replicas"] == expected.replicas
 
 
 @pytest.mark.slow
@@ -344,7 +341,7 @@ def test_what_a_diagnosis_is_asked(folder: Path) -> None:
     document = json.loads((folder / "told" / "verdict.json").read_text())
     settings = replace(SAMPLING, seed=7)
     assert document["base_model"] == "constant"
-    assert document["settings"] == settings.as_dict() | {"replicas": FEWEST_CLEAN}
+    assert document["settings"] == settings.as_dict()
     problem = as_diagnosed(hierarchical_problem(campaign, error_model="student", smoothing_m=20.0))
     draws = calibrate(problem, load_law("constant"), settings).tree["posterior"]["retardation"]
     with xr.open_datatree(folder / "told" / "base.nc", engine="h5netcdf") as written:

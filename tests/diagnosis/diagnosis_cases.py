@@ -82,7 +82,7 @@ def gates_campaign(events: range, *, biased: bool) -> Campaign:
 @cache
 def gates_diagnosis(*, biased: bool) -> Diagnosis:
     """The whole diagnosis of eight avalanches, one mechanism added at most."""
-    settings, effort = SamplerSettings("metropolis", 500, 500, 4, 0), Effort(replicas=100, max_mechanisms=1)
+    settings, effort = SamplerSettings("metropolis", 500, 500, 4, 0), Effort(max_mechanisms=1)
     problem = hierarchical_problem(gates_campaign(range(8), biased=biased))
     found = diagnose(problem, load_law("constant"), settings, effort)
     assert isinstance(found, Diagnosis)

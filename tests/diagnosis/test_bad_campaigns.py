@@ -39,7 +39,7 @@ def small(n_events: int = 8) -> Campaign:
 def diagnosed(campaign: Campaign, problem: Any = None) -> dict[str, Any]:
     settings = SamplerSettings("metropolis", 300, 300, 4, 0)
     problem = problem or hierarchical_problem(campaign)
-    found = diagnose(problem, load_law("constant"), settings, Effort(replicas=25, max_mechanisms=1))
+    found = diagnose(problem, load_law("constant"), settings, Effort(max_mechanisms=1))
     return verdict(found)
 
 
@@ -87,9 +87,7 @@ def test_no_reading_at_all() -> None:
 def test_a_gate_that_fails_gives_no_name() -> None:
     """Twenty draws are not enough, nor sixteen times as many: a verdict all the same, which says why."""
     settings = SamplerSettings("metropolis", 10, 10, 2, 0)
-    found = diagnose(
-        hierarchical_problem(small()), load_law("constant"), settings, Effort(replicas=25, max_mechanisms=1)
-    )
+    found = diagnose(hierarchical_problem(small()), load_law("constant"), settings, Effort(max_mechanisms=1))
     assert_refused(verdict(found), "the gate of the base law's calibration failed")
 
 

@@ -91,7 +91,7 @@ def test_replicates_know_on_which_side_their_own_readings_lie() -> None:
 
 @pytest.mark.slow
 def test_a_diagnosis_with_bounds_finds_what_one_without_finds() -> None:
-    settings, effort = SamplerSettings("metropolis", 500, 500, 4, 0), Effort(replicas=100, max_mechanisms=1)
+    settings, effort = SamplerSettings("metropolis", 500, 500, 4, 0), Effort(max_mechanisms=1)
     found = diagnose(hierarchical_problem(bounded_campaign(biased=True)), CONSTANT, settings, effort)
     assert isinstance(found, Diagnosis)
     said = verdict(found)

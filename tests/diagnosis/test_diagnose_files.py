@@ -78,7 +78,7 @@ def test_files_of_what_is_not_there_are_not_written(tmp_path: Path) -> None:
 def test_locked_avalanches_and_folds_are_in_the_verdict(tmp_path: Path) -> None:
     """The diagnosis is repeated without each fold of those that are not locked."""
     problem = hierarchical_problem(gates_campaign(range(16), biased=True))
-    settings, effort = SamplerSettings("metropolis", 300, 300, 4, 0), Effort(replicas=100, max_mechanisms=1)
+    settings, effort = SamplerSettings("metropolis", 300, 300, 4, 0), Effort(max_mechanisms=1)
     diagnose_to(problem, load_law("constant"), settings, effort, tmp_path, lock=3, folds=2)
     document = json.loads((tmp_path / "verdict.json").read_text())
     locked, folds = document["locked"]["events"], document["outer_folds"]["folds"]

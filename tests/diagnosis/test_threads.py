@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from diagnosis_cases import sparse_base
 
-from skred.diagnosis.check.bootstrap_test import linear_test, odds_test
+from skred.diagnosis.check.bootstrap_test import odds_test
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import curve_near
 from skred.diagnosis.evidence.event_quadrature import FINE
@@ -42,8 +42,8 @@ def test_there_are_no_threads_within_threads(monkeypatch: pytest.MonkeyPatch) ->
     assert threads() == 3
 
 
-@pytest.mark.parametrize("by", ["linear model", pytest.param("fronts", marks=pytest.mark.slow)])
-def test_the_check_is_the_same_in_threads(by: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.slow
+def test_the_check_is_the_same_in_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     base = sparse_base()
     n = len(base.law.mechanisms)
     rng = np.random.default_rng(3)
@@ -52,11 +52,9 @@ def test_the_check_is_the_same_in_threads(by: str, monkeypatch: pytest.MonkeyPat
     found = []
     for said in ("1", "2"):
         monkeypatch.setenv("OMP_NUM_THREADS", said)
-        fronts = by == "fronts"
-        found.append(odds_test(base, draws, 5, -1.2) if fronts else linear_test(base, draws, 5, 120))
-    if by == "fronts":
-        with helpers():
-            found.append(odds_test(base, draws, 5, -1.2))
+        found.append(odds_test(base, draws, 5, -1.2))
+    with helpers():
+        found.append(odds_test(base, draws, 5, -1.2))
     one, *others = found
     assert all(one.statistic == other.statistic for other in others)
     assert 4 <= len(one.simulated) < 120  # it stopped at the fourth that is as odd

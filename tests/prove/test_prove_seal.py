@@ -69,13 +69,12 @@ def test_seeds_of_development_are_refused() -> None:
 
 def test_settings_are_those_of_a_user() -> None:
     from skred.diagnosis.effort import Effort
-    from skred.diagnosis.limits import FEWEST_CLEAN
 
     settings, quick = diagnosis_settings(False), diagnosis_settings(True)
     assert Effort(**settings["effort"]) == Effort()
     sampler = {"sampler": "metropolis", "draws": 600, "tune": 1000, "chains": 4, "seed": 0}
     assert settings["sampler"] == sampler == quick["sampler"]
-    assert quick["effort"]["replicas"] == FEWEST_CLEAN
+    assert settings["effort"]["max_mechanisms"] == 2 and quick["effort"]["max_mechanisms"] == 1
 
 
 def test_hashes_do_not_depend_on_the_order_of_keys() -> None:

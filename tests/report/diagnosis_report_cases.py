@@ -266,7 +266,7 @@ def _steps(problem, comparison, names, clean, *, second):
 
 def document_of(found: Outcome, **more) -> dict:
     """What `skred diagnose` writes to verdict.json, as it is read again."""
-    document = verdict(found) | {"settings": {"draws": 1000, "replicas": 50}, "report": report_facts(found)}
+    document = verdict(found) | {"settings": {"draws": 1000}, "report": report_facts(found)}
     return json.loads(json.dumps(plain(document | more), allow_nan=False))
 
 

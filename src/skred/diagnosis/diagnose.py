@@ -71,7 +71,7 @@ def _steps(calibration: Calibration, run: Run) -> Outcome:
         clock.end()
         why = "the gate of the base law's calibration failed: " + "; ".join(calibration.gate.problems)
         return NotDiagnosed(problem, law, why, calibration, seconds=clock.seconds)
-    draws = population_draws(calibration, effort.replicas, run.seed)
+    draws = population_draws(calibration, run.seed)
     base = fit_base(problem, law, typical(draws))
 
     clock.stage("identify", "what these recordings can tell")
@@ -92,7 +92,7 @@ def _steps(calibration: Calibration, run: Run) -> Outcome:
         decision = Decision("cannot_tell", ())
     if decision.verdict == "unexplained":
         clock.stage("profile", "the force profile added: checked again, fitted anew without some avalanches")
-        finding = profile_law(comparison.leading(UNLISTED), effort.replicas, run.seed)
+        finding = profile_law(comparison.leading(UNLISTED), run.seed)
     before, after = _left_out(finding, calibration, run)
     hangs_on = given = None
     if after is not None:

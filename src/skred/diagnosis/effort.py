@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from skred.diagnosis.clock import Clock
-from skred.diagnosis.limits import FEWEST_CLEAN
 from skred.inference.sampling import SamplerSettings
 
 SAMPLING = SamplerSettings("metropolis", draws=600, tune=1000, chains=4, seed=0)
 """How a diagnosis samples: enough to converge nearly always; with more draws where it did not."""
-REPLICAS = 500
-"""Clean campaigns of an augmented law: where 1 % of them are as odd, about five of these are."""
 
 
 @dataclass(frozen=True)
@@ -20,15 +17,12 @@ class Effort:
 
     Attributes
     ----------
-    replicas : int
-        Bootstrap campaigns simulated at most for the check of a law with something added.
     max_mechanisms : int
         1 or 2.
     exact_loo : bool
         Refit without every avalanche.
     """
 
-    replicas: int = REPLICAS
     max_mechanisms: int = 2
     exact_loo: bool = False
 
@@ -38,7 +32,7 @@ def effort_of(quick: bool) -> Effort:
 
     A quick one adds no second mechanism: that takes another comparison, half of the time.
     """
-    return Effort(FEWEST_CLEAN, max_mechanisms=1) if quick else Effort()
+    return Effort(max_mechanisms=1) if quick else Effort()
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ def diagnose_to(
         folds_of(problem, folds, settings.seed)  # refused now rather than after the diagnosis
     found = diagnose(problem, law, settings, effort, tell)
     document = verdict(found) | {
-        "settings": settings.as_dict() | {"replicas": effort.replicas},
+        "settings": settings.as_dict(),
         "report": report_facts(found),
     }
     # Not all of these are written each time: an earlier diagnosis's would be taken for this one's.

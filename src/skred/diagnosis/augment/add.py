@@ -1,7 +1,7 @@
 """Mechanisms added to a law one after the other: the named one, and a second only if it earns its place.
 
-More is looked for where the check of the law with what was added raises an alarm, by the limit of any. What
-is found then and cannot be added is reported.
+The law with what was added is asked as the base law was: by a comparison, and by what clean campaigns have.
+What is found then and cannot be added is reported.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from skred.diagnosis.augment.reference import reference
 from skred.diagnosis.augment.step import Augmented, Left, NotAugmented, Step
 from skred.diagnosis.check.decision import decide
 from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.compare.comparison import Comparison, compare
+from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.effort import Run
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.inference.between_events import BetweenEvents
@@ -55,15 +55,12 @@ def add_mechanisms(
                 return NotAugmented(reason)
             left = replace(left, reason=reason)
             break
-        run.clock.stage("check again", "is anything wrong with the augmented law")
         check, again = check_again(under_errors.base, augmented, chosen, run)
         steps.append(Step(candidate, tuple(names[1:]), comparison, augmented, check))
         left, error_model = None, under_errors.error_model
-        if not check.fired or run.effort.max_mechanisms == 1:  # one alone is asked for: that saves time
+        if again is None or not check.fired:
             break
-        run.clock.stage("compare again", "something may be left: every candidate refitted again")
-        comparison = compare(again)
-        left = Left(comparison)
+        comparison, left = again, Left(again)
         more = decide(comparison.probability, check.p_value, True)
         if not more.names:
             break

@@ -1,4 +1,7 @@
-"""Whether anything is wrong with an augmented law, and that law as a base for another comparison."""
+"""Whether anything is wrong with an augmented law: the same question as of the base law, by the same odds.
+
+A comparison takes long, and mostly nothing more is found. So the odds are computed by fronts first.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from skred.diagnosis.augment.coefficient import augmented_of, multiples_of_events
-from skred.diagnosis.check.bootstrap_test import BootstrapTest, linear_test
+from skred.diagnosis.check.bootstrap_test import BootstrapTest, odds_of_recordings, odds_test
+from skred.diagnosis.compare.comparison import Comparison, compare
 from skred.diagnosis.effort import Run
 from skred.diagnosis.evidence.coefficient import Base, Curve, fit_base
 from skred.diagnosis.evidence.population_draws import population_draws, typical
@@ -15,7 +19,7 @@ from skred.inference.calibrate import Calibration, posterior_of
 
 def check_again(
     base: Base, calibration: Calibration, chosen: Sequence[Curve], run: Run
-) -> tuple[BootstrapTest, Base]:
+) -> tuple[BootstrapTest, Comparison | None]:
     """Ask a law with mechanisms added once more.
 
     Parameters
@@ -28,20 +32,33 @@ def check_again(
     Returns
     -------
     check : BootstrapTest
-        Whether anything is wrong with it, by the linear model.
-    base : Base
-        That law, its added strengths held at their means, each avalanche's own where they differ: for another
-        comparison.
+        Whether anything is wrong with it.
+    comparison : Comparison or None
+        Of everything else with it; None where no second mechanism is asked for, or nothing more is more
+        probable by fronts.
     """
+    seed = run.seed + 1
+    run.clock.stage("check again", "is anything wrong with the augmented law: clean campaigns refitted")
+    again, comparison = _augmented(base, calibration, chosen, seed), None
+    log_odds = odds_of_recordings(again, seed)
+    if run.effort.max_mechanisms > 1 and log_odds > 0.0:
+        run.clock.stage("compare again", "what could be missing still: every candidate refitted once more")
+        comparison = compare(again)
+        log_odds = comparison.log_odds
+        run.clock.stage("check again", "is that more than clean campaigns of the augmented law have")
+    return odds_test(again, population_draws(calibration, seed), seed, log_odds), comparison
+
+
+def _augmented(base: Base, calibration: Calibration, chosen: Sequence[Curve], seed: int) -> Base:
+    """The law with its added strengths held at their means, each avalanche's own where they differ."""
     own = multiples_of_events(calibration)
     directions = tuple(one.direction for one in chosen)
     if own is not None:
         directions = tuple(replace(one, own=own[:, k]) for k, one in enumerate(directions))
     strengths = augmented_of(calibration).added_rows(posterior_of(calibration)).mean(axis=0)
-    draws = population_draws(calibration, run.effort.replicas, run.seed + 1)
-    again = fit_base(base.problem, base.law, typical(draws), base.fit.points, directions, strengths)
+    population = typical(population_draws(calibration, seed))
+    again = fit_base(base.problem, base.law, population, base.fit.points, directions, strengths)
     # What acts along the track cannot be missing from it a second time.
     along_the_track = [one.mechanism.id for one in chosen if one.shape.place_m is None]
     setting = replace(again.setting, base=(*base.setting.base, *along_the_track))
-    again = replace(again, setting=setting)
-    return linear_test(again, draws, run.seed + 1, run.effort.replicas), again
+    return replace(again, setting=setting)

@@ -2,16 +2,17 @@
 
 The statistic is the log odds of anything against nothing. Whole campaigns are simulated from the base law's
 posterior and everything is refitted to each, so that looking at many mechanisms and places is accounted for.
-Of a comparison's odds those of simulated campaigns are computed by fronts (`by_fronts`), of a law with
-something added both are the linear model's. Sampling stops as soon as the answer is clear (Besag and
-Clifford, 1991, doi 10.1093/biomet/78.2.301). Bayes factors of clean campaigns average to one, so that odds of
-100 to 1 are rarer than one in a hundred by Markov's inequality: a few campaigns show there what is usual.
+Those of simulated campaigns are computed by fronts (`by_fronts`), and so are those of the recordings where
+that is enough: of a law with something added, of which nothing more is missing mostly. Sampling stops as soon
+as the answer is clear (Besag and Clifford, 1991, doi 10.1093/biomet/78.2.301). Bayes factors of clean
+campaigns average to one, so that odds of 100 to 1 are rarer than one in a hundred by Markov's inequality: a
+few campaigns show there what is usual.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -33,6 +34,8 @@ _ENOUGH_ABOVE = 4
 """Clean campaigns at least as odd after which sampling stops: p is known to half of itself then."""
 _BATCH = 25
 """Campaigns refitted together: large enough for arrays, small enough to stop early."""
+_LOOKS = 4
+"""Looks at the recordings by fronts: what one of two finds is missed by all once in sixteen."""
 _FEW = fewest_clean(NOTHING_AT_MOST)
 """Clean campaigns by fronts at most where nothing is too probable for a claim, or the odds are rare: they
 show what is usual. Else as few as place the limit."""
@@ -90,8 +93,22 @@ class BootstrapTest:
         return self.p_value <= LIMIT
 
 
+def odds_of_recordings(base: Base, seed: int) -> float:
+    """Log odds of anything against nothing of the recordings, by fronts: the mean odds of some looks.
+
+    Each look draws shapes anew; one alone may miss the place of what is there.
+    """
+    test = ScoreTest(base)
+    own = _refitted(test, base.rows, base.fit.start).one(0)
+    rngs = [np.random.default_rng([seed, 23, look]) for look in range(_LOOKS)]
+    with worker_pool() as pool:
+        # The leading one is computed again where it is more probable than nothing.
+        found = list(pool.map(partial(log_odds_by_fronts, test, 0.0, *own), rngs))
+    return float(np.logaddexp.reduce(found)) - math.log(_LOOKS)
+
+
 def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_odds: float) -> BootstrapTest:
-    """Check a base law by the odds that its comparison gives.
+    """Check a law by the odds of the recordings.
 
     Parameters
     ----------
@@ -100,66 +117,37 @@ def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_o
     draws : (n, n_base) and (n, n_base, n_base) arrays
         Means and factors of populations from the law's posterior.
     log_odds : float
-        Of anything against nothing.
+        Of anything against nothing: a comparison's, or by fronts.
     """
-    test = ScoreTest(base)
-
-    def by_fronts(refitted: _Refitted, first: int) -> Iterator[float]:
-        groups = range(len(refitted.log_odds))
-        rngs = [np.random.default_rng([seed, 22, first + group]) for group in groups]
-        campaigns = zip(*map(refitted.one, groups), strict=True)
-        with worker_pool() as pool:  # those that nobody waits for any more are not begun
-            yield from pool.map(partial(log_odds_by_fronts, test, log_odds), *campaigns, rngs)
-
+    test, rng = ScoreTest(base), np.random.default_rng([seed, 21])
     most = FEWEST_CLEAN if _OF_A_CLAIM < log_odds < _RARE else _FEW
-    return BootstrapTest(log_odds, _until_clear(test, draws, seed, log_odds, most, by_fronts))
-
-
-def linear_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, most: int) -> BootstrapTest:
-    """Check a law with something added by the linear model's odds of what may be missing still.
-
-    Parameters
-    ----------
-    base, draws
-        As of `odds_test`.
-    most : int
-        Campaigns simulated at most; as many draws at least.
-    """
-    test = ScoreTest(base)
-    statistic = float(_refitted(test, base.rows, base.fit.start).log_odds[0])
-    simulated = _until_clear(test, draws, seed, statistic, most, lambda refitted, first: refitted.log_odds)
-    return BootstrapTest(statistic, simulated)
-
-
-def _until_clear(
-    test: ScoreTest,
-    draws: tuple[FloatArray, FloatArray],
-    seed: int,
-    statistic: float,
-    most: int,
-    log_odds: Callable[[_Refitted, int], Iterable[float]],
-) -> FloatArray:
-    """Log odds of clean campaigns, until enough are as odd as the recordings."""
-    rng = np.random.default_rng([seed, 21])
     simulated, above = list[float](), 0
     for first in range(0, most, _BATCH):
         clean = _simulated(test, draws, slice(first, min(first + _BATCH, most)), rng)
-        for one in log_odds(_refitted(test, *clean), first):
+        for one in _by_fronts(test, _refitted(test, *clean), log_odds, [seed, 22, first]):
             simulated.append(one)
-            above += one >= statistic
+            above += one >= log_odds
             if above >= _ENOUGH_ABOVE:
-                return np.array(simulated)
-    return np.array(simulated)
+                return BootstrapTest(log_odds, np.array(simulated))
+    return BootstrapTest(log_odds, np.array(simulated))
+
+
+def _by_fronts(test: ScoreTest, refitted: _Refitted, reach: float, seeds: Sequence[int]) -> Iterator[float]:
+    """Log odds of each campaign; the last of the seeds is that of the first one."""
+    groups = range(refitted.rows.n_groups)
+    rngs = [np.random.default_rng([*seeds[:-1], seeds[-1] + group]) for group in groups]
+    campaigns = zip(*map(refitted.one, groups), strict=True)
+    with worker_pool() as pool:  # those that nobody waits for any more are not begun
+        yield from pool.map(partial(log_odds_by_fronts, test, reach), *campaigns, rngs)
 
 
 class _Refitted(NamedTuple):
-    """Simulated campaigns, one group each, refitted; what the linear model says of them."""
+    """Campaigns, one group each, refitted; what the linear model says of them."""
 
     rows: Rows
     population: Population
     points: FloatArray
     scores: Scores
-    log_odds: FloatArray
 
     def one(self, group: int) -> tuple[Rows, tuple[Population, FloatArray], Scores]:
         """One of the campaigns by itself."""
@@ -181,5 +169,4 @@ def _refitted(test: ScoreTest, rows: Rows, start: tuple[Population, FloatArray])
     """Populations and events refitted."""
     likelihood = EventLikelihood(test.base.extended(), rows, test.base.strengths)
     population, points = fit_population(likelihood, test.prior, start)
-    scores = test.scores(rows, points, population)
-    return _Refitted(rows, population, points, scores, test.statistic(scores))
+    return _Refitted(rows, population, points, test.scores(rows, points, population))

@@ -9,8 +9,11 @@ from skred.diagnosis.evidence.conditional_map import Population
 from skred.inference.calibrate import Calibration, posterior_of
 from skred.inference.hierarchical.population import population_of
 
+_DRAWS = 500
+"""Populations drawn: their middle is known to a twentieth of how they scatter."""
 
-def population_draws(calibration: Calibration, n: int, seed: int) -> tuple[FloatArray, FloatArray]:
+
+def population_draws(calibration: Calibration, seed: int) -> tuple[FloatArray, FloatArray]:
     """Means and factors of populations from a posterior, drawn at random without replacement.
 
     Returns
@@ -20,7 +23,8 @@ def population_draws(calibration: Calibration, n: int, seed: int) -> tuple[Float
         Lower Cholesky factors of the covariances.
     """
     means, factors = population_of(calibration.law, posterior_of(calibration))
-    chosen = np.random.default_rng([seed, 41]).choice(len(means), size=min(n, len(means)), replace=False)
+    n = min(_DRAWS, len(means))
+    chosen = np.random.default_rng([seed, 41]).choice(len(means), size=n, replace=False)
     return means[chosen], factors[chosen]
 
 

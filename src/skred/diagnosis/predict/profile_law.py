@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 
 from skred.arrays import FloatArray, IntArray
-from skred.diagnosis.check.bootstrap_test import BootstrapTest, linear_test
+from skred.diagnosis.check.bootstrap_test import BootstrapTest, odds_of_recordings, odds_test
 from skred.diagnosis.compare.comparison import ComparisonUnderErrors
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, most_probable, with_mean
@@ -27,6 +27,7 @@ from skred.diagnosis.evidence.event_quadrature import USUAL, event_nodes
 from skred.diagnosis.evidence.marginal import evidence, importance_draws, population_at
 from skred.diagnosis.evidence.refit import Rounds, refit
 from skred.diagnosis.evidence.tolerance import DRAWS
+from skred.diagnosis.limits import FEWEST_CLEAN
 from skred.diagnosis.predict.draws import Draws, LeftOut
 from skred.diagnosis.predict.held_out import HeldOut
 from skred.diagnosis.predict.unseen import log_densities
@@ -66,31 +67,29 @@ class ProfileLaw:
     draws_after: Draws
 
 
-def profile_law(under_errors: ComparisonUnderErrors, most: int, seed: int) -> ProfileLaw:
+def profile_law(under_errors: ComparisonUnderErrors, seed: int) -> ProfileLaw:
     """Add the most probable profile of a comparison.
 
     Parameters
     ----------
     under_errors : ComparisonUnderErrors
         The comparison under the error model that the force has most evidence under.
-    most : int
-        Campaigns simulated at most for the check.
     """
     base, profile = under_errors.base, most_probable(under_errors.profiles)
     parts = parts_left_out(len(base.rows.event), seed)
     with worker_pool() as pool:
         fitted = list(pool.map(partial(_left_out, base, profile, seed), parts))
     before, after = (_held_out(base, others, seed) for others in zip(*_by_event(fitted), strict=True))
-    check, rng = _check(base, profile, most, seed), np.random.default_rng([seed, 55])
+    check, rng = _check(base, profile, seed), np.random.default_rng([seed, 55])
     without, within = _plain(base, rng).draws, with_profile(base, profile, rng).draws
     return ProfileLaw(profile, base.problem.error_model.id, check, before, after, without, within)
 
 
-def _check(base: Base, profile: Profile, most: int, seed: int) -> BootstrapTest:
+def _check(base: Base, profile: Profile, seed: int) -> BootstrapTest:
     """The bootstrap test of the law with the profile in."""
     added = with_mean(base, profile)
-    draws = _draws(base, added, np.empty((most, 0)), np.random.default_rng([seed, 51]))
-    return linear_test(added, (draws.means, draws.factors), seed + 1, most)
+    draws = _draws(base, added, np.empty((FEWEST_CLEAN, 0)), np.random.default_rng([seed, 51]))
+    return odds_test(added, (draws.means, draws.factors), seed + 1, odds_of_recordings(added, seed + 1))
 
 
 def parts_left_out(n: int, seed: int) -> list[IntArray]:

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Rows = list[dict[str, Any]]
-_SETTINGS = {"replicas": "clean campaigns of an augmented law's check, at most"}
-"""What settings are called whose key says too little."""
 _HOPELESS = 1000.0
 """Relevant strengths above which a detection limit means nothing."""
 
@@ -272,4 +270,4 @@ def settings_rows(document: doc.Document) -> list[tuple[str, Any]]:
     """Settings and times."""
     settings, seconds = (doc.get(document, key) or {} for key in ("settings", "seconds"))
     times = [(f"time: {name_text(stage)}", f"{fixed(value, 1)} s") for stage, value in seconds.items()]
-    return [(_SETTINGS.get(key, name_text(key)), value) for key, value in settings.items()] + times
+    return [(name_text(key), value) for key, value in settings.items()] + times
