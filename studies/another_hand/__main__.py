@@ -1,8 +1,9 @@
-"""Diagnose the campaigns of another hand, each under its base law.
+"""Diagnose the campaigns of other hands, each under its base law.
 
-``python -m studies.another_hand`` goes on with those that are not in ``results/another_hand.json`` yet;
-remove that file to diagnose all again. The truths lie in the archive beside the campaigns. Nothing was tuned
-on these. ``faults`` of the result file, written by hand, says which ended with a fault before it was mended.
+``python -m studies.another_hand [--again NAME ...]`` goes on with those that are not in
+``results/another_hand.json`` yet. The truths lie in the archives beside the campaigns, and were opened after
+these answers. What is diagnosed again by later code is stored beside them. ``faults`` of the result file,
+written by hand, says which ended with a fault before it was mended.
 """
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import cyclopts
 
 from benchmarks.commit import commit
-from studies.another_hand.campaigns import hidden, unpack
+from studies.another_hand.campaigns import HANDS, hidden, unpack
 from studies.files import RESULTS, read, write
 
 app = cyclopts.App(help=__doc__)
@@ -38,10 +39,10 @@ def answer(verdict: dict[str, Any], code: str) -> dict[str, Any]:
     }
 
 
-def diagnosed(name: str, base_model: str, folder: Path) -> dict[str, Any]:
+def diagnosed(hand: str, name: str, base_model: str, folder: Path) -> dict[str, Any]:
     """The verdict on a campaign, as ``skred diagnose`` writes it."""
     out = folder / "out"
-    asked = [str(unpack(name, folder)), "--base-model", base_model]
+    asked = [str(unpack(hand, name, folder)), "--base-model", base_model]
     command = [sys.executable, "-m", "skred.cli", "diagnose", *asked, "--out", str(out), "--quiet"]
     subprocess.run(command, check=True)
     verdict: dict[str, Any] = json.loads((out / "verdict.json").read_text(encoding="utf-8"))
@@ -49,17 +50,25 @@ def diagnosed(name: str, base_model: str, folder: Path) -> dict[str, Any]:
 
 
 @app.default
-def main() -> None:
-    """Diagnose those that are not yet."""
-    known = read(RESULT) if RESULT.exists() else {}
-    answers = known.get("answers", {})
-    for name, truth in hidden().items():
-        if name in answers:
-            continue
-        with tempfile.TemporaryDirectory(prefix="another-hand-") as scratch:
-            answers[name] = answer(diagnosed(name, truth.base_model, Path(scratch)), commit())
-        print(f"{name}: {answers[name]['verdict']} {answers[name]['mechanisms']}", flush=True)
-        write(RESULT, {**known, "answers": dict(sorted(answers.items()))})
+def main(
+    *,
+    again: Annotated[
+        tuple[str, ...], cyclopts.Parameter(help="To be diagnosed by the present code too.")
+    ] = (),
+) -> None:
+    """Diagnose those that are not yet, and some again."""
+    found = read(RESULT) if RESULT.exists() else {"answers": {}, "again": {}}
+    for hand in HANDS:
+        for name, truth in hidden(hand).items():
+            into = found["again"] if name in found["answers"] else found["answers"]
+            if name in found["answers"] and name not in again:
+                continue
+            with tempfile.TemporaryDirectory(prefix="another-hand-") as scratch:
+                into[name] = answer(diagnosed(hand, name, truth.base_model, Path(scratch)), commit())
+            print(f"{name}: {into[name]['verdict']} {into[name]['mechanisms']}", flush=True)
+            for key in ("answers", "again"):
+                found[key] = dict(sorted(found[key].items()))
+            write(RESULT, found)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The campaigns of another hand: one archive, with what is hidden in each and the program that made them."""
+"""The campaigns of other hands: an archive each, with what is hidden and the program that made them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
-ARCHIVE = Path(__file__).with_name("campaigns.zip")
-"""``campaigns/NAME/`` in the campaign format, ``truth.json`` by name, and ``generator/`` as it was run."""
+HANDS = ("first", "second")
+"""``HAND.zip`` has ``campaigns/NAME/`` in the campaign format, ``truth.json`` by name, and ``generator/`` as
+it was run. No name is in two."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +47,9 @@ class Hidden:
     differs: bool
 
 
-def hidden() -> dict[str, Hidden]:
-    """What is hidden in each campaign, by its name."""
-    with ZipFile(ARCHIVE) as archive:
+def hidden(hand: str) -> dict[str, Hidden]:
+    """What is hidden in each campaign of a hand, by its name."""
+    with ZipFile(_archive(hand)) as archive:
         truth: dict[str, dict[str, Any]] = json.loads(archive.read("truth.json"))
     return {name: _hidden(one) for name, one in sorted(truth.items())}
 
@@ -61,10 +62,14 @@ def _hidden(one: dict[str, Any]) -> Hidden:
     )  # fmt: skip
 
 
-def unpack(name: str, folder: Path) -> Path:
+def unpack(hand: str, name: str, folder: Path) -> Path:
     """Write the files of a campaign into a folder; returns where they are."""
-    with ZipFile(ARCHIVE) as archive:
+    with ZipFile(_archive(hand)) as archive:
         for member in archive.namelist():
             if member.startswith(f"campaigns/{name}/"):
                 archive.extract(member, folder)
     return folder / "campaigns" / name
+
+
+def _archive(hand: str) -> Path:
+    return Path(__file__).with_name(f"{hand}.zip")

@@ -1,4 +1,4 @@
-"""Section of studies/README.md about the campaigns of another hand."""
+"""Sections of studies/README.md about the campaigns of other hands."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from skred.prove.scoring.answers import UNLISTED, Pair
 from skred.prove.scoring.intervals import share
-from studies.another_hand.campaigns import Hidden, hidden
+from studies.another_hand.campaigns import HANDS, Hidden, hidden
 from studies.files import RESULTS, read
 
 RIGHT = "right name"
@@ -39,9 +39,16 @@ def counted(hits: Sequence[bool]) -> str:
 
 
 def sections() -> str:
-    """The section."""
-    truths, found = hidden(), read(RESULTS / "another_hand.json")
-    answers, faults = found["answers"], found.get("faults", {})
+    """A section for each hand."""
+    return "".join(map(_section, HANDS))
+
+
+def _section(hand: str) -> str:
+    truths, found = hidden(hand), read(RESULTS / "another_hand.json")
+    answers, again, faults = (
+        {name: one for name, one in found[key].items() if name in truths}
+        for key in ("answers", "again", "faults")
+    )
     worth = {name: judged(truths[name], answer) for name, answer in answers.items()}
     rows = "".join(_row(name, truths[name], answer, worth[name]) for name, answer in answers.items())
     clean = [worth[name] == "right" for name in answers if not truths[name].ids]
@@ -52,15 +59,16 @@ def sections() -> str:
     every = truths.values()
     spreads = [sd for one in every for sd in one.spreads]
     wider = [one.errors for one in every if one.errors > 1.0]
+    times = " to ".join(f"{size:g}" for size in sorted({min(wider), max(wider)}))
     return f"""
-## Campaigns by another hand
+## Campaigns by another hand: the {hand}
 
 `python -m studies.another_hand` (code {versions}): {len(answers)} campaigns of a simulator that shares
 no code with skred's. It was written from the campaign format, the base laws and the list of mechanisms, lies
-with the campaigns in `studies/another_hand/campaigns.zip`, and integrates in time. It breaks what trials of
+with the campaigns in `studies/another_hand/{hand}.zip`, and integrates in time. It breaks what trials of
 the record assume: coefficients differ between avalanches with an sd of the logarithm of {min(spreads):g}
-to {max(spreads):g}, errors are {max(wider):g} times as large as stated in {len(wider)} campaigns, one
-reading is half of what it should be in {sum(one.is_odd for one in every)}, and in
+to {max(spreads):g}, errors are {times} times as large as stated in {len(wider)} campaigns, one
+reading is odd in {sum(one.is_odd for one in every)}, and in
 {sum(one.differs for one in every)} an effect acts in half of the avalanches only, or differs in strength.
 Edges are soft, and exponents others than the library's. Truths were opened after the verdicts.
 
@@ -77,7 +85,24 @@ stretch are the same term and are always told together, and what is tied with `u
   {counted([one in HOLDS for one in listed])}.
 - Single names that are right: {counted([worth[name] == RIGHT for name in single])}. Ties that hold the truth:
   {counted([worth[name] in HOLDS for name in tied])}.
-"""
+{_since(answers, again)}"""
+
+
+def _since(answers: dict[str, dict[str, Any]], again: dict[str, dict[str, Any]]) -> str:
+    """What later code says otherwise; empty where nothing was diagnosed again."""
+    if not again:
+        return ""
+    others = [name for name, one in again.items() if _says(one) != _says(answers[name])]
+    changed = "; ".join(f"{name}: {_says(again[name])} instead of {_says(answers[name])}" for name in others)
+    versions = ", ".join(dict.fromkeys(one["commit"] for one in again.values()))
+    return (
+        f"- By later code ({versions}), with the truths known, {len(again)} were diagnosed again"
+        f" ({', '.join(again)}). Other names: {changed or 'none'}.\n"
+    )
+
+
+def _says(answer: dict[str, Any]) -> str:
+    return " + ".join(answer["mechanisms"]) or str(answer["verdict"])
 
 
 def _first(faults: dict[str, str]) -> str:
@@ -94,6 +119,13 @@ def _first(faults: dict[str, str]) -> str:
 def _row(name: str, truth: Hidden, answer: dict[str, Any], worth: str) -> str:
     ratio = "" if truth.log_likelihood_ratio is None else f"{truth.log_likelihood_ratio:.0f}"
     what = f"{', '.join(truth.ids)}: {truth.note}" if truth.ids else "nothing"
-    says = " + ".join(answer["mechanisms"]) or answer["verdict"]
-    cells = (name, truth.base_model, what.replace("|", "/"), ratio, says, ", ".join(answer["tied"]), worth)
+    cells = (
+        name,
+        truth.base_model,
+        what.replace("|", "/"),
+        ratio,
+        _says(answer),
+        ", ".join(answer["tied"]),
+        worth,
+    )
     return f"| {' | '.join(cells)} |\n"

@@ -50,12 +50,12 @@ def added(monkeypatch: pytest.MonkeyPatch) -> Added:
 
         def checked(*given: Any) -> Any:
             p_value = next(left)
-            return SimpleNamespace(p_value=p_value, fired=p_value <= 0.01), BASE
+            again = next(further) if max_mechanisms > 1 else None
+            return SimpleNamespace(p_value=p_value, fired=p_value <= 0.01), again
 
         monkeypatch.setattr(add, "augmented_problem", lambda *given: None)
         monkeypatch.setattr(add, "calibrate_surely", lambda *given: calibration(next(gates)))
         monkeypatch.setattr(add, "check_again", checked)
-        monkeypatch.setattr(add, "compare", lambda base: next(further))
         monkeypatch.setattr(add, "reference", lambda own, problem: lambda: calibration(same_errors, "base"))
         first = compared(nothing=0.0, unlisted=0.0, obstacle=1.0)
         run = Run(SamplerSettings(), Effort(max_mechanisms=max_mechanisms), Clock(lambda line: None))

@@ -6,13 +6,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from diagnosis_cases import sparse_base
+from diagnosis_cases import base_of, gates_campaign, sparse_base, trial
 
 from skred.diagnosis.check import by_fronts
-from skred.diagnosis.check.bootstrap_test import odds_test
+from skred.diagnosis.check.bootstrap_test import odds_of_recordings, odds_test
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.detect.score_test import LinearFactors, ScoreTest
+from skred.diagnosis.diagnose import diagnose
+from skred.diagnosis.effort import SAMPLING, Effort
 from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.diagnosis.outcome import Diagnosis
+from skred.inference.hierarchical.problem import hierarchical_problem
+from skred.physics.laws import load_law
 
 
 def test_one_shape_estimates_the_evidence_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -65,3 +70,19 @@ def test_evidence_of_one_shape_is_that_of_a_comparison() -> None:
     fitted, beside = by_fronts.drawn(base, linear, np.random.default_rng(1))
     assert beside == pytest.approx(0.0)
     assert fitted.log_bayes_factor == curve(base, one).log_bayes_factor
+
+
+def test_odds_of_the_recordings_by_fronts() -> None:
+    """A gate that reads too high is more probable than nothing; in clean recordings nothing is."""
+    clean, biased = (base_of(gates_campaign(range(8), biased=which), "constant") for which in (False, True))
+    assert odds_of_recordings(clean, 1) < 0.0 < 5.0 < odds_of_recordings(biased, 1)
+
+
+@pytest.mark.slow
+def test_a_second_effect_is_not_lost_among_what_tangents_overstate() -> None:
+    """The linear model had odds of e^6 for the recordings, and clean campaigns of its own had more."""
+    campaign = trial(41001, "sparse", "two", "pcm", 10.0).campaign
+    found = diagnose(hierarchical_problem(campaign), load_law("pcm"), SAMPLING, Effort())
+    assert isinstance(found, Diagnosis) and len(found.steps) == 2
+    assert found.steps[1].candidate.mechanism.id == "covariate_friction"
+    assert found.steps[0].check.fired and not found.steps[1].check.fired

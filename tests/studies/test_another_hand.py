@@ -11,8 +11,8 @@ import pytest
 from skred.campaign import read_campaign
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
-from studies.another_hand.campaigns import Hidden, hidden, unpack
-from studies.another_hand.page import judged
+from studies.another_hand.campaigns import HANDS, Hidden, hidden, unpack
+from studies.another_hand.page import judged, sections
 from studies.files import RESULTS, read
 
 DRAG = Hidden("pcm", ("segment_drag",), "drag", 50.0, (0.2, 0.3), 1.0, is_odd=False, differs=False)
@@ -45,10 +45,16 @@ def test_an_answer_is_judged_by_its_first_name_and_its_tie(ids: Any, given: Any,
 
 
 def test_every_campaign_can_be_read_and_has_its_answer(tmp_path: Path) -> None:
-    truths, answers = hidden(), read(RESULTS / "another_hand.json")["answers"]
-    assert list(answers) == list(truths) and len(truths) == 20
-    for name, truth in truths.items():
-        campaign = read_campaign(unpack(name, tmp_path))
-        assert campaign.origin == "simulated" and campaign.n_events >= 14
-        assert load_law(truth.base_model).id == truth.base_model
-        assert set(truth.ids) <= {*mechanisms(), "unlisted"}
+    found = read(RESULTS / "another_hand.json")
+    assert list(found["answers"]) == [name for hand in HANDS for name in hidden(hand)]
+    assert set(found["again"]) <= set(found["answers"]) and len(found["answers"]) == 44
+    for hand in HANDS:
+        for name, truth in hidden(hand).items():
+            campaign = read_campaign(unpack(hand, name, tmp_path))
+            assert campaign.origin == "simulated" and campaign.n_events >= 8
+            assert load_law(truth.base_model).id == truth.base_model
+            assert set(truth.ids) <= {*mechanisms(), "unlisted"}
+
+
+def test_names_that_later_code_gives_are_told() -> None:
+    assert "by another hand: the second" in sections() and "instead of segment_drag" in sections()

@@ -83,7 +83,7 @@ def diagnose(
     Parameters
     ----------
     quick : bool
-        Fewer simulated campaigns for the check, and one mechanism at most.
+        One mechanism at most, and no second comparison for another.
     exact_loo : bool
         Refit without every avalanche, not only where importance sampling is unreliable.
     max_mechanisms : int, optional

@@ -34,7 +34,7 @@ Quick = Annotated[
     Parameter(
         name="--quick",
         negative="",
-        help="Fewer simulated campaigns for the check, and one mechanism at most.",
+        help="One mechanism at most, and no second comparison for another.",
     ),
 ]
 TrackFile = Annotated[
