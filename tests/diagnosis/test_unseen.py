@@ -71,7 +71,7 @@ def base() -> Calibration:
 @pytest.fixture(scope="module")
 def augmented(base: Calibration) -> Calibration:
     problem: Any = base.problem
-    fitted = fit_base(problem, base.law, typical(population_draws(base, 200, 0)))
+    fitted = fit_base(problem, base.law, typical(population_draws(base, 0)))
     mechanism = mechanisms()["sensor_bias"]
     shape = Shape(sensor=biased().sensors[GATE].id)
     found = curve_at(fitted, placed(mechanism, fitted.setting, shape), np.linspace(-0.3, 0.6, 10))

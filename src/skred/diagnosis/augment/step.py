@@ -62,7 +62,7 @@ class Augmented:
         Of the base law under the error model of the last step, so that before and after differ by what was
         added alone.
     left : Left or None
-        None where the augmented law was not compared with anything.
+        None where the check of the augmented law raised no alarm.
     """
 
     steps: tuple[Step, ...]
