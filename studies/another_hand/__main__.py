@@ -57,7 +57,7 @@ def main(
     ] = (),
 ) -> None:
     """Diagnose those that are not yet, and some again."""
-    found = read(RESULT) if RESULT.exists() else {"answers": {}, "again": {}}
+    found = read(RESULT) if RESULT.exists() else {"answers": {}, "again": {}, "faults": {}}
     for hand in HANDS:
         for name, truth in hidden(hand).items():
             into = found["again"] if name in found["answers"] else found["answers"]

@@ -13,6 +13,7 @@ from skred.diagnosis.check.bootstrap_test import BootstrapTest, odds_of_recordin
 from skred.diagnosis.compare.comparison import Comparison, compare
 from skred.diagnosis.effort import Run
 from skred.diagnosis.evidence.coefficient import Base, Curve, fit_base
+from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.population_draws import population_draws, typical
 from skred.inference.calibrate import Calibration, posterior_of
 
@@ -39,24 +40,24 @@ def check_again(
     """
     seed = run.seed + 1
     run.clock.stage("check again", "is anything wrong with the augmented law: clean campaigns refitted")
-    again, comparison = _augmented(base, calibration, chosen, seed), None
+    draws, comparison = population_draws(calibration, seed), None
+    again = _augmented(base, calibration, chosen, typical(draws))
     log_odds = odds_of_recordings(again, seed)
     if run.effort.max_mechanisms > 1 and log_odds > 0.0:
         run.clock.stage("compare again", "what could be missing still: every candidate refitted once more")
         comparison = compare(again)
         log_odds = comparison.log_odds
         run.clock.stage("check again", "is that more than clean campaigns of the augmented law have")
-    return odds_test(again, population_draws(calibration, seed), seed, log_odds), comparison
+    return odds_test(again, draws, seed, log_odds), comparison
 
 
-def _augmented(base: Base, calibration: Calibration, chosen: Sequence[Curve], seed: int) -> Base:
+def _augmented(base: Base, calibration: Calibration, chosen: Sequence[Curve], population: Population) -> Base:
     """The law with its added strengths held at their means, each avalanche's own where they differ."""
     own = multiples_of_events(calibration)
     directions = tuple(one.direction for one in chosen)
     if own is not None:
         directions = tuple(replace(one, own=own[:, k]) for k, one in enumerate(directions))
     strengths = augmented_of(calibration).added_rows(posterior_of(calibration)).mean(axis=0)
-    population = typical(population_draws(calibration, seed))
     again = fit_base(base.problem, base.law, population, base.fit.points, directions, strengths)
     # What acts along the track cannot be missing from it a second time.
     along_the_track = [one.mechanism.id for one in chosen if one.shape.place_m is None]

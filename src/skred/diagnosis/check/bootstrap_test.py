@@ -12,7 +12,7 @@ few campaigns show there what is usual.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -124,7 +124,7 @@ def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_o
     simulated, above = list[float](), 0
     for first in range(0, most, _BATCH):
         clean = _simulated(test, draws, slice(first, min(first + _BATCH, most)), rng)
-        for one in _by_fronts(test, _refitted(test, *clean), log_odds, [seed, 22, first]):
+        for one in _by_fronts(test, _refitted(test, *clean), log_odds, seed, first):
             simulated.append(one)
             above += one >= log_odds
             if above >= _ENOUGH_ABOVE:
@@ -132,10 +132,10 @@ def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_o
     return BootstrapTest(log_odds, np.array(simulated))
 
 
-def _by_fronts(test: ScoreTest, refitted: _Refitted, reach: float, seeds: Sequence[int]) -> Iterator[float]:
-    """Log odds of each campaign; the last of the seeds is that of the first one."""
+def _by_fronts(test: ScoreTest, refitted: _Refitted, reach: float, seed: int, first: int) -> Iterator[float]:
+    """Log odds of each campaign, numbered from the first one."""
     groups = range(refitted.rows.n_groups)
-    rngs = [np.random.default_rng([*seeds[:-1], seeds[-1] + group]) for group in groups]
+    rngs = [np.random.default_rng([seed, 22, first + group]) for group in groups]
     campaigns = zip(*map(refitted.one, groups), strict=True)
     with worker_pool() as pool:  # those that nobody waits for any more are not begun
         yield from pool.map(partial(log_odds_by_fronts, test, reach), *campaigns, rngs)

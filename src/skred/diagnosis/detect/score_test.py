@@ -1,8 +1,8 @@
 """The score test of everything that could be missing: efficient scores at the events' modes.
 
-Detection limits come from it, and so does the check's statistic: the evidence for anything at all in the
-linear model, over every mechanism, place, instrument fault and the force that is not in the list, with their
-prior odds. It is cheap, so it is computed for the recordings and for bootstrap campaigns alike.
+Detection limits come from it, and so do the shapes that stand for each mechanism where odds are computed by
+fronts: its odds of anything at all, over every mechanism, place, instrument fault and the force that is not
+in the list, are cheap, and too large where tangents overstate what stops fronts.
 """
 
 from __future__ import annotations
