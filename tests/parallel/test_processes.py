@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from skred.parallel.processes import helpers, meanwhile, worker_pool
+from skred.parallel.processes import helpers, in_processes, meanwhile, worker_pool
 from skred.parallel.threads import threads
 
 
@@ -43,6 +43,17 @@ def test_without_helpers_all_is_done_here(two_cores: None) -> None:
     with worker_pool() as pool:
         assert {pool.submit(os.getpid).result() for _ in range(4)} == {os.getpid()}
     assert meanwhile(os.getpid)() == os.getpid()
+
+
+def test_what_no_two_threads_may_do_goes_to_processes_only(two_cores: None) -> None:
+    jobs = [(number, [100]) for number in range(20)]
+    with helpers("skred.physics.kernel.fronts"):
+        meanwhile(os.getpid)()  # it is there
+        shared = in_processes(where, jobs)
+    alone = in_processes(where, jobs)
+    assert [row[:2] for row in shared] == [row[:2] for row in alone]
+    assert len({row[2] for row in shared}) == 2
+    assert {row[2] for row in alone} == {os.getpid()}
 
 
 def test_one_core_has_no_helpers(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -81,6 +81,18 @@ def test_python_the_package_and_its_laws_are_within() -> None:
     assert not within(Path(sys.prefix).parent / "skred-out" / "prove" / "sealed", roots)
 
 
+def test_caches_that_are_not_there_yet_are_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A diagnosis may not make the folders above its caches itself."""
+    numba, pytensor = tmp_path / "caches" / "numba", tmp_path / "caches" / "pytensor"
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(numba))
+    monkeypatch.setenv("PYTENSOR_FLAGS", f"base_compiledir={pytensor}")
+    own = tmp_path / "own"
+    own.mkdir()
+    sandbox = Sandbox(own)
+    assert numba.is_dir() and pytensor.is_dir()
+    sandbox("os.mkdir", (str(pytensor / "compiled"), 0o777, -1))
+
+
 def test_a_folder_that_diagnoses_may_read_is_refused(
     proof: ProofFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:

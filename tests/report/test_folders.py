@@ -14,6 +14,7 @@ from test_report_html import Page
 from skred.cli.main import run
 from skred.inference.results import save
 from skred.output import write_json
+from skred.parallel.processes import helpers
 from skred.physics.laws import load_law
 from skred.report.diagnosis.places import places_figure, places_of
 from skred.report.folders import ReportError, write_reports
@@ -41,6 +42,20 @@ def write_comparison(folder, document, made, problem, where=""):
         place.mkdir(parents=True)
         law = load_law(model["id"])
         save(as_saved(made(problem, law), law, problem), place / "posterior.nc")
+
+
+def test_figures_drawn_in_a_worker_are_the_same(tmp_path, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    write_documents("cannot", tmp_path)
+    with helpers("skred.report.diagnosis.page"):
+        write_reports(tmp_path)
+    shared = contents(tmp_path)
+    deleted(tmp_path)
+    write_reports(tmp_path)
+    # The resolution is that of this process's test, or the worker's own.
+    of_page = {name for name in shared if name.suffix == ".html"}
+    assert of_page and all(shared[name] == contents(tmp_path)[name] for name in of_page)
+    assert shared.keys() == contents(tmp_path).keys()
 
 
 SLOW = [pytest.param(kind, marks=pytest.mark.slow) for kind in ("tie", "unexplained")]

@@ -21,6 +21,9 @@ from skred.cli.options import (
 from skred.cli.output import OUTPUT, Output
 from skred.cli.refused import tell_refused_mechanisms
 
+_DRAWING = ("skred.report.diagnosis.page", "skred.report.explore.plots.tstat")
+"""What figures of the report are drawn by, as files and to be explored."""
+
 
 def diagnose(
     campaign: Campaigns = "ryggfonn",
@@ -36,7 +39,9 @@ def diagnose(
     from skred.parallel.processes import helpers
 
     recorded = campaign_of(campaign)
-    with helpers("skred.diagnosis.diagnose"):  # they load packages while this process loads its own
+    with helpers(
+        "skred.diagnosis.diagnose", *_DRAWING
+    ):  # they load packages while this process loads its own
         law = law_of(base_model, priors)
         tell_refused_mechanisms()
         problem = hierarchical_of(recorded, likelihood.errors, likelihood.smoothing)

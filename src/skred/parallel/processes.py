@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -123,6 +123,14 @@ def worker_pool() -> ThreadPoolExecutor:
         _seat.number = next(seats)
 
     return _Crew(1 + _wanted(), initializer=take)
+
+
+def in_processes[Result](work: Callable[..., Result], jobs: Iterable[tuple[Any, ...]]) -> list[Result]:
+    """Do work that no two threads may do at once: as `worker_pool` does it, or job by job without workers."""
+    if not _there:
+        return [work(*job) for job in jobs]
+    with worker_pool() as pool:
+        return list(pool.map(work, *zip(*jobs, strict=True)))
 
 
 class _Crew(ThreadPoolExecutor):

@@ -15,6 +15,7 @@ import site
 import sys
 import sysconfig
 from collections.abc import Callable
+from contextlib import suppress
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
@@ -85,7 +86,7 @@ def within(path: str | Path, roots: list[Path]) -> bool:
 
 
 class Sandbox:
-    """An audit hook.
+    """An audit hook; folders of caches are made before it is at work, for those above them are out of bounds.
 
     Parameters
     ----------
@@ -94,6 +95,9 @@ class Sandbox:
     """
 
     def __init__(self, own: Path) -> None:
+        for folder in _cache_folders():
+            with suppress(OSError):  # a cache that cannot be is an error where it is used
+                folder.mkdir(parents=True, exist_ok=True)
         process = f"/proc/{os.getpid()}"
         files = [f"{process}/{name}" for name in _OF_ITSELF] + [f"/proc/{name}" for name in _OF_ALL]
         self.roots = [_real(own), *allowed_roots(), *(Path(one) for one in files)]

@@ -6,8 +6,10 @@ import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING
 
+from skred.parallel.processes import in_processes
 from skred.report.shared.inline import inline_svg
 from skred.report.shared.labels import printable
 from skred.report.shared.style import narrow, write_png
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _UNLABELLED = 'aria-label=""'
+_drawing = Lock()
+"""Matplotlib's settings are one for all threads."""
 
 
 @dataclass(frozen=True)
@@ -99,18 +103,26 @@ def draw(
     explorations : mapping of str to callable, optional
         By the name of the figure in whose place they are looked at.
     """
-    drawn = {}
-    for number, (name, make) in enumerate(makers.items()):
+    explorations = explorations or {}
+    jobs = [
+        (make, folder / f"{name}.png", f"{key}f{number}", explorations.get(name))
+        for number, (name, make) in enumerate(makers.items())
+    ]
+    drawn = zip(makers, in_processes(_drawn, jobs), strict=True)
+    return {name: picture for name, picture in drawn if picture is not None}
+
+
+def _drawn(
+    make: Callable[[], Figure | None], file: Path, key: str, explore: Callable[[], Exploration | None] | None
+) -> Picture | None:
+    with _drawing:
         figure = make()
         if figure is None:
-            continue
-        own = f"{key}f{number}"
-        file = write_png(figure, folder / f"{name}.png")
-        wide = inline_svg(figure, f"{own}w")
-        narrow_one = _for_telephones(make, f"{own}n") or inline_svg(figure, f"{own}n")
-        explore = (explorations or {}).get(name)
-        drawn[name] = Picture(file, wide, narrow_one, explore() if explore is not None else None)
-    return drawn
+            return None
+        write_png(figure, file)
+        wide = inline_svg(figure, f"{key}w")
+        narrow_one = _for_telephones(make, f"{key}n") or inline_svg(figure, f"{key}n")
+        return Picture(file, wide, narrow_one, explore() if explore is not None else None)
 
 
 def _for_telephones(make: Callable[[], Figure | None], key: str) -> str:
