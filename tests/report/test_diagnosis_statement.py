@@ -32,6 +32,7 @@ from skred.diagnosis.words import percent, plus_minus
 from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Direction, Setting, Shape
 from skred.physics.mechanisms.stretches import U_1, U_2
+from skred.report.diagnosis.lay import lay_words
 from skred.report.diagnosis.report import render_diagnosis
 from skred.report.shared.draws import chains_of
 
@@ -314,7 +315,8 @@ def test_that_few_avalanches_carry_an_answer_comes_first() -> None:
     assert first.startswith(f"Take this with care: 2 of 22 avalanches carry this answer ({few})")
     assert "25.0 nats with all, 0.5 without, 4.0 needed" in first
     assert rest.endswith(
-        f"It would not be given without the readings of {found.influence.readings[1].sensor} (21)."
+        "The odds would not suffice for it without"
+        f" the readings of {found.influence.readings[1].sensor} (21)."
     )
     named = verdict(diagnosis("two"))["statement"]
     assert "Take this with care" not in named and "It does not hang on a few avalanches" in named
@@ -327,7 +329,9 @@ def test_of_many_sensors_that_an_answer_needs_five_are_named() -> None:
     of_gates = [ReadingsLeftOut("sensor", f"gate{k:02d}", 9, found.needed - k) for k in range(1, 41)]
     zeros = ReadingsLeftOut("zeros", None, 3, found.needed - 0.5)
     said = hangs_on(replace(found, readings=(*of_gates, zeros)))[-1]
-    assert said.startswith("It would not be given without readings of zero (3) or without the readings of")
+    assert said.startswith(
+        "The odds would not suffice for it without readings of zero (3) or without the readings of"
+    )
     assert "without the readings of gate40 (9) or without the readings of gate39 (9)" in said
     assert said.endswith("gate37 (9), nor without those of any one of 36 further sensors.")
 
@@ -421,3 +425,28 @@ def test_how_a_covariate_enters_is_told(logarithm: bool) -> None:
     assert (f"({name}, by its logarithm)" in document["statement"]) is logarithm
     assert (f"({name})" in document["statement"]) is not logarithm
     assert document["mechanisms"][1]["standard"] is None
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "about", "mean", "said"),
+    [
+        ("sensor_bias", "sensor", -0.1, " (CD, which reads low)"),
+        ("sensor_place", "sensor", 40.8, " (CD, 41 m further down than noted)"),
+        ("sensor_place", "sensor", -12.2, " (CD, 12 m further up than noted)"),
+        ("covariate_friction", "covariate", 0.3, " (CD)"),
+    ],
+)
+def test_the_first_paragraph_says_what_is_off_of_a_sensor(
+    mechanism: str, about: str, mean: float, said: str
+) -> None:
+    document = {"verdict": "instrument", "mechanism": mechanism, about: "CD", "strength": {"mean": mean}}
+    assert said in " ".join(lay_words(document))
+
+
+def test_the_first_paragraph_says_how_well_the_ends_of_a_stretch_are_known() -> None:
+    location = {"s_from_m": 1179.0, "s_to_m": 1779.0}
+    document = {"verdict": "missing_physics", "mechanism": "segment_friction", "location": location}
+    assert "between 1179 and 1779 m along the track." in " ".join(lay_words(document))
+    location |= {"s_from_interval_m": [939.0, 1354.0], "s_to_interval_m": [1704.0, 1829.0]}
+    known = "(begins at 939 to 1354, ends at 1704 to 1829)"
+    assert f"between 1179 and 1779 m along the track {known}." in " ".join(lay_words(document))

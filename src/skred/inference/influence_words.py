@@ -18,7 +18,7 @@ def carried(
     Parameters
     ----------
     carried_by : sequence of str
-        Without these the answer would not be given.
+        Without these the odds would not suffice for the answer.
     n_events : int
         How many avalanches there are.
     with_all, without_them, needed : float, nats
@@ -28,5 +28,6 @@ def carried(
     evidence = f"{with_all:.1f} nats with all, {without_them:.1f} without"
     return (
         f"{many} {'carries' if one else 'carry'} this answer ({enumerated(carried_by)}), and without"
-        f" {'it' if one else 'them'} it would not be given (log Bayes factor {evidence}, {needed:.1f} needed)"
+        f" {'it' if one else 'them'} the odds would not suffice for it"
+        f" (log Bayes factor {evidence}, {needed:.1f} needed)"
     )

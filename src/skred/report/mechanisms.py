@@ -95,9 +95,7 @@ def looked_for(mechanism: Mechanism) -> str:
     except InputError as error:
         return f"unknown: {error}"
     if any(is_opposed(shape) for shape in shapes):
-        where += (
-            "; the longer ones also, and from above it, with a relief that equals it at the typical speed,"
-        )
+        where += "; the longer ones also with a driving force that equals it at the typical speed,"
         where += f" the prior of its coefficient {OPPOSED_SCALES:g} times as wide"
     plain = [shape for shape in shapes if not is_opposed(shape)]
     constants = [dict(shape.constants) for shape in plain]
@@ -120,7 +118,7 @@ def _where(mechanism: Mechanism, setting: Setting, shapes: Sequence[Shape]) -> s
         case BoundTo.PLACE:
             lengths = sorted({round(last - first) for first, last in map(ends_of, shapes)})
             finer = ", finer around the likeliest" if parts_of(mechanism, setting, shapes[0], 1.0) else ""
-            return f"stretches of {_either(lengths)} m over the recorded part of the track{finer}"
+            return f"stretches of {_either(lengths)} m that end in the recorded part of the track{finer}"
         case BoundTo.SENSOR:
             return "each sensor of front velocity, where there are several"
         case BoundTo.COVARIATE if added.needs:

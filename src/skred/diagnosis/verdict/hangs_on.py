@@ -20,7 +20,7 @@ def carried(found: Influence | None) -> str:
 
 
 def hangs_on(found: Influence | None) -> list[str]:
-    """That no few avalanches carry the answer; and which kinds of readings it would not be given without."""
+    """That no few avalanches carry the answer; and without which readings the odds would not suffice."""
     if found is None:
         return []
     sentences = []
@@ -37,7 +37,7 @@ def hangs_on(found: Influence | None) -> list[str]:
         more = len(lost[MOST_NAMED:])
         any_of = "any one of " if more > 1 else ""
         rest = f", nor without those of {any_of}{counted(more, 'further sensor')}" if more else ""
-        sentences.append(f"It would not be given without {named}{rest}.")
+        sentences.append(f"The odds would not suffice for it without {named}{rest}.")
     return sentences
 
 

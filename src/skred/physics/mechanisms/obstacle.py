@@ -61,8 +61,8 @@ def _direction(setting: Setting, shape: Shape) -> Direction:
 
 def _equation(shape: Shape) -> str:
     if TAKEN in dict(shape.constants):
-        return "-(g h / w) climb around s_o, and J = g h is lost for good: v < 2 g h stops"
-    return "-(g h / w) [climb - descent] - (l h / 4 w) U^2 around s_o: v < 2 g h stops"
+        return "-(g h / w) climb around s_o, and J = g h is lost for good: U^2 < 2 g h stops"
+    return "-(g h / w) [climb - descent] - (l h / 4 w) U^2 around s_o: U^2 < 2 g h stops"
 
 
 MECHANISM = Mechanism(
@@ -75,8 +75,9 @@ MECHANISM = Mechanism(
         prior_scale=8.0,
         prior_reason="dams and steps that matter to a front of 20-40 m/s are metres to tens of metres high",
     ),
-    equation="-(g h / w) [climb - descent] - (l h / 4 w) U^2 around s_o, or -(J / w) climb: v < 2 g h stops",
-    signature="stops pile up in front of it; faster fronts pass and lose a share of v, or the same J each",
+    equation="-(g h / w) [climb - descent] - (l h / 4 w) U^2 around s_o, or -(J / w) climb:"
+    " U^2 < 2 g h stops",
+    signature="stops pile up in front of it; faster fronts pass and lose a share of U^2, or the same J each",
     reference="Faug, Gauer, Lied and Naaim (2008), Journal of Geophysical Research 113, F03009",
     doi="10.1029/2007JF000854",
     added=Added(

@@ -15,7 +15,7 @@ MECHANISM = Mechanism(
         prior_reason="over 200 m the scale takes 63 % of U^2",
     ),
     equation="-D_f U^2 for s_1 < s < s_2",
-    signature="fast fronts lose more on the stretch than slow ones, in proportion to v; few stop there",
+    signature="fast fronts lose more on the stretch than slow ones, in proportion to U^2; few stop there",
     reference="Perla, Cheng and McClung (1980), Journal of Glaciology 26(94), 197-207: drag by segment",
     doi="10.3189/S002214300001073X",
     added=Added(

@@ -152,7 +152,7 @@ def _constant_rows(constants: doc.Document, opposed: bool) -> list[dict[str, Any
     known = {str(name): value for name, value in constants.items() if is_number(value)}
     if opposed and len(known) == 2:
         first, last = known.values()
-        what = f"speed at which a relief on the stretch equals it, here {first:g} at s_1 to {last:g} at s_2"
+        what = f"speed at which a driving force equals it, here {first:g} at s_1 to {last:g} at s_2"
         return [_row("U_0", "m s-1", what, new=True)]
     rows = []
     for named, value in known.items():

@@ -130,7 +130,7 @@ def _shape_text(comparison: doc.Document, name: str) -> str:
     elif is_number(first):
         parts.append(f"from s = {first:.0f} m on")
     if doc.get(shape, "opposed"):
-        parts.append("with a relief equal to it at about the typical speed")
+        parts.append("with a driving force equal to it at about the typical speed")
     else:
         constants = doc.get(shape, "constants") or {}
         parts += [
@@ -210,6 +210,8 @@ def _scales(
     for other, colour in zip([name, *others][:_MOST_LINES], _LINES, strict=False):
         facts = facts_of(document, other)
         values = curves["log_bayes_factor"].sel(candidate=other).values
+        if not np.isfinite(values).any():
+            continue
         unit = bracketed(doc.get(facts, "unit")).strip().strip("[]")
         scale = doc.get(facts, "prior", "scale")
         used = f" (scale {scale:g}{' ' + unit if unit else ''})" if is_number(scale) else ""

@@ -5,12 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from skred.report.diagnosis.words import law_id, short_title, stretch_in
+from skred.report.diagnosis.words import ends_in, law_id, short_title, stretch_in
 from skred.report.shared import document as doc
 from skred.report.shared.labels import printable
 from skred.report.shared.numbers import fixed, is_number
 
 _SURE, _LIKELY = 0.95, 0.75
+_WAYS = {
+    "sensor_bias": (", which reads high", ", which reads low"),
+    "sensor_place": (", {:.0f} m further down than noted", ", {:.0f} m further up than noted"),
+}
+"""What a positive strength and a negative one say of a sensor."""
 
 
 def lay_words(document: doc.Document) -> list[str]:
@@ -58,12 +63,13 @@ def _named(document: doc.Document, verdict: str, where: str) -> str:
 
 
 def _which(document: doc.Document) -> str:
-    """Which sensor reads wrongly, and which way."""
-    sensor, mean = doc.get(document, "sensor"), doc.get(document, "strength", "mean")
-    if not sensor:
+    """Which sensor is off, and which way; or the property that friction goes with."""
+    about = doc.get(document, "sensor") or doc.get(document, "covariate")
+    mean = doc.get(document, "strength", "mean")
+    if not about:
         return ""
-    way = f", which reads {'high' if mean > 0.0 else 'low'}" if is_number(mean) else ""
-    return f" ({printable(sensor)}{way})"
+    way = _WAYS.get(str(doc.get(document, "mechanism"))) if is_number(mean) else None
+    return f" ({printable(about)}{'' if way is None else way[mean < 0.0].format(abs(mean))})"
 
 
 def _how_sure(document: doc.Document) -> str:
@@ -82,8 +88,16 @@ def _tied(document: doc.Document) -> list[str]:
 
 
 def _between(document: doc.Document) -> str:
-    stretch = stretch_in(doc.get(document, "location"))
-    return "" if stretch is None else f" between {stretch[0]:.0f} and {stretch[1]:.0f} m along the track"
+    location = doc.get(document, "location")
+    stretch = stretch_in(location)
+    if stretch is None:
+        return ""
+    known = ", ".join(
+        f"{what} at {first:.0f} to {last:.0f}"
+        for what, (first, last) in zip(("begins", "ends"), ends_in(location), strict=False)
+    )
+    place = f" between {stretch[0]:.0f} and {stretch[1]:.0f} m along the track"
+    return f"{place} ({known})" if known else place
 
 
 def _hangs_on(document: doc.Document) -> list[str]:
@@ -94,7 +108,10 @@ def _hangs_on(document: doc.Document) -> list[str]:
     n, are = len(carried), "avalanche carries" if len(carried) == 1 else "avalanches carry"
     them = "it" if n == 1 else "them"
     names = ", ".join(carried)
-    return [f"Take it with care: only {n} {are} this answer ({names}). Without {them} it would not be given."]
+    return [
+        f"Take it with care: only {n} {are} this answer ({names})."
+        f" Without {them} the odds would not suffice for it."
+    ]
 
 
 def _use(document: doc.Document) -> list[str]:

@@ -11,7 +11,7 @@ from skred.report.diagnosis.equation import equations, held_places, parameter_ro
 from skred.report.diagnosis.events import MOST_OPEN, event_rows, reading_rows
 from skred.report.diagnosis.evidence import group_of
 from skred.report.diagnosis.lay import lay_words
-from skred.report.diagnosis.words import comparisons, in_words, law_id, stretch_in, verdict_words
+from skred.report.diagnosis.words import comparisons, ends_in, in_words, law_id, stretch_in, verdict_words
 from skred.report.shared import document as doc
 from skred.report.shared import html
 from skred.report.shared.labels import name_text, unit_text
@@ -43,6 +43,7 @@ def page(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Pictur
     locked, folds = unseen.locked(document), unseen.outer_folds(document)
     sections = _sections(document, has_unseen=locked is not None or folds is not None)
     report = doc.get(document, "report") or {}
+    checks = doc.listed(report, "checks")
     compared = [_comparison(document, number, one) for number, one in enumerate(comparisons(document))]
     return html.page(
         "diagnosis.html.jinja",
@@ -59,7 +60,7 @@ def page(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Pictur
         detectability=rows.detectability_rows(document),
         work=rows.work_rows(document),
         stretch=stretch_in(doc.get(document, "location")),
-        ends=_ends(document),
+        ends=ends_in(doc.get(document, "location")),
         first_sensor=_first_sensor(tree),
         comparisons=compared,
         equations=equations(document),
@@ -80,7 +81,8 @@ def page(document: doc.Document, tree: xr.DataTree, figures: Mapping[str, Pictur
         own=_way(document),
         readings=reading_rows(tree),
         most_open=MOST_OPEN,
-        checks=doc.listed(report, "checks"),
+        checks=checks,
+        none_as_odd=_none_as_odd(checks),
         dropped=in_words(doc.listed(report, "not_added")),
         flat=not _number(doc.get(report, "force", "largest"), 1.0) > _NO_FORCE,
     )
@@ -90,10 +92,10 @@ def _number(value: Any, otherwise: float) -> float:
     return float(value) if is_number(value) else otherwise
 
 
-def _ends(document: doc.Document) -> list[Any]:
-    """Intervals of both ends of the stretch; empty where there are none."""
-    ends = [doc.listed(document, "location", f"s_{end}_interval_m") for end in ("from", "to")]
-    return ends if all(len(one) == 2 and all(map(is_number, one)) for one in ends) else []
+def _none_as_odd(checks: list[Any]) -> bool:
+    """Whether no clean campaign of the last law has odds like those of the recordings."""
+    p_value, n = (doc.get(checks[-1] if checks else {}, key) for key in ("p_value", "n_simulated"))
+    return is_number(p_value) and is_number(n) and p_value * (n + 1) < 1.5
 
 
 def _first_sensor(tree: xr.DataTree) -> float | None:

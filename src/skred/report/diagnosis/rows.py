@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from skred.arrays import FloatArray
 from skred.report.diagnosis.words import (
     facts_of,
     kind_of,
@@ -28,6 +29,15 @@ _HOPELESS = 1000.0
 """Relevant strengths above which a detection limit means nothing."""
 
 
+def _constant_sd(of_sensor: float, of_rows: FloatArray) -> str:
+    """Constant part of a sensor's errors: from the smallest to the largest, where rows state their own."""
+    used = np.where(of_rows > 0.0, of_rows, of_sensor)
+    ends = dict.fromkeys(
+        rounded(end, None) for end in ((used.min(), used.max()) if len(used) else [of_sensor])
+    )
+    return " to ".join(ends)
+
+
 def sensor_rows(tree: xr.DataTree) -> Rows:
     """Each sensor: where, what, how well, and how many readings."""
     recordings = recordings_of(tree)
@@ -46,7 +56,7 @@ def sensor_rows(tree: xr.DataTree) -> Rows:
                 "place": f"{place} to {whole(sensor.s_to_m)}" if sensor.is_span else place,
                 "unit": "m" if sensor.is_runout else "m s-1",
                 "relative": f"{100.0 * sensor.relative_sd:.0f} %",
-                "absolute": rounded(sensor.absolute_sd, None),
+                "absolute": _constant_sd(sensor.absolute_sd, recordings.stated_sd[observed, column]),
                 "observed": int(observed.sum()),
                 "not_reached": int(recordings.not_reached[:, column].sum()),
                 "bounds": int(recordings.bounded[:, column].sum()),

@@ -106,6 +106,12 @@ def stretch_in(entry: doc.Document | None) -> tuple[float, float] | None:
     return (float(ends[0]), float(ends[1])) if all(map(is_number, ends)) else None
 
 
+def ends_in(entry: doc.Document | None) -> list[Any]:
+    """Intervals of both ends of a ``location`` [m]; empty where it has none."""
+    ends = [doc.listed(entry, f"s_{end}_interval_m") for end in ("from", "to")]
+    return ends if all(len(one) == 2 and all(map(is_number, one)) for one in ends) else []
+
+
 def blamed_sensors(document: doc.Document) -> set[str]:
     """Sensors that the verdict blames."""
     return {

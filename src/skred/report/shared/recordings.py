@@ -27,6 +27,8 @@ class Recordings:
     sensors : tuple of Sensor
     values, reading_sd : (n_events, n_sensors) arrays, m/s or m
         Readings and their standard deviations, NaN where there is none.
+    stated_sd : (n_events, n_sensors) array, m/s or m
+        Constant part of a reading's error where its row states one, NaN where it does not.
     status : (n_events, n_sensors) array
         A `Status` for each.
     release_s_m, release_speed_m_s : (n_events,) arrays
@@ -42,6 +44,7 @@ class Recordings:
     sensors: tuple[Sensor, ...]
     values: FloatArray
     reading_sd: FloatArray
+    stated_sd: FloatArray
     status: NDArray[np.int8]
     release_s_m: FloatArray
     release_speed_m_s: FloatArray
@@ -126,6 +129,7 @@ def recordings_of(tree: xr.DataTree) -> Recordings:
         ),
         values=_floats(constant["reading"].transpose("event", "sensor")),
         reading_sd=_floats(constant["reading_sd"].transpose("event", "sensor")),
+        stated_sd=_floats(constant["stated_sd"].transpose("event", "sensor")),
         status=np.asarray(constant["status"].transpose("event", "sensor").values, dtype=np.int8),
         release_s_m=_floats(constant["release_s"]),
         release_speed_m_s=_floats(constant.get("release_speed", 0.0 * constant["release_s"])),
