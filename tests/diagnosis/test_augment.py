@@ -6,6 +6,7 @@ from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from skred.diagnosis.augment import add
@@ -64,16 +65,20 @@ def added(monkeypatch: pytest.MonkeyPatch) -> Added:
     return found
 
 
-def test_without_an_alarm_nothing_more_is_looked_for(added: Added) -> None:
-    found = added([0.02], compared(nothing=0.0, unlisted=0.0, segment_drag=1.0))
-    assert len(found.steps) == 1 and found.reference.of == "base" and found.left is None
+def test_without_an_alarm_nothing_more_is_added_and_what_led_is_told(added: Added) -> None:
+    again = compared(nothing=0.0, unlisted=0.0, segment_drag=1.0)
+    found = added([0.02], again)
+    assert len(found.steps) == 1 and found.reference.of == "base"
+    assert found.left.comparison is again and found.left.reason == "no alarm, p = 0.02"
+    found = added([0.02], (None,))
+    assert len(found.steps) == 1 and found.left is None
 
 
 def test_after_an_alarm_the_comparison_has_to_be_sure(added: Added) -> None:
     sure = compared(nothing=0.005, unlisted=0.0, segment_drag=0.995)
     found = added([0.01, 0.5], sure)
     assert [step.candidate.best for step in found.steps] == ["obstacle", "segment_drag"]
-    assert found.left is None
+    assert found.left.reason == "no alarm, p = 0.5"
     unsure = compared(nothing=0.3, unlisted=0.0, segment_drag=0.7)
     found = added([0.01], unsure)
     assert len(found.steps) == 1 and found.left.comparison is unsure and not found.left.reason
@@ -118,7 +123,40 @@ def test_what_cannot_be_sampled_where_avalanches_differ_is_in_common(
     candidate: Any = SimpleNamespace(likely_ways=(BetweenEvents.SOME,), ways=None)
     curve: Any = "obstacle"
     found, way = add.calibrated(BASE, candidate, [curve], SamplerSettings())
-    assert found.gate.passed and way is BetweenEvents.COMMON
+    assert found is not None and found.gate.passed and way is BetweenEvents.COMMON
+
+
+def test_where_the_numerics_break_down_that_way_of_differing_is_left_out(
+    added: Added, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(base: Any, chosen: Any, way: BetweenEvents, ways: Any) -> None:
+        if way is BetweenEvents.SOME or chosen[-1] == "segment_drag":
+            raise np.linalg.LinAlgError("Matrix is not positive definite")
+
+    monkeypatch.setattr(add, "augmented_problem", broken)
+    monkeypatch.setattr(add, "calibrate_surely", lambda *given: calibration(True))
+    candidate: Any = SimpleNamespace(likely_ways=(BetweenEvents.SOME,), ways=None)
+    curve: Any = "obstacle"
+    found, way = add.calibrated(BASE, candidate, [curve], SamplerSettings())
+    assert found is not None and found.gate.passed and way is BetweenEvents.COMMON
+    curve = "segment_drag"
+    assert add.calibrated(BASE, candidate, [curve], SamplerSettings())[0] is None
+
+
+def test_where_the_numerics_break_down_beside_the_first_one_that_stays(
+    added: Added, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first answer is not lost with the second."""
+    sure = compared(nothing=0.001, unlisted=0.0, segment_drag=0.999)
+    whole = add.calibrated
+
+    def second_breaks(base: Any, candidate: Any, chosen: Any, settings: Any) -> Any:
+        return whole(base, candidate, chosen, settings) if len(chosen) == 1 else (None, BetweenEvents.COMMON)
+
+    monkeypatch.setattr(add, "calibrated", second_breaks)
+    found = added([0.005], sure)
+    assert len(found.steps) == 1
+    assert found.left.reason == "the numerics broke down as pcm + segment_drag was calibrated"
 
 
 def test_without_the_base_law_under_the_same_errors_nothing_is_added(added: Added) -> None:

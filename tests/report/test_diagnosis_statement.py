@@ -16,6 +16,7 @@ from skred.diagnosis.augment.step import Left
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import Decision
 from skred.diagnosis.compare.candidate import FORM, Candidate, Strength
+from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.compare.sensor_places import Shifts
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.extension import setting_of
@@ -51,12 +52,14 @@ def test_a_lean_that_the_check_does_not_bear_out_is_told_and_not_claimed(kind: s
     assert ("no silence either" in leaning) == found.table.can_tell == (kind == "nothing")
     assert ("so silence means little" in leaning) == (kind == "silent")
     assert "an obstacle would be the most probable (62 %)" in leaning
-    assert (
-        f"None is claimed: {100.0 * found.check.p_value:.0f} % of clean campaigns have such odds" in leaning
-    )
+    above, of = int(np.sum(found.check.simulated >= found.check.statistic)), len(found.check.simulated)
+    assert above > 1 and f"None is claimed: {above} of {of} clean campaigns have such odds" in leaning
+    differ = replace(found, check=BootstrapTest(2.0, np.zeros(9)))
+    told = statement(differ, document({"nothing": 0.08, "obstacle": 0.62, "unlisted": 0.3}))
+    assert "with a strength in common to all avalanches the log odds are only 2.0 nats" in told
     kept = statement(found, document({"nothing": 0.2, "obstacle": 0.5, "unlisted": 0.3}))
     assert "None is claimed: nothing keeps 20 %, and a claim leaves it less than 10 %" in kept
-    assert "of clean campaigns" not in kept
+    assert "clean campaigns" not in kept
     other = statement(found, document({"nothing": 0.2, "obstacle": 0.3, "unlisted": 0.5}))
     assert "a force not in the list would be" in other
     plain = statement(found, document({"nothing": 0.6, "obstacle": 0.3, "unlisted": 0.1}))
@@ -79,6 +82,12 @@ def test_what_a_last_comparison_leaned_to_is_told() -> None:
     assert f"({document['left']['covariate']}), " in document["statement"]
     assert "leans to friction that goes with a property" in document["statement"]
     assert "it was not added (the gate failed)" in document["statement"]
+    shares = {"nothing": 0.4, "obstacle": 0.25, "unlisted": 0.35}
+    made = leaning.left.comparison
+    unsure = type("Unsure", (Comparison,), {"probability": shares})(**vars(made))
+    told = verdict(with_finding(found, left=Left(unsure, "no alarm, p = 0.1")))
+    assert told["left"]["most_probable"] == "unlisted"
+    assert "(nothing more: 40 %); it was not added (no alarm, p = 0.1)." in told["statement"]
     nothing = verdict(with_finding(found, left=Left(diagnosis("nothing").comparison)))
     assert nothing["left"]["most_probable"] == "nothing" and "Another comparison" not in nothing["statement"]
 
@@ -450,3 +459,21 @@ def test_the_first_paragraph_says_how_well_the_ends_of_a_stretch_are_known() -> 
     location |= {"s_from_interval_m": [939.0, 1354.0], "s_to_interval_m": [1704.0, 1829.0]}
     known = "(begins at 939 to 1354, ends at 1704 to 1829)"
     assert f"between 1179 and 1779 m along the track {known}." in " ".join(lay_words(document))
+
+
+def test_what_cannot_be_told_from_a_second_one_is_said() -> None:
+    found = diagnosis("two")
+    first, second = found.steps
+    told = document_of(with_finding(found, steps=(first, replace(second, tied=("sensor_bias",)))))
+    assert "These recordings cannot tell it from: one sensor" in told["statement"]
+    assert " or one sensor reads too high or too low." in " ".join(lay_words(told))
+    assert "cannot tell it from" not in verdict(found)["statement"]
+
+
+def test_physics_and_a_fault_of_a_sensor_are_told_as_both() -> None:
+    document = document_of(diagnosis("two"))
+    named = document["mechanisms"]
+    named[1] |= {"id": "sensor_bias", "group": "instrument", "sensor": "CD"}
+    told = " ".join(lay_words(document))
+    assert "a force is missing, and the recordings are off: friction" in told
+    assert "and one sensor reads too high or too low (CD)." in told

@@ -203,7 +203,7 @@ def held(**values):
 
 RISES = "For avalanches left out the log score rises by 51.0 (twice its standard error: 16.0)"
 FALLS = "the log score falls by 20.0 (twice its standard error: 16.0)"
-STAYS = "the log score changes by +9.0 (twice its standard error: 16.0), no practical difference"
+STAYS = "the log score changes by +9.0 (twice its standard error: 16.0), not beyond its error"
 FASTER = "the error of speeds falls from 5.6 to 4.3 m/s"
 FARTHER = "But the error of runouts grows from 205 to 212 m."
 

@@ -11,6 +11,7 @@ from skred.diagnosis.augment.step import Augmented, NotAugmented
 from skred.diagnosis.check.bootstrap_test import odds_test
 from skred.diagnosis.check.decision import Decision, decide
 from skred.diagnosis.clock import Clock, Tell
+from skred.diagnosis.compare.between import or_none
 from skred.diagnosis.compare.comparison import compare
 from skred.diagnosis.compare.location import location_of
 from skred.diagnosis.detect.detectability import identify
@@ -101,9 +102,9 @@ def _steps(calibration: Calibration, run: Run) -> Outcome:
         gained = after.pointwise - before.pointwise
         if isinstance(finding, Augmented) and len(finding.steps) > 1:
             gained = gained_by(finding.steps[0], calibration, run.seed, exact=effort.exact_loo)
-        hangs_on = influence(comparison, decision.answer, gained, check.needed)
+        hangs_on = or_none(influence, comparison, decision.answer, gained, check.needed)
         clock.stage("conditional", "predicting each reading from those above it")
-        given = BeforeAfter.of(before, after, run.seed)
+        given = or_none(BeforeAfter.of, before, after, run.seed)
     clock.end()
     return Diagnosis(
         problem, law, calibration, table, check, comparison, decision, location, finding, before, after,

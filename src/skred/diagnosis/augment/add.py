@@ -14,6 +14,7 @@ from skred.diagnosis.augment.check_again import check_again
 from skred.diagnosis.augment.reference import reference
 from skred.diagnosis.augment.step import Augmented, Left, NotAugmented, Step
 from skred.diagnosis.check.decision import decide
+from skred.diagnosis.compare.between import or_none
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.effort import Run
@@ -49,7 +50,7 @@ def add_mechanisms(
         if under_errors.error_model not in references:
             references[under_errors.error_model] = reference(calibration, under_errors.base.problem)
         augmented, way = calibrated(under_errors.base, candidate, chosen, run.settings)
-        if not augmented.gate.passed:
+        if augmented is None or not augmented.gate.passed:
             reason = _failed(f"{base.law.id} + {names[0]}", augmented)
             if left is None:
                 return NotAugmented(reason)
@@ -58,9 +59,12 @@ def add_mechanisms(
         check, again = check_again(under_errors.base, augmented, chosen, run)
         steps.append(Step(candidate, tuple(names[1:]), comparison, augmented, check))
         left, error_model = None, under_errors.error_model
-        if again is None or not check.fired:
+        if again is None:
             break
         comparison, left = again, Left(again)
+        if not check.fired:
+            left = Left(again, f"no alarm, p = {check.p_value:.2g}")
+            break
         more = decide(comparison.probability, check.p_value, True)
         if not more.names:
             break
@@ -81,11 +85,11 @@ def add_mechanisms(
 
 def calibrated(
     base: Base, candidate: Candidate, chosen: Sequence[Curve], settings: SamplerSettings
-) -> tuple[Calibration, BetweenEvents]:
+) -> tuple[Calibration | None, BetweenEvents]:
     """The law with what is chosen added, calibrated, and how avalanches differ in it.
 
     They may differ in one that is added: in the most probable way that can be sampled. What cannot be sampled
-    so is still an effect with a strength in common.
+    so is still an effect with a strength in common. None where the numerics break down for that as well.
 
     Parameters
     ----------
@@ -96,12 +100,20 @@ def calibrated(
     settings = replace(settings, tune=settings.tune // 2)
     likely = candidate.likely_ways if len(chosen) == 1 else ()
     for way in dict.fromkeys((*likely, BetweenEvents.COMMON)):
-        problem = augmented_problem(base.plain(), chosen, way, candidate.ways)
-        calibration = calibrate_surely(problem, base.law, settings)
-        if calibration.gate.passed:
+        calibration = or_none(_calibrated, base, chosen, way, candidate, settings)
+        if calibration is not None and calibration.gate.passed:
             break
     return calibration, way
 
 
-def _failed(what: str, calibration: Calibration) -> str:
+def _calibrated(
+    base: Base, chosen: Sequence[Curve], way: BetweenEvents, candidate: Candidate, settings: SamplerSettings
+) -> Calibration:
+    problem = augmented_problem(base.plain(), chosen, way, candidate.ways)
+    return calibrate_surely(problem, base.law, settings)
+
+
+def _failed(what: str, calibration: Calibration | None) -> str:
+    if calibration is None:
+        return f"the numerics broke down as {what} was calibrated"
     return f"the gate of {what} failed: {'; '.join(calibration.gate.problems)}"

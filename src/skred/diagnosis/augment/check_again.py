@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from skred.diagnosis.augment.coefficient import augmented_of, multiples_of_events
 from skred.diagnosis.check.bootstrap_test import BootstrapTest, odds_of_recordings, odds_test
+from skred.diagnosis.compare.between import or_none
 from skred.diagnosis.compare.comparison import Comparison, compare
 from skred.diagnosis.effort import Run
 from skred.diagnosis.evidence.coefficient import Base, Curve, fit_base
@@ -35,8 +36,8 @@ def check_again(
     check : BootstrapTest
         Whether anything is wrong with it.
     comparison : Comparison or None
-        Of everything else with it; None where no second mechanism is asked for, or nothing more is more
-        probable by fronts.
+        Of everything else with it; None where no second mechanism is asked for, nothing more is more
+        probable by fronts, or the numerics broke down.
     """
     seed = run.seed + 1
     run.clock.stage("check again", "is anything wrong with the augmented law: clean campaigns refitted")
@@ -45,8 +46,8 @@ def check_again(
     log_odds = odds_of_recordings(again, seed)
     if run.effort.max_mechanisms > 1 and log_odds > 0.0:
         run.clock.stage("compare again", "what could be missing still: every candidate refitted once more")
-        comparison = compare(again)
-        log_odds = comparison.log_odds
+        comparison = or_none(compare, again)
+        log_odds = log_odds if comparison is None else comparison.log_odds
         run.clock.stage("check again", "is that more than clean campaigns of the augmented law have")
     return odds_test(again, draws, seed, log_odds), comparison
 

@@ -43,7 +43,7 @@ class Left:
     ----------
     comparison : Comparison
     reason : str
-        Why what it would name was not added, where it would name something.
+        Why what it would name was not added.
     """
 
     comparison: Comparison
@@ -62,7 +62,7 @@ class Augmented:
         Of the base law under the error model of the last step, so that before and after differ by what was
         added alone.
     left : Left or None
-        None where the check of the augmented law raised no alarm.
+        None where there was no comparison after the last addition.
     """
 
     steps: tuple[Step, ...]

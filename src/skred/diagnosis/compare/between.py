@@ -90,7 +90,7 @@ def _looked_closer(base: Base, shape: Looked) -> Looked:
 
 
 def or_none[Found](compute: Callable[..., Found], *given: Any) -> Found | None:
-    """What is computed; None where some way has no density that draws find."""
+    """What is computed; None where the numerics break down: a way has no density that draws find, say."""
     try:
         return compute(*given)
     except np.linalg.LinAlgError:

@@ -119,7 +119,7 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray, enough: f
     parts = [_Part(everything, chosen) for _, _, chosen in kinds]
     without_each = stated - gained
     # What is tied with the answer explains the same recordings: without some of them it falls as much.
-    needed = stated - (comparison.log_odds - enough)
+    needed = max(stated - (comparison.log_odds - enough), 0.0)
     order, third = np.argsort(without_each), int(MOST * n)
     parts = [_Part(everything), _first_left_out(order, third), *parts]
     # By the same, quicker method on both sides; only the difference is taken from it.

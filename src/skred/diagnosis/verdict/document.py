@@ -11,7 +11,7 @@ import numpy as np
 from skred.diagnosis.augment.coefficient import augmented_of
 from skred.diagnosis.augment.step import Left
 from skred.diagnosis.detect.detectability import Identifiability
-from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER
+from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER, SHARES
 from skred.diagnosis.influence.influence import Influence
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.predict.held_out import HeldOut, elpd_difference, errors
@@ -136,7 +136,9 @@ def _left(left: Left | None) -> dict[str, Any] | None:
     if left is None:
         return None
     probability = left.comparison.probability
-    first = max(probability, key=lambda name: probability[name])
+    # Where nothing more has less than its prior probability, what else is most probable.
+    could = set(probability) - ({NOTHING} if probability[NOTHING] < SHARES[NOTHING] else set())
+    first = max(could, key=lambda name: probability[name])
     candidate = candidates_of(left.comparison).get(first)  # none where that is nothing, or not in the list
     return {
         "most_probable": first,

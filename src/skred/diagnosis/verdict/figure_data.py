@@ -83,9 +83,7 @@ def _checks(found: Diagnosis) -> xr.Dataset:
             "statistic": ("law", [check.statistic for _, check in checks], _NATS),
         },
         coords={"law": [" + ".join((found.law.id, *added)) for added, _ in checks]},
-        attrs={
-            "statistic": "log odds of anything against nothing; of campaigns linear, by fronts where high"
-        },
+        attrs={"statistic": "log odds of anything against nothing; of clean campaigns by fronts"},
     )
 
 

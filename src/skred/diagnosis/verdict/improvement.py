@@ -20,7 +20,9 @@ def improvement(document: dict[str, Any]) -> str:
     doubled = f"(twice its standard error: {2.0 * se:.1f})"
     counts = abs(difference) >= max(PRACTICAL_DIFFERENCE, 2.0 * se)
     if not counts:
-        score = f"the log score changes by {difference:+.1f} {doubled}, no practical difference"
+        small = abs(difference) < PRACTICAL_DIFFERENCE
+        why = "no practical difference" if small else "not beyond its error"
+        score = f"the log score changes by {difference:+.1f} {doubled}, {why}"
     else:
         way = "rises" if difference > 0.0 else "falls"
         score = f"the log score {way} by {abs(difference):.1f} {doubled}"

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
-from skred.diagnosis.check.decision import Decision
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.evidence.prior_odds import NOTHING, SHARES, UNLISTED
 from skred.diagnosis.limits import NOTHING_AT_MOST
@@ -92,11 +91,13 @@ def _begins(step: Step) -> str:
     )
 
 
-def _what(decision: Decision) -> str:
+def _what(found: Diagnosis) -> str:
     """What is off, before the name that leads."""
-    if decision.disputed:
+    if found.decision.disputed:
         return "Physics is missing, or the recordings are off; in the lead"
-    return "The recordings are off" if decision.verdict == "instrument" else "Physics is missing"
+    if len({step.candidate.mechanism.group for step in found.steps}) > 1:
+        return "Physics is missing, and the recordings are off; first"
+    return "The recordings are off" if found.decision.verdict == "instrument" else "Physics is missing"
 
 
 def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
@@ -104,7 +105,7 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     strength, probability = document["strength"], document["probability"]
     first, *others = document["mechanisms"]
     sentences = [
-        f"{_what(found.decision)}: {_entry(first)}, with a probability of"
+        f"{_what(found)}: {_entry(first)}, with a probability of"
         f" {percent(probability[name])} (nothing: {percent(probability[NOTHING])}; a force not in the list:"
         f" {percent(probability[UNLISTED])}).",
         f"Its {strength['parameter'].replace('_', ' ')} is"
@@ -118,10 +119,13 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     if document["covariate"]:
         sentences.append("Associated with, not necessarily caused by.")
     if ties:
-        sentences += [_tied(document), _split(found.steps[0], document)]
+        sentences += [_tied([name, *ties], probability), _split(found.steps[0], document)]
     sentences.append(_not_excluded(document))
     for step, second in zip(found.steps[1:], others, strict=True):
-        sentences.append(f"Given that, a second one earned its place: {_entry(second)}.")
+        again = step.comparison.probability
+        sure = percent(again[second["id"]])
+        sentences.append(f"Given that, a second one earned its place: {_entry(second)}, {sure}.")
+        sentences.append(_tied([second["id"], *step.tied], again))
         sentences.append(_begins(step))
         sentences.append(_compensated(second["constants"]))
     sentences.append(improvement(document))
@@ -131,22 +135,21 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
 
 def _in_words(found: Diagnosis, mean: float) -> str:
     """What a strength does that is the logarithm of a factor, or a place; empty for all others."""
-    direction, change = found.steps[0].candidate.best.direction, math.expm1(mean)
-    size = f"{100.0 * abs(change):.0f} %"
-    if direction.log_readings is not None:
-        return f": it reads {size} too {'high' if change > 0.0 else 'low'}"
+    direction = found.steps[0].candidate.best.direction
     if direction.places is not None:
         return f": it stands {'further down' if mean > 0.0 else 'further up'} than noted"
-    if direction.log_strengths is not None:
-        what = found.law.mechanisms[0].strength.name.replace("_", " ")
-        return f": one standard deviation up, {what} is {size} {'more' if change > 0.0 else 'less'}"
-    return ""
+    if direction.log_readings is None and direction.log_strengths is None:
+        return ""
+    size = f"{100.0 * abs(math.expm1(mean)):.0f} %"
+    if direction.log_readings is not None:
+        return f": it reads {size} too {'high' if mean > 0.0 else 'low'}"
+    what = found.law.mechanisms[0].strength.name.replace("_", " ")
+    return f": one standard deviation up, {what} is {size} {'more' if mean > 0.0 else 'less'}"
 
 
-def _tied(document: dict[str, Any]) -> str:
-    """What the recordings cannot tell from the answer."""
-    probability, ties = document["probability"], document["indistinguishable"]
-    told = {document["mechanism"], *ties}
+def _tied(names: Sequence[str], probability: Mapping[str, float]) -> str:
+    """What the recordings cannot tell from the first of these."""
+    ties, told = names[1:], set(names)
     how = {other: percent(probability.get(other, 0.0)) for other in ties}
     for other in ties:
         if other != UNLISTED and mechanisms()[other].same_term_as in told:
@@ -171,7 +174,7 @@ def _still_fired(check: BootstrapTest) -> str:
     if not check.fired:
         return ""
     return (
-        f"The augmented law still fails the check (p = {check.p_value:.2g}): something more is missing, or"
+        f"The augmented law still fails the check ({_rare(check)}): something more is missing, or"
         " the same in another form. Do not take this for the whole story."
     )
 
@@ -190,7 +193,7 @@ def _compensated(constants: dict[str, float]) -> str:
 def _left(document: dict[str, Any]) -> str:
     """What a last comparison leaned to."""
     left = document["left"]
-    if left is None or left["most_probable"] == NOTHING:
+    if left is None or left["nothing"] >= SHARES[NOTHING]:
         return ""
     what = f"{_title(left['most_probable'])}{_about(left)}"
     why = f" ({left['reason']})" if left["reason"] else ""
@@ -218,7 +221,7 @@ def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         f"Something is missing{_where(document['location'])} that {'most probably ' if doubt else ''}no"
         f" listed mechanism accounts for (a force not in the list: {percent(probability[UNLISTED])}; nothing:"
         f" {percent(probability[NOTHING])}; check: {_rare(found.check)}).",
-        _tied(document),
+        _tied([UNLISTED, *document["indistinguishable"]], probability),
         _by_speed(found.location),
         _closest(found, document),
         "The force profile is the answer: it says where the force acts and how much work it does.",
@@ -259,12 +262,20 @@ def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
         f"nothing keeps {percent(probability[NOTHING])}, and a claim leaves it less than"
         f" {percent(NOTHING_AT_MOST)}"
         if probability[NOTHING] >= NOTHING_AT_MOST
-        else f"{100.0 * found.check.p_value:.0f} % of clean campaigns have such odds"
+        else _too_usual(found.check)
     )
     return (
         f"Of what could be missing, {_title(first)} would be the most probable"
         f" ({percent(probability[first])}). None is claimed: {why}."
     )
+
+
+def _too_usual(check: BootstrapTest) -> str:
+    """Why the check raises no alarm though nothing is improbable."""
+    above, of = int((check.simulated >= check.statistic).sum()), len(check.simulated)
+    if above:
+        return f"{above} of {of} clean campaigns {'has' if above == 1 else 'have'} such odds"
+    return f"with a strength in common to all avalanches the log odds are only {check.statistic:.1f} nats"
 
 
 def _odd(found: Diagnosis, document: dict[str, Any]) -> str:

@@ -191,9 +191,9 @@ def parameter_rows(document: doc.Document) -> list[dict[str, Any]]:
 def held_places(document: doc.Document) -> list[str]:
     """Where the calibration holds each added strength, which over all places is another number."""
     sentences = []
-    strengths = {doc.get(one, "id"): doc.get(one, "strength") for one in doc.listed(document, "mechanisms")}
-    for one in doc.listed(document, "report", "added"):
-        where, strength = _held_at(doc.get(one, "shape")), strengths.get(doc.get(one, "id"))
+    named = doc.listed(document, "mechanisms")
+    for one, entry in zip(doc.listed(document, "report", "added"), named, strict=False):
+        where, strength = _held_at(doc.get(one, "shape")), doc.get(entry, "strength")
         mean, sd = (doc.get(strength, key) for key in ("mean", "sd"))
         if where and is_number(mean) and is_number(sd):
             decimals = decimals_for(sd)

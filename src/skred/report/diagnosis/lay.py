@@ -57,8 +57,10 @@ def _named(document: doc.Document, verdict: str, where: str) -> str:
     what = "something in the recordings is off" if verdict == "instrument" else "a force is missing"
     if doc.get(document, "report", "disputed"):
         what = "a force is missing, or the recordings are off"
-    seconds = doc.listed(document, "mechanisms")[1:]
-    more = "".join(f", and {short_title(document, doc.get(one, 'id'))}" for one in seconds)
+    entries = doc.listed(document, "mechanisms")
+    if len({doc.get(one, "group") for one in entries}) > 1:
+        what = "a force is missing, and the recordings are off"
+    more = "".join(_second(document, one) for one in entries[1:])
     return f"Answer: {_how_sure(document)}, {what}: {name}{where}{more}."
 
 
@@ -70,6 +72,14 @@ def _which(document: doc.Document) -> str:
         return ""
     way = _WAYS.get(str(doc.get(document, "mechanism"))) if is_number(mean) else None
     return f" ({printable(about)}{'' if way is None else way[mean < 0.0].format(abs(mean))})"
+
+
+def _second(document: doc.Document, entry: doc.Document) -> str:
+    """What was found given the first, and what recordings cannot tell from it."""
+    names = [doc.get(entry, "id"), *doc.listed(entry, "tied_with")]
+    about = doc.get(entry, "sensor") or doc.get(entry, "covariate")
+    first, *tied = (short_title(document, one) for one in names)
+    return f", and {first}{f' ({printable(about)})' if about else ''}{''.join(f' or {one}' for one in tied)}"
 
 
 def _how_sure(document: doc.Document) -> str:
