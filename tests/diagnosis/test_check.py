@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,30 @@ def test_what_reaches_the_recordings_is_computed_again(monkeypatch: pytest.Monke
     looked.clear()
     rare = odds_test(base, draws, 5, 6.0)
     assert rare.fired and rare.is_bound and len(rare.simulated) == 9 and not looked
+
+
+@pytest.mark.parametrize(("above", "again"), [(-0.5, True), (0.5, True), (1.5, False)])
+def test_what_is_just_below_the_recordings_is_computed_again_too(
+    above: float, again: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Or errors of the quick odds would only ever lower a campaign's, and p with them."""
+    base = sparse_base()
+    test, looked = ScoreTest(base), list[str]()
+
+    def lower(base: Base, one: Any) -> tuple[Any, float]:
+        looked.append(one.mechanism.id)
+        return SimpleNamespace(log_bayes_factor=-9.0), 0.0
+
+    monkeypatch.setattr(by_fronts, "computed_again", lower)
+    scores = test.scores(base.rows, base.fit.points, base.fit.population)
+
+    def odds(reach: float) -> float:
+        rng = np.random.default_rng(2)
+        return by_fronts.log_odds_by_fronts(test, reach, base.rows, base.fit.start, scores, rng)
+
+    quick = odds(np.inf)
+    assert not looked
+    assert (odds(quick + above) < quick) == again == bool(looked)
 
 
 def test_evidence_of_one_shape_is_that_of_a_comparison() -> None:

@@ -4,8 +4,8 @@ A comparison refits every mechanism in every shape, which is too slow for a hund
 refitted in one of its shapes, drawn by what the linear model thinks of them and by their prior, half each.
 With the weight of importance sampling this estimates the evidence over all shapes without bias, wherever the
 linear model errs: tangents overstate it where fronts stop near sensors, and miss it where strengths have to
-be large. What leads where the odds reach those of the recordings is computed again by more points, as a
-comparison does.
+be large. What leads where the odds come close to those of the recordings, from below or above, is computed again
+by more points, as a comparison does.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from skred.diagnosis.evidence.conditional_map import Population, Rows
 from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.linear_mixed_model import Scores
 from skred.diagnosis.evidence.refit import Rounds, refit
+from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
 
 
 def log_odds_by_fronts(
@@ -60,7 +61,7 @@ def log_odds_by_fronts(
         log_odds = float(np.logaddexp.reduce(list(terms.values())))
         first = max(terms, key=lambda name: terms[name])
         one, beside = of_id.pop(first, (None, 0.0))
-        if log_odds < reach or not isinstance(one, Curve):
+        if log_odds < reach - DECIDES_NOTHING or not isinstance(one, Curve):
             return log_odds
         terms[first] = beside + computed_again(simulated, one)[0].log_bayes_factor
 
