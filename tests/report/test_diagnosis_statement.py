@@ -12,7 +12,7 @@ from diagnosis_report_cases import comparison_of, diagnosis, document_of, with_f
 from numpy.typing import NDArray
 
 from skred.diagnosis.augment.coefficient import strength_of
-from skred.diagnosis.augment.step import Left
+from skred.diagnosis.augment.step import Left, NotAugmented
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import Decision
 from skred.diagnosis.compare.candidate import FORM, Candidate, Strength
@@ -79,8 +79,8 @@ def test_what_a_last_comparison_leaned_to_is_told() -> None:
     assert document["left"]["most_probable"] == "covariate_friction"
     assert document["left"]["nothing"] == leaning.left.comparison.probability["nothing"]
     assert document["left"]["covariate"] and document["left"]["sensor"] is None
-    assert f"({document['left']['covariate']}), " in document["statement"]
-    assert "leans to friction that goes with a property" in document["statement"]
+    assert f"({document['left']['covariate']}) as the most probable" in document["statement"]
+    assert "has friction that goes with a property" in document["statement"]
     assert "it was not added (the gate failed)" in document["statement"]
     shares = {"nothing": 0.4, "obstacle": 0.25, "unlisted": 0.35}
     made = leaning.left.comparison
@@ -477,3 +477,13 @@ def test_physics_and_a_fault_of_a_sensor_are_told_as_both() -> None:
     told = " ".join(lay_words(document))
     assert "a force is missing, and the recordings are off: friction" in told
     assert "and one sensor reads too high or too low (CD)." in told
+
+
+def test_what_was_found_and_could_not_be_added_is_said() -> None:
+    nothing_after = {"after": None, "influence": None, "conditional": None}
+    cannot, gone = Decision("cannot_tell", ()), NotAugmented("the gate failed")
+    found = replace(diagnosis("two"), decision=cannot, finding=gone, **nothing_after)
+    said = verdict(found)["statement"]
+    assert said.startswith("These recordings cannot tell: there is an alarm (p ")
+    assert said.endswith("(more than 99 %), but it could not be added; the gate failed.")
+    assert "friction that goes with a property" in said

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from skred.diagnosis.augment.step import Augmented, Left, NotAugmented, Step
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
-from skred.diagnosis.check.decision import Decision, alarmed
+from skred.diagnosis.check.decision import Decision, alarmed, decide
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.detect.detectability import Identifiability
@@ -142,6 +142,13 @@ class Diagnosis:
         if isinstance(self.finding, ProfileLaw):
             return (UNLISTED,)
         return tuple(step.candidate.mechanism.id for step in self.steps)
+
+    @property
+    def not_added(self) -> tuple[str, ...]:
+        """What the comparison names where it could not be added: the name that leads, and its ties."""
+        if self.steps:
+            return ()
+        return decide(self.comparison.probability, self.check.p_value, self.table.can_tell).names
 
     @property
     def reference(self) -> Calibration:

@@ -4,8 +4,8 @@ A comparison refits every mechanism in every shape, which is too slow for a hund
 refitted in one of its shapes, drawn by what the linear model thinks of them and by their prior, half each.
 With the weight of importance sampling this estimates the evidence over all shapes without bias, wherever the
 linear model errs: tangents overstate it where fronts stop near sensors, and miss it where strengths have to
-be large. What leads where the odds come close to those of the recordings, from below or above, is computed again
-by more points, as a comparison does.
+be large. What leads where the odds come close to those of the recordings, or above them, is computed again by
+more points, as a comparison does.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ import numpy as np
 from skred.campaign import Campaign, Status
 from skred.diagnosis.augment.coefficient import augmented_of
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
-from skred.diagnosis.check.decision import TIED_NATS, decide
+from skred.diagnosis.check.decision import TIED_NATS
 from skred.diagnosis.compare.comparison import ERROR_SHARES, Comparison
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.discrepancy.profile import AMPLITUDES, KINDS, LENGTHS_M, NEAR_M
@@ -56,7 +56,7 @@ def report_facts(found: Outcome) -> dict[str, Any]:
 def _of_diagnosis(found: Diagnosis) -> dict[str, Any]:
     return {
         "disputed": found.decision.disputed,
-        "not_added": _not_added(found),
+        "not_added": list(found.not_added),
         "mechanisms": _mechanisms(found),
         "checks": _checks(found),
         "force": _force(found.location),
@@ -228,13 +228,6 @@ def _parameters(found: Outcome) -> list[dict[str, Any]]:
                 "mean": float(values.mean()), "sd": float(values.std()), "low": low, "high": high,
             }  # fmt: skip
     return list(rows.values())
-
-
-def _not_added(found: Diagnosis) -> list[str]:
-    """What the comparison names where it could not be added."""
-    if found.steps:
-        return []
-    return list(decide(found.comparison.probability, found.check.p_value, found.table.can_tell).names)
 
 
 def _checks(found: Diagnosis) -> list[dict[str, Any]]:

@@ -26,7 +26,7 @@ from skred.physics.mechanisms.stretches import U_1, U_2
 def statement(found: Outcome, document: dict[str, Any]) -> str:
     """One paragraph in plain words."""
     if isinstance(found, NotDiagnosed) or found.reason:
-        return f"These recordings cannot tell: {found.reason}."
+        return f"These recordings cannot tell: {_found(found)}{found.reason}."
     parts = {
         "missing_physics": _named,
         "instrument": _named,
@@ -36,6 +36,15 @@ def statement(found: Outcome, document: dict[str, Any]) -> str:
     }[found.decision.verdict](found, document)
     parts = [_caution(found), *parts, moved_as_stated(found), *hangs_on(found.influence)]
     return " ".join(part for part in parts if part)
+
+
+def _found(found: Outcome) -> str:
+    """What the comparison found and could not be added, before the reason."""
+    if isinstance(found, NotDiagnosed) or not found.not_added:
+        return ""
+    name = found.not_added[0]
+    leads = f"{_title(name)} leads ({percent(found.comparison.probability[name])})"
+    return f"there is an alarm ({_rare(found.check)}), and {leads}, but it could not be added; "
 
 
 def _caution(found: Diagnosis) -> str:
@@ -191,15 +200,16 @@ def _compensated(constants: dict[str, float]) -> str:
 
 
 def _left(document: dict[str, Any]) -> str:
-    """What a last comparison leaned to."""
+    """What led in a last comparison."""
     left = document["left"]
     if left is None or left["nothing"] >= SHARES[NOTHING]:
         return ""
     what = f"{_title(left['most_probable'])}{_about(left)}"
     why = f" ({left['reason']})" if left["reason"] else ""
     return (
-        f"Another comparison, of the augmented law, leans to {what}, {percent(left['probability'])}"
-        f" (nothing more: {percent(left['nothing'])}); it was not added{why}."
+        f"Another comparison, of the augmented law, has {what} as the most probable of what could still be"
+        f" missing, {percent(left['probability'])} (nothing more: {percent(left['nothing'])}); it was not"
+        f" added{why}."
     )
 
 
