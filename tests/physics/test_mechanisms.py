@@ -258,7 +258,7 @@ def test_the_equation_of_an_obstacle_is_that_of_its_shape() -> None:
     )
     assert "descent" in share and "l h" in share and "J" not in share
     assert "descent" not in same and "l h" not in same and "J = g h" in same
-    assert "v < 2 g h stops" in share and "v < 2 g h stops" in same
+    assert "U^2 < 2 g h stops" in share and "U^2 < 2 g h stops" in same
 
 
 def test_what_passing_an_obstacle_costs(settings: list[Setting]) -> None:
