@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from diagnosis_cases import base_of, gates_campaign, sparse_base, trial
 
-from skred.diagnosis.check import by_fronts
+from skred.diagnosis.check import bootstrap_test, by_fronts
 from skred.diagnosis.check.bootstrap_test import odds_of_recordings, odds_test
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.detect.score_test import LinearFactors, ScoreTest
 from skred.diagnosis.diagnose import diagnose
 from skred.diagnosis.effort import SAMPLING, Effort
-from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.outcome import Diagnosis
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.physics.laws import load_law
@@ -43,24 +43,29 @@ def test_one_shape_estimates_the_evidence_of_all(monkeypatch: pytest.MonkeyPatch
     assert weights.max() <= 2.0 * np.exp(-1.5 + 3.0)
 
 
-def test_what_reaches_the_recordings_is_computed_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_clean_campaigns_are_computed_again_where_a_claim_hangs_on_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     base = sparse_base()
     n = len(base.law.mechanisms)
     draws = np.tile(base.population.mean, (120, 1)), np.tile(0.1 * np.eye(n), (120, 1, 1))
-    again = by_fronts.computed_again
-    looked: list[str] = []
+    quick, reached = bootstrap_test.log_odds_by_fronts, list[float]()
 
-    def told(base: Base, one: Any) -> tuple[Curve, float]:
-        looked.append(one.mechanism.id)
-        return again(base, one)
+    def told(test: ScoreTest, reach: float, *given: Any) -> float:
+        reached.append(reach)
+        return quick(test, reach, *given) if len(reached) <= 9 else -1.0
 
-    monkeypatch.setattr(by_fronts, "computed_again", told)
+    monkeypatch.setattr(bootstrap_test, "log_odds_by_fronts", told)
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     found = odds_test(base, draws, 5, -1.5)
-    assert looked and (found.simulated < 3.0).all()  # as Markov's inequality wants it
-    looked.clear()
+    assert (found.simulated < 3.0).all()  # as Markov's inequality wants it
+    assert set(reached) == {np.inf}
+    reached.clear()
+    placed = odds_test(base, draws, 5, 3.0)
+    assert placed.fired and not placed.is_bound and len(placed.simulated) == 99 and set(reached) == {3.0}
+    reached.clear()
     rare = odds_test(base, draws, 5, 6.0)
-    assert rare.fired and rare.is_bound and len(rare.simulated) == 9 and not looked
+    assert rare.fired and rare.is_bound and len(rare.simulated) == 9 and set(reached) == {6.0}
 
 
 @pytest.mark.parametrize(("above", "again"), [(-0.5, True), (0.5, True), (1.5, False)])

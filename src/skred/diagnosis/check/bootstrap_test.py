@@ -121,10 +121,11 @@ def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_o
     """
     test, rng = ScoreTest(base), np.random.default_rng([seed, 21])
     most = FEWEST_CLEAN if _OF_A_CLAIM < log_odds < _RARE else _FEW
+    reach = log_odds if log_odds > _OF_A_CLAIM else math.inf  # no claim hangs on the others
     simulated, above = list[float](), 0
     for first in range(0, most, _BATCH):
         clean = _simulated(test, draws, slice(first, min(first + _BATCH, most)), rng)
-        for one in _by_fronts(test, _refitted(test, *clean), log_odds, seed, first):
+        for one in _by_fronts(test, _refitted(test, *clean), reach, seed, first):
             simulated.append(one)
             above += one >= log_odds
             if above >= _ENOUGH_ABOVE:
