@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from studies.ryggfonn.before import before_and_now, beside_the_audit
 from studies.ryggfonn.groups import words
 
 Found = Mapping[str, Any]
@@ -47,6 +48,8 @@ def page(found: Mapping[str, Found]) -> str:
         _robust(found),
         _left(found),
         _unseen(found),
+        before_and_now(found),
+        beside_the_audit(found),
     ]
     return "\n".join(parts)
 

@@ -6,6 +6,8 @@ import time
 from collections.abc import Callable
 
 Tell = Callable[[str], None]
+Progress = Callable[[int, int], None]
+"""Is told how much is done, and of how much."""
 _TOLD_EVERY_S = 10.0
 """Seconds between two lines on how far a stage has come: those that are done sooner say nothing."""
 

@@ -82,7 +82,7 @@ def _steps(calibration: Calibration, run: Run) -> Outcome:
     comparison = compare(base, clock.progress)
 
     clock.stage("check", "is anything wrong: clean campaigns simulated and refitted")
-    check = odds_test(base, draws, run.seed, comparison.log_odds)
+    check = odds_test(base, draws, run.seed, comparison.log_odds, clock.progress)
     decision = decide(comparison.probability, check.p_value, table.can_tell)
     location = location_of(comparison, next(iter(decision.names), None))
 

@@ -23,6 +23,7 @@ from scipy.special import logit
 from skred.arrays import FloatArray
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
 from skred.diagnosis.check.by_fronts import log_odds_by_fronts
+from skred.diagnosis.clock import Progress
 from skred.diagnosis.detect.score_test import ScoreTest
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
@@ -107,7 +108,13 @@ def odds_of_recordings(base: Base, seed: int) -> float:
     return float(np.logaddexp.reduce(found)) - math.log(_LOOKS)
 
 
-def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_odds: float) -> BootstrapTest:
+def odds_test(
+    base: Base,
+    draws: tuple[FloatArray, FloatArray],
+    seed: int,
+    log_odds: float,
+    progress: Progress = lambda done, of: None,
+) -> BootstrapTest:
     """Check a law by the odds of the recordings.
 
     Parameters
@@ -118,6 +125,8 @@ def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_o
         Means and factors of populations from the law's posterior.
     log_odds : float
         Of anything against nothing: a comparison's, or by fronts.
+    progress : callable
+        Is told how many clean campaigns are refitted, and of how many at most.
     """
     test, rng = ScoreTest(base), np.random.default_rng([seed, 21])
     most = FEWEST_CLEAN if _OF_A_CLAIM < log_odds < _RARE else _FEW
@@ -127,6 +136,7 @@ def odds_test(base: Base, draws: tuple[FloatArray, FloatArray], seed: int, log_o
         clean = _simulated(test, draws, slice(first, min(first + _BATCH, most)), rng)
         for one in _by_fronts(test, _refitted(test, *clean), reach, seed, first):
             simulated.append(one)
+            progress(len(simulated), most)
             above += one >= log_odds
             if above >= _ENOUGH_ABOVE:
                 return BootstrapTest(log_odds, np.array(simulated))

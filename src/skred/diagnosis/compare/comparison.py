@@ -19,12 +19,13 @@ from functools import partial
 import numpy as np
 
 from skred.arrays import FloatArray
+from skred.diagnosis.clock import Progress
 from skred.diagnosis.compare.between import SEARCH, with_ways
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import candidates_of, refine, screened_parts
 from skred.diagnosis.compare.residue import with_residues
-from skred.diagnosis.compare.screening import Tell, screened
+from skred.diagnosis.compare.screening import screened
 from skred.diagnosis.compare.sensor_places import Shifts, with_stated_places
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, alike, log_evidence_of, most_probable
@@ -142,14 +143,14 @@ class Comparison:
         return math.log(ERROR_SHARES[error_model]) + self.base_evidence[error_model]
 
 
-def compare(base: Base, tell: Tell = lambda done, of: None) -> Comparison:
+def compare(base: Base, progress: Progress = lambda done, of: None) -> Comparison:
     """Run the comparison from a fitted base law.
 
     Parameters
     ----------
     base : Base
         Under any error model.
-    tell : callable
+    progress : callable
         Is told how many candidates are screened, and of how many, under each error model.
     """
     fitted = side_by_side(lambda name: with_errors(base, name), list(ERROR_SHARES))
@@ -161,11 +162,11 @@ def compare(base: Base, tell: Tell = lambda done, of: None) -> Comparison:
     if ahead <= DECIDES_NOTHING:
         preferred = DEFAULT_ERRORS
     with worker_pool() as pool:
-        curves = {preferred: screened(bases[preferred], pool, tell)}
+        curves = {preferred: screened(bases[preferred], pool, progress)}
         if preferred != DEFAULT_ERRORS:
             before = curves[preferred] if ahead <= COUNTS else worth_comparing(curves[preferred], ahead)
             if before:
-                curves[DEFAULT_ERRORS] = screened(bases[DEFAULT_ERRORS], pool, tell, before)
+                curves[DEFAULT_ERRORS] = screened(bases[DEFAULT_ERRORS], pool, progress, before)
         under = _under_each({name: bases[name] for name in curves}, curves, height, pool)
     # The evidence of an error model that is left out counts for nothing and everything alike.
     listed = [candidate.mechanism for candidate in under[preferred].candidates.values()]

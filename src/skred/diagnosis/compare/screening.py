@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 
 import numpy as np
 
+from skred.diagnosis.clock import Progress
 from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.evidence.coefficient import NEAR, Base, Curve, curve_at
 from skred.diagnosis.evidence.event_quadrature import SCREENING
 from skred.diagnosis.evidence.global_start import first_strengths, global_starts
 from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms.placed import PlacedMechanism
-
-Tell = Callable[[int, int], None]
 
 
 def curve(base: Base, candidate: PlacedMechanism) -> Curve:
@@ -39,7 +38,7 @@ def curve(base: Base, candidate: PlacedMechanism) -> Curve:
 def screened(
     base: Base,
     pool: ThreadPoolExecutor,
-    tell: Tell = lambda done, of: None,
+    progress: Progress = lambda done, of: None,
     before: Sequence[Curve] = (),
 ) -> list[Curve]:
     """A curve for each candidate.
@@ -49,7 +48,7 @@ def screened(
 
     Parameters
     ----------
-    tell : callable
+    progress : callable
         Is told how many candidates are screened, and of how many.
     before : sequence of Curve, optional
         Screened under another error model: the candidates. Those that cannot count are returned as they are.
@@ -62,7 +61,7 @@ def screened(
         found = pool.map(partial(curve, base), [todo[number] for number in jobs])
         for done, (number, one) in enumerate(zip(jobs, found, strict=True), start=1):
             curves[number] = one
-            tell(len(todo) - len(jobs) + done, len(todo))
+            progress(len(todo) - len(jobs) + done, len(todo))
     return [curves[number] for number in range(len(todo))]
 
 

@@ -76,8 +76,8 @@ class Influence:
         there are none. They are looked for in the order of what each one takes by itself.
     without_them : float or None
         Log Bayes factor without those.
-    without_a_third : float or None
-        Without the third of the avalanches that take most of it, where it has what it needs then too.
+    without_a_third : float
+        Without the third of the avalanches that take most of it.
     readings : tuple of ReadingsLeftOut
     """
 
@@ -88,7 +88,7 @@ class Influence:
     without_each: FloatArray
     carried_by: tuple[str, ...]
     without_them: float | None
-    without_a_third: float | None
+    without_a_third: float
     readings: tuple[ReadingsLeftOut, ...]
 
 
@@ -141,7 +141,7 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray, enough: f
         without_each,
         tuple(ids[k] for k in sorted(order[:many])),
         float(left) if many else None,
-        None if many else float(left),
+        float(without_third),
         tuple(
             ReadingsLeftOut(kind, sensor, int(chosen.sum()), float(factor))
             for (kind, sensor, chosen), factor in zip(kinds, without_kinds, strict=True)

@@ -24,7 +24,7 @@ def hangs_on(found: Influence | None) -> list[str]:
     if found is None:
         return []
     sentences = []
-    if found.without_a_third is not None:
+    if not found.carried_by:
         evidence = f"{found.without_a_third:.1f} nats ({found.log_bayes_factor:.1f} with all)"
         sentences.append(
             "It does not hang on a few avalanches: without the third that carry most of it, its log Bayes"

@@ -45,8 +45,8 @@ def check_figure(document: doc.Document, tree: xr.DataTree) -> Figure | None:
         check = checks[number] if number < len(checks) else {}
         # Of three laws beside each other, the name of each in lines that fit.
         name = wrap(figure_text(with_added(document, doc.listed(check, "added")), 80), 27)
-        p_value = two_digits(doc.get(check, "p_value"))
-        axes.set_title("\n".join([*name, f"p = {p_value}, {len(values)} simulated"]))
+        p_value = f"p {'≤' if doc.get(check, 'is_bound') else '='} {two_digits(doc.get(check, 'p_value'))}"
+        axes.set_title("\n".join([*name, f"{p_value}, {len(values)} simulated"]))
         axes.set_xlabel("log odds of anything\nagainst nothing [nats]")
     panels[0].set_ylabel("clean campaigns")
     legend_below(figure, panels, columns=2)

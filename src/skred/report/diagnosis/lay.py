@@ -42,14 +42,25 @@ def _answer(document: doc.Document) -> list[str]:
     if verdict == "nothing_missing":
         return ["Answer: no. Something of a size that matters would mostly have been found here."]
     if verdict == "unexplained":
-        told = f"Answer: yes, something is missing{where}, but no cause on the list accounts for it."
-        return [told, "The report shows how strongly it brakes or drives the avalanches, and where."]
+        return [
+            f"{_answer_of(document)}: yes, something is missing{where},"
+            " but no cause on the list accounts for it.",
+            "The report shows how strongly it brakes or drives the avalanches, and where.",
+        ]
     if verdict in ("missing_physics", "instrument"):
         return [_named(document, verdict, where), *_tied(document)]
     return [
         "Answer: these recordings cannot tell. That does not mean that nothing is missing.",
         *_more(document),
     ]
+
+
+def _answer_of(document: doc.Document) -> str:
+    """That it is the answer; and of how few avalanches, where few carry it."""
+    few = len(doc.listed(document, "influence", "carried_by"))
+    n = doc.get(document, "report", "campaign", "n_events")
+    carry = "carries" if few == 1 else "carry"
+    return f"Answer, which only {few} of the {n} avalanches {carry}" if few and is_number(n) else "Answer"
 
 
 def _named(document: doc.Document, verdict: str, where: str) -> str:
@@ -61,7 +72,7 @@ def _named(document: doc.Document, verdict: str, where: str) -> str:
     if len({doc.get(one, "group") for one in entries}) > 1:
         what = "a force is missing, and the recordings are off"
     more = "".join(_second(document, one) for one in entries[1:])
-    return f"Answer: {_how_sure(document)}, {what}: {name}{where}{more}."
+    return f"{_answer_of(document)}: {_how_sure(document)}, {what}: {name}{where}{more}."
 
 
 def _which(document: doc.Document) -> str:
@@ -118,10 +129,7 @@ def _hangs_on(document: doc.Document) -> list[str]:
     n, are = len(carried), "avalanche carries" if len(carried) == 1 else "avalanches carry"
     them = "it" if n == 1 else "them"
     names = ", ".join(carried)
-    return [
-        f"Take it with care: only {n} {are} this answer ({names})."
-        f" Without {them} the odds would not suffice for it."
-    ]
+    return [f"Take it with care: {n} {are} it ({names}). Without {them} the odds would not suffice for it."]
 
 
 def _use(document: doc.Document) -> list[str]:
