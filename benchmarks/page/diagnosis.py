@@ -1,6 +1,7 @@
 """Section of benchmarks/README.md about the diagnosis."""
 
 from benchmarks.page.results import result_of
+from benchmarks.reference.table import table
 
 
 def diagnosis() -> str:
@@ -70,9 +71,11 @@ def _evidence() -> str:
 
 `python -m benchmarks.evidence_reference --n {pairs["n"]} --seed 1 [--also DIR]` draws pairs of a campaign and
 a candidate and compares the diagnosis' log Bayes factor with that of a slow reference, which shares only the
-likelihood of an event. The table is printed; pairs and summary are in `results/evidence_reference.json`. The
+likelihood of an event. Candidates are listed mechanisms in one to three given shapes, with a strength in
+common. Pairs and summary are in `results/evidence_reference.json`. The
 diagnosis is that of commit {found["commit"]}; `--also` gave two campaigns of others, which are not part of
 this repository. Median difference of {pairs["n"]} pairs {pairs["median"]:.2f} nats, 95 % within
 {pairs["q95"]:.2f}, {pairs["beyond_1"]} beyond 1, the largest {pairs["largest"]:.1f}. Of
-{pairs["big"]} pairs that the reference has above 10 nats {pairs["lost"] or "none"} is lost.
-"""
+{pairs["big"]} pairs that the reference has above 10 nats {pairs["lost"] or "none"} is lost. Differences in nats:
+
+{table(found)}"""

@@ -84,12 +84,13 @@ The *newest batch* is {newest}, the last that was sealed. Intervals in brackets 
 what the linearised model expects of a perfect method in the blind run. Criteria leave compensated effects
 out; these have a table of their own.
 """
-_EARLIER = f"""The campaigns of batch {{}}, by the code of commit 7d03b1a as well, side by side on one
-machine. That version had no global starts, took avalanches to have every added strength in common, named a
-term that two mechanisms share by one of them, and compared no mechanism with a force beside
-it. *p* is that of a sign test of trials that one version has right and the other has not. Rows
-on effects take those with a signal-to-noise of {STRONG:g} and more, and open ones but for the
-row on compensated effects.
+_EARLIER = f"""The same campaigns by the code of commit 7d03b1a as well. That *earlier* version had no global
+starts, took avalanches to have every added strength in common, named a term that two mechanisms share by one
+of them, and compared no mechanism with a force beside it. *Later* is the version that the batch was sealed
+for. It diagnosed the first batch side by side with the other on one machine; the times of the second one are
+of different days, beside other work. *p* is that of a sign test of trials that one version has right and the
+other has not. Rows on effects take those with a signal-to-noise of {STRONG:g} and more, and open ones but for
+the row on compensated effects.
 """
 _ORDER = """In the order in which they were sealed, each diagnosed by the code of its day. *Found* counts
 effects with a signal-to-noise of {strong:g} and more. The first two batches did not look for forces that are
@@ -133,9 +134,10 @@ def page(figures: Sequence[str], run: Found) -> str:
     parts += [f"![{name.replace('_', ' ')}](figures/proof-{name}.png)\n" for name in figures]
     parts += ["Open and compensated effects of the blind run:\n", _open_and_compensated(run)]
     parts += ["What was hidden in the blind run:\n", _by_hidden(run["trials"])]
-    for batch in [one for one in every if EARLIER in answers_of(one)][-1:]:
+    parts += ["## Two batches by an earlier version\n", _EARLIER]
+    for batch in [one for one in every if EARLIER in answers_of(one)][-2:]:
         trials, answers = gathered([batch])
-        parts += ["## A batch by an earlier version\n", _EARLIER.format(batch.name), beside(trials, answers)]
+        parts += [f"Batch {batch.name}, {len(trials)} trials:\n", beside(trials, answers)]
     parts += ["## Every batch\n", _ORDER.format(strong=STRONG), _by_batch(every, lines)]
     parts += ["## The full record\n", _FULL.format(command=COMMAND, kept=KEPT)]
     return "\n".join(parts)

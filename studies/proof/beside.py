@@ -1,4 +1,4 @@
-"""Today's diagnosis beside that of an earlier version of the code, on the trials of one batch."""
+"""The diagnosis of a batch beside that of an earlier version of the code, on the same trials."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def beside(trials: Sequence[Mapping[str, Any]], answers: Mapping[str, Mapping[st
     now, then = (pairs_of(trials, answers[method]) for method in (DIAGNOSIS, EARLIER))
     both = list(zip(now, then, strict=True))
     rows = [
-        "| what | trials | today | earlier | good today only | earlier only | p |",
+        "| what | trials | later | earlier | good by the later only | by the earlier only | p |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for what, chosen, good in ROWS:
@@ -88,7 +88,7 @@ def _sets(now: Sequence[Pair], then: Sequence[Pair]) -> list[str]:
         for pairs in (now, then):
             own = [pair for pair in pairs if chosen(pair)]
             counts.append(f"{sum(map(good, own))} of {len(own)}")
-        said.append(f"- {what}: today {counts[0]}, earlier {counts[1]}.")
+        said.append(f"- {what}: later {counts[0]}, earlier {counts[1]}.")
     return said
 
 
@@ -99,8 +99,8 @@ def _sums(now: Sequence[Pair], then: Sequence[Pair]) -> list[str]:
     for kind in ("sparse", "dense"):
         times = [[_seconds(pair) for pair in pairs if pair.kind == kind] for pairs in (now, then)]
         if all(times):
-            today, earlier = (median(own) for own in times)
-            said.append(f"- Median CPU time, {kind}: today {today:.0f} s, earlier {earlier:.0f} s.")
+            later, earlier = (median(own) for own in times)
+            said.append(f"- Median CPU time, {kind}: later {later:.0f} s, earlier {earlier:.0f} s.")
     return said
 
 

@@ -7,6 +7,7 @@ with a run that was ended. Delete a result to have it made again.
 
 from __future__ import annotations
 
+import math
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -115,6 +116,8 @@ def diagnose_case(case: Case, *, figures: bool = True) -> dict[str, Any]:
             name: {str(factor): _best_factor(found.comparison, name, factor) for factor in PRIOR_FACTORS}
             for name in found.comparison.under_each[0].candidates
         }
+    if case.name == case.base_model and isinstance(found, Diagnosis):
+        document["clean"] = {"log_odds": clean_log_odds(found), "recordings": found.check.statistic}
     if figures and case.name == case.base_model and isinstance(found, Diagnosis):
         with TemporaryDirectory() as folder:
             whole = document | {"report": report_facts(found)}
@@ -127,6 +130,22 @@ def diagnose_case(case: Case, *, figures: bool = True) -> dict[str, Any]:
         document["retardations"] = retardations(found)
         shrink(write_png(groups_figure(document["retardations"]), FIGURES / "ryggfonn-groups.png"))
     return document
+
+
+def clean_log_odds(found: Any) -> list[float]:
+    """Log odds of anything against nothing of as many clean campaigns of the base law as place the limit.
+
+    A diagnosis simulates fewer where the recordings' odds are rare whatever clean campaigns are like.
+    """
+    from skred.diagnosis.check.bootstrap_test import odds_test
+    from skred.diagnosis.evidence.coefficient import fit_base
+    from skred.diagnosis.evidence.population_draws import population_draws, typical
+    from skred.diagnosis.limits import LIMIT
+
+    draws = population_draws(found.calibration, 0)
+    base = fit_base(found.calibration.problem, found.law, typical(draws))
+    just_not_rare = -math.log(LIMIT) - 0.01
+    return sorted(odds_test(base, draws, 0, just_not_rare).simulated.tolist())
 
 
 def _best_factor(comparison: Any, name: str, factor: float) -> float:

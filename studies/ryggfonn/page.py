@@ -93,6 +93,11 @@ def _answers(one: Found) -> dict[str, str]:
     said["check"] = (
         f"p = {_number(evidence['p_value'])}; with what was added {_number(one.get('p_value_augmented'))}"
     )
+    if clean := one.get("clean"):
+        odds = clean["log_odds"]
+        said["log odds of anything against `nothing`"] = (
+            f"{clean['recordings']:.1f}; of {len(odds)} clean campaigns at most {max(odds):.1f}"
+        )
     said["probability of `nothing`"] = _share(shares["nothing"])
     said["error models compared"] = f"{', '.join(one.get('error_models', []))}{_under(one)}"
     if one["next_sensor"] and one["next_sensor"]["splits"]:

@@ -41,8 +41,8 @@ def test_each_version_has_its_own() -> None:
     assert rows["no alarm where nothing is hidden"] == ["1", "0", "1", "0", "1"]
     assert rows["right first name"] == ["2", "1", "0", "1", "0"]
     assert rows["a verdict"] == ["3", "3", "3", "0", "0"]
-    assert "Single names that are right: today 1 of 2, earlier 0 of 0." in table
-    assert "Median CPU time, sparse: today 5 s, earlier 2 s." in table
+    assert "Single names that are right: later 1 of 2, earlier 0 of 0." in table
+    assert "Median CPU time, sparse: later 5 s, earlier 2 s." in table
 
 
 def test_a_missing_answer_is_a_failure() -> None:
