@@ -59,6 +59,7 @@ def timed(name: str, campaign: Path | str, law: str, out: Path) -> dict[str, Any
         "memory_gb": used.ru_maxrss / 1024.0**2,
         "stages": verdict["seconds"],
         "verdict": verdict["verdict"],
+        "names": [one for one in (verdict["mechanism"], *verdict["indistinguishable"]) if one],
     }
     print(
         f"{name} {law}: {row['events']} events, {row['sensors']} sensors, verdict after {told:.1f} s,"

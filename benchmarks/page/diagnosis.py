@@ -11,11 +11,12 @@ def diagnosis() -> str:
     for row in times["runs"]:
         stages = ", ".join(f"{name} {value:.0f}" for name, value in row["stages"].items() if value >= 0.5)
         rows += f"| {row['campaign']} | {row['base_model']} | {stages} |\n"
+    said = [", ".join([row["verdict"], *row.get("names", [])]) for row in times["runs"]]
     whole = "".join(
         f"| {row['campaign']} | {row['base_model']} | {row['events']} events, {row['sensors']} sensors"
         f" | {row['verdict_seconds']:.0f} | {row['seconds']:.0f} | {row['cpu_seconds']:.0f}"
-        f" | {row['memory_gb']:.1f} | {row['verdict']} | {row['commit']} |\n"
-        for row in times["runs"]
+        f" | {row['memory_gb']:.1f} | {verdict} | {row['commit']} |\n"
+        for row, verdict in zip(times["runs"], said, strict=True)
     )
     more = [slower[name] / here[name] for name in ("kernel", "pure Python")]
     proof = result_of("prove_throughput")
@@ -76,6 +77,7 @@ common. Pairs and summary are in `results/evidence_reference.json`. The
 diagnosis is that of commit {found["commit"]}; `--also` gave two campaigns of others, which are not part of
 this repository. Median difference of {pairs["n"]} pairs {pairs["median"]:.2f} nats, 95 % within
 {pairs["q95"]:.2f}, {pairs["beyond_1"]} beyond 1, the largest {pairs["largest"]:.1f}. Of
-{pairs["big"]} pairs that the reference has above 10 nats {pairs["lost"] or "none"} is lost. Differences in nats:
+{pairs["big"]} pairs that the reference has above 10 nats {pairs["lost"] or "none"} is lost.
+Differences in nats:
 
 {table(found)}"""
