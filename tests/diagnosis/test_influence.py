@@ -89,12 +89,16 @@ def test_a_first_finding_is_judged_under_its_own_errors() -> None:
     not_asked: Any = None
     step = Step(candidate, (), comparison, with_drag, not_asked)
     gained = gained_by(step, calibrate(robust.problem, robust.law, settings), 0)
+    assert gained is not None
     after = held_out(with_drag, 0).pointwise
     own, other = (
         after - held_out(calibrate(one.problem, one.law, settings), 0).pointwise for one in (student, robust)
     )
     np.testing.assert_allclose(gained, own, atol=0.3)
     assert np.abs(other - own).max() > 2.0
+    alone = calibrate(student.problem, student.law, settings)
+    failed = replace(alone, gate=alone.gate.with_numerical_problems(["too rough"]))
+    assert gained_by(step, failed, 0) is None
 
 
 def test_a_strong_effect_in_all_avalanches_hangs_on_no_few() -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from skred.arrays import FloatArray
 from skred.diagnosis.augment.add import add_mechanisms
 from skred.diagnosis.augment.problem import as_diagnosed
 from skred.diagnosis.augment.step import Augmented, NotAugmented
@@ -99,10 +102,12 @@ def _steps(calibration: Calibration, run: Run) -> Outcome:
     if after is not None:
         assert decision.answer is not None
         clock.stage("influence", "what the answer hangs on: without each avalanche, each kind of reading")
-        gained = after.pointwise - before.pointwise
+        gained: FloatArray | None = after.pointwise - before.pointwise
         if isinstance(finding, Augmented) and len(finding.steps) > 1:
-            gained = gained_by(finding.steps[0], calibration, run.seed, exact=effort.exact_loo)
-        hangs_on = or_none(influence, comparison, decision.answer, gained, check.needed)
+            exact = effort.exact_loo
+            gained = or_none(partial(gained_by, exact=exact), finding.steps[0], calibration, run.seed)
+        if gained is not None:
+            hangs_on = or_none(influence, comparison, decision.answer, gained, check.needed)
         clock.stage("conditional", "predicting each reading from those above it")
         given = or_none(BeforeAfter.of, before, after, run.seed)
     clock.end()

@@ -109,7 +109,7 @@ def held_out(calibration: Calibration, seed: int, *, exact: bool = False) -> Hel
     return HeldOut.of(pointwise, others, seed, k, tuple(events[e] for e in again), failed)
 
 
-def gained_by(step: Step, calibration: Calibration, seed: int, *, exact: bool = False) -> FloatArray:
+def gained_by(step: Step, calibration: Calibration, seed: int, *, exact: bool = False) -> FloatArray | None:
     """What a mechanism that was added first gains for each avalanche left out, under its own errors.
 
     Parameters
@@ -119,11 +119,13 @@ def gained_by(step: Step, calibration: Calibration, seed: int, *, exact: bool = 
 
     Returns
     -------
-    (n_events,) array
-        Log predictive density with it, less that of the base law.
+    (n_events,) array or None
+        Log predictive density with it, less that of the base law; None where chains of that do not converge.
     """
     under_errors = step.comparison.leading(step.candidate.mechanism.id)
     alone = reference(calibration, under_errors.base.problem)()
+    if not alone.gate.passed:
+        return None
     before, after = (held_out(one, seed, exact=exact) for one in (alone, step.calibration))
     return after.pointwise - before.pointwise
 
