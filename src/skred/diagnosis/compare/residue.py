@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from skred.diagnosis.compare.between import or_none
 from skred.diagnosis.compare.candidate import Beside, Candidate, names_of_constants
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, knots, log_evidence_of
@@ -92,21 +93,17 @@ def residues(
         What each must have to count: climbs end where it cannot be had, and then know less than they say.
     """
     jobs = [(curve, one, kind) for curve, one in zip(curves, least, strict=True) for kind in KINDS]
-    fits = batched(pool.map(partial(_fit_beside, base), *zip(*jobs, strict=True)), len(KINDS))
-    fitted = [[one for one in profiles if one is not None] for profiles in fits]
-    found = [
-        Residue(log_evidence_of(profiles) - curve.log_bayes_factor, Beside(curve, tuple(profiles)))
-        if len(profiles) == len(KINDS)
-        else None
-        for curve, profiles in zip(curves, fitted, strict=True)
-    ]
-    return [
-        own if own is not None and own.log_factor > lowest else None
-        for own, lowest in zip(found, least, strict=True)
-    ]
+    fits = batched(pool.map(partial(or_none, _fit_beside, base), *zip(*jobs, strict=True)), len(KINDS))
+    found = list[Residue | None]()
+    for curve, lowest, fitted in zip(curves, least, fits, strict=True):
+        profiles = tuple(one for one in fitted if one is not None)
+        known = len(profiles) == len(KINDS)
+        log_factor = log_evidence_of(profiles) - curve.log_bayes_factor if known else -math.inf
+        found.append(Residue(log_factor, Beside(curve, profiles)) if log_factor > lowest else None)
+    return found
 
 
-def _fit_beside(base: Base, curve: Curve, least: float, kind: Kind) -> Profile | None:
+def _fit_beside(base: Base, curve: Curve, least: float, kind: Kind) -> Profile:
     """A force of one kind beside a mechanism of a curve's shape, from where that is by itself.
 
     Both are fitted together: beside such a force a mechanism is as strong as it is, and not as strong as it
@@ -117,7 +114,4 @@ def _fit_beside(base: Base, curve: Curve, least: float, kind: Kind) -> Profile |
     wide = replace(base, directions=directions, strengths=np.append(base.strengths, 0.0))
     values = np.append(curve.strengths[top], np.zeros(len(knots(base.setting))))
     near = values, curve.fits[top].start
-    try:
-        return fit_profile(wide, kind, near, beside=curve, least=curve.log_bayes_factor + least)
-    except np.linalg.LinAlgError:
-        return None
+    return fit_profile(wide, kind, near, beside=curve, least=curve.log_bayes_factor + least)
