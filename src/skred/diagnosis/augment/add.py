@@ -100,11 +100,17 @@ def calibrated(
     settings = replace(settings, tune=settings.tune // 2)
     likely = candidate.likely_ways if len(chosen) == 1 else ()
     for way in dict.fromkeys((*likely, BetweenEvents.COMMON)):
-        problem = or_none(augmented_problem, base.plain(), chosen, way, candidate.ways)
-        calibration = None if problem is None else or_none(calibrate_surely, problem, base.law, settings)
+        calibration = or_none(_calibrated, base, chosen, way, candidate, settings)
         if calibration is not None and calibration.gate.passed:
             break
     return calibration, way
+
+
+def _calibrated(
+    base: Base, chosen: Sequence[Curve], way: BetweenEvents, candidate: Candidate, settings: SamplerSettings
+) -> Calibration:
+    problem = augmented_problem(base.plain(), chosen, way, candidate.ways)
+    return calibrate_surely(problem, base.law, settings)
 
 
 def _failed(what: str, calibration: Calibration | None) -> str:
