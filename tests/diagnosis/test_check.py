@@ -57,7 +57,9 @@ def test_clean_campaigns_are_computed_again_where_a_claim_hangs_on_them(
 
     monkeypatch.setattr(bootstrap_test, "log_odds_by_fronts", told)
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    found = odds_test(base, draws, 5, -1.5)
+    progress = list[tuple[int, int]]()
+    found = odds_test(base, draws, 5, -1.5, lambda *done: progress.append(done))
+    assert progress == [(k, progress[0][1]) for k in range(1, len(found.simulated) + 1)]
     assert (found.simulated < 3.0).all()  # as Markov's inequality wants it
     assert set(reached) == {np.inf}
     reached.clear()
