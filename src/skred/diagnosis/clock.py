@@ -19,6 +19,7 @@ class Clock:
         self.tell, self.seconds = tell, dict[str, float]()
         self._last, self._name = time.monotonic(), ""
         self._told = self._last
+        self._first: tuple[float, int] | None = None
 
     def stage(self, name: str, line: str) -> None:
         """Begin a stage."""
@@ -27,10 +28,16 @@ class Clock:
         self.tell(line)
 
     def progress(self, done: int, of: int) -> None:
-        """Tell how much of the present stage is done, and about how long the rest takes."""
+        """Tell how much of the present stage is done, and about how long the rest takes.
+
+        Reckoned from the first that is told of: a stage may begin with something else.
+        """
         now = time.monotonic()
-        if 0 < done < of and now - self._told > _TOLD_EVERY_S:
-            left = (now - self._last) * (of - done) / done
+        if self._first is None or done < self._first[1]:
+            self._first = now, done
+        began, before = self._first
+        if before < done < of and now - self._told > _TOLD_EVERY_S:
+            left = (now - began) * (of - done) / (done - before)
             self.tell(f"  {done} of {of}, about {_in_words(left)} left")
             self._told = now
 
@@ -39,7 +46,7 @@ class Clock:
         now = time.monotonic()
         if self._name:
             self.seconds[self._name] = self.seconds.get(self._name, 0.0) + now - self._last
-        self._last, self._name, self._told = now, "", now
+        self._last, self._name, self._told, self._first = now, "", now, None
 
 
 def _in_words(seconds: float) -> str:
