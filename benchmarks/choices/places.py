@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 from scipy.stats import multivariate_t, qmc
 
 from benchmarks.reference.engine import fitted_base
@@ -22,34 +23,37 @@ from benchmarks.reference.pairs import Drawn
 from skred.diagnosis.compare.refinement import refine
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.detect.score_test import placed_mechanisms
-from skred.diagnosis.evidence.coefficient import Base, curve_near
+from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.physics.laws import load_law
-from skred.physics.mechanisms.placed import PlacedMechanism, placed
+from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import BoundTo, Mechanism, Shape
 from skred.physics.mechanisms.stretches import STRETCHES_M, is_opposed
 
 FloatArray = NDArray[np.float64]
-_FIRST, _EACH, _TURNS = 128, 48, 4
+_FIRST, _EACH, _TURNS = 128, 32, 8
 """Draws from the prior, and in each turn after."""
 _DEFENSIVE = 0.2
 """Share of the prior in each later proposal."""
-_CENTRES, _DEGREES = 12, 5
+_CENTRES, _NEIGHBOURS, _DEGREES = 12, 6, 5
+_EFFECTIVE = 12.0
+"""Draws that proposals are put around count for at least so many: by a power of their weights."""
 
 
 def look(drawn: Drawn) -> dict[str, Any] | None:
-    """Log Bayes factor of a mechanism of a stretch by both ways; None where the law or the track has none."""
+    """Log Bayes factor of the leading mechanism of a stretch by both ways; None where there is none."""
     base = fitted_base(hierarchical_problem(drawn.campaign), load_law(drawn.base))
-    own: dict[str, list[PlacedMechanism]] = {}
-    for one in placed_mechanisms(base.setting):
-        if one.added.bound_to is BoundTo.PLACE and not one.shape.constants and not is_opposed(one.shape):
-            own.setdefault(one.mechanism.id, []).append(one)
-    if not own:
+    curves = [
+        curve(base, one)
+        for one in placed_mechanisms(base.setting)
+        if one.added.bound_to is BoundTo.PLACE and not one.shape.constants and not is_opposed(one.shape)
+    ]
+    if not curves:
         return None
-    hidden = [one["id"] for one in drawn.hidden if one["id"] in own]
-    name = hidden[0] if hidden else str(drawn.rng.choice(sorted(own)))
-    refined, n_refined = _refined(base, own[name])
-    found, error, effective, n_drawn = _drawn(base, own[name], drawn.rng)
+    name = max(curves, key=lambda one: one.log_bayes_factor).mechanism.id
+    own = [one for one in curves if one.mechanism.id == name]
+    refined, n_refined = _refined(base, own)
+    found, error, effective, n_drawn = _drawn(base, own, drawn.rng)
     return {
         "mechanism": name,
         "refined": refined,
@@ -61,17 +65,14 @@ def look(drawn: Drawn) -> dict[str, Any] | None:
     }
 
 
-def _refined(base: Base, own: list[PlacedMechanism]) -> tuple[float, int]:
+def _refined(base: Base, own: list[Curve]) -> tuple[float, int]:
     """As a comparison has it, and of how many shapes."""
     with ThreadPoolExecutor(1) as pool:
-        curves = [curve(base, one) for one in own]
-        candidate = refine(base.setting, curves, partial(curve_near, base), pool)[own[0].mechanism.id]
+        candidate = refine(base.setting, own, partial(curve_near, base), pool)[own[0].mechanism.id]
     return candidate.alone, len(candidate.curves)
 
 
-def _drawn(
-    base: Base, own: list[PlacedMechanism], rng: np.random.Generator
-) -> tuple[float, float, float, int]:
+def _drawn(base: Base, own: list[Curve], rng: np.random.Generator) -> tuple[float, float, float, int]:
     """By draws of place and length: with standard error, effective number of draws, and their number."""
     mechanism, lengths = own[0].mechanism, sorted({_length(one.shape) for one in own})
     low, high = _range(lengths)
@@ -79,8 +80,7 @@ def _drawn(
     log_factors = _heights(base, mechanism, points, low, high)
     proposals: list[Any] = []
     for _ in range(_TURNS):
-        weights = _normalised(log_factors - _log_density(points, proposals))
-        proposals.append(_mixture(points, weights, rng))
+        proposals.append(_mixture(points, log_factors - _log_density(points, proposals), rng))
         new = _from(proposals[-1], rng)
         points = np.vstack([points, new])
         log_factors = np.append(log_factors, _heights(base, mechanism, new, low, high))
@@ -118,13 +118,27 @@ def _heights(base: Base, mechanism: Mechanism, points: FloatArray, low: float, h
     return np.array(found)
 
 
-def _mixture(points: FloatArray, weights: FloatArray, rng: np.random.Generator) -> list[Any]:
-    """Student t around draws with much weight."""
-    mean = weights @ points
-    covariance = (points - mean).T @ ((points - mean) * weights[:, None])
-    covariance = covariance / len(points) ** (1.0 / 3.0) + 1e-6 * np.eye(2)
-    centres = points[rng.choice(len(points), size=_CENTRES, p=weights)]
-    return [multivariate_t(loc=centre, shape=covariance, df=_DEGREES, seed=rng) for centre in centres]
+def _mixture(points: FloatArray, log_weights: FloatArray, rng: np.random.Generator) -> list[Any]:
+    """Student t around draws with much weight, as wide as the next draws are apart."""
+    weights = _normalised(_temper(log_weights) * log_weights)
+    found = []
+    for centre in points[rng.choice(len(points), size=_CENTRES, p=weights)]:
+        square = np.sum((points - centre) ** 2, axis=1)
+        near = points[np.argsort(square)[: _NEIGHBOURS + 1]] - centre
+        covariance = near.T @ near / _NEIGHBOURS + 1e-7 * np.eye(2)
+        found.append(multivariate_t(loc=centre, shape=0.5 * covariance, df=_DEGREES, seed=rng))
+    return found
+
+
+def _temper(log_weights: FloatArray) -> float:
+    """The largest power, at most one, of weights that leaves enough effective draws."""
+
+    def effective(power: float) -> float:
+        return float(1.0 / np.sum(_normalised(power * log_weights) ** 2))
+
+    if effective(1.0) >= _EFFECTIVE:
+        return 1.0
+    return float(brentq(lambda power: effective(power) - _EFFECTIVE, 0.0, 1.0))
 
 
 def _from(mixture: list[Any], rng: np.random.Generator) -> FloatArray:

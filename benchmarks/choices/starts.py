@@ -14,8 +14,9 @@ import numpy as np
 
 from benchmarks.reference.engine import fitted_base
 from benchmarks.reference.pairs import Drawn
-from skred.diagnosis.compare.screening import curve, screened
-from skred.diagnosis.evidence.coefficient import Curve
+from skred.diagnosis.compare.screening import curve_about, screened
+from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.diagnosis.evidence.global_start import global_starts
 from skred.diagnosis.evidence.refit import Fit
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.physics.laws import load_law
@@ -33,9 +34,22 @@ def look(drawn: Drawn) -> dict[str, Any] | None:
     found = {}
     for name in order:
         other = order[1] if name == order[0] else order[0]
-        again = curve(base, best[name], _top(best[other]))
+        again = _from_both(base, best[name], _top(best[other]))
         found[name] = {"usual": best[name].log_bayes_factor, "more": again.log_bayes_factor}
     return {"mechanisms": found}
+
+
+def _from_both(base: Base, candidate: Curve, other: Fit) -> Curve:
+    """The curve by climbs from the base law's fit, and from another one."""
+    extension, either_sign = base.extended(candidate.direction), candidate.added.either_sign
+    starts = [
+        one
+        for fit in (base.fit, other)
+        for one in global_starts(
+            extension, base.rows, base.strengths, fit.start, candidate.scale, either_sign
+        )
+    ]
+    return curve_about(base, candidate, starts)
 
 
 def _top(one: Curve) -> Fit:

@@ -13,30 +13,25 @@ from skred.diagnosis.clock import Progress
 from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.evidence.coefficient import NEAR, Base, Curve, curve_at
 from skred.diagnosis.evidence.event_quadrature import SCREENING
-from skred.diagnosis.evidence.global_start import first_strengths, global_starts
-from skred.diagnosis.evidence.refit import Fit
+from skred.diagnosis.evidence.global_start import Start, first_strengths, global_starts
 from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms.placed import PlacedMechanism
 
 
-def curve(base: Base, candidate: PlacedMechanism, *others: Fit) -> Curve:
-    """Evidence along the strength of a mechanism: where global climbs begin, and about where they lead.
+def curve(base: Base, candidate: PlacedMechanism) -> Curve:
+    """Evidence along the strength of a mechanism: where global climbs begin, and about where they lead."""
+    extension, either_sign = base.extended(candidate.direction), candidate.added.either_sign
+    given = base.rows, base.strengths, base.fit.start, candidate.scale, either_sign
+    return curve_about(base, candidate, global_starts(extension, *given))
+
+
+def curve_about(base: Base, candidate: PlacedMechanism, starts: Sequence[Start]) -> Curve:
+    """Evidence along the strength of a mechanism where climbs begin, and about where some have led.
 
     Many recordings tell strengths far below the prior's scale, or far beyond what a refit from the base law
     reaches; strengths over the prior alone would miss where the evidence is.
-
-    Parameters
-    ----------
-    others : Fit
-        Of other mechanisms: climbs begin with their populations and events, too.
     """
     scale, either_sign = candidate.scale, candidate.added.either_sign
-    extension = base.extended(candidate.direction)
-    starts = [
-        one
-        for fit in (base.fit, *others)
-        for one in global_starts(extension, base.rows, base.strengths, fit.start, scale, either_sign)
-    ]
     begin = {0.0: base.fit} | {one.strength: one.fit for one in starts if one.strength != 0.0}
     about = np.array([one.strength + one.sd * by for one in starts for by in NEAR[1::2]])
     strengths = np.append(first_strengths(scale, either_sign), about)
