@@ -13,7 +13,7 @@ from scipy.stats import norm
 from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.diagnosis.evidence.conditional_map import campaign_rows
 from skred.diagnosis.evidence.extension import Extension, extended, setting_of
-from skred.diagnosis.influence.influence import Influence
+from skred.diagnosis.influence.influence import Few, Influence
 from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.predict.conditional import BeforeAfter, Conditional, above, conditional, readings_of
 from skred.diagnosis.predict.draws import Draws, LeftOut
@@ -192,7 +192,8 @@ def test_seeds_are_fixed_and_few_draws_are_told(ryggfonn: HierarchicalProblem) -
 def found_of(pair: BeforeAfter, problem: HierarchicalProblem, *carried_by: str) -> Diagnosis:
     nothing: Any = (None,) * 9
     events = tuple(problem.campaign.event_ids)
-    hangs_on = Influence("drag", 9.0, 4.0, events, np.full(len(events), 8.0), carried_by, None, None, ())
+    few = Few(carried_by, 3.0) if carried_by else None
+    hangs_on = Influence("drag", 9.0, 4.0, events, np.full(len(events), 8.0), few, None, 3.0, ())
     return Diagnosis(problem, load_law("pcm"), *nothing, hangs_on, pair)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import Any
@@ -23,7 +24,9 @@ from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.compare.ways import Looked
 from skred.diagnosis.evidence.coefficient import Curve, curve_near
 from skred.diagnosis.evidence.prior_odds import prior_odds
-from skred.diagnosis.influence.influence import MOST, FloatArray, influence
+from skred.diagnosis.influence.influence import FloatArray, influence
+from skred.diagnosis.influence.margin import MOST, Change, Margin
+from skred.diagnosis.influence.part import Part
 from skred.diagnosis.predict.held_out import gained_by, held_out
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.inference.calibrate import calibrate
@@ -104,7 +107,7 @@ def test_a_first_finding_is_judged_under_its_own_errors() -> None:
 def test_a_strong_effect_in_all_avalanches_hangs_on_no_few() -> None:
     comparison = drag_in(rolling(2.4e-4, n_events=12))[0]
     said = influence(comparison, DRAG.id, np.full(12, comparison.log_factors[DRAG.id] / 12), ENOUGH)
-    assert said.carried_by == () and said.without_them is None
+    assert said.carried_by == () and said.without_them is None and said.rival is None
     assert said.needed < said.without_a_third < said.log_bayes_factor
 
 
@@ -121,6 +124,55 @@ def test_avalanches_that_carry_an_answer_are_found() -> None:
     assert said.without_them is not None and said.without_them < said.needed < said.log_bayes_factor
     assert said.without_a_third < said.needed
     assert {said.events[k] for k in np.argsort(said.without_each)[:2]} == {"run02", "run05"}
+
+
+def two_drags(campaign: Campaign) -> tuple[Comparison, float]:
+    """A comparison of drags with U^2 and with U, and how far the first is ahead."""
+    base = base_of(campaign, "coulomb")
+    candidates, found = {}, []
+    for mechanism in (DRAG, mechanisms()["viscous_drag"]):
+        one = curve(base, placed(mechanism, base.setting, Shape()))
+        one = curve_near(base, one, Shape())
+        candidates[mechanism.id] = Candidate(mechanism, (one,), np.zeros(1))
+        found.append(one.log_bayes_factor)
+    under_errors = ComparisonUnderErrors("robust", base, candidates, [])
+    odds = prior_odds([one.mechanism for one in candidates.values()])
+    return Comparison((under_errors,), odds, {"robust": 0.0}), found[0] - found[1]
+
+
+def test_a_rival_is_what_is_most_probable_and_not_tied() -> None:
+    campaign = rolling(2.4e-4, n_events=9)
+    campaign = replace(campaign, stated_sd=np.full(campaign.values.shape, 0.15))
+    comparison, ahead = two_drags(campaign)
+    said = influence(comparison, DRAG.id, np.full(9, comparison.log_factors[DRAG.id] / 9), ENOUGH)
+    assert said.rival is not None and said.rival.id == "viscous_drag"
+    assert said.rival.ahead == pytest.approx(ahead)
+    # All runs were drawn with the same drag: none of them tells alone which one it is.
+    assert said.rival.few is None and said.carried_by == ()
+    assert influence(comparison, DRAG.id, said.without_each, ENOUGH, ["viscous_drag"]).rival is None
+
+
+@pytest.mark.parametrize(("whole", "fewest"), [(2.5, (4,)), (4.0, (1, 4)), (5.6, (1, 2, 4)), (8.0, None)])
+def test_the_fewest_avalanches_without_which_a_rival_leads(
+    whole: float, fewest: tuple[int, ...] | None
+) -> None:
+    """What each takes of both adds up here: of the difference 3, 2 and 1 nats, and others against it."""
+    own = np.array([1.0, 4.0, 2.0, 1.0, 3.0, 0.0, 0.0, 1.0, 0.0])
+    other = own - np.array([-0.1, 2.0, 1.0, -0.2, 3.0, -0.3, 0.0, 0.0, -0.1])
+
+    def takes(each: FloatArray) -> Callable[[Part], float]:
+        return lambda part: float(100.0 + each[part.kept].sum())
+
+    with ThreadPoolExecutor(1) as pool:
+        change = Change(takes(own), pool)
+        margin = Margin(whole, np.argsort(other - own), change, Change(takes(other), pool))
+        found = margin.fewest()
+    if fewest is None:
+        assert found is None
+        return
+    assert found is not None
+    assert tuple(np.flatnonzero(found[0])) == fewest
+    assert found[1] == pytest.approx(whole - (own - other)[list(fewest)].sum()) and found[1] < 0.0
 
 
 def test_readings_are_left_out_by_sensor_and_kind() -> None:

@@ -15,10 +15,11 @@ from skred.campaign import find_campaign, read_campaign
 from skred.cli.main import run
 from skred.errors import InputError
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
-from skred.inference.influence_words import carried
+from skred.inference.influence_words import carried, displaced, title_of, too_little
 from skred.inference.results import save
 from skred.output import write_json
 from skred.physics.mechanisms.spec import Shape
+from skred.prediction.diagnosis_cautions import diagnosis_cautions
 from skred.prediction.source import source_of
 
 ASKED = ["--per-year", "0.2", "--pressure", "30"]
@@ -134,11 +135,18 @@ def test_the_diagnosis_speaks_against_itself(
     told = " ".join(capsys.readouterr().out.split())
     page = (out / "report.html").read_text(encoding="utf-8")
     check_page(page)
-    words = carried(["a<b", "c"], 3, 29.9, 3.2, 7.0)
+    words = carried(["a<b", "c"], 3, too_little(29.9, 3.2, 7.0))
     assert words.startswith("2 of 3 avalanches carry this answer (a<b and c)")
     for said in (words, "another surface on a stretch 62 %; a force not in the list 6 %", "(30 %)"):
         assert 0 <= told.index(said) < told.index("the next avalanche")
         assert escape(said, quote=False) in page and told.count(said) == 1
+    rival = {"id": "obstacle", "ahead": 3.0, "carried_by": ["c"], "without_them": -1.5}
+    alarm = {"carried_by": ["a<b", "c"], "without_them": 3.2}
+    by_name = influence | {"carried_by": ["c"], "without_them": 12.0, "alarm": alarm, "rival": rival}
+    first, second = diagnosis_cautions(verdict | {"influence": by_name})[0].split("; ")
+    other = displaced(title_of("obstacle"), 3.0, -1.5)
+    assert first == f"Take the diagnosis with care: {carried(['c'], 3, other)}"
+    assert second == f"{carried(['a<b', 'c'], 3, too_little(29.9, 3.2, 7.0), 'the alarm')}."
     write_json(folder / "verdict.json", verdict | {"influence": {"carried_by": ["a"]}})
     with pytest.raises(InputError, match="not as skred writes it"):
         source_of(folder)

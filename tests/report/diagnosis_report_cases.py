@@ -24,7 +24,7 @@ from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.predictive import Predicted
 from skred.diagnosis.evidence.prior_odds import UNLISTED, prior_odds
 from skred.diagnosis.evidence.refit import Fit
-from skred.diagnosis.influence.influence import Influence, ReadingsLeftOut
+from skred.diagnosis.influence.influence import Few, Influence, ReadingsLeftOut
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.predict.conditional import BeforeAfter, Conditional, above
 from skred.diagnosis.predict.draws import Draws
@@ -222,8 +222,8 @@ def hangs_on(verdict_: str, names: tuple[str, ...], problem: HierarchicalProblem
         ReadingsLeftOut("sensor", problem.campaign.sensor_ids[0], 21, 1.5),
     )
     return Influence(
-        names[0] if names else "unlisted", 25.0, 4.0, ids, without, few,
-        0.5 if few else None, None if few else 14.0, readings,
+        names[0] if names else "unlisted", 25.0, 4.0, ids, without, Few(few, 0.5) if few else None,
+        0.5 if few else None, 0.5 if few else 14.0, readings,
     )  # fmt: skip
 
 

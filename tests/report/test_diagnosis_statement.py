@@ -23,18 +23,20 @@ from skred.diagnosis.evidence.extension import setting_of
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.evidence.refit import Fit, unfitted
 from skred.diagnosis.evidence.stated_places import StatedPlaces
-from skred.diagnosis.influence.influence import ReadingsLeftOut
+from skred.diagnosis.influence.influence import Few, ReadingsLeftOut, Rival
 from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.verdict.document import verdict
 from skred.diagnosis.verdict.figure_data import figure_data
 from skred.diagnosis.verdict.hangs_on import hangs_on
 from skred.diagnosis.verdict.statement import statement
 from skred.diagnosis.words import percent, plus_minus
+from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Direction, Setting, Shape
 from skred.physics.mechanisms.stretches import U_1, U_2
 from skred.report.diagnosis.lay import lay_words
 from skred.report.diagnosis.report import render_diagnosis
+from skred.report.diagnosis.words import short_title
 from skred.report.shared.draws import chains_of
 
 FloatArray = NDArray[np.float64]
@@ -329,6 +331,26 @@ def test_that_few_avalanches_carry_an_answer_comes_first() -> None:
     )
     named = verdict(diagnosis("two"))["statement"]
     assert "Take this with care" not in named and "It does not hang on a few avalanches" in named
+
+
+def test_that_few_avalanches_carry_a_name_comes_before_what_carries_the_alarm() -> None:
+    found = diagnosis("two")
+    assert found.influence is not None
+    ids = found.influence.events
+    rival = Rival("viscous_drag", 3.25, Few(ids[:1], -2.5))
+    influence = replace(found.influence, few=Few(ids[:2], 0.5), without_them=9.0, rival=rival)
+    document = verdict(replace(found, influence=influence))
+    first = document["statement"].partition(". ")[0]
+    title = mechanisms()["viscous_drag"].title.partition(":")[0]
+    assert first.startswith(
+        f"Take this with care: 1 of 22 avalanches carries this answer ({ids[0]}), and without it {title}"
+    )
+    assert f"2 of 22 avalanches carry the alarm ({ids[0]} and {ids[1]}), and without them the odds" in first
+    assert "3.2 nats behind with all, 2.5 ahead without" in first
+    assert document["influence"]["carried_by"] == [ids[0]] and document["influence"]["without_them"] == 9.0
+    assert document["influence"]["alarm"] == {"carried_by": [ids[0], ids[1]], "without_them": 0.5}
+    short = short_title(document, "viscous_drag")
+    assert f"Without it another answer would be more probable: {short}." in " ".join(lay_words(document))
 
 
 def test_of_many_sensors_that_an_answer_needs_five_are_named() -> None:

@@ -107,7 +107,7 @@ def _steps(calibration: Calibration, run: Run) -> Outcome:
             exact = effort.exact_loo
             gained = or_none(partial(gained_by, exact=exact), finding.steps[0], calibration, run.seed)
         if gained is not None:
-            hangs_on = or_none(influence, comparison, decision.answer, gained, check.needed)
+            hangs_on = or_none(influence, comparison, decision.answer, gained, check.needed, decision.tied)
         clock.stage("conditional", "predicting each reading from those above it")
         given = or_none(BeforeAfter.of, before, after, run.seed)
     clock.end()

@@ -4,30 +4,60 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from skred.physics.mechanisms import mechanisms
+
+NOT_LISTED = "unlisted"
+
 
 def enumerated(names: Sequence[str]) -> str:
     """Names as one says them: ``a``, ``a and b``, ``a, b and c``."""
     return " and ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
 
 
-def carried(
-    carried_by: Sequence[str], n_events: int, with_all: float, without_them: float, needed: float
-) -> str:
+def title_of(name: str) -> str:
+    """An id in words, without examples: recordings of speeds do not show whether it is ice or bare ground."""
+    if name == NOT_LISTED:
+        return "a force not in the list"
+    known = mechanisms()
+    return known[name].title.partition(":")[0] if name in known else str(name)
+
+
+def carried(carried_by: Sequence[str], n_events: int, otherwise: str, what: str = "this answer") -> str:
     """That few avalanches carry an answer; begins with a small letter.
 
     Parameters
     ----------
     carried_by : sequence of str
-        Without these the odds would not suffice for the answer.
+        Without these the answer would not be given.
     n_events : int
         How many avalanches there are.
-    with_all, without_them, needed : float, nats
-        Log Bayes factors.
+    otherwise : str
+        What would be without them: `too_little` or `displaced`.
+    what : str
+        What they carry.
     """
     one, many = len(carried_by) == 1, f"{len(carried_by)} of {n_events} avalanches"
-    evidence = f"{with_all:.1f} nats with all, {without_them:.1f} without"
     return (
-        f"{many} {'carries' if one else 'carry'} this answer ({enumerated(carried_by)}), and without"
-        f" {'it' if one else 'them'} the odds would not suffice for it"
-        f" (log Bayes factor {evidence}, {needed:.1f} needed)"
+        f"{many} {'carries' if one else 'carry'} {what} ({enumerated(carried_by)}), and without"
+        f" {'it' if one else 'them'} {otherwise}"
     )
+
+
+def too_little(with_all: float, without_them: float, needed: float) -> str:
+    """That odds would not suffice, by log Bayes factors in nats."""
+    evidence = f"{with_all:.1f} nats with all, {without_them:.1f} without"
+    return f"the odds would not suffice for it (log Bayes factor {evidence}, {needed:.1f} needed)"
+
+
+def displaced(rival: str, ahead: float, without_them: float) -> str:
+    """That something else would be more probable.
+
+    Parameters
+    ----------
+    rival : str
+        What.
+    ahead, without_them : float
+        Nats of its log Bayes factor that the answer can lose against it, by all recordings and without some.
+    """
+    evidence = f"{ahead:.1f} nats behind with all, {-without_them:.1f} ahead without"
+    return f"{rival} would be more probable ({evidence})"

@@ -6,10 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from skred.chances import percent
-from skred.inference.influence_words import carried
-from skred.physics.mechanisms import mechanisms
-
-_NOT_LISTED = "unlisted"
+from skred.inference.influence_words import NOT_LISTED, carried, displaced, title_of, too_little
 
 
 def diagnosis_cautions(verdict: Mapping[str, Any]) -> list[str]:
@@ -31,20 +28,26 @@ def diagnosis_cautions(verdict: Mapping[str, Any]) -> list[str]:
 def _carried(influence: Mapping[str, Any] | None) -> list[str]:
     if not influence or not influence["carried_by"]:
         return []
-    told = carried(
-        [str(event) for event in influence["carried_by"]],
-        len(influence["events"]),
-        *(float(influence[key]) for key in ("log_bayes_factor", "without_them", "needed")),
-    )
-    return [f"Take the diagnosis with care: {told}."]
+    n, rival = len(influence["events"]), influence.get("rival")
+    with_all, needed = float(influence["log_bayes_factor"]), float(influence["needed"])
+    told = []
+    if rival and rival["carried_by"] == influence["carried_by"]:
+        otherwise = displaced(title_of(str(rival["id"])), float(rival["ahead"]), float(rival["without_them"]))
+        told.append(carried(list(map(str, rival["carried_by"])), n, otherwise))
+    alarm = influence.get("alarm") or influence  # without it in verdicts of older versions
+    if alarm["carried_by"]:
+        otherwise = too_little(with_all, float(alarm["without_them"]), needed)
+        what = "the alarm" if told else "this answer"
+        told.append(carried(list(map(str, alarm["carried_by"])), n, otherwise, what))
+    return [f"Take the diagnosis with care: {'; '.join(told)}."]
 
 
 def _probability(verdict: Mapping[str, Any]) -> list[str]:
     probability = verdict.get("probability") or {}
     named = verdict.get("mechanism")
     told = [
-        f"{_title(name)} {percent(float(probability[name]))}"
-        for name in (named, _NOT_LISTED)
+        f"{title_of(name)} {percent(float(probability[name]))}"
+        for name in (named, NOT_LISTED)
         if name is not None and name in probability
     ]
     return [f"Probability by the diagnosis: {'; '.join(told)}."] if told else []
@@ -52,13 +55,5 @@ def _probability(verdict: Mapping[str, Any]) -> list[str]:
 
 def _ties(verdict: Mapping[str, Any]) -> list[str]:
     tied, probability = verdict.get("indistinguishable") or [], verdict.get("probability") or {}
-    told = [f"{_title(name)} ({percent(float(probability[name]))})" for name in tied]
+    told = [f"{title_of(name)} ({percent(float(probability[name]))})" for name in tied]
     return [f"Its recordings cannot tell that from: {', '.join(told)}."] if told else []
-
-
-def _title(name: str) -> str:
-    """A mechanism without the examples in its title."""
-    known = mechanisms()
-    if name == _NOT_LISTED:
-        return "a force not in the list"
-    return known[name].title.partition(":")[0] if name in known else str(name)

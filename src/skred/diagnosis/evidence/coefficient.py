@@ -129,6 +129,11 @@ class Curve(PlacedMechanism):
         return _closest(self.known, strength)
 
     @property
+    def top(self) -> Fit:
+        """The fit at the strength with most evidence."""
+        return self.fits[int(np.argmax(self.log_evidence))]
+
+    @property
     def known(self) -> dict[float, Fit]:
         """The fits by strength."""
         return dict(zip(self.strengths.tolist(), self.fits, strict=True))

@@ -98,9 +98,16 @@ class Spread(NamedTuple):
 
     def log_shares(self, population: Population, rows: Rows) -> FloatArray:
         """Log of each point's share of its row's integral over a population, (n_rows, n_nodes)."""
-        log_terms = self.log_weights + _log_prior(population, rows, self.points[:, :, :-1])
+        log_terms = self._log_terms(population, rows)
         shares: FloatArray = log_terms - np.logaddexp.reduce(log_terms, axis=1, keepdims=True)
         return shares
+
+    def log_integrals(self, population: Population, rows: Rows) -> FloatArray:
+        """Log of each row's integral over a population, (n_rows,)."""
+        return np.asarray(np.logaddexp.reduce(self._log_terms(population, rows), axis=1))
+
+    def _log_terms(self, population: Population, rows: Rows) -> FloatArray:
+        return self.log_weights + _log_prior(population, rows, self.points[:, :, :-1])
 
     @property
     def nodes(self) -> Nodes:

@@ -4,35 +4,39 @@ Of a single avalanche no refit is needed: evidence is what all others have, time
 given them. So the Bayes factor without it is that of all, less what it is predicted better with the answer
 (nearly, where many are left out in parts). Without several, or without a kind of reading, population and
 every avalanche are refitted to what is left, at all strengths of the named mechanism's leading shapes, or
-with the whole profile. Nothing is chosen again: the question is whether what was answered would still stand.
-Of a speed that is left out it stays known that the front came there.
+with the whole profile. Nothing is looked for again: the question is whether what was answered would still
+stand. It does not where the odds would not suffice for it, or where its rival, the listed id that is most
+probable of those it is not tied with, would be more probable. Of a speed that is left out it stays known that
+the front came there.
 """
 
 from __future__ import annotations
 
-from bisect import bisect_left
-from dataclasses import dataclass, replace
-from functools import cache, partial
+import math
+from collections.abc import Collection, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from skred.arrays import BoolArray, FloatArray, IntArray
+from skred.arrays import BoolArray, FloatArray
 from skred.diagnosis.compare.between import or_none, searched
 from skred.diagnosis.compare.candidate import Candidate, all_but_place, log_gain
-from skred.diagnosis.compare.comparison import Comparison
+from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
 from skred.diagnosis.compare.ways import gains_of
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of, most_probable
-from skred.diagnosis.evidence.coefficient import Base, curve_at
-from skred.diagnosis.evidence.event_quadrature import USUAL
-from skred.diagnosis.evidence.prior_odds import UNLISTED
+from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
+from skred.diagnosis.evidence.conditional_map import EventLikelihood, event_modes
+from skred.diagnosis.evidence.event_quadrature import USUAL, event_nodes
+from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.evidence.prior_odds import POWER, UNLISTED
 from skred.diagnosis.evidence.refit import Fit
-from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
-from skred.diagnosis.predict.conditional import sensor_ends
+from skred.diagnosis.evidence.tolerance import COUNTS
+from skred.diagnosis.influence.margin import Change, Margin
+from skred.diagnosis.influence.part import Part, kinds_of
 from skred.parallel.processes import worker_pool
-
-MOST = 1.0 / 3.0
-"""Share of the avalanches that an answer may hang on and be said to be carried by few: more is not few."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +60,41 @@ class ReadingsLeftOut:
     log_bayes_factor: float
 
 
+@dataclass(frozen=True)
+class Few:
+    """The fewest avalanches, at most a third of them, without which something does not hold.
+
+    They are looked for in the order of what each one takes by itself.
+
+    Attributes
+    ----------
+    events : tuple of str
+    left : float
+        Without them: the log Bayes factor of the answer, or nats as `Rival.ahead`.
+    """
+
+    events: tuple[str, ...]
+    left: float
+
+
+@dataclass(frozen=True)
+class Rival:
+    """The most probable listed id that an answer is not tied with.
+
+    Attributes
+    ----------
+    id : str
+    ahead : float
+        Nats of its log Bayes factor that the answer can lose against this one before both are as probable.
+    few : Few or None
+        Avalanches without which this one is more probable.
+    """
+
+    id: str
+    ahead: float
+    few: Few | None
+
+
 @dataclass(frozen=True, eq=False)
 class Influence:
     """What the leading answer hangs on.
@@ -71,14 +110,15 @@ class Influence:
     events : tuple of str
     without_each : (n_events,) array
         Log Bayes factor without each avalanche.
-    carried_by : tuple of str
-        The fewest avalanches, at most a third of them, without which it has less than it needs; empty where
-        there are none. They are looked for in the order of what each one takes by itself.
+    few : Few or None
+        Avalanches without which it has less than it needs.
     without_them : float or None
-        Log Bayes factor without those.
+        Log Bayes factor without those that carry the answer.
     without_a_third : float
-        Without the third of the avalanches that take most of it.
+        Log Bayes factor without the third of the avalanches that take most of it.
     readings : tuple of ReadingsLeftOut
+    rival : Rival or None
+        None where there is no such id under the same error model, or the answer is no listed one.
     """
 
     answer: str
@@ -86,13 +126,22 @@ class Influence:
     needed: float
     events: tuple[str, ...]
     without_each: FloatArray
-    carried_by: tuple[str, ...]
+    few: Few | None
     without_them: float | None
     without_a_third: float
     readings: tuple[ReadingsLeftOut, ...]
+    rival: Rival | None = None
+
+    @property
+    def carried_by(self) -> tuple[str, ...]:
+        """The fewest avalanches without which the answer would not be given; none where they are many."""
+        found = [self.few, None if self.rival is None else self.rival.few]
+        return min((one.events for one in found if one is not None), key=len, default=())
 
 
-def influence(comparison: Comparison, answer: str, gained: FloatArray, enough: float) -> Influence:
+def influence(
+    comparison: Comparison, answer: str, gained: FloatArray, enough: float, tied: Collection[str] = ()
+) -> Influence:
     """What an answer of a comparison hangs on, under the error model that it has most evidence under.
 
     Parameters
@@ -103,6 +152,8 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray, enough: f
         Log predictive density of each avalanche given the others with the answer, less that without it.
     enough : float
         Log odds of anything against nothing that raise an alarm.
+    tied : collection of str
+        Ids that recordings cannot tell from the answer.
     """
     under_errors = comparison.leading(answer)
     base = under_errors.base
@@ -113,80 +164,82 @@ def influence(comparison: Comparison, answer: str, gained: FloatArray, enough: f
         candidate = under_errors.candidates[answer]
         again = partial(_by_mechanism, candidate, base)
         stated = candidate.alone + log_gain(None, candidate.gains)
-    n = len(base.rows.event)
-    everything = np.ones(n, dtype=bool)
-    kinds = _kinds(base)
-    parts = [_Part(everything, chosen) for _, _, chosen in kinds]
-    without_each = stated - gained
     # What is tied with the answer explains the same recordings: without some of them it falls as much.
     needed = max(stated - (comparison.log_odds - enough), 0.0)
-    order, third = np.argsort(without_each), int(MOST * n)
-    parts = [_Part(everything), _first_left_out(order, third), *parts]
-    # By the same, quicker method on both sides; only the difference is taken from it.
-    with worker_pool() as pool:
-        whole, *found = pool.map(again, parts)
-    without_third, *without_kinds = stated + np.array(found) - whole
-    left_by = cache(lambda many: stated + again(_first_left_out(order, many)) - whole)
-    many, left = 0, without_third
-    if left < needed:
-        # Each one more leaves less: their number is found by halving.
-        many = 1 + bisect_left(range(1, third), True, key=lambda so_many: left_by(so_many) < needed)
-        left = without_third if many == third else left_by(many)
+    kinds = kinds_of(base)
+    parts = [Part(np.ones(len(gained), dtype=bool), chosen) for _, _, chosen in kinds]
+    with worker_pool() as pool, ThreadPoolExecutor(2) as waiting:
+        own = Change(again, pool)
+        margins = [Margin(stated - needed, np.argsort(-gained), own)]
+        name = None if answer == UNLISTED else _rival(comparison, under_errors, {answer, *tied})
+        if name is not None:
+            other = under_errors.candidates[name]
+            order = np.argsort(_gained(base, other.best) - gained)
+            change = Change(partial(_by_mechanism, other, base), pool)
+            margins.append(Margin(_ahead(comparison, answer, name), order, own, change))
+        third, *without = (needed + margins[0].left_by([margins[0].without_third, *parts])).tolist()
+        few = list(waiting.map(Margin.fewest, margins))
+        least = min((one for one in few if one is not None), key=lambda one: one[0].sum(), default=None)
+        left = None if least is None else float(margins[0].left_by([Part(~least[0])])[0])
     ids = base.problem.campaign.event_ids
     return Influence(
         answer,
         stated,
         needed,
         tuple(ids),
-        without_each,
-        tuple(ids[k] for k in sorted(order[:many])),
-        float(left) if many else None,
-        float(without_third),
+        stated - gained,
+        _few(ids, few[0], needed),
+        None if left is None else needed + left,
+        third,
         tuple(
-            ReadingsLeftOut(kind, sensor, int(chosen.sum()), float(factor))
-            for (kind, sensor, chosen), factor in zip(kinds, without_kinds, strict=True)
+            ReadingsLeftOut(kind, sensor, int(chosen.sum()), factor)
+            for (kind, sensor, chosen), factor in zip(kinds, without, strict=True)
         ),
+        None if name is None else Rival(name, margins[1].whole, _few(ids, few[1], 0.0)),
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """A part of the recordings.
-
-    Attributes
-    ----------
-    kept : (n_events,) boolean array
-        Avalanches that are kept.
-    left_out : (n_events, n_sensors) boolean array, optional
-        Readings that are not.
-    """
-
-    kept: BoolArray
-    left_out: BoolArray | None = None
-
-    def fit(self, fit: Fit) -> Fit:
-        """Where to begin with the avalanches that are kept."""
-        return fit._replace(points=fit.points[self.kept])
-
-    def base(self, base: Base) -> Base:
-        """The base law on what is kept."""
-        rows, readings = base.rows, base.rows.readings
-        if self.left_out is not None:
-            left = readings._replace(
-                observed=readings.observed & ~self.left_out,
-                least=np.where(self.left_out, -np.inf, readings.least),
-                most=np.where(self.left_out, np.inf, readings.most),
-            )
-            rows = rows._replace(readings=left)
-        return replace(base, rows=rows.take(np.flatnonzero(self.kept)), fit=self.fit(base.fit))
+def _few(ids: Sequence[str], found: tuple[BoolArray, float] | None, needed: float) -> Few | None:
+    """Avalanches by name, with what is left without them."""
+    if found is None:
+        return None
+    chosen, margin = found
+    return Few(tuple(one for one, carries in zip(ids, chosen, strict=True) if carries), needed + margin)
 
 
-def _by_mechanism(candidate: Candidate, base: Base, part: _Part) -> float:
-    """The log Bayes factor of a mechanism by a part of the recordings, over its leading shapes."""
+def _rival(comparison: Comparison, under_errors: ComparisonUnderErrors, given: Collection[str]) -> str | None:
+    """The most probable listed id beside those given."""
+    shares = comparison.probability
+    others = [name for name in under_errors.candidates if name not in given]
+    return max(others, key=lambda name: shares[name], default=None)
+
+
+def _ahead(comparison: Comparison, answer: str, rival: str) -> float:
+    """Nats of its log Bayes factor that an answer can lose before another id is as probable."""
+    factors, odds = comparison.log_factors, comparison.odds
+    return factors[answer] - factors[rival] + math.log(odds[answer] / odds[rival]) / POWER
+
+
+def _gained(base: Base, curve: Curve) -> FloatArray:
+    """What each avalanche's log integral gains by a mechanism at its best strength, where all is fitted."""
+    strengths = np.append(base.strengths, curve.strengths[np.argmax(curve.log_evidence)])
+    with_it = _log_integrals(base.extended(curve.direction), base, strengths, curve.top)
+    return with_it - _log_integrals(base.extended(), base, base.strengths, base.fit)
+
+
+def _log_integrals(extension: Extension, base: Base, strengths: FloatArray, fit: Fit) -> FloatArray:
+    """Of each avalanche over the most probable population."""
+    likelihood = EventLikelihood(extension, base.rows, strengths)
+    modes = event_modes(likelihood, fit.points, fit.population)
+    return event_nodes(likelihood, fit.population, modes).log_integrals(fit.population, base.rows)
+
+
+def _by_mechanism(candidate: Candidate, base: Base, part: Part) -> float:
+    """The log Bayes factor of a mechanism by a part of the recordings, over its shapes that may count."""
     factors, best = candidate.log_factors, candidate.best
     rest, of_kind, others = part.base(base), list[float](), list[float]()
     for k, curve in enumerate(candidate.curves):
-        if factors[k] <= factors.max() - DECIDES_NOTHING and curve is not best:
+        if factors[k] <= factors.max() - COUNTS and curve is not best:
             continue
         known = {strength: part.fit(fit) for strength, fit in curve.known.items()}
         one = curve_at(rest, curve, curve.strengths, USUAL, known)
@@ -202,33 +255,7 @@ def _by_mechanism(candidate: Candidate, base: Base, part: _Part) -> float:
     return float(np.logaddexp.reduce([*others, gain + np.logaddexp.reduce(of_kind)]))
 
 
-def _by_profile(profile: Profile, base: Base, part: _Part) -> float:
+def _by_profile(profile: Profile, base: Base, part: Part) -> float:
     """The log Bayes factor of a profile by a part of the recordings."""
     near = profile.mean, part.fit(profile.fit).start
     return fit_profile(part.base(base), profile.kind, near, profile.prior).log_bayes_factor
-
-
-def _first_left_out(order: IntArray, many: int) -> _Part:
-    """The recordings without the first avalanches of an order."""
-    return _Part(~np.isin(np.arange(len(order)), order[:many]))
-
-
-def _kinds(base: Base) -> list[tuple[str, str | None, BoolArray]]:
-    """Readings that may mean something else than they say, and each sensor's, as (n_events, n_sensors)."""
-    readings, campaign = base.rows.readings, base.problem.campaign
-    observed = readings.observed
-    speeds = observed & readings.is_velocity
-    first, last = sensor_ends(base.problem)
-    # Stops that are recorded, one column for each sensor of the runout, with their standard deviations.
-    stops = np.where(observed & ~readings.is_velocity, readings.values, np.nan)
-    off = np.abs(0.5 * (first + last)[:, None] - stops[:, None])
-    near = speeds & (off <= readings.sd(np.arange(len(stops)), readings.values)[:, None]).any(axis=2)
-    kinds: list[tuple[str, str | None, BoolArray]] = [
-        ("zeros", None, speeds & (readings.values == 0.0)),
-        ("near a stop", None, near),
-    ]
-    for j, sensor in enumerate(campaign.sensor_ids):
-        own = np.zeros_like(observed)
-        own[:, j] = observed[:, j] | readings.bounded[:, j]
-        kinds.append(("sensor", sensor, own))
-    return [one for one in kinds if one[2].any()]

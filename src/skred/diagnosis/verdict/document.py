@@ -12,7 +12,7 @@ from skred.diagnosis.augment.coefficient import augmented_of
 from skred.diagnosis.augment.step import Left
 from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER, SHARES
-from skred.diagnosis.influence.influence import Influence
+from skred.diagnosis.influence.influence import Few, Influence
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.predict.held_out import HeldOut, elpd_difference, errors
 from skred.diagnosis.predict.profile_law import ProfileLaw
@@ -229,6 +229,13 @@ def _influence(found: Influence | None) -> dict[str, Any] | None:
         ],
         "carried_by": list(found.carried_by),
         "without_them": found.without_them,
+        "alarm": _few(found.few),
         "without_a_third": found.without_a_third,
         "readings": [asdict(one) for one in found.readings],
+        "rival": found.rival and {"id": found.rival.id, "ahead": found.rival.ahead, **_few(found.rival.few)},
     }
+
+
+def _few(found: Few | None) -> dict[str, Any]:
+    """Avalanches without which something does not hold, and what is left without them."""
+    return {"carried_by": list(found.events) if found else [], "without_them": found.left if found else None}

@@ -4,19 +4,27 @@ from __future__ import annotations
 
 from skred.diagnosis.influence.influence import Influence, ReadingsLeftOut
 from skred.diagnosis.words import MOST_NAMED, counted
-from skred.inference import influence_words
+from skred.inference import influence_words as words
+from skred.inference.influence_words import title_of
 
 _KINDS = {"zeros": "readings of zero", "near a stop": "speeds beside the same avalanche's stop"}
 
 
 def carried(found: Influence | None) -> str:
     """That few avalanches carry the answer, where they do; begins with a small letter."""
-    if found is None or not found.carried_by:
+    if found is None:
         return ""
-    assert found.without_them is not None
-    return influence_words.carried(
-        found.carried_by, len(found.events), found.log_bayes_factor, found.without_them, found.needed
-    )
+    told, n = [], len(found.events)
+    rival = found.rival
+    if rival is not None and rival.few is not None and rival.few.events == found.carried_by:
+        otherwise = words.displaced(title_of(rival.id), rival.ahead, rival.few.left)
+        told.append(words.carried(rival.few.events, n, otherwise))
+    if found.few is not None:
+        otherwise = words.too_little(found.log_bayes_factor, found.few.left, found.needed)
+        told.append(
+            words.carried(found.few.events, n, otherwise, what="the alarm" if told else "this answer")
+        )
+    return "; ".join(told)
 
 
 def hangs_on(found: Influence | None) -> list[str]:

@@ -18,7 +18,7 @@ from skred.diagnosis.verdict.hangs_on import carried, hangs_on
 from skred.diagnosis.verdict.improvement import improvement
 from skred.diagnosis.verdict.stated_places import moved_as_stated, place_as_stated, strength_with_places
 from skred.diagnosis.words import TOLD_FROM, percent, plus_minus
-from skred.inference.influence_words import enumerated
+from skred.inference.influence_words import enumerated, title_of
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.stretches import U_1, U_2
 
@@ -43,7 +43,7 @@ def _found(found: Outcome) -> str:
     if isinstance(found, NotDiagnosed) or not found.not_added:
         return ""
     name = found.not_added[0]
-    leads = f"{_title(name)} leads ({percent(found.comparison.probability[name])})"
+    leads = f"{title_of(name)} leads ({percent(found.comparison.probability[name])})"
     return f"there is an alarm ({_rare(found.check)}), and {leads}, but it could not be added; "
 
 
@@ -64,11 +64,6 @@ def _not_converged(events: Sequence[str]) -> str:
     return f"{refits} did not converge, and the held-out scores rest on that"
 
 
-def _title(name: str) -> str:
-    """Without its examples: recordings of speeds do not show whether it is ice or bare ground."""
-    return "a force not in the list" if name == UNLISTED else mechanisms()[name].title.partition(":")[0]
-
-
 def _where(location: dict[str, float] | None) -> str:
     if location is None:
         return ""
@@ -79,7 +74,7 @@ def _entry(entry: dict[str, Any]) -> str:
     """What was added, the sensor or covariate it refers to, and where it acts."""
     standard = entry["standard"]
     by_logarithm = ", by its logarithm" if standard is not None and standard["logarithm"] else ""
-    return f"{_title(entry['id'])}{_about(entry, by_logarithm)}{_where(entry['location'])}"
+    return f"{title_of(entry['id'])}{_about(entry, by_logarithm)}{_where(entry['location'])}"
 
 
 def _about(entry: dict[str, Any], how: str = "") -> str:
@@ -164,7 +159,7 @@ def _tied(names: Sequence[str], probability: Mapping[str, float]) -> str:
         if other != UNLISTED and mechanisms()[other].same_term_as in told:
             own = f"; in a form of its own {how[other]}" if other in probability else ""
             how[other] = f"the same term{own}"
-    listed = ", ".join(f"{_title(other)} ({sure})" for other, sure in how.items())
+    listed = ", ".join(f"{title_of(other)} ({sure})" for other, sure in how.items())
     return f"These recordings cannot tell it from: {listed}." if ties else ""
 
 
@@ -175,7 +170,7 @@ def _not_excluded(document: dict[str, Any]) -> str:
     name = max(others, key=lambda one: others[one], default="")
     if not name or others[name] < TOLD_FROM:
         return ""
-    return f"Not excluded: {_title(name)} ({percent(others[name])})."
+    return f"Not excluded: {title_of(name)} ({percent(others[name])})."
 
 
 def _still_fired(check: BootstrapTest) -> str:
@@ -204,7 +199,7 @@ def _left(document: dict[str, Any]) -> str:
     left = document["left"]
     if left is None or left["nothing"] >= SHARES[NOTHING]:
         return ""
-    what = f"{_title(left['most_probable'])}{_about(left)}"
+    what = f"{title_of(left['most_probable'])}{_about(left)}"
     why = f" ({left['reason']})" if left["reason"] else ""
     return (
         f"Another comparison, of the augmented law, has {what} as the most probable of what could still be"
@@ -219,8 +214,8 @@ def _split(step: Step, document: dict[str, Any]) -> str:
     if sensor is not None and sensor["splits"]:
         first, second = sensor["splits"]
         at = f"A speed at s = {sensor['s_from_m']:.0f} m"
-        return f"{at} would split {_title(first)} and {_title(second)} best."
-    same = ", ".join(_title(name) for name in step.tied if name != UNLISTED)
+        return f"{at} would split {title_of(first)} and {title_of(second)} best."
+    same = ", ".join(title_of(name) for name in step.tied if name != UNLISTED)
     return f"No further speed would split off {same}: the term is the same." if same else ""
 
 
@@ -256,7 +251,7 @@ def _closest(found: Diagnosis, document: dict[str, Any]) -> str:
     listed = [name for name in factors if name not in (NOTHING, UNLISTED)]
     name = max(listed, key=lambda one: probability[one])
     return (
-        f"Of the listed mechanisms, {_title(name)} comes closest ({percent(probability[name])}):"
+        f"Of the listed mechanisms, {title_of(name)} comes closest ({percent(probability[name])}):"
         f" its log Bayes factor against nothing is {factors[name]:.1f} nats, that of a force not in the list"
         f" {factors[UNLISTED]:.1f}."
     )
@@ -275,7 +270,7 @@ def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
         else _too_usual(found.check)
     )
     return (
-        f"Of what could be missing, {_title(first)} would be the most probable"
+        f"Of what could be missing, {title_of(first)} would be the most probable"
         f" ({percent(probability[first])}). None is claimed: {why}."
     )
 

@@ -129,7 +129,15 @@ def _hangs_on(document: doc.Document) -> list[str]:
     n, are = len(carried), "avalanche carries" if len(carried) == 1 else "avalanches carry"
     them = "it" if n == 1 else "them"
     names = ", ".join(carried)
-    return [f"Take it with care: {n} {are} it ({names}). Without {them} the odds would not suffice for it."]
+    return [f"Take it with care: {n} {are} it ({names}). Without {them} {_otherwise(document)}."]
+
+
+def _otherwise(document: doc.Document) -> str:
+    """What would be without the avalanches that carry the answer."""
+    rival = doc.get(document, "influence", "rival")
+    if doc.listed(rival, "carried_by") != doc.listed(document, "influence", "carried_by"):
+        return "the odds would not suffice for it"
+    return f"another answer would be more probable: {short_title(document, str(doc.get(rival, 'id')))}"
 
 
 def _use(document: doc.Document) -> list[str]:
