@@ -1,11 +1,11 @@
 """What the choices that make a comparison affordable cost, each against doing without it.
 
-``python -m benchmarks.evidence_choices places|cut|starts [--n 40] [--seed 2] [--workers 2]`` draws pairs of a
+``python -m benchmarks.evidence_choices places|starts [--n 40] [--seed 2] [--workers 2]`` draws pairs of a
 campaign and a base law as `benchmarks.evidence_reference` does and writes ``results/evidence_choices.json``.
 The same command goes on with a run that was ended.
 
-places: refined shapes of a stretch against draws of its place and length. cut: a comparison in which hardly
-anything is left aside. starts: climbs that begin with another mechanism's fit, too.
+places: refined shapes of a stretch against draws of its place and length. starts: climbs that begin with
+another mechanism's fit, too.
 """
 
 from __future__ import annotations
@@ -41,9 +41,7 @@ def one_pair(choice: str, seed: int, number: int) -> dict[str, Any]:
 
 
 @app.default
-def main(
-    choice: Literal["places", "cut", "starts"], /, *, n: int = 40, seed: int = 2, workers: int = 2
-) -> int:
+def main(choice: Literal["places", "starts"], /, *, n: int = 40, seed: int = 2, workers: int = 2) -> int:
     """Look at pairs that were not looked at yet."""
     os.environ["OMP_NUM_THREADS"] = "1"  # of each worker
     document: dict[str, Any] = read(RESULT) if RESULT.exists() else {}

@@ -31,8 +31,8 @@ from skred.physics.mechanisms.spec import BoundTo, Mechanism, Shape
 from skred.physics.mechanisms.stretches import STRETCHES_M, is_opposed
 
 FloatArray = NDArray[np.float64]
-_FIRST, _EACH, _TURNS = 128, 32, 8
-"""Draws from the prior, and in each turn after."""
+_FIRST, _EACH, _TURNS, _LAST = 128, 32, 5, 160
+"""Draws from the prior, in each turn after, and those that count: no proposal has followed these."""
 _DEFENSIVE = 0.2
 """Share of the prior in each later proposal."""
 _CENTRES, _NEIGHBOURS, _DEGREES = 12, 6, 5
@@ -52,44 +52,47 @@ def look(drawn: Drawn) -> dict[str, Any] | None:
         return None
     name = max(curves, key=lambda one: one.log_bayes_factor).mechanism.id
     own = [one for one in curves if one.mechanism.id == name]
-    refined, n_refined = _refined(base, own)
-    found, error, effective, n_drawn = _drawn(base, own, drawn.rng)
+    refined, n_refined = by_refinement(base, own)
+    found, error, effective, n_drawn = by_draws(base, own, drawn.rng)
     return {
         "mechanism": name,
         "refined": refined,
         "curves": n_refined,
         "drawn": found,
-        "error": error,
+        "standard_error": error,
         "effective": effective,
         "draws": n_drawn,
     }
 
 
-def _refined(base: Base, own: list[Curve]) -> tuple[float, int]:
+def by_refinement(base: Base, own: list[Curve]) -> tuple[float, int]:
     """As a comparison has it, and of how many shapes."""
     with ThreadPoolExecutor(1) as pool:
         candidate = refine(base.setting, own, partial(curve_near, base), pool)[own[0].mechanism.id]
     return candidate.alone, len(candidate.curves)
 
 
-def _drawn(base: Base, own: list[Curve], rng: np.random.Generator) -> tuple[float, float, float, int]:
+def by_draws(base: Base, own: list[Curve], rng: np.random.Generator) -> tuple[float, float, float, int]:
     """By draws of place and length: with standard error, effective number of draws, and their number."""
     mechanism, lengths = own[0].mechanism, sorted({_length(one.shape) for one in own})
-    low, high = _range(lengths)
+    low, high = range_of(lengths)
     points = qmc.Sobol(2, seed=rng).random(_FIRST)
-    log_factors = _heights(base, mechanism, points, low, high)
+    log_factors = heights(base, mechanism, points, low, high)
     proposals: list[Any] = []
     for _ in range(_TURNS):
-        proposals.append(_mixture(points, log_factors - _log_density(points, proposals), rng))
-        new = _from(proposals[-1], rng)
+        log_weights = log_factors - _log_density(points, proposals)
+        proposals.append(_mixture(points, log_weights, _CENTRES, rng))
+        new = _from(proposals[-1], _EACH, rng)
         points = np.vstack([points, new])
-        log_factors = np.append(log_factors, _heights(base, mechanism, new, low, high))
-    log_weights = log_factors - _log_density(points, proposals)
+        log_factors = np.append(log_factors, heights(base, mechanism, new, low, high))
+    last = _mixture(points, log_factors - _log_density(points, proposals), _LAST, rng)
+    new = _from(last, _LAST, rng)
+    log_weights = heights(base, mechanism, new, low, high) - np.log(_density(new, last))
     most = float(log_weights.max())
     weights = np.exp(log_weights - most)
     error = float(weights.std() / weights.mean() / math.sqrt(len(weights)))
     effective = float(weights.sum() ** 2 / (weights**2).sum())
-    return most + math.log(float(weights.mean())), error, effective, len(points)
+    return most + math.log(float(weights.mean())), error, effective, len(points) + len(new)
 
 
 def _length(shape: Shape) -> float:
@@ -99,14 +102,14 @@ def _length(shape: Shape) -> float:
     return min(STRETCHES_M, key=lambda one: abs(one - length)) if shape.s_from_m > 0.0 else STRETCHES_M[-1]
 
 
-def _range(lengths: list[float]) -> tuple[float, float]:
+def range_of(lengths: list[float]) -> tuple[float, float]:
     """Logarithms of the lengths that some stand for: half-way to the next, as far beyond the last."""
     logs = np.log(lengths)
     step = np.diff(logs) if len(logs) > 1 else np.array([1.0])
     return float(logs[0] - step[0] / 2.0), float(logs[-1] + step[-1] / 2.0)
 
 
-def _heights(base: Base, mechanism: Mechanism, points: FloatArray, low: float, high: float) -> FloatArray:
+def heights(base: Base, mechanism: Mechanism, points: FloatArray, low: float, high: float) -> FloatArray:
     """Log Bayes factors at places and lengths in the unit square."""
     first, last = base.setting.recorded_m
     found = []
@@ -118,11 +121,11 @@ def _heights(base: Base, mechanism: Mechanism, points: FloatArray, low: float, h
     return np.array(found)
 
 
-def _mixture(points: FloatArray, log_weights: FloatArray, rng: np.random.Generator) -> list[Any]:
+def _mixture(points: FloatArray, log_weights: FloatArray, size: int, rng: np.random.Generator) -> list[Any]:
     """Student t around draws with much weight, as wide as the next draws are apart."""
     weights = _normalised(_temper(log_weights) * log_weights)
     found = []
-    for centre in points[rng.choice(len(points), size=_CENTRES, p=weights)]:
+    for centre in points[rng.choice(len(points), size=size, p=weights)]:
         square = np.sum((points - centre) ** 2, axis=1)
         near = points[np.argsort(square)[: _NEIGHBOURS + 1]] - centre
         covariance = near.T @ near / _NEIGHBOURS + 1e-7 * np.eye(2)
@@ -141,10 +144,10 @@ def _temper(log_weights: FloatArray) -> float:
     return float(brentq(lambda power: effective(power) - _EFFECTIVE, 0.0, 1.0))
 
 
-def _from(mixture: list[Any], rng: np.random.Generator) -> FloatArray:
+def _from(mixture: list[Any], size: int, rng: np.random.Generator) -> FloatArray:
     """Draws inside the unit square, some of them from the prior."""
-    found = [rng.random(2) for _ in range(round(_DEFENSIVE * _EACH))]
-    while len(found) < _EACH:
+    found = list(rng.random((int(rng.binomial(size, _DEFENSIVE)), 2)))
+    while len(found) < size:
         one = np.asarray(mixture[int(rng.integers(len(mixture)))].rvs())
         if ((one >= 0.0) & (one < 1.0)).all():
             found.append(one)
@@ -155,10 +158,15 @@ def _log_density(points: FloatArray, proposals: list[list[Any]]) -> FloatArray:
     """Of all proposals together, each normalised inside the unit square; the prior's density is 1."""
     total = np.full(len(points), float(_FIRST))
     for mixture in proposals:
-        inside = np.mean([_inside(one) for one in mixture])
-        density = np.mean([np.atleast_1d(one.pdf(points)) for one in mixture], axis=0) / inside
-        total += _EACH * (_DEFENSIVE + (1.0 - _DEFENSIVE) * density)
-    return np.log(total / (_FIRST + _EACH * len(proposals)))
+        total += _EACH * _density(points, mixture)
+    return np.asarray(np.log(total / (_FIRST + _EACH * len(proposals))))
+
+
+def _density(points: FloatArray, mixture: list[Any]) -> FloatArray:
+    """Of a mixture within the unit square, with its share of the prior."""
+    inside = np.mean([_inside(one) for one in mixture])
+    density = np.mean([np.atleast_1d(one.pdf(points)) for one in mixture], axis=0) / inside
+    return np.asarray(_DEFENSIVE + (1.0 - _DEFENSIVE) * density)
 
 
 def _inside(one: Any) -> float:

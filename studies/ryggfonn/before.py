@@ -92,7 +92,8 @@ recordings do, while drag could. That is why it said `unexplained`.
 
 def _without(influence: Found) -> str:
     """What is left without the few that carry it, and without the third that carries most."""
-    few = f"{influence['without_them']:.1f} ({', '.join(influence['carried_by'])})"
+    alarm = influence.get("alarm", influence)
+    few = f"{alarm['without_them']:.1f} ({', '.join(alarm['carried_by'])})"
     third = influence["without_a_third"]
     return few if third is None else f"{few}; {third:.1f} (the third that takes most)"
 

@@ -115,13 +115,17 @@ def _answers(one: Found) -> dict[str, str]:
 
 def _carried(found: Found) -> str:
     """The few avalanches without which the answer would not be given, or that there are none."""
-    if not found["carried_by"]:
+    alarm, rival = found.get("alarm", found), found.get("rival")
+    name = ""
+    if rival is not None and rival["carried_by"]:
+        few = ", ".join(rival["carried_by"])
+        name = f"the name by {few}: without, `{rival['id']}` is {-rival['without_them']:.1f} nats ahead; "
+    if not alarm["carried_by"]:
         left = f"{found['without_a_third']:.1f} nats are left"
-        return f"no few avalanches: {left} without the third that carry most"
-    few = ", ".join(found["carried_by"])
-    return (
-        f"{few}: without them {found['without_them']:.1f} nats are left, and {found['needed']:.1f} are needed"
-    )
+        return f"{name}the alarm by no few: {left} without the third that carry most"
+    few = ", ".join(alarm["carried_by"])
+    left = f"{alarm['without_them']:.1f} nats are left, and {found['needed']:.1f} are needed"
+    return f"{name}the alarm by {few}: without them {left}"
 
 
 def _added(row: Found) -> str:
