@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Sequence, Set
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,10 +44,12 @@ def influence_figure(document: doc.Document) -> Figure:
     figure = new_figure(3.6, f"What the answer hangs on: {name}, again without some of the recordings")
     readings = doc.listed(found, "readings")
     panels = side_by_side(figure, 2, sharey=True, width_ratios=[3, 1.2])
-    carried = set(found["carried_by"])
+    alarm = doc.get(found, "alarm") or found  # without it in verdicts of older versions
+    carried, rival = set(doc.listed(alarm, "carried_by")), doc.get(found, "rival")
+    of_name = doc.listed(rival, "carried_by")
     without = {one["event"]: float(one["log_bayes_factor"]) for one in found["events"]}
     events = sorted(without, key=lambda event: without[event])
-    _points(panels[0], found, events, [without[event] for event in events], carried)
+    _points(panels[0], found, events, [without[event] for event in events], carried, of_name)
     told = [f"without {event}: {without[event]:.1f} nats" for event in events]
     mark(panels[0], np.arange(len(events)), [without[event] for event in events], told, events)
     panels[0].set_xlabel(
@@ -59,10 +61,17 @@ def influence_figure(document: doc.Document) -> Figure:
     told = [f"without {_kind(one)}: {value:.1f} nats" for one, value in zip(readings, values, strict=True)]
     mark(panels[1], np.arange(len(readings)), values, told)
     panels[1].set_xlabel("without readings")
-    if found["without_them"] is not None:
+    if is_number(left := doc.get(alarm, "without_them")):
         panels[0].plot(
-            [(len(carried) - 1) / 2.0], [found["without_them"]], linestyle="none", marker="D", color=MISMATCH,
-            label="without all that carry it",
+            [(len(carried) - 1) / 2.0], [left], linestyle="none", marker="D", color=MISMATCH,
+            label="without all that carry the alarm",
+        )  # fmt: skip
+    if of_name:
+        carrying = [k for k, event in enumerate(events) if event in of_name]
+        other = figure_text(in_words([str(doc.get(rival, "id"))])[0], 40)
+        panels[0].scatter(
+            carrying, [without[events[k]] for k in carrying], s=110, facecolors="none", edgecolors="black",
+            label=f"carries the name: without, {other} leads",
         )  # fmt: skip
     legend_below(figure, panels, columns=2)
     return figure
@@ -74,6 +83,7 @@ def _points(
     names: list[str],
     values: list[float],
     carried: Set[str] = frozenset(),
+    also_told: Sequence[str] = (),
 ) -> None:
     """One point for each part that is left out, with the evidence of all and what is needed as lines."""
     at = np.arange(len(names))
@@ -83,7 +93,8 @@ def _points(
         colours = [MISMATCH if name in carried else AFTER for name in names]
         axes.vlines(at, values, found["log_bayes_factor"], color=colours, linewidth=1.4, alpha=0.5)
         axes.scatter(at, values, color=colours, s=18, zorder=3)
-    told = {one for one, value in zip(names, values, strict=True) if value < found["needed"]} | carried
+    told = {one for one, value in zip(names, values, strict=True) if value < found["needed"]}
+    told |= {*carried, *also_told}
     shown = names if len(names) <= _MOST_NAMED else [one if one in told else "" for one in names]
     axes.set_xticks(at, [figure_text(one, 16) for one in shown], rotation=90, fontsize=7)
     axes.set_xlim(-0.7, max(len(names), 1) - 0.3)
