@@ -10,8 +10,6 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-import numpy as np
-
 from benchmarks.reference.engine import fitted_base
 from benchmarks.reference.pairs import Drawn
 from skred.diagnosis.compare.screening import curve_about, screened
@@ -34,7 +32,7 @@ def look(drawn: Drawn) -> dict[str, Any] | None:
     found = {}
     for name in order:
         other = order[1] if name == order[0] else order[0]
-        again = _from_both(base, best[name], _top(best[other]))
+        again = _from_both(base, best[name], best[other].top)
         found[name] = {"usual": best[name].log_bayes_factor, "more": again.log_bayes_factor}
     return {"mechanisms": found}
 
@@ -50,8 +48,3 @@ def _from_both(base: Base, candidate: Curve, other: Fit) -> Curve:
         )
     ]
     return curve_about(base, candidate, starts)
-
-
-def _top(one: Curve) -> Fit:
-    """The fit where a curve is highest."""
-    return one.fits[int(np.argmax(one.log_evidence))]
