@@ -3,6 +3,7 @@
 import numpy as np
 
 from benchmarks.page.results import result_of
+from benchmarks.reference.pairs import SIMULATED
 from benchmarks.reference.table import table
 
 _GAINS = 1.0
@@ -116,7 +117,13 @@ sampling. Both take the evidence at a shape as the diagnosis computes it. In nat
 def _starts() -> str:
     """What climbs from another mechanism's fit find."""
     part = result_of("evidence_choices")["starts"]
-    found = [one["mechanisms"] for one in part["pairs"] if "mechanisms" in one]
+    # Recordings that are no simulated ones are the same under each base law, however often they are drawn.
+    distinct = {
+        one["pair"] if one["source"] == SIMULATED else (one["source"], one["base"]): one["mechanisms"]
+        for one in part["pairs"]
+        if "mechanisms" in one
+    }
+    found = list(distinct.values())
     more, count = [], 0
     for each in found:
         lead = max(0.0, *(max(one["usual"], one["more"]) for one in each.values()))
@@ -130,6 +137,6 @@ def _starts() -> str:
 
 `python -m benchmarks.evidence_choices starts --n {len(part["pairs"])}` (commit {part["commit"]}): each
 mechanism at its best shape, as screened, climbed once more from population and events of the mechanism that
-has most evidence. Of {count} curves of {len(found)} campaigns {len(more)} gain more than a nat, in nats (and
-how far behind the leading one they are then): {told}. Such climbs are left out: none of these leads.
+has most evidence. Of {count} curves of {len(found)} campaigns and base laws {len(more)} gain more than a
+nat, in nats (and how far behind the leading one they are then): {told}. Such climbs are left out: none of these leads.
 """

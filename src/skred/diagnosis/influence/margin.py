@@ -26,6 +26,7 @@ class Change:
     ----------
     factor : callable
         Log Bayes factor by a part of the recordings.
+    pool : ThreadPoolExecutor
     known : dict
         By what was left out.
     """
