@@ -138,5 +138,6 @@ def _starts() -> str:
 `python -m benchmarks.evidence_choices starts --n {len(part["pairs"])}` (commit {part["commit"]}): each
 mechanism at its best shape, as screened, climbed once more from population and events of the mechanism that
 has most evidence. Of {count} curves of {len(found)} campaigns and base laws {len(more)} gain more than a
-nat, in nats (and how far behind the leading one they are then): {told}. Such climbs are left out: none of these leads.
+nat, in nats (and how far behind the leading one they are then): {told}. Such climbs are left out: none of
+these leads.
 """
