@@ -1,9 +1,9 @@
 """The average over where a stretch is: refined shapes, against draws of place and length.
 
-The comparison looks at stretches of three lengths that overlap, and parts those that hold much evidence.
-Here the prior is continuous: the end uniform over the recorded part, the logarithm of the length uniform over
-what these lengths stand for. Both are drawn by adaptive importance sampling, and the evidence of each draw is
-computed as that of a refined shape is. Evidence at a shape has its own reference (`benchmarks.reference`).
+The comparison looks at stretches of three lengths that overlap, parts those that hold much evidence, and
+interpolates between them. Here places and lengths are drawn from their prior by adaptive importance sampling,
+and the evidence of each draw is computed as that of a refined shape is. Evidence at a shape has its own
+reference (`benchmarks.reference`).
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from scipy.stats import multivariate_t, qmc
 
 from benchmarks.reference.engine import fitted_base
 from benchmarks.reference.pairs import Drawn
+from skred.diagnosis.compare.over_places import Area
 from skred.diagnosis.compare.refinement import refine
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.detect.score_test import placed_mechanisms
@@ -27,8 +28,8 @@ from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.physics.laws import load_law
 from skred.physics.mechanisms.placed import placed
-from skred.physics.mechanisms.spec import BoundTo, Mechanism, Shape
-from skred.physics.mechanisms.stretches import STRETCHES_M, is_opposed
+from skred.physics.mechanisms.spec import BoundTo, Mechanism
+from skred.physics.mechanisms.stretches import is_opposed
 
 FloatArray = NDArray[np.float64]
 _FIRST, _EACH, _TURNS, _LAST = 128, 32, 5, 160
@@ -74,20 +75,19 @@ def by_refinement(base: Base, own: list[Curve]) -> tuple[float, int]:
 
 def by_draws(base: Base, own: list[Curve], rng: np.random.Generator) -> tuple[float, float, float, int]:
     """By draws of place and length: with standard error, effective number of draws, and their number."""
-    mechanism, lengths = own[0].mechanism, sorted({_length(one.shape) for one in own})
-    low, high = range_of(lengths)
+    mechanism, area = own[0].mechanism, Area.around([one.shape for one in own], base.setting)
     points = qmc.Sobol(2, seed=rng).random(_FIRST)
-    log_factors = heights(base, mechanism, points, low, high)
+    log_factors = heights(base, mechanism, points, area)
     proposals: list[Any] = []
     for _ in range(_TURNS):
         log_weights = log_factors - _log_density(points, proposals)
         proposals.append(_mixture(points, log_weights, _CENTRES, rng))
         new = _from(proposals[-1], _EACH, rng)
         points = np.vstack([points, new])
-        log_factors = np.append(log_factors, heights(base, mechanism, new, low, high))
+        log_factors = np.append(log_factors, heights(base, mechanism, new, area))
     last = _mixture(points, log_factors - _log_density(points, proposals), _LAST, rng)
     new = _from(last, _LAST, rng)
-    log_weights = heights(base, mechanism, new, low, high) - np.log(_density(new, last))
+    log_weights = heights(base, mechanism, new, area) - np.log(_density(new, last))
     most = float(log_weights.max())
     weights = np.exp(log_weights - most)
     error = float(weights.std() / weights.mean() / math.sqrt(len(weights)))
@@ -95,27 +95,10 @@ def by_draws(base: Base, own: list[Curve], rng: np.random.Generator) -> tuple[fl
     return most + math.log(float(weights.mean())), error, effective, len(points) + len(new)
 
 
-def _length(shape: Shape) -> float:
-    """Of the stretch, before the track's beginning cuts it [m]."""
-    assert shape.s_from_m is not None and shape.s_to_m is not None
-    length = shape.s_to_m - shape.s_from_m
-    return min(STRETCHES_M, key=lambda one: abs(one - length)) if shape.s_from_m > 0.0 else STRETCHES_M[-1]
-
-
-def range_of(lengths: list[float]) -> tuple[float, float]:
-    """Logarithms of the lengths that some stand for: half-way to the next, as far beyond the last."""
-    logs = np.log(lengths)
-    step = np.diff(logs) if len(logs) > 1 else np.array([1.0])
-    return float(logs[0] - step[0] / 2.0), float(logs[-1] + step[-1] / 2.0)
-
-
-def heights(base: Base, mechanism: Mechanism, points: FloatArray, low: float, high: float) -> FloatArray:
+def heights(base: Base, mechanism: Mechanism, points: FloatArray, area: Area) -> FloatArray:
     """Log Bayes factors at places and lengths in the unit square."""
-    first, last = base.setting.recorded_m
     found = []
-    for across, along in points:
-        end, length = last - across * (last - first), math.exp(low + along * (high - low))
-        shape = Shape(max(end - length, 0.0), end)
+    for shape in map(area.shape, points):
         rough = curve(base, placed(mechanism, base.setting, shape))
         found.append(curve_near(base, rough, shape).log_bayes_factor)
     return np.array(found)

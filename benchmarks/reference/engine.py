@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
+
 from skred.diagnosis.augment.problem import as_diagnosed
 from skred.diagnosis.compare.comparison import with_errors
 from skred.diagnosis.compare.recomputed import recomputed
-from skred.diagnosis.compare.refinement import candidates_of, leading, screened_parts
+from skred.diagnosis.compare.refinement import Kind, Part, candidates_of, leading
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import Base, curve_near, fit_base
 from skred.diagnosis.evidence.conditional_map import Population
@@ -18,6 +20,7 @@ from skred.inference.hierarchical.rough_population import rough_population
 from skred.physics.law import Law
 from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Mechanism, Shape
+from skred.physics.mechanisms.stretches import shares
 
 ERRORS = "robust"
 
@@ -36,13 +39,16 @@ def engine_log_bayes_factor(base: Base, mechanism: Mechanism, shapes: Sequence[S
     """Log Bayes factor of a mechanism against nothing, averaged over some shapes alone.
 
     Screened, the leading shapes computed anew, and then with more quadrature points, as a comparison does; no
-    shape is parted.
+    shape is parted, and between them nothing is interpolated.
     """
-    parts = screened_parts([curve(base, placed(mechanism, base.setting, one)) for one in shapes])
-    while todo := [k for k in leading(parts) if parts[k].level == 0]:
+    log_shares = np.log(shares(shapes))
+    curves = [curve(base, placed(mechanism, base.setting, one)) for one in shapes]
+    kinds = [Kind(share, (Part(one),)) for share, one in zip(log_shares, curves, strict=True)]
+    while todo := [k for k, _ in leading(kinds) if kinds[k].parts[0].level == 0]:
         for k in todo:
-            (parts[k],) = parts[k].parted([curve_near(base, parts[k].curve, parts[k].curve.shape)])
-    candidates = candidates_of(parts)
+            one = kinds[k].parts[0].curve
+            kinds[k] = kinds[k].parted({0: [curve_near(base, one, one.shape)]})
+    candidates = candidates_of(kinds)
     with ThreadPoolExecutor(1) as pool:
         again, _ = recomputed(base, candidates, [], pool)
     return again[mechanism.id].log_bayes_factor

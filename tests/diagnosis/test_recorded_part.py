@@ -13,7 +13,7 @@ from rolling_cases import PLACES_M, rolling
 from skred.campaign import Status
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import free_force
-from skred.diagnosis.compare.refinement import candidates_of, screened_parts
+from skred.diagnosis.compare.refinement import candidates_of, kinds_of
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.discrepancy.profile import KINDS, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, curve_near
@@ -31,7 +31,7 @@ def drag_on(base: Base) -> Candidate:
     """Drag along the track and from the first recording on, by the usual number of quadrature points."""
     screened = [curve(base, placed(DRAG, base.setting, shape)) for shape in shapes_of(DRAG, base.setting)]
     again = [curve_near(base, one, one.shape) for one in screened]
-    return candidates_of(screened_parts(again))[DRAG.id]
+    return candidates_of(kinds_of(base.setting, again))[DRAG.id]
 
 
 def test_a_made_up_ramp_hides_no_drag() -> None:

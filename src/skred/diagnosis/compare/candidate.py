@@ -75,7 +75,8 @@ class Candidate:
     curves : tuple of Curve
         One for each shape.
     log_weights : (n_curves,) array
-        Prior weight of each shape; they sum to 1.
+        What each shape's evidence counts for: its prior probability; of a place that of all places for which
+        it stands, by how their evidence is to its own.
     correction : float
         What many more quadrature points, and importance sampling over the population, change along the best
         curves, in nats; 0 where not looked at.
@@ -107,7 +108,7 @@ class Candidate:
 
     @property
     def log_factors(self) -> FloatArray:
-        """Log Bayes factor of each shape, its prior weight included."""
+        """Log Bayes factor of each shape, its weight included."""
         return self.log_weights + np.array([one.log_bayes_factor for one in self.curves])
 
     @property

@@ -23,7 +23,7 @@ from skred.diagnosis.clock import Progress
 from skred.diagnosis.compare.between import SEARCH, with_ways
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.recomputed import recomputed
-from skred.diagnosis.compare.refinement import candidates_of, refine, screened_parts
+from skred.diagnosis.compare.refinement import candidates_of, kinds_of, refine
 from skred.diagnosis.compare.residue import with_residues
 from skred.diagnosis.compare.screening import screened
 from skred.diagnosis.compare.sensor_places import Shifts, with_stated_places
@@ -243,7 +243,7 @@ def _under_each(
         there = curve_near(bases[name], leads, leads.shape)  # places were screened coarsely
         behind = height[first] + _most([leads]) - max(top[name], height[name] + _most([there]))
         if behind > COUNTS:
-            candidates = candidates_of(screened_parts(curves[name]))
+            candidates = candidates_of(kinds_of(bases[name].setting, curves[name]))
             # Stated places change nothing there: beside candidates that are only screened they are not known.
             found[name] = ComparisonUnderErrors(name, bases[name], candidates, [])
         else:

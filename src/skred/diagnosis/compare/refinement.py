@@ -1,64 +1,99 @@
 """Local refinement: what holds much of a mechanism's evidence is computed anew and parted, again and again.
 
-Screening takes one shape for all that are near it. A shape that holds much of its mechanism's evidence is
-computed with more quadrature points, and moved, shortened and lengthened; the parts share its weight, and
-such as hold much of the evidence then are parted in their turn, in smaller steps. A strong effect on a
-stretch whose ends are wrong by a tenth of its length loses several nats, and a force of any shape would not.
+Screening looks at a few places. A shape that holds more of its mechanism's evidence than the tolerance is
+computed with more quadrature points, and moved, shortened and lengthened; such of these as hold so much then
+are parted in their turn, in smaller steps. Between all that were looked at evidence is interpolated. A strong
+effect on a stretch whose ends are wrong by a tenth of its length loses several nats, and a force of any shape
+would not.
 """
 
 from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from skred.diagnosis.compare.candidate import Candidate
+from skred.arrays import FloatArray
+from skred.diagnosis.compare.candidate import Candidate, all_but_place
+from skred.diagnosis.compare.over_places import Area, log_means
 from skred.diagnosis.evidence.coefficient import Curve
-from skred.diagnosis.evidence.tolerance import COUNTS
+from skred.diagnosis.evidence.tolerance import COUNTS, MOST_ROUNDS, STANDARD_ERROR
 from skred.physics.mechanisms.placed import parts_of
-from skred.physics.mechanisms.spec import Setting, Shape
-from skred.physics.mechanisms.stretches import shares
+from skred.physics.mechanisms.spec import Mechanism, Setting, Shape
+from skred.physics.mechanisms.stretches import is_opposed, shares
 
 Near = Callable[[Curve, Shape], Curve]
-_HOLDS_MUCH = 0.2
-"""Share of its mechanism's evidence from which a shape is parted: four at most."""
-_LEVELS = 4
-"""How many times a shape is parted: the last steps are an eighth of the first, some metres."""
 _SMALLER = 0.5
-"""Steps within a part, in those that led to it. At 0.38 a part of a stretch would stand for as much of the
-prior as it has of the weight; half finds narrow maxima that 0.38 misses, and costs them up to 0.6 nats each
-time."""
+"""Steps within a part, in those that led to it."""
 
 
 class Part(NamedTuple):
-    """A shape, and what it stands for.
+    """A shape that was looked at.
 
     Attributes
     ----------
-    log_weight : float
-        Prior probability among its mechanism's shapes.
     level : int
         How many times it was parted: 0 is as it was screened.
     """
 
     curve: Curve
-    log_weight: float
     level: int = 0
 
-    @property
-    def log_factor(self) -> float:
-        """Log Bayes factor, its prior weight included."""
-        return self.log_weight + self.curve.log_bayes_factor
 
-    def parted(self, others: Sequence[Curve]) -> list[Part]:
-        """Itself and others, which share its weight; others alone where it was screened only."""
-        curves = [self.curve, *others] if self.level else others
-        log_weight = self.log_weight - math.log(len(curves))
-        return [Part(one, log_weight, self.level + 1) for one in curves]
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """Shapes of a mechanism that differ in where a stretch is alone; or a single shape.
+
+    Attributes
+    ----------
+    log_share : float
+        Log of the kind's prior probability among its mechanism's shapes.
+    parts : tuple of Part
+    area : Area, optional
+        Where the stretch may be; None for a single shape.
+    """
+
+    log_share: float
+    parts: tuple[Part, ...]
+    area: Area | None = None
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """Whose shapes they are."""
+        return self.parts[0].curve.mechanism
+
+    @cached_property
+    def log_factors(self) -> FloatArray:
+        """Log Bayes factor of each part, with the prior probability of what it stands for, (n_parts,)."""
+        heights = np.array([one.curve.log_bayes_factor for one in self.parts])
+        if self.area is not None:
+            heights = log_means(self.area, [one.curve.shape for one in self.parts], heights)
+        return self.log_share + heights
+
+    def finer(self, setting: Setting, number: int) -> list[Shape]:
+        """Shapes to compute beside a part, or with it where it was screened only."""
+        part, known = self.parts[number], {one.curve.shape for one in self.parts}
+        shape = part.curve.shape
+        around = dict.fromkeys(parts_of(self.mechanism, setting, shape, _SMALLER**part.level))
+        own = [] if part.level else [shape]
+        return own + [one for one in around if one not in known]
+
+    def parted(self, others: Mapping[int, Sequence[Curve]]) -> Kind:
+        """With others beside some parts; they alone where it was screened only."""
+        parts = list[Part]()
+        for number, one in enumerate(self.parts):
+            if number not in others:
+                parts.append(one)
+                continue
+            curves = [one.curve, *others[number]] if one.level else others[number]
+            parts += [Part(curve, one.level + 1) for curve in curves]
+        return replace(self, parts=tuple(parts))
 
 
 def refine(
@@ -81,74 +116,74 @@ def refine(
     best : float
         The most that a candidate has under another error model, in nats above nothing under this one.
     """
-    parts = screened_parts(curves)
-    while todo := leading(parts, best):
-        jobs = [(k, shape) for k in todo for shape in _finer(setting, parts, k)]
-        computed = pool.map(near, [parts[k].curve for k, _ in jobs], [shape for _, shape in jobs])
-        others = defaultdict[int, list[Curve]](list)
-        for (k, _), one in zip(jobs, computed, strict=True):
-            others[k].append(one)
-        parts = [
-            new for k, one in enumerate(parts) for new in (one.parted(others[k]) if k in todo else [one])
-        ]
-    return candidates_of(parts)
+    kinds = kinds_of(setting, curves)
+    while todo := leading(kinds, best):
+        jobs = [(k, number, shape) for k, number in todo for shape in kinds[k].finer(setting, number)]
+        known = [kinds[k].parts[number].curve for k, number, _ in jobs]
+        computed = pool.map(near, known, [shape for _, _, shape in jobs])
+        others = {k: {n: list[Curve]() for j, n in todo if j == k} for k, _ in todo}
+        for (k, number, _), one in zip(jobs, computed, strict=True):
+            others[k][number].append(one)
+        kinds = [one.parted(others[k]) if k in others else one for k, one in enumerate(kinds)]
+    return candidates_of(kinds)
 
 
-def screened_parts(curves: Sequence[Curve]) -> list[Part]:
-    """What was screened, with its prior weight."""
-    parts = list[Part]()
-    for name in dict.fromkeys(one.mechanism.id for one in curves):
-        own = [one for one in curves if one.mechanism.id == name]
-        weights = shares([one.shape for one in own])
-        parts += [Part(one, math.log(share)) for one, share in zip(own, weights, strict=True)]
-    return parts
+def kinds_of(setting: Setting, curves: Sequence[Curve]) -> list[Kind]:
+    """What was screened."""
+    found = list[Kind]()
+    for own in _by_id(curves, [one.mechanism for one in curves]):
+        log_shares = np.log(shares([one.shape for one in own]))
+        together = defaultdict[Hashable, list[int]](list)
+        for k, one in enumerate(own):
+            together[_all_but_place(one) if own[0].added.moves else k].append(k)
+        for ks in together.values():
+            area = Area.around([own[k].shape for k in ks], setting) if own[0].added.moves else None
+            share = float(np.logaddexp.reduce(log_shares[ks]))
+            found.append(Kind(share, tuple(Part(own[k]) for k in ks), area))
+    return found
 
 
-def leading(parts: Sequence[Part], best: float = -math.inf) -> list[int]:
-    """Numbers of those to part: where their mechanism has evidence and may come up to the best one.
+def leading(kinds: Sequence[Kind], best: float = -math.inf) -> list[tuple[int, int]]:
+    """Which to part, by kind and part: where their mechanism has evidence and may come up to the best one.
 
     By being parted for the first time a mechanism may gain as many nats as it has: 0.6 of that was seen, of
     drag between the dam and the sensor above it at Ryggfonn. What it may gain falls with the square of the
     steps.
     """
     height = {
-        name: float(np.logaddexp.reduce([one.log_factor for one in own])) for name, own in _by_id(parts)
+        own[0].mechanism.id: float(np.logaddexp.reduce(np.concatenate([one.log_factors for one in own])))
+        for own in _by_id(kinds, [one.mechanism for one in kinds])
     }
     least = max(max(best, *height.values()) - COUNTS, 0.0)
     return [
-        k
-        for k, one in enumerate(parts)
-        if one.level < _LEVELS
-        and (1.0 + _SMALLER ** (2 * one.level)) * (own := height[one.curve.mechanism.id]) > least
-        and one.log_factor > own + math.log(_HOLDS_MUCH)
+        (k, number)
+        for k, kind in enumerate(kinds)
+        for number, (one, factor) in enumerate(zip(kind.parts, kind.log_factors, strict=True))
+        if one.level < MOST_ROUNDS
+        and (1.0 + _SMALLER ** (2 * one.level)) * (own := height[kind.mechanism.id]) > least
+        and factor > own + math.log(STANDARD_ERROR)
     ]
 
 
-def candidates_of(parts: Sequence[Part]) -> dict[str, Candidate]:
-    """Parts by mechanism."""
-    return {
-        name: Candidate(
-            own[0].curve.mechanism,
-            tuple(one.curve for one in own),
-            np.array([one.log_weight for one in own]),
-        )
-        for name, own in _by_id(parts)
-    }
+def candidates_of(kinds: Sequence[Kind]) -> dict[str, Candidate]:
+    """Candidates of all their kinds."""
+    found = {}
+    for own in _by_id(kinds, [one.mechanism for one in kinds]):
+        curves = tuple(part.curve for one in own for part in one.parts)
+        heights = np.array([one.log_bayes_factor for one in curves])
+        log_weights = np.concatenate([one.log_factors for one in own]) - heights
+        found[own[0].mechanism.id] = Candidate(own[0].mechanism, curves, log_weights)
+    return found
 
 
-def _by_id(parts: Sequence[Part]) -> Iterable[tuple[str, list[Part]]]:
-    """The parts of each mechanism."""
-    found = defaultdict[str, list[Part]](list)
-    for one in parts:
-        found[one.curve.mechanism.id].append(one)
-    return found.items()
+def _by_id[T](all_: Sequence[T], of: Sequence[Mechanism]) -> list[list[T]]:
+    """What belongs to each mechanism."""
+    found = defaultdict[str, list[T]](list)
+    for one, mechanism in zip(all_, of, strict=True):
+        found[mechanism.id].append(one)
+    return list(found.values())
 
 
-def _finer(setting: Setting, parts: Sequence[Part], number: int) -> list[Shape]:
-    """Shapes to compute beside one, or with it where it was screened only."""
-    part = parts[number]
-    mechanism, shape = part.curve.mechanism, part.curve.shape
-    known = {one.curve.shape for one in parts if one.curve.mechanism.id == mechanism.id}
-    finer = dict.fromkeys(parts_of(mechanism, setting, shape, _SMALLER**part.level))
-    own = [] if part.level else [shape]
-    return own + [one for one in finer if one not in known]
+def _all_but_place(curve: Curve) -> Hashable:
+    """What shapes share that differ in their place alone: an opposed one's speeds are those of its place."""
+    return all_but_place(curve), None if is_opposed(curve.shape) else curve.shape.constants

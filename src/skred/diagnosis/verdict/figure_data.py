@@ -175,7 +175,7 @@ def _shapes(comparison: Comparison) -> xr.Dataset:
             shape = curve.shape
             ends = [math.nan if end is None else end for end in (shape.s_from_m, shape.s_to_m)]
             what = shape.sensor or "", shape.covariate or "", is_opposed(shape), curve is best
-            rows.append((name, *ends, *what, float(np.exp(weight)), curve.log_bayes_factor))
+            rows.append((name, *ends, *what, float(weight), curve.log_bayes_factor))
     columns: dict[str, tuple[type, dict[str, str]]] = {
         "mechanism": (str, {}),
         "s_from": (float, {"units": "m"}),
@@ -184,7 +184,7 @@ def _shapes(comparison: Comparison) -> xr.Dataset:
         "covariate": (str, {}),
         "opposed": (bool, {}),
         "best": (bool, {}),
-        "prior": (float, {"units": "1"}),
+        "log_weight": (float, _NATS),
         "log_bayes_factor": (float, _NATS),
     }
     return xr.Dataset(

@@ -188,6 +188,11 @@ class Direction:
         return replace(self, log_readings=padded[0], places=padded[1])
 
 
+def without_parts(setting: Setting, shape: Shape, steps: float) -> tuple[Shape, ...]:
+    """Finer shapes of a mechanism that has none."""
+    return ()
+
+
 @dataclass(frozen=True)
 class Added:
     """How a mechanism joins a law that leaves it out.
@@ -213,8 +218,9 @@ class Added:
     joins : callable
         Ids of the base law's mechanisms to whether it can be missing there.
     split : callable
-        Setting, shape and steps to finer shapes around it, which share its weight. Steps are 1 around a shape
-        of the screening, and less around its parts.
+        Setting, shape and steps to finer shapes around it. Steps are 1 around a shape of the screening, and
+        less around its parts. A mechanism of a stretch that has it may be anywhere between its shapes: the
+        prior of a stretch is uniform in its end and in the logarithm of its length.
     equation : callable, optional
         Shape to its term, where shapes have different ones; by default all have the mechanism's.
     """
@@ -227,8 +233,13 @@ class Added:
     needs: tuple[str, ...] = ()
     either_sign: bool = False
     joins: Callable[[tuple[str, ...]], bool] = lambda base: True
-    split: Callable[[Setting, Shape, float], tuple[Shape, ...]] = lambda setting, shape, steps: ()
+    split: Callable[[Setting, Shape, float], tuple[Shape, ...]] = without_parts
     equation: Callable[[Shape], str] | None = None
+
+    @property
+    def moves(self) -> bool:
+        """Whether it may be anywhere between its shapes."""
+        return self.bound_to is BoundTo.PLACE and self.split is not without_parts
 
     def scale_of(self, shape: Shape) -> float:
         """Scale of the prior of the coefficient of a shape."""

@@ -1,0 +1,125 @@
+"""The integral over where a stretch is: between the places that were looked at, log evidence is linear.
+
+A mechanism's prior is uniform in the end of its stretch and in the logarithm of its length. The places that
+were looked at are the corners of triangles (of intervals, where they lie on a line), and over a triangle the
+exponential of a linear function has a closed form.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.spatial import Delaunay, KDTree
+
+from skred.arrays import FloatArray
+from skred.physics.mechanisms.spec import Setting, Shape
+from skred.physics.mechanisms.stretches import ends_of
+
+_SAME = 9
+"""Decimals to which two places in a unit square are the same one: their ends were computed in two ways."""
+_POINTS = 16
+"""Of the quadrature rule on a triangle, along each axis: right to a hundredth where corners are 60 nats apart,
+and what is so far below its neighbours adds nothing."""
+
+
+class Area(NamedTuple):
+    """Where a mechanism of one kind may be: ends [m] and logarithms of lengths, from and to.
+
+    Attributes
+    ----------
+    low, high : (2,) array
+    """
+
+    low: FloatArray
+    high: FloatArray
+
+    @classmethod
+    def around(cls, shapes: list[Shape], setting: Setting) -> Area:
+        """Of shapes looked at first: it ends in the recorded part, at lengths half a step beyond theirs."""
+        at = _coordinates(shapes)
+        ends, lengths = [*setting.recorded_m, *at[:, 0]], np.sort(at[:, 1])
+        step = np.ptp(lengths) and np.diff(lengths).max()  # most are equal, and the track cuts some
+        beyond = 0.5 * (step or 1.0)
+        return cls(np.array([min(ends), lengths[0] - beyond]), np.array([max(ends), lengths[-1] + beyond]))
+
+    def shape(self, within: FloatArray) -> Shape:
+        """The stretch at a place from 0 to 1 along both axes, cut off where the track begins."""
+        last, log_length = self.low + within * (self.high - self.low)
+        return Shape(max(float(last - np.exp(log_length)), 0.0), float(last))
+
+    def within(self, shapes: list[Shape]) -> FloatArray:
+        """Places of shapes in it, (n, 2): from 0 to 1 along both axes."""
+        span = self.high - self.low
+        return np.asarray((_coordinates(shapes) - self.low) / np.where(span > 0.0, span, 1.0))
+
+
+def log_means(area: Area, shapes: list[Shape], heights: FloatArray) -> FloatArray:
+    """Log of what each shape adds to the mean of the evidence over an area.
+
+    Parameters
+    ----------
+    shapes : list of Shape
+        Those beside the area count for what lies between them and the others.
+    heights : (n,) array
+        Log evidence of each.
+
+    Returns
+    -------
+    (n,) array
+        The log of their sum is the log of the mean.
+    """
+    at = area.within(shapes)
+    places, of = np.unique(at[:, np.ptp(at, axis=0) > 10.0**-_SAME].round(_SAME), axis=0, return_inverse=True)
+    # Shapes at one place, a stretch opposed by more and by less, share it.
+    many = np.bincount(of)
+    height = np.full(len(places), -np.inf)
+    np.logaddexp.at(height, of, heights)
+    height -= np.log(many)
+    own = heights - np.log(many[of]) - height[of]
+    return np.asarray(own + _over_simplices(places, height)[of])
+
+
+def _over_simplices(places: FloatArray, heights: FloatArray) -> FloatArray:
+    """What each place adds, on a log scale, where all are different ones; (n, d) and (n,) to (n,)."""
+    d = places.shape[1]
+    if d == 0:
+        return heights
+    corners = np.array(list(product((0.0, 1.0), repeat=d)))
+    nearest = KDTree(places).query(corners)[1]  # beyond the outermost places the evidence stays as it is
+    points, of = np.vstack([places, corners]), np.append(np.arange(len(places)), nearest)
+    simplices = Delaunay(points).simplices if d > 1 else sliding_window_view(np.argsort(points[:, 0]), 2)
+    sides = points[simplices[:, 1:]] - points[simplices[:, :1]]
+    at, weights = _rule(d)
+    own, top = heights[of[simplices]], float(heights.max())
+    where = at @ points[simplices]
+    inside = ((where >= 0.0) & (where <= 1.0)).all(axis=2)
+    adds = inside * np.exp(own @ at.T - top) * weights * np.abs(np.linalg.det(sides))[:, None]
+    found = np.zeros(len(places))
+    np.add.at(found, of[simplices], adds @ at)
+    return np.asarray(np.log(np.maximum(found, np.finfo(float).tiny)) + top)
+
+
+@cache
+def _rule(d: int) -> tuple[FloatArray, FloatArray]:
+    """Points of a quadrature rule on a simplex by barycentric coordinates, (n, d + 1), and their weights.
+
+    Gauss's along each axis of a cube that has one side drawn together (Duffy, 1982, doi 10.1137/0719090).
+    """
+    at, weights = np.ones((1, 1)), np.ones(1)
+    nodes, own = np.polynomial.legendre.leggauss(_POINTS)
+    nodes, own = 0.5 * (nodes + 1.0), 0.5 * own
+    for axis in range(d):
+        inner = (nodes[:, None, None] * at).reshape(-1, axis + 1)
+        at = np.column_stack([np.repeat(1.0 - nodes, len(at)), inner])
+        weights = ((own * nodes**axis)[:, None] * weights).ravel()
+    return at, weights
+
+
+def _coordinates(shapes: list[Shape]) -> FloatArray:
+    """End [m] and logarithm of the length of each shape's stretch, (n, 2)."""
+    first, last = np.array([ends_of(one) for one in shapes]).T
+    return np.column_stack([last, np.log(last - first)])
