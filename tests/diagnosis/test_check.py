@@ -43,6 +43,7 @@ def test_one_shape_estimates_the_evidence_of_all(monkeypatch: pytest.MonkeyPatch
     assert weights.max() <= 2.0 * np.exp(-1.5 + 3.0)
 
 
+@pytest.mark.slow
 def test_clean_campaigns_are_computed_again_where_a_claim_hangs_on_them(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

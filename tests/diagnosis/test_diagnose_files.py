@@ -42,7 +42,7 @@ def test_nothing_of_an_earlier_diagnosis_is_left(few: HierarchicalProblem, tmp_p
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("with_helpers", [False, True])
+@pytest.mark.parametrize("with_helpers", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_draws_are_in_their_files(
     with_helpers: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -53,9 +53,13 @@ def test_draws_are_in_their_files(
     other.tree.attrs["name"] = "under the same errors"
     added = replace(found, finding=replace(found.finding, reference=other))
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    first, alone = tmp_path / "first", tmp_path / "alone"
+    first.mkdir()
+    alone.mkdir()
     with helpers() if with_helpers else nullcontext():
-        write_trees(added, tmp_path)
-    trees = {file.name: xr.open_datatree(file, engine="h5netcdf") for file in tmp_path.iterdir()}
+        write_trees(added, first)
+        write_trees(found, alone)
+    trees = {file.name: xr.open_datatree(file, engine="h5netcdf") for file in first.iterdir()}
     assert set(trees) == {"base.nc", "base_same_errors.nc", "augmented.nc", "diagnosis.nc"}
     assert "name" not in trees["base.nc"].attrs
     assert trees["base_same_errors.nc"].attrs["name"] == "under the same errors"
@@ -63,15 +67,13 @@ def test_draws_are_in_their_files(
     assert own < {str(name) for name in trees["augmented.nc"]["posterior"].data_vars}
     assert "added" in trees["augmented.nc"].children and "added" not in trees["base.nc"].children
     assert "posterior" not in trees["diagnosis.nc"].children
+    # What is not there is not written.
+    assert {file.name for file in alone.iterdir()} == {"base.nc", "augmented.nc", "diagnosis.nc"}
 
 
-def test_files_of_what_is_not_there_are_not_written(tmp_path: Path) -> None:
-    write_trees(gates_diagnosis(biased=True), tmp_path)
-    assert {file.name for file in tmp_path.iterdir()} == {"base.nc", "augmented.nc", "diagnosis.nc"}
-    clean = tmp_path / "clean"
-    clean.mkdir()
-    write_trees(gates_diagnosis(biased=False), clean)
-    assert {file.name for file in clean.iterdir()} == {"base.nc", "diagnosis.nc"}
+def test_draws_of_nothing_are_not_written(tmp_path: Path) -> None:
+    write_trees(gates_diagnosis(biased=False), tmp_path)
+    assert {file.name for file in tmp_path.iterdir()} == {"base.nc", "diagnosis.nc"}
 
 
 @pytest.mark.slow

@@ -397,7 +397,9 @@ def test_push_and_pull_beside_each_other_are_of_no_listed_shape(base: Base) -> N
     assert profile.log_bayes_factor > best + 2.0
 
 
-@pytest.mark.parametrize(("kind", "size"), [(0, 1.0), (1, 2.0e-3), (0, 0.0)])
+@pytest.mark.parametrize(
+    ("kind", "size"), [(0, 1.0), pytest.param(1, 2.0e-3, marks=pytest.mark.slow), (0, 0.0)]
+)
 def test_evidence_over_priors_against_climbing_under_each(base: Base, kind: int, size: float) -> None:
     """The few priors that are climbed under stand for all."""
     changed = planted(base, kind, 800.0, size) if size else base

@@ -43,6 +43,7 @@ def test_a_curve_goes_on_to_a_maximum_far_away() -> None:
     assert not found.is_cut and 0 < np.argmax(found.log_evidence) < len(found.strengths) - 1
 
 
+@pytest.mark.slow
 def test_tables_follow_the_population() -> None:
     """The population is spreads away from that of the next table; at one for all, events are nats off."""
     base = base_of(draw_trial(1374178000, kind="sparse", hidden="listed").campaign, "constant")

@@ -77,6 +77,7 @@ def test_without_an_avalanche_as_in_a_campaign_that_never_had_it() -> None:
         assert said.without_each[event] == pytest.approx(without_one(campaign, event), abs=0.5)
 
 
+@pytest.mark.slow
 def test_a_first_finding_is_judged_under_its_own_errors() -> None:
     """The base law that it is held against has its errors too, whatever the base law was calibrated under."""
     campaign = rolling(2.4e-4, n_events=8, friction=0.015)

@@ -196,6 +196,7 @@ def test_what_only_makes_up_for_a_shift_has_no_more_than_where_the_sensor_stands
     assert force.log_bayes_factor == pytest.approx(expected[1].log_bayes_factor, abs=1.0)
 
 
+@pytest.mark.slow
 def test_a_span_that_is_noted_to_end_below_a_sensor_that_its_fronts_did_not_reach() -> None:
     """As if they had come there and had not: but with its place known to 40 m all is as where it stands."""
     campaign = trial(9302, "sparse", "segment_friction", "coulomb", 10.0).campaign

@@ -137,6 +137,7 @@ def test_a_profile_that_cannot_be_is_refused(key: str, value: Any, words: str) -
         from_dict(document | {"profile": term | {key: value}})
 
 
+@pytest.mark.slow
 def test_an_avalanche_has_no_say_in_what_is_predicted_of_it(hidden: Base, added: ProfileLaw) -> None:
     """Other readings of one avalanche change its scores, and what is predicted of the others alone."""
     event, readings = 3, hidden.rows.readings

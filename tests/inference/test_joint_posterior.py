@@ -104,6 +104,7 @@ def test_slow_avalanches_that_need_a_drag_far_above_its_prior_scale(gibbs: Any) 
     assert np.abs(scores).max() < LIMIT, scores
 
 
+@pytest.mark.slow
 def test_a_wrong_integral_would_be_found(gibbs: Any) -> None:
     """An event that counts twice, and one not at all: the comparison must see as much."""
     law = load_law("constant")

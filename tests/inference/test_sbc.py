@@ -206,7 +206,7 @@ def test_small_calibration_of_m2(sbc: Any, problem: Any) -> None:
     assert truth == again[0]
     assert_array_equal(simulated.values, again[1].values)
     quantities = ["dry_friction", "turbulent_drag", sbc.LOG_LIKELIHOOD]
-    records = list(sbc.simulations(calibrator, range(8)))
+    records = list(sbc.simulations(calibrator, range(5)))
     summary = sbc.summarise(records, quantities)
     assert summary["errors"] == 0, records
     assert summary["gate_failed"] <= 2

@@ -22,8 +22,8 @@ from skred.physics.mechanisms.stretches import ends_of
 _SAME = 9
 """Decimals to which two places in a unit square are the same one: their ends were computed in two ways."""
 _POINTS = 16
-"""Of the quadrature rule on a triangle, along each axis: right to a hundredth where corners are 60 nats apart,
-and what is so far below its neighbours adds nothing."""
+"""Of the quadrature rule on a triangle, along each axis: right to a hundredth where corners are 60 nats
+apart, and what is so far below its neighbours adds nothing."""
 
 
 class Area(NamedTuple):
