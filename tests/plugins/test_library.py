@@ -162,6 +162,10 @@ WRONG = {
         "BoundTo.TRACK, added=dict(shapes=lambda s: (Shape(s_to_m=9.0),))",
         "to begin somewhere",
     ),
+    "no stretch": (
+        "BoundTo.PLACE, added=dict(shapes=lambda s: (Shape(s_from_m=9.0, s_to_m=9.0),))",
+        "begin above its end",
+    ),
     "no such sensor": ("BoundTo.SENSOR, added=dict(shapes=lambda s: (Shape(sensor='z'),))", "sensor 'z'"),
     "no covariate": (
         "BoundTo.COVARIATE, added=dict(shapes=lambda s: (Shape(covariate='z'),))",

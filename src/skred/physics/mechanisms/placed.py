@@ -137,6 +137,10 @@ def _check_shape(added: Added, shape: Shape, setting: Setting) -> None:
             )
     if shape.s_to_m is not None and shape.s_from_m is None:
         raise ValueError("expected a shape that ends somewhere to begin somewhere")
+    if named[BoundTo.PLACE] and not shape.s_from_m < shape.s_to_m:  # type: ignore[operator]
+        raise ValueError(
+            f"expected a stretch to begin above its end, found {shape.s_from_m} to {shape.s_to_m}"
+        )
     if shape.sensor is not None and shape.sensor not in setting.sensors:
         raise ValueError(f"no sensor {shape.sensor!r}")
     if shape.covariate is not None and shape.covariate not in setting.covariates:
