@@ -90,7 +90,7 @@ Differences in nats:
 
 
 def _places() -> str:
-    """What refined shapes cost, against draws of place and length."""
+    """What interpolation between refined shapes costs, against draws of place and length."""
     part = result_of("evidence_choices")["places"]
     pairs = [one for one in part["pairs"] if "drawn" in one]
     apart = np.array([one["refined"] - one["drawn"] for one in pairs])
@@ -104,9 +104,9 @@ def _places() -> str:
 ### Places
 
 `python -m benchmarks.evidence_choices places --n {len(part["pairs"])}` (commit
-{part["commit"]}): of the mechanism of a stretch that leads, the log Bayes factor over its refined shapes, as
-a comparison has it, and over draws of place and length from a continuous prior, by adaptive importance
-sampling. Both take the evidence at a shape as the diagnosis computes it. In nats: median difference
+{part["commit"]}): of the mechanism of a stretch that leads, the log Bayes factor interpolated between its
+refined shapes, as a comparison has it, and over draws of place and length from their prior, by adaptive
+importance sampling. Both take the evidence at a shape as the diagnosis computes it. In nats: median difference
 {np.median(np.abs(apart)):.2f}, the largest {np.abs(apart).max():.1f}, the mean {apart.mean():+.2f}.
 
 | pair | campaign | base law | recordings | hidden | mechanism | refined | drawn | difference |
