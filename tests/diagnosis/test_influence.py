@@ -61,6 +61,7 @@ def each_takes(campaign: Campaign, comparison: Comparison) -> FloatArray:
     return np.array([factor - without_one(campaign, event) for event in range(campaign.n_events)])
 
 
+@pytest.mark.slow
 def test_without_an_avalanche_as_in_a_campaign_that_never_had_it() -> None:
     """The gain in its density, given the others, is what it takes: by sampling, and by leaving it out."""
     # As much friction as drag: what is left of it with more drag than there is stays positive.

@@ -61,6 +61,7 @@ def test_refits_are_the_same_in_threads(monkeypatch: pytest.MonkeyPatch, calibra
     assert found[0].mcse == found[1].mcse
 
 
+@pytest.mark.slow
 def test_the_stated_error_is_that_of_repeated_refits(calibration: Any) -> None:
     """Of the sum over three avalanches, by fourteen seeds."""
     model, step = calibration.model, calibration.step

@@ -59,6 +59,7 @@ def test_one_missing_column_by_regression() -> None:
     assert_allclose(covariance, variance, rtol=1e-7)
 
 
+@pytest.mark.slow
 def test_simulated_moments_are_recovered() -> None:
     values, not_reached = campaign(500, missing=0.1)
     assert not_reached.sum() > 100
