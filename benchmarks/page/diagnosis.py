@@ -107,7 +107,8 @@ def _places() -> str:
 {part["commit"]}): of the mechanism of a stretch that leads, the log Bayes factor interpolated between its
 refined shapes, as a comparison has it, and over draws of place and length from their prior, by adaptive
 importance sampling. Both take the evidence at a shape as the diagnosis computes it. In nats: median
-difference {np.median(np.abs(apart)):.2f}, the largest {np.abs(apart).max():.1f}, the mean {apart.mean():+.2f}.
+difference {np.median(np.abs(apart)):.2f}, the largest {np.abs(apart).max():.1f}, the mean
+{apart.mean():+.2f}.
 
 | pair | campaign | base law | recordings | hidden | mechanism | refined | drawn | difference |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
