@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from skred.diagnosis.compare.over_places import Area, log_means
+from skred.diagnosis.compare.over_places import Area, OverPlaces, over_places
 from skred.physics.mechanisms.spec import Shape
 
 SETTING: Any = SimpleNamespace(recorded_m=(300.0, 900.0))
@@ -22,7 +22,10 @@ def rows(*lengths: float) -> list[Shape]:
 
 def mean_over(area: Area, height: Any, shapes: list[Shape]) -> float:
     heights = np.array([height(*one) for one in area.within(shapes)])
-    return float(np.logaddexp.reduce(log_means(area, shapes, heights)))
+    found = over_places(area, shapes, heights)
+    mean = float(np.logaddexp.reduce(found.log_means))
+    assert np.logaddexp.reduce(found.log_weights + heights) == pytest.approx(mean)
+    return mean
 
 
 @pytest.mark.parametrize("lengths", [(80.0,), (80.0, 200.0)])
@@ -68,8 +71,8 @@ def test_shapes_at_one_place_share_it() -> None:
     shapes = rows(80.0, 200.0)
     area = Area.around(shapes, SETTING)
     heights = np.zeros(len(shapes))
-    alone = log_means(area, shapes, heights)
-    more = log_means(area, [*shapes, shapes[3]], np.append(heights, np.log(3.0)))
+    alone = over_places(area, shapes, heights).log_means
+    more = over_places(area, [*shapes, shapes[3]], np.append(heights, np.log(3.0))).log_means
     shared = np.logaddexp(more[3], more[-1])
     assert more[-1] - more[3] == pytest.approx(np.log(3.0))
     assert alone[3] < shared < alone[3] + np.log(2.0)  # of 1 and 3, and less than that between it and others
@@ -79,9 +82,24 @@ def test_a_place_that_is_far_below_all_others_adds_nothing() -> None:
     shapes = rows(80.0, 200.0)
     area = Area.around(shapes, SETTING)
     heights = np.where(np.arange(len(shapes)) == 4, -1e3, 50.0)
-    found = log_means(area, shapes, heights)
-    assert np.isfinite(found).all() and found[4] < 45.0
-    assert 48.0 < np.logaddexp.reduce(found) < 50.0
+    found: OverPlaces = over_places(area, shapes, heights)
+    assert np.isfinite(found).all() and found.log_means[4] < 45.0
+    assert 48.0 < np.logaddexp.reduce(found.log_means) < 50.0
+
+
+def test_weights_stay_near_the_truth_where_the_evidence_becomes_another_one() -> None:
+    """Without some avalanches a peak is lower and wider."""
+
+    def height(end: float, length: float, nats: float) -> float:
+        return nats - nats * ((end - 0.5) ** 2 + (length - 0.5) ** 2)
+
+    near = rows(60.0, 80.0, 98.0, 120.0, 155.0, 200.0, 260.0)
+    shapes = [*near, *(Shape(one.s_from_m + 50.0, one.s_to_m + 50.0) for one in near)]  # type: ignore[operator]
+    area = Area.around(rows(80.0, 120.0, 200.0), SETTING)
+    many, few = (np.array([height(*at, nats) for at in area.within(shapes)]) for nats in (60.0, 10.0))
+    weights = over_places(area, shapes, many).log_weights
+    exact = np.logaddexp.reduce(over_places(area, shapes, few).log_means)
+    assert np.logaddexp.reduce(weights + few) == pytest.approx(exact, abs=0.5)
 
 
 def test_what_may_be_is_the_recorded_part_and_somewhat_longer_or_shorter() -> None:

@@ -75,8 +75,8 @@ class Candidate:
     curves : tuple of Curve
         One for each shape.
     log_weights : (n_curves,) array
-        What each shape's evidence counts for: its prior probability; of a place that of all places for which
-        it stands, by how their evidence is to its own.
+        What each shape's evidence counts for: its prior probability; of a place that of its part of all
+        places, times one number for all that makes their sum the mean over what lies between.
     correction : float
         What many more quadrature points, and importance sampling over the population, change along the best
         curves, in nats; 0 where not looked at.

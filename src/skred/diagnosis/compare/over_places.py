@@ -57,8 +57,24 @@ class Area(NamedTuple):
         return np.asarray((_coordinates(shapes) - self.low) / np.where(span > 0.0, span, 1.0))
 
 
-def log_means(area: Area, shapes: list[Shape], heights: FloatArray) -> FloatArray:
-    """Log of what each shape adds to the mean of the evidence over an area.
+class OverPlaces(NamedTuple):
+    """The mean of the evidence over an area, by the shapes that were looked at.
+
+    Attributes
+    ----------
+    log_means : (n,) array
+        Log of what each shape adds to the mean.
+    log_weights : (n,) array
+        Log of each shape's part of the area, times one number for all that makes them give the same mean:
+        weights that stay near the truth where the evidence becomes another one.
+    """
+
+    log_means: FloatArray
+    log_weights: FloatArray
+
+
+def over_places(area: Area, shapes: list[Shape], heights: FloatArray) -> OverPlaces:
+    """The mean of the evidence over an area.
 
     Parameters
     ----------
@@ -66,11 +82,6 @@ def log_means(area: Area, shapes: list[Shape], heights: FloatArray) -> FloatArra
         Those beside the area count for what lies between them and the others.
     heights : (n,) array
         Log evidence of each.
-
-    Returns
-    -------
-    (n,) array
-        The log of their sum is the log of the mean.
     """
     at = area.within(shapes)
     places, of = np.unique(at[:, np.ptp(at, axis=0) > 10.0**-_SAME].round(_SAME), axis=0, return_inverse=True)
@@ -79,15 +90,18 @@ def log_means(area: Area, shapes: list[Shape], heights: FloatArray) -> FloatArra
     height = np.full(len(places), -np.inf)
     np.logaddexp.at(height, of, heights)
     height -= np.log(many)
-    own = heights - np.log(many[of]) - height[of]
-    return np.asarray(own + _over_simplices(places, height)[of])
+    log_means, log_parts = _over_simplices(places, height)
+    own = heights - np.log(many[of]) - height[of] + log_means[of]
+    log_weights = log_parts[of] - np.log(many[of])
+    same = np.logaddexp.reduce(own) - np.logaddexp.reduce(log_weights + heights)
+    return OverPlaces(own, log_weights + same)
 
 
-def _over_simplices(places: FloatArray, heights: FloatArray) -> FloatArray:
-    """What each place adds, on a log scale, where all are different ones; (n, d) and (n,) to (n,)."""
+def _over_simplices(places: FloatArray, heights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Logs of what each place adds to the mean and of its part, all different; (n, d), (n,) to (n,), (n,)."""
     d = places.shape[1]
     if d == 0:
-        return heights
+        return heights, np.zeros(1)
     corners = np.array(list(product((0.0, 1.0), repeat=d)))
     nearest = KDTree(places).query(corners)[1]  # beyond the outermost places the evidence stays as it is
     points, of = np.vstack([places, corners]), np.append(np.arange(len(places)), nearest)
@@ -97,10 +111,12 @@ def _over_simplices(places: FloatArray, heights: FloatArray) -> FloatArray:
     own, top = heights[of[simplices]], float(heights.max())
     where = at @ points[simplices]
     inside = ((where >= 0.0) & (where <= 1.0)).all(axis=2)
-    adds = inside * np.exp(own @ at.T - top) * weights * np.abs(np.linalg.det(sides))[:, None]
-    found = np.zeros(len(places))
-    np.add.at(found, of[simplices], adds @ at)
-    return np.asarray(np.log(np.maximum(found, np.finfo(float).tiny)) + top)
+    parts = inside * weights * np.abs(np.linalg.det(sides))[:, None]
+    found = np.zeros((2, len(places)))
+    np.add.at(found[0], of[simplices], (parts * np.exp(own @ at.T - top)) @ at)
+    np.add.at(found[1], of[simplices], parts @ at)
+    logs = np.log(np.maximum(found, np.finfo(float).tiny))
+    return logs[0] + top, logs[1]
 
 
 @cache

@@ -21,7 +21,7 @@ import numpy as np
 
 from skred.arrays import FloatArray
 from skred.diagnosis.compare.candidate import Candidate, all_but_place
-from skred.diagnosis.compare.over_places import Area, log_means
+from skred.diagnosis.compare.over_places import Area, OverPlaces, over_places
 from skred.diagnosis.evidence.coefficient import Curve
 from skred.diagnosis.evidence.tolerance import COUNTS, MOST_ROUNDS, STANDARD_ERROR
 from skred.physics.mechanisms.placed import parts_of
@@ -69,12 +69,21 @@ class Kind:
         return self.parts[0].curve.mechanism
 
     @cached_property
+    def _over(self) -> OverPlaces:
+        heights = np.array([one.curve.log_bayes_factor for one in self.parts])
+        if self.area is None:
+            return OverPlaces(heights, np.zeros(1))
+        return over_places(self.area, [one.curve.shape for one in self.parts], heights)
+
+    @property
     def log_factors(self) -> FloatArray:
         """Log Bayes factor of each part, with the prior probability of what it stands for, (n_parts,)."""
-        heights = np.array([one.curve.log_bayes_factor for one in self.parts])
-        if self.area is not None:
-            heights = log_means(self.area, [one.curve.shape for one in self.parts], heights)
-        return self.log_share + heights
+        return self.log_share + self._over.log_means
+
+    @property
+    def log_weights(self) -> FloatArray:
+        """What each part's evidence counts for, (n_parts,)."""
+        return self.log_share + self._over.log_weights
 
     def finer(self, setting: Setting, number: int) -> list[Shape]:
         """Shapes to compute beside a part, or with it where it was screened only."""
@@ -170,8 +179,7 @@ def candidates_of(kinds: Sequence[Kind]) -> dict[str, Candidate]:
     found = {}
     for own in _by_id(kinds, [one.mechanism for one in kinds]):
         curves = tuple(part.curve for one in own for part in one.parts)
-        heights = np.array([one.log_bayes_factor for one in curves])
-        log_weights = np.concatenate([one.log_factors for one in own]) - heights
+        log_weights = np.concatenate([one.log_weights for one in own])
         found[own[0].mechanism.id] = Candidate(own[0].mechanism, curves, log_weights)
     return found
 
