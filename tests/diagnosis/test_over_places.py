@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from skred.diagnosis.compare.over_places import Area, OverPlaces, over_places
+from skred.diagnosis.compare.over_places import Area, over_places
 from skred.physics.mechanisms.spec import Shape
 
 SETTING: Any = SimpleNamespace(recorded_m=(300.0, 900.0))
@@ -82,7 +82,7 @@ def test_a_place_that_is_far_below_all_others_adds_nothing() -> None:
     shapes = rows(80.0, 200.0)
     area = Area.around(shapes, SETTING)
     heights = np.where(np.arange(len(shapes)) == 4, -1e3, 50.0)
-    found: OverPlaces = over_places(area, shapes, heights)
+    found = over_places(area, shapes, heights)
     assert np.isfinite(found).all() and found.log_means[4] < 45.0
     assert 48.0 < np.logaddexp.reduce(found.log_means) < 50.0
 

@@ -1,8 +1,8 @@
-"""The integral over where a stretch is: between the places that were looked at, log evidence is linear.
+"""The mean of the evidence over where a stretch is: linear, on a log scale, between the places looked at.
 
 A mechanism's prior is uniform in the end of its stretch and in the logarithm of its length. The places that
-were looked at are the corners of triangles (of intervals, where they lie on a line), and over a triangle the
-exponential of a linear function has a closed form.
+were looked at are corners of triangles, or of intervals where they lie on a line, and over each of these a
+rule of quadrature sums the evidence.
 """
 
 from __future__ import annotations

@@ -140,7 +140,7 @@ def refine(
 def kinds_of(setting: Setting, curves: Sequence[Curve]) -> list[Kind]:
     """What was screened."""
     found = list[Kind]()
-    for own in _by_id(curves, [one.mechanism for one in curves]):
+    for own in _by_id(curves):
         log_shares = np.log(shares([one.shape for one in own]))
         together = defaultdict[Hashable, list[int]](list)
         for k, one in enumerate(own):
@@ -161,7 +161,7 @@ def leading(kinds: Sequence[Kind], best: float = -math.inf) -> list[tuple[int, i
     """
     height = {
         own[0].mechanism.id: float(np.logaddexp.reduce(np.concatenate([one.log_factors for one in own])))
-        for own in _by_id(kinds, [one.mechanism for one in kinds])
+        for own in _by_id(kinds)
     }
     least = max(max(best, *height.values()) - COUNTS, 0.0)
     return [
@@ -177,18 +177,18 @@ def leading(kinds: Sequence[Kind], best: float = -math.inf) -> list[tuple[int, i
 def candidates_of(kinds: Sequence[Kind]) -> dict[str, Candidate]:
     """Candidates of all their kinds."""
     found = {}
-    for own in _by_id(kinds, [one.mechanism for one in kinds]):
+    for own in _by_id(kinds):
         curves = tuple(part.curve for one in own for part in one.parts)
         log_weights = np.concatenate([one.log_weights for one in own])
         found[own[0].mechanism.id] = Candidate(own[0].mechanism, curves, log_weights)
     return found
 
 
-def _by_id[T](all_: Sequence[T], of: Sequence[Mechanism]) -> list[list[T]]:
-    """What belongs to each mechanism."""
+def _by_id[T: (Curve, Kind)](every: Sequence[T]) -> list[list[T]]:
+    """Those of each mechanism."""
     found = defaultdict[str, list[T]](list)
-    for one, mechanism in zip(all_, of, strict=True):
-        found[mechanism.id].append(one)
+    for one in every:
+        found[one.mechanism.id].append(one)
     return list(found.values())
 
 
