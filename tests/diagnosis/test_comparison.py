@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
+from numpy.testing import assert_allclose
 from scipy.stats import qmc
 
 import skred.diagnosis.evidence.refit as refits
@@ -24,7 +25,7 @@ from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at, curve_ne
 from skred.diagnosis.evidence.event_quadrature import FINE, FIRST, SCREENING, USUAL
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.refit import Rounds, refit
-from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING
+from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING, STANDARD_ERROR
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Direction, Shape
@@ -133,6 +134,17 @@ def test_what_holds_much_of_its_mechanisms_evidence_is_parted() -> None:
     fell = kind.parted({0: [made("segment_drag", 0.0, 2.0), made("segment_drag", 10.0, 2.0)]})
     assert [one.level for one in fell.parts] == [1, 1, 0, 0, 0, 0]
     assert leading([fell]) == [(0, 2), (0, 4)]
+
+
+def test_a_place_has_what_it_adds_to_the_mean_and_not_the_wide_part_around_it() -> None:
+    """A peak among places close to each other, beside a lonely one that stands for most of the track."""
+    near = [made("segment_drag", 100.0 + 10.0 * k, 10.0 - 0.5 * k**2) for k in range(-4, 5)]
+    kinds = places_of(*near, made("segment_drag", 400.0, 8.0))
+    (candidate,) = candidates_of(kinds).values()
+    assert_allclose(candidate.log_factors, kinds[0].log_factors)
+    by_weight = candidate.log_weights + np.array([one.log_bayes_factor for one in candidate.curves])
+    assert np.logaddexp.reduce(by_weight) == pytest.approx(candidate.alone)
+    assert by_weight.argmax() != candidate.log_factors.argmax() == 4
 
 
 def test_only_mechanisms_that_may_come_up_to_the_best_are_parted() -> None:
@@ -259,6 +271,7 @@ def test_a_place_is_parted_where_one_part_holds_most(
     heights = [peaked(area.shape(at), width_m) for at in qmc.Sobol(2, rng=0).random(1 << 14)]
     exact = np.logaddexp.reduce(heights) - np.log(len(heights)) + as_high_as_nothing()
     assert exact - error < candidate.log_bayes_factor < exact + 0.1
+    assert candidate.shape_weights.max() < 1.5 * STANDARD_ERROR
 
 
 def as_high_as_nothing() -> float:

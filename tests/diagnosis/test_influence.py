@@ -154,20 +154,26 @@ def test_a_rival_is_what_is_most_probable_and_not_tied() -> None:
     assert influence(comparison, DRAG.id, said.without_each, ENOUGH, ["viscous_drag"]).rival is None
 
 
-@pytest.mark.parametrize(("whole", "fewest"), [(2.5, (4,)), (4.0, (1, 4)), (5.6, (1, 2, 4)), (8.0, None)])
+@pytest.mark.parametrize(
+    ("whole", "fewest", "against"),
+    [
+        (2.5, (4,), 0.1), (4.0, (1, 4), 0.1), (5.6, (1, 2, 4), 0.1), (8.0, None, 0.1), (5.2, (1, 2, 4), 2.0),
+        (2.5, (4,), 2.0), (-0.1, (4,), 0.1),
+    ],
+)  # fmt: skip
 def test_the_fewest_avalanches_without_which_a_rival_leads(
-    whole: float, fewest: tuple[int, ...] | None
+    whole: float, fewest: tuple[int, ...] | None, against: float
 ) -> None:
     """What each takes of both adds up here: of the difference 3, 2 and 1 nats, and others against it."""
     own = np.array([1.0, 4.0, 2.0, 1.0, 3.0, 0.0, 0.0, 1.0, 0.0])
-    other = own - np.array([-0.1, 2.0, 1.0, -0.2, 3.0, -0.3, 0.0, 0.0, -0.1])
+    other = own - np.array([-against, 2.0, 1.0, -against, 3.0, -against, 0.0, 0.0, -against])
 
     def takes(each: FloatArray) -> Callable[[Part], float]:
         return lambda part: float(100.0 + each[part.kept].sum())
 
     with ThreadPoolExecutor(1) as pool:
         change = Change(takes(own), pool)
-        margin = Margin(whole, np.argsort(other - own), change, Change(takes(other), pool))
+        margin = Margin(whole, own - other, change, Change(takes(other), pool))
         found = margin.fewest()
     if fewest is None:
         assert found is None
@@ -175,6 +181,17 @@ def test_the_fewest_avalanches_without_which_a_rival_leads(
     assert found is not None
     assert tuple(np.flatnonzero(found[0])) == fewest
     assert found[1] == pytest.approx(whole - (own - other)[list(fewest)].sum()) and found[1] < 0.0
+
+
+def test_one_avalanche_among_many_that_speak_against_the_answer_is_found() -> None:
+    """Of the third that take most all but one speak against it: without all of them it would stand."""
+    gains = np.array([3.0] + [-0.9] * 8)
+    with ThreadPoolExecutor(1) as pool:
+        found = Margin(2.5, gains, Change(lambda part: float(gains[part.kept].sum()), pool)).fewest()
+        none = Margin(2.5, -np.abs(gains), Change(lambda part: float(part.kept.sum()), pool)).fewest()
+    assert found is not None and tuple(np.flatnonzero(found[0])) == (0,)
+    assert found[1] == pytest.approx(-0.5)
+    assert none is None
 
 
 def test_readings_are_left_out_by_sensor_and_kind() -> None:

@@ -10,6 +10,7 @@ import pytest
 from scipy.stats import qmc
 
 from skred.diagnosis.compare.over_places import Area, over_places
+from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.spec import Shape
 
 SETTING: Any = SimpleNamespace(recorded_m=(300.0, 900.0))
@@ -109,5 +110,20 @@ def test_what_may_be_is_the_recorded_part_and_somewhat_longer_or_shorter() -> No
     assert first.s_from_m == pytest.approx(300.0 - 80.0 * np.sqrt(80.0 / 200.0))
     assert last.s_from_m == pytest.approx(900.0 - 200.0 * np.sqrt(200.0 / 80.0))
     # Stretches that the track's beginning cuts off are no lengths of their own.
-    cut = [*rows(80.0, 200.0), Shape(0.0, 190.0), Shape(0.0, 150.0)]
-    assert Area.around(cut, SETTING).high[1] == pytest.approx(area.high[1], abs=0.3)
+    cut = [*rows(80.0, 200.0), Shape(0.0, 60.0), Shape(0.0, 150.0)]
+    assert Area.around(cut, SETTING).low[1] == pytest.approx(area.low[1])
+    assert Area.around(cut, SETTING).high[1] == pytest.approx(area.high[1])
+
+
+@pytest.mark.parametrize("recorded_m", [(199.0, 1187.42), (200.0, 1190.0), (113.0, 1486.5)])
+def test_lengths_that_rounding_alone_tells_apart_are_one(recorded_m: tuple[float, float]) -> None:
+    """All obstacles are as long: only where they stand is integrated over."""
+    added = mechanisms()["obstacle"].added
+    assert added is not None
+    setting: Any = SimpleNamespace(recorded_m=recorded_m, terrain=SimpleNamespace(length_m=1900.0))
+    shapes = [one for one in added.shapes(setting) if one.constants == (("J/gh [1]", 1.0),)]
+    area = Area.around(shapes, setting)
+    assert np.ptp([area.low[1], area.high[1]]) == pytest.approx(1.0)
+    heights = np.array([-0.5 * ((one.place_m - 900.0) / 100.0) ** 2 for one in shapes])  # type: ignore[operator]
+    exact = np.log(100.0 * np.sqrt(2.0 * np.pi) / (area.high[0] - area.low[0]))
+    assert np.logaddexp.reduce(over_places(area, shapes, heights).log_means) == pytest.approx(exact, abs=0.05)

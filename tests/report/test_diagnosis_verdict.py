@@ -46,7 +46,7 @@ def uncertain_place():
         for k, (one, top) in enumerate(zip(curves, tops, strict=True))
     ]
     weights = np.full(len(curves), -np.log(len(curves)))
-    candidate = replace(step.candidate, curves=tuple(curves), log_weights=weights)
+    candidate = replace(step.candidate, curves=tuple(curves), log_weights=weights, log_between=0.0)
     under = replace(
         step.comparison.under_each[0],
         candidates=step.comparison.under_each[0].candidates | {candidate.mechanism.id: candidate},

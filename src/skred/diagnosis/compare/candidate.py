@@ -76,7 +76,8 @@ class Candidate:
         One for each shape.
     log_weights : (n_curves,) array
         What each shape's evidence counts for: its prior probability; of a place that of its part of all
-        places, times one number for all that makes their sum the mean over what lies between.
+        places, times one number for all that makes their sum the mean over what lies between. It stays near
+        the truth where the evidence becomes another one.
     correction : float
         What many more quadrature points, and importance sampling over the population, change along the best
         curves, in nats; 0 where not looked at.
@@ -93,6 +94,8 @@ class Candidate:
     strength_with_places : Strength or None
         As `strength`, the shifts of such sensors fitted together with it; None where there are none, or where
         it would be below nil.
+    log_between : (n_curves,) array or float
+        Log of what each place adds to that mean, over what it adds by its weight.
     """
 
     mechanism: Mechanism
@@ -105,11 +108,12 @@ class Candidate:
     looked: tuple[Looked, ...] = ()
     of_places: float = 0.0
     strength_with_places: Strength | None = None
+    log_between: FloatArray | float = 0.0
 
     @property
     def log_factors(self) -> FloatArray:
-        """Log Bayes factor of each shape, its weight included."""
-        return self.log_weights + np.array([one.log_bayes_factor for one in self.curves])
+        """Log of what each shape adds to the Bayes factor, with what lies between it and others."""
+        return self.log_weights + np.array([one.log_bayes_factor for one in self.curves]) + self.log_between
 
     @property
     def alone(self) -> float:

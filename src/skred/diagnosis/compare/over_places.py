@@ -20,7 +20,7 @@ from skred.physics.mechanisms.spec import Setting, Shape
 from skred.physics.mechanisms.stretches import ends_of
 
 _SAME = 9
-"""Decimals to which two places in a unit square are the same one: their ends were computed in two ways."""
+"""Decimals to which two places in a unit square, or two lengths, are the same: computed in two ways."""
 _POINTS = 16
 """Of the quadrature rule on a triangle, along each axis: right to a hundredth where corners are 60 nats
 apart, and what is so far below its neighbours adds nothing."""
@@ -41,9 +41,11 @@ class Area(NamedTuple):
     def around(cls, shapes: list[Shape], setting: Setting) -> Area:
         """Of shapes looked at first: it ends in the recorded part, at lengths half a step beyond theirs."""
         at = _coordinates(shapes)
-        ends, lengths = [*setting.recorded_m, *at[:, 0]], np.sort(at[:, 1])
-        step = np.ptp(lengths) and np.diff(lengths).max()  # most are equal, and the track cuts some
-        beyond = 0.5 * (step or 1.0)
+        ends, longest = [*setting.recorded_m, *at[:, 0]], at[:, 1].max()
+        # A stretch that the track's beginning cuts off is no length that was chosen, but for the longest.
+        whole = np.array([ends_of(one)[0] > 0.0 for one in shapes]) | (at[:, 1] == longest)
+        lengths = np.unique(at[whole, 1].round(_SAME))
+        beyond = 0.5 * (np.diff(lengths).max() if len(lengths) > 1 else 1.0)
         return cls(np.array([min(ends), lengths[0] - beyond]), np.array([max(ends), lengths[-1] + beyond]))
 
     def shape(self, within: FloatArray) -> Shape:
@@ -103,7 +105,7 @@ def _over_simplices(places: FloatArray, heights: FloatArray) -> tuple[FloatArray
     if d == 0:
         return heights, np.zeros(1)
     corners = np.array(list(product((0.0, 1.0), repeat=d)))
-    nearest = KDTree(places).query(corners)[1]  # beyond the outermost places the evidence stays as it is
+    nearest = KDTree(places).query(corners)[1]  # a corner of what may be has what is nearest to it
     points, of = np.vstack([places, corners]), np.append(np.arange(len(places)), nearest)
     simplices = Delaunay(points).simplices if d > 1 else sliding_window_view(np.argsort(points[:, 0]), 2)
     sides = points[simplices[:, 1:]] - points[simplices[:, :1]]

@@ -87,11 +87,11 @@ class Kind:
 
     def finer(self, setting: Setting, number: int) -> list[Shape]:
         """Shapes to compute beside a part, or with it where it was screened only."""
-        part, known = self.parts[number], {one.curve.shape for one in self.parts}
+        part, known = self.parts[number], {_known_by(one.curve.shape) for one in self.parts}
         shape = part.curve.shape
-        around = dict.fromkeys(parts_of(self.mechanism, setting, shape, _SMALLER**part.level))
+        around = parts_of(self.mechanism, setting, shape, _SMALLER**part.level)
         own = [] if part.level else [shape]
-        return own + [one for one in around if one not in known]
+        return own + [one for one in around if _known_by(one) not in known]
 
     def parted(self, others: Mapping[int, Sequence[Curve]]) -> Kind:
         """With others beside some parts; they alone where it was screened only."""
@@ -127,7 +127,8 @@ def refine(
     """
     kinds = kinds_of(setting, curves)
     while todo := leading(kinds, best):
-        jobs = [(k, number, shape) for k, number in todo for shape in kinds[k].finer(setting, number)]
+        finer = [(k, number, shape) for k, number in todo for shape in kinds[k].finer(setting, number)]
+        jobs = list({(k, _known_by(shape)): (k, number, shape) for k, number, shape in finer}.values())
         known = [kinds[k].parts[number].curve for k, number, _ in jobs]
         computed = pool.map(near, known, [shape for _, _, shape in jobs])
         others = {k: {n: list[Curve]() for j, n in todo if j == k} for k, _ in todo}
@@ -179,8 +180,13 @@ def candidates_of(kinds: Sequence[Kind]) -> dict[str, Candidate]:
     found = {}
     for own in _by_id(kinds):
         curves = tuple(part.curve for one in own for part in one.parts)
-        log_weights = np.concatenate([one.log_weights for one in own])
-        found[own[0].mechanism.id] = Candidate(own[0].mechanism, curves, log_weights)
+        log_weights, log_factors = (
+            np.concatenate(each)
+            for each in zip(*((one.log_weights, one.log_factors) for one in own), strict=True)
+        )
+        by_weight = log_weights + np.array([one.log_bayes_factor for one in curves])
+        between = log_factors - by_weight
+        found[own[0].mechanism.id] = Candidate(own[0].mechanism, curves, log_weights, log_between=between)
     return found
 
 
@@ -190,6 +196,12 @@ def _by_id[T: (Curve, Kind)](every: Sequence[T]) -> list[list[T]]:
     for one in every:
         found[one.mechanism.id].append(one)
     return list(found.values())
+
+
+def _known_by(shape: Shape) -> Shape:
+    """A shape with its ends to the millimetre: they are computed in more than one way."""
+    first, last = (None if end is None else round(end, 3) for end in (shape.s_from_m, shape.s_to_m))
+    return replace(shape, s_from_m=first, s_to_m=last)
 
 
 def _all_but_place(curve: Curve) -> Hashable:

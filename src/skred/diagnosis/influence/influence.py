@@ -170,13 +170,13 @@ def influence(
     parts = [Part(np.ones(len(gained), dtype=bool), chosen) for _, _, chosen in kinds]
     with worker_pool() as pool, ThreadPoolExecutor(2) as waiting:
         own = Change(again, pool)
-        margins = [Margin(stated - needed, np.argsort(-gained), own)]
+        margins = [Margin(stated - needed, gained, own)]
         name = None if answer == UNLISTED else _rival(comparison, under_errors, {answer, *tied})
         if name is not None:
             other = under_errors.candidates[name]
-            order = np.argsort(_gained(base, other.best) - gained)
+            taken = gained - _gained(base, other.best)
             change = Change(partial(_by_mechanism, other, base), pool)
-            margins.append(Margin(_ahead(comparison, answer, name), order, own, change))
+            margins.append(Margin(_ahead(comparison, answer, name), taken, own, change))
         third, *without = (needed + margins[0].left_by([margins[0].without_third, *parts])).tolist()
         few = list(waiting.map(Margin.fewest, margins))
         least = min((one for one in few if one is not None), key=lambda one: one[0].sum(), default=None)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from skred.arrays import BoolArray, FloatArray, IntArray
+from skred.arrays import BoolArray, FloatArray
 from skred.diagnosis.influence.part import Part
 
 MOST = 1.0 / 3.0
@@ -52,15 +52,15 @@ class Margin:
     ----------
     whole : float
         By all recordings.
-    order : (n_events,) array
-        Avalanches, those first that take most of it.
+    gains : (n_events,) array
+        What each avalanche takes of it by itself, nearly: in their order they are left out.
     own : Change
     other : Change, optional
         Of what the answer is compared with; nothing if None.
     """
 
     whole: float
-    order: IntArray
+    gains: FloatArray
     own: Change
     other: Change | None = None
 
@@ -71,7 +71,7 @@ class Margin:
 
     @property
     def _third(self) -> int:
-        return int(MOST * len(self.order))
+        return int(MOST * len(self.gains))
 
     def left_by(self, parts: Sequence[Part]) -> FloatArray:
         """By parts of the recordings."""
@@ -80,7 +80,7 @@ class Margin:
 
     def without_first(self, many: int) -> Part:
         """The recordings without the avalanches that take most of it."""
-        return Part(~np.isin(np.arange(len(self.order)), self.order[:many]))
+        return Part(~np.isin(np.arange(len(self.gains)), np.argsort(-self.gains)[:many]))
 
     def fewest(self) -> tuple[BoolArray, float] | None:
         """The fewest avalanches without which none is left, and what is; None: more than a third."""
@@ -88,8 +88,9 @@ class Margin:
         def left(many: int) -> float:
             return float(self.left_by([self.without_first(many)])[0])
 
-        if left(self._third) >= 0.0:
+        most = min(self._third, int(np.count_nonzero(self.gains > 0.0)))
+        if most == 0 or left(most) >= 0.0:
             return None
-        # Each one more leaves less: their number is found by halving.
-        many = 1 + bisect_left(range(1, self._third), True, key=lambda so_many: left(so_many) < 0.0)
+        # Each one more that speaks for the answer leaves less: their number is found by halving.
+        many = 1 + bisect_left(range(1, most), True, key=lambda so_many: left(so_many) < 0.0)
         return ~self.without_first(many).kept, left(many)

@@ -171,11 +171,11 @@ def _shapes(comparison: Comparison) -> xr.Dataset:
     rows: list[tuple[Any, ...]] = []
     for name, candidate in candidates_of(comparison).items():
         best = candidate.best
-        for curve, weight in zip(candidate.curves, candidate.log_weights, strict=True):
+        for curve, factor in zip(candidate.curves, candidate.log_factors, strict=True):
             shape = curve.shape
             ends = [math.nan if end is None else end for end in (shape.s_from_m, shape.s_to_m)]
             what = shape.sensor or "", shape.covariate or "", is_opposed(shape), curve is best
-            rows.append((name, *ends, *what, float(weight), curve.log_bayes_factor))
+            rows.append((name, *ends, *what, float(factor - curve.log_bayes_factor), curve.log_bayes_factor))
     columns: dict[str, tuple[type, dict[str, str]]] = {
         "mechanism": (str, {}),
         "s_from": (float, {"units": "m"}),
