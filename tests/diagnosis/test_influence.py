@@ -22,11 +22,12 @@ from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors, with_errors
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.compare.ways import Looked
-from skred.diagnosis.evidence.coefficient import Curve, curve_near
+from skred.diagnosis.evidence.coefficient import Curve, curve_at, curve_near
 from skred.diagnosis.evidence.prior_odds import prior_odds
+from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
 from skred.diagnosis.influence.influence import FloatArray, influence
 from skred.diagnosis.influence.margin import MOST, Change, Margin
-from skred.diagnosis.influence.part import Part
+from skred.diagnosis.influence.part import Part, kinds_of
 from skred.diagnosis.predict.held_out import gained_by, held_out
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.inference.calibrate import calibrate
@@ -202,6 +203,27 @@ def test_readings_are_left_out_by_sensor_and_kind() -> None:
     said = influence(drag_in(replace(campaign, values=values))[0], DRAG.id, np.zeros(8), ENOUGH)
     kinds = [(one.kind, one.sensor, one.n) for one in said.readings]
     assert kinds == [("zeros", None, 1), *(("sensor", f"s{k}", 8) for k in range(6))]
+
+
+def test_refits_at_the_best_strength_of_a_shape_have_nearly_what_all_strengths_give() -> None:
+    """Without one sensor after the other, over stretches of which some are nearly as good as the best one."""
+    base = base_of(rolling(2.4e-4, n_events=8), "coulomb")
+    drag = mechanisms()["segment_drag"]
+    assert drag.added is not None
+    looked = [curve(base, placed(drag, base.setting, one)) for one in drag.added.shapes(base.setting)]
+    found = sorted(looked, key=lambda one: -one.log_bayes_factor)[:6]
+    curves = tuple(curve_near(base, one, one.shape) for one in found)
+    candidates = {drag.id: Candidate(drag, curves, np.full(6, -np.log(6.0)))}
+    comparison = Comparison(
+        (ComparisonUnderErrors("robust", base, candidates, []),), prior_odds([drag]), {"robust": 0.0}
+    )
+    said = influence(comparison, drag.id, np.zeros(8), ENOUGH)
+    for left, (_, _, chosen) in zip(said.readings, kinds_of(base), strict=True):
+        rest = Part(np.ones(8, dtype=bool), chosen).base(base)
+        again = [curve_at(rest, one, one.strengths, known=one.known).log_bayes_factor for one in curves]
+        whole = np.logaddexp.reduce(again) - np.log(6.0)
+        assert left.log_bayes_factor == pytest.approx(whole, abs=DECIDES_NOTHING)
+    assert min(one.log_bayes_factor for one in said.readings) < said.log_bayes_factor - 5.0
 
 
 def test_an_answer_may_lose_what_the_alarm_has_to_spare() -> None:

@@ -3,8 +3,8 @@
 Of a single avalanche no refit is needed: evidence is what all others have, times the density of this one
 given them. So the Bayes factor without it is that of all, less what it is predicted better with the answer
 (nearly, where many are left out in parts). Without several, or without a kind of reading, population and
-every avalanche are refitted to what is left, at all strengths of the named mechanism's leading shapes, or
-with the whole profile. Nothing is looked for again: the question is whether what was answered would still
+every avalanche are refitted to what is left, with the named mechanism's leading shapes, or with the whole
+profile. Nothing is looked for again: the question is whether what was answered would still
 stand. It does not where the odds would not suffice for it, or where its rival, the listed id that is most
 probable of those it is not tied with, would be more probable. Of a speed that is left out it stays known that
 the front came there.
@@ -222,7 +222,7 @@ def _ahead(comparison: Comparison, answer: str, rival: str) -> float:
 
 def _gained(base: Base, curve: Curve) -> FloatArray:
     """What each avalanche's log integral gains by a mechanism at its best strength, where all is fitted."""
-    strengths = np.append(base.strengths, curve.strengths[np.argmax(curve.log_evidence)])
+    strengths = np.append(base.strengths, _top_strength(curve))
     with_it = _log_integrals(base.extended(curve.direction), base, strengths, curve.top)
     return with_it - _log_integrals(base.extended(), base, base.strengths, base.fit)
 
@@ -235,24 +235,45 @@ def _log_integrals(extension: Extension, base: Base, strengths: FloatArray, fit:
 
 
 def _by_mechanism(candidate: Candidate, base: Base, part: Part) -> float:
-    """The log Bayes factor of a mechanism by a part of the recordings, over its shapes that may count."""
+    """The log Bayes factor of a mechanism by a part of the recordings, over its shapes that may count.
+
+    All strengths are refitted at the best shape. The others follow the evidence at their best strength, and
+    by as much more as the best one does over all of its own.
+    """
     factors, best = candidate.log_factors, candidate.best
     rest, of_kind, others = part.base(base), list[float](), list[float]()
+    at_best = _without(rest, best, best.strengths, part)
+    over_strengths = at_best.log_bayes_factor - best.log_bayes_factor - _change(best, at_best)
     for k, curve in enumerate(candidate.curves):
         if factors[k] <= factors.max() - COUNTS and curve is not best:
             continue
-        known = {strength: part.fit(fit) for strength, fit in curve.known.items()}
-        one = curve_at(rest, curve, curve.strengths, USUAL, known)
+        one = at_best if curve is best else _without(rest, curve, np.array([_top_strength(curve)]), part)
         own = of_kind if all_but_place(curve) == all_but_place(best) else others
-        own.append(candidate.log_weights[k] + one.log_bayes_factor)
-        if curve is best:
-            at_best = one
+        changed = _change(curve, one) + over_strengths
+        own.append(candidate.log_weights[k] + curve.log_bayes_factor + changed)
     gain = 0.0
     if candidate.looked:
         ways = or_none(searched, rest, at_best)
         gain = 0.0 if ways is None else log_gain(None, gains_of(ways, at_best.log_factor_of(at_best.sign)))
     # What another kind of shape gains where avalanches differ is not known for a part, and not counted.
     return float(np.logaddexp.reduce([*others, gain + np.logaddexp.reduce(of_kind)]))
+
+
+def _without(rest: Base, curve: Curve, strengths: FloatArray, part: Part) -> Curve:
+    """Evidence by a part of the recordings, at some strengths and at nil."""
+    known = {strength: part.fit(fit) for strength, fit in curve.known.items()}
+    return curve_at(rest, curve, strengths, USUAL, known)
+
+
+def _top_strength(curve: Curve) -> float:
+    """The strength with most evidence."""
+    return float(curve.strengths[np.argmax(curve.log_evidence)])
+
+
+def _change(curve: Curve, without: Curve) -> float:
+    """By how many nats the evidence at the best strength by all recordings changes by a part of them."""
+    at_it = without.strengths == _top_strength(curve)
+    return float(without.log_evidence[at_it][0] - curve.log_evidence.max())
 
 
 def _by_profile(profile: Profile, base: Base, part: Part) -> float:
