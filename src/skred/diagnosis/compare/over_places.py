@@ -1,8 +1,8 @@
 """The mean of the evidence over where a stretch is: linear, on a log scale, between the places looked at.
 
 A mechanism's prior is uniform in the end of its stretch and in the logarithm of its length. The places that
-were looked at are corners of triangles, or of intervals where they lie on a line, and over each of these a
-rule of quadrature sums the evidence.
+were looked at, and the corners of what may be with what is nearest to them, are corners of triangles, or of
+intervals where they lie on a line, and over each of these a rule of quadrature sums the evidence.
 """
 
 from __future__ import annotations
