@@ -10,7 +10,7 @@ from zipfile import ZipFile
 
 HANDS = ("first", "second")
 """``HAND.zip`` has ``campaigns/NAME/`` in the campaign format, ``truth.json`` by name, and ``generator/`` as
-it was run. No name is in two."""
+it was run. No name is in two. ``third.zip`` is not among them: nothing of it has been diagnosed or opened."""
 
 
 @dataclass(frozen=True)
