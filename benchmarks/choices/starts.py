@@ -32,7 +32,7 @@ def look(drawn: Drawn) -> dict[str, Any] | None:
     found = {}
     for name in order:
         other = order[1] if name == order[0] else order[0]
-        again = _from_both(base, best[name], best[other].top)
+        again = _from_both(base, best[name], best[other].top[1])
         found[name] = {"usual": best[name].log_bayes_factor, "more": again.log_bayes_factor}
     return {"mechanisms": found}
 

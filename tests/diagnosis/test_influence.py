@@ -19,9 +19,16 @@ from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.compare.between import with_ways
 from skred.diagnosis.compare.candidate import Candidate
-from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors, with_errors
+from skred.diagnosis.compare.comparison import (
+    Comparison,
+    ComparisonUnderErrors,
+    free_force,
+    with_errors,
+)
+from skred.diagnosis.compare.residue import with_residues
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.compare.ways import Looked
+from skred.diagnosis.discrepancy.profile import KINDS
 from skred.diagnosis.evidence.coefficient import Curve, curve_at, curve_near
 from skred.diagnosis.evidence.prior_odds import prior_odds
 from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
@@ -153,6 +160,20 @@ def test_a_rival_is_what_is_most_probable_and_not_tied() -> None:
     # All runs were drawn with the same drag: none of them tells alone which one it is.
     assert said.rival.few is None and said.carried_by == ()
     assert influence(comparison, DRAG.id, said.without_each, ENOUGH, ["viscous_drag"]).rival is None
+
+
+def test_an_answer_with_a_force_beside_it_is_held_against_its_rival_as_it_was_compared() -> None:
+    """Waves of the ground look like a drag with U in some runs: with a force beside either they do not."""
+    comparison, ahead = two_drags(rolling(2.4e-4, waves=0.05, n_events=9))
+    under = comparison.under_each[0]
+    profiles = [free_force(under.base, kind, {}) for kind in KINDS]
+    with ThreadPoolExecutor(2) as pool:
+        candidates = with_residues(under.base, under.candidates, profiles, pool)
+    compared = replace(comparison, under_each=(replace(under, candidates=candidates),))
+    said = influence(compared, DRAG.id, np.full(9, candidates[DRAG.id].alone / 9), ENOUGH)
+    assert said.rival is not None and 0.0 < said.rival.ahead < 0.3 * ahead
+    # Drags by themselves change by more than that where one run is left out, whole comparisons do not.
+    assert said.rival.few is None and said.carried_by == ()
 
 
 @pytest.mark.parametrize(

@@ -39,9 +39,12 @@ def log_gain(residue: float | None, gains: Mapping[BetweenEvents, float] | None 
         What each way in which avalanches may differ has more than the strength in common.
     """
     own = 0.0 if gains is None else over_ways(gains)
-    if residue is None:
-        return own
-    return float(np.logaddexp(math.log1p(-BESIDE) + own, math.log(BESIDE) + residue))
+    return own if residue is None else with_or_without(own, residue)
+
+
+def with_or_without(own: float, both: float) -> float:
+    """Log evidence of a mechanism where a force may act beside it, from that of it alone and of both."""
+    return float(np.logaddexp(math.log1p(-BESIDE) + own, math.log(BESIDE) + both))
 
 
 class Beside(NamedTuple):

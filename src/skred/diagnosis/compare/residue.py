@@ -21,7 +21,7 @@ import numpy as np
 from skred.diagnosis.compare.between import or_none
 from skred.diagnosis.compare.candidate import Beside, Candidate, names_of_constants
 from skred.diagnosis.discrepancy.fit import fit_profile
-from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, knots, log_evidence_of
+from skred.diagnosis.discrepancy.profile import KINDS, Kind, Prior, Profile, knots, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms.spec import Group
@@ -93,7 +93,7 @@ def residues(
         What each must have to count: climbs end where it cannot be had, and then know less than they say.
     """
     jobs = [(curve, one, kind) for curve, one in zip(curves, least, strict=True) for kind in KINDS]
-    fits = batched(pool.map(partial(or_none, _fit_beside, base), *zip(*jobs, strict=True)), len(KINDS))
+    fits = batched(pool.map(partial(or_none, fit_beside, base), *zip(*jobs, strict=True)), len(KINDS))
     found = list[Residue | None]()
     for curve, lowest, fitted in zip(curves, least, fits, strict=True):
         profiles = tuple(one for one in fitted if one is not None)
@@ -103,15 +103,21 @@ def residues(
     return found
 
 
-def _fit_beside(base: Base, curve: Curve, least: float, kind: Kind) -> Profile:
+def fit_beside(base: Base, curve: Curve, least: float, kind: Kind, again: Prior | None = None) -> Profile:
     """A force of one kind beside a mechanism of a curve's shape, from where that is by itself.
 
     Both are fitted together: beside such a force a mechanism is as strong as it is, and not as strong as it
     has to be for both.
+
+    Parameters
+    ----------
+    least : float
+        What the force must have to count, in nats above the mechanism alone.
+    again : Prior, optional
+        Under which to climb first, as `fit_profile` does by a part of the avalanches.
     """
-    top = int(np.argmax(curve.log_evidence))
+    strength, fit = curve.top
     directions = (*base.directions, curve.direction)
     wide = replace(base, directions=directions, strengths=np.append(base.strengths, 0.0))
-    values = np.append(curve.strengths[top], np.zeros(len(knots(base.setting))))
-    near = values, curve.fits[top].start
-    return fit_profile(wide, kind, near, beside=curve, least=curve.log_bayes_factor + least)
+    near = np.append(strength, np.zeros(len(knots(base.setting)))), fit.start
+    return fit_profile(wide, kind, near, again, beside=curve, least=curve.log_bayes_factor + least)

@@ -167,8 +167,8 @@ def _maximum_from_one(base: Base, kind: Kind, starts: Sequence[Expansion], cover
 
 def as_profile(base: Base, kind: Kind, near: Curve) -> Start:
     """A listed mechanism that enters like a kind, at its best strength: values at the knots, and its fit."""
-    at, best = knots(base.setting), int(np.argmax(near.log_evidence))
+    at, (strength, fit) = knots(base.setting), near.top
     profile = near.direction.profiles[near.direction.columns.index(kind.column)]
     cells = spline_basis(base.setting.terrain, at) * np.diff(base.setting.terrain.edge_s_m)
-    values = near.strengths[best] * (cells @ profile) / np.maximum(cells.sum(axis=1), 1e-9)
-    return values, near.fits[best].start
+    values = strength * (cells @ profile) / np.maximum(cells.sum(axis=1), 1e-9)
+    return values, fit.start

@@ -129,9 +129,10 @@ class Curve(PlacedMechanism):
         return _closest(self.known, strength)
 
     @property
-    def top(self) -> Fit:
-        """The fit at the strength with most evidence."""
-        return self.fits[int(np.argmax(self.log_evidence))]
+    def top(self) -> tuple[float, Fit]:
+        """The strength with most evidence, and the fit there."""
+        number = int(np.argmax(self.log_evidence))
+        return float(self.strengths[number]), self.fits[number]
 
     @property
     def known(self) -> dict[float, Fit]:

@@ -6,8 +6,9 @@ given them. So the Bayes factor without it is that of all, less what it is predi
 every avalanche are refitted to what is left, with the named mechanism's leading shapes, or with the whole
 profile. Nothing is looked for again: the question is whether what was answered would still
 stand. It does not where the odds would not suffice for it, or where its rival, the listed id that is most
-probable of those it is not tied with, would be more probable. Of a speed that is left out it stays known that
-the front came there.
+probable of those it is not tied with, would be more probable. Where either has much of its evidence together
+with a force in no list, so it is held against the other. Of a speed that is left out it stays known that the
+front came there.
 """
 
 from __future__ import annotations
@@ -17,13 +18,15 @@ from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from skred.arrays import BoolArray, FloatArray
 from skred.diagnosis.compare.between import or_none, searched
-from skred.diagnosis.compare.candidate import Candidate, all_but_place, log_gain
+from skred.diagnosis.compare.candidate import Candidate, all_but_place, log_gain, with_or_without
 from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
+from skred.diagnosis.compare.residue import fit_beside
 from skred.diagnosis.compare.ways import gains_of
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of, most_probable
@@ -175,8 +178,10 @@ def influence(
         if name is not None:
             other = under_errors.candidates[name]
             taken = gained - _gained(base, other.best)
-            change = Change(partial(_by_mechanism, other, base), pool)
-            margins.append(Margin(_ahead(comparison, answer, name), taken, own, change))
+            candidate = under_errors.candidates[answer]
+            first = own if candidate.residue is None else Change(partial(_with_force, candidate, base), pool)
+            second = Change(partial(_with_force, other, base), pool)
+            margins.append(Margin(_ahead(comparison, answer, name), taken, first, second))
         third, *without = (needed + margins[0].left_by([margins[0].without_third, *parts])).tolist()
         few = list(waiting.map(Margin.fewest, margins))
         least = min((one for one in few if one is not None), key=lambda one: one[0].sum(), default=None)
@@ -222,8 +227,8 @@ def _ahead(comparison: Comparison, answer: str, rival: str) -> float:
 
 def _gained(base: Base, curve: Curve) -> FloatArray:
     """What each avalanche's log integral gains by a mechanism at its best strength, where all is fitted."""
-    strengths = np.append(base.strengths, _top_strength(curve))
-    with_it = _log_integrals(base.extended(curve.direction), base, strengths, curve.top)
+    strength, fit = curve.top
+    with_it = _log_integrals(base.extended(curve.direction), base, np.append(base.strengths, strength), fit)
     return with_it - _log_integrals(base.extended(), base, base.strengths, base.fit)
 
 
@@ -234,7 +239,30 @@ def _log_integrals(extension: Extension, base: Base, strengths: FloatArray, fit:
     return event_nodes(likelihood, fit.population, modes).log_integrals(fit.population, base.rows)
 
 
+class _Factor(NamedTuple):
+    """Log Bayes factor of a mechanism by itself, with a strength in common and over all ways to differ."""
+
+    in_common: float
+    differing: float
+
+
 def _by_mechanism(candidate: Candidate, base: Base, part: Part) -> float:
+    """The log Bayes factor of a mechanism by itself, by a part of the recordings."""
+    return _by_shapes(candidate, base, part).differing
+
+
+def _with_force(candidate: Candidate, base: Base, part: Part) -> float:
+    """The same with a force in no list beside it, as far as it is probable then; if it was looked for."""
+    by_itself, beside = _by_shapes(candidate, base, part), candidate.beside
+    if candidate.residue is None or beside is None:
+        return by_itself.differing
+    rest, force = part.base(base), most_probable(beside.profiles)
+    curve = _without(rest, beside.curve, beside.curve.strengths, part)
+    both = fit_beside(rest, curve, -math.inf, force.kind, force.prior).log_bayes_factor
+    return with_or_without(by_itself.differing, by_itself.in_common + both - curve.log_bayes_factor)
+
+
+def _by_shapes(candidate: Candidate, base: Base, part: Part) -> _Factor:
     """The log Bayes factor of a mechanism by a part of the recordings, over its shapes that may count.
 
     All strengths are refitted at the best shape. The others follow the evidence at their best strength, and
@@ -247,7 +275,7 @@ def _by_mechanism(candidate: Candidate, base: Base, part: Part) -> float:
     for k, curve in enumerate(candidate.curves):
         if factors[k] <= factors.max() - COUNTS and curve is not best:
             continue
-        one = at_best if curve is best else _without(rest, curve, np.array([_top_strength(curve)]), part)
+        one = at_best if curve is best else _without(rest, curve, np.array([curve.top[0]]), part)
         own = of_kind if all_but_place(curve) == all_but_place(best) else others
         changed = _change(curve, one) + over_strengths
         own.append(candidate.log_weights[k] + curve.log_bayes_factor + changed)
@@ -256,7 +284,8 @@ def _by_mechanism(candidate: Candidate, base: Base, part: Part) -> float:
         ways = or_none(searched, rest, at_best)
         gain = 0.0 if ways is None else log_gain(None, gains_of(ways, at_best.log_factor_of(at_best.sign)))
     # What another kind of shape gains where avalanches differ is not known for a part, and not counted.
-    return float(np.logaddexp.reduce([*others, gain + np.logaddexp.reduce(of_kind)]))
+    same = np.logaddexp.reduce(of_kind)
+    return _Factor(*(float(np.logaddexp.reduce([*others, same + more])) for more in (0.0, gain)))
 
 
 def _without(rest: Base, curve: Curve, strengths: FloatArray, part: Part) -> Curve:
@@ -265,14 +294,9 @@ def _without(rest: Base, curve: Curve, strengths: FloatArray, part: Part) -> Cur
     return curve_at(rest, curve, strengths, USUAL, known)
 
 
-def _top_strength(curve: Curve) -> float:
-    """The strength with most evidence."""
-    return float(curve.strengths[np.argmax(curve.log_evidence)])
-
-
 def _change(curve: Curve, without: Curve) -> float:
     """By how many nats the evidence at the best strength by all recordings changes by a part of them."""
-    at_it = without.strengths == _top_strength(curve)
+    at_it = without.strengths == curve.top[0]
     return float(without.log_evidence[at_it][0] - curve.log_evidence.max())
 
 

@@ -56,12 +56,11 @@ def _splitting(found: Diagnosis, first: Candidate, second: Candidate) -> float:
     speeds = []
     for candidate in (first, second):
         curve = candidate.best
-        at = int(np.argmax(curve.log_evidence))
+        strength, fit = curve.top
         direction = curve.direction.with_more_sensors(len(places))
         extension = extended(problem, found.law, [direction])
-        points = curve.fits[at].points
-        events = np.arange(len(points))
-        speeds.append(extension.predict(events, points, curve.strengths[at : at + 1])[:, columns])
+        events = np.arange(len(fit.points))
+        speeds.append(extension.predict(events, fit.points, np.array([strength]))[:, columns])
     readings = problem.readings
     typical = 0.5 * (speeds[0] + speeds[1])
     sd = np.hypot(readings.relative_sd[columns] * typical, readings.absolute_sd[columns])
