@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
-HANDS = ("first", "second")
+HANDS = ("first", "second", "third")
 """``HAND.zip`` has ``campaigns/NAME/`` in the campaign format, ``truth.json`` by name, and ``generator/`` as
-it was run. No name is in two. ``third.zip`` is not among them: nothing of it has been diagnosed or opened."""
+it was run. No name is in two."""
 
 
 @dataclass(frozen=True)
