@@ -19,6 +19,7 @@ from skred.diagnosis.predict.conditional import BeforeAfter, Conditional, above,
 from skred.diagnosis.predict.draws import Draws, LeftOut
 from skred.diagnosis.predict.unseen import log_densities
 from skred.diagnosis.verdict.conditional import conditional_document
+from skred.diagnosis.verdict.given_above import given_above
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.hierarchical.problem import HierarchicalProblem, hierarchical_problem
 from skred.inference.reading_density import log_likelihoods
@@ -219,6 +220,33 @@ def test_nothing_is_gained_where_before_is_after(ryggfonn: HierarchicalProblem) 
     assert without.startswith("no reading is clearly predicted better") and "18 readings" in without
     assert document["sensors"][0]["carrying"]["n"] == 2 and document["sensors"][0]["others"]["n"] == 18
     assert document["sensors"][1]["carrying"] is None
+
+
+def of_sensor(name: str, gain: float, covered: float = 0.9, n: int = 20) -> dict[str, Any]:
+    scores = {
+        "n": n, "rmse_before": 1.0, "rmse_after": 0.8, "rmse_diff": -0.2, "log_score_diff": gain / n,
+        "log_score_diff_2se": 2.0 / n, "coverage_90_after": covered,
+    }  # fmt: skip
+    sets = {"all": scores, "carrying": None, "others": None}
+    return {"sensor": name, "quantity": "front_velocity", "unit": "m s-1", **sets}
+
+
+def test_of_many_sensors_the_gain_of_each_is_counted() -> None:
+    gains = [9.0, 9.0, 0.5, 0.5, 0.5, -9.0]
+    sensors = [of_sensor(f"v{k}", gain) for k, gain in enumerate(gains)]
+    said = given_above({"sensors": sensors, "speeds": of_sensor("all", 10.5, n=120)})
+    assert "improves the prediction of the speeds at 6 sensors together" in said
+    assert "Of these sensors by themselves: 2 better, 3 nothing gained, 1 worse." in said
+    few = given_above({"sensors": sensors[:2], "speeds": of_sensor("all", 18.0, n=40)})
+    assert "by themselves" not in few
+
+
+@pytest.mark.parametrize(("covered", "told"), [(0.9, False), (0.95, False), (1.0, True)])
+def test_errors_stated_too_large_are_told(covered: float, told: bool) -> None:
+    """Of 100 speeds all lie in their 90 % intervals by chance in one of 37 000 cases."""
+    said = given_above({"sensors": [of_sensor("v", 9.0)], "speeds": of_sensor("all", 9.0, covered, 100)})
+    assert ("scatter less than their stated errors" in said) == told
+    assert not told or "lie 100 of 100 speeds" in said
 
 
 def test_a_gain_counts_beyond_twice_its_standard_error(ryggfonn: HierarchicalProblem) -> None:

@@ -253,6 +253,13 @@ def test_an_answer_may_lose_what_the_alarm_has_to_spare() -> None:
     comparison = drag_in(campaign)[0]
     said = influence(comparison, DRAG.id, np.zeros(8), comparison.log_odds - 1.5)
     assert said.needed == pytest.approx(said.log_bayes_factor - 1.5)
+    # A force beside it raises the odds, and is not in what the answer has by itself: nothing more to spare.
+    under = comparison.under_each[0]
+    candidates = {DRAG.id: replace(under.candidates[DRAG.id], residue=20.0)}
+    beside = replace(comparison, under_each=(replace(under, candidates=candidates),))
+    assert beside.log_odds > comparison.log_odds + 10.0
+    again = influence(beside, DRAG.id, np.zeros(8), comparison.log_odds - 1.5)
+    assert again.needed == pytest.approx(said.needed)
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from types import SimpleNamespace
@@ -15,7 +16,7 @@ from skred.diagnosis.augment.coefficient import strength_of
 from skred.diagnosis.augment.step import Left, NotAugmented
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import Decision
-from skred.diagnosis.compare.candidate import FORM, Candidate, Strength
+from skred.diagnosis.compare.candidate import BESIDE, FORM, Candidate, Strength, log_gain
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.compare.sensor_places import Shifts
 from skred.diagnosis.evidence.conditional_map import Population
@@ -28,6 +29,7 @@ from skred.diagnosis.outcome import Diagnosis
 from skred.diagnosis.verdict.document import verdict
 from skred.diagnosis.verdict.figure_data import figure_data
 from skred.diagnosis.verdict.hangs_on import hangs_on
+from skred.diagnosis.verdict.next_sensor import next_sensor
 from skred.diagnosis.verdict.statement import statement
 from skred.diagnosis.words import percent, plus_minus
 from skred.physics.mechanisms import mechanisms
@@ -327,7 +329,7 @@ def test_that_few_avalanches_carry_an_answer_comes_first() -> None:
     assert "25.0 nats with all, 0.5 without, 4.0 needed" in first
     assert rest.endswith(
         "The odds would not suffice for it without"
-        f" the readings of {found.influence.readings[1].sensor} (21)."
+        f" the readings of {found.influence.readings[1].sensor} (21 readings)."
     )
     named = verdict(diagnosis("two"))["statement"]
     assert "Take this with care" not in named and "It does not hang on a few avalanches" in named
@@ -361,10 +363,10 @@ def test_of_many_sensors_that_an_answer_needs_five_are_named() -> None:
     zeros = ReadingsLeftOut("zeros", None, 3, found.needed - 0.5)
     said = hangs_on(replace(found, readings=(*of_gates, zeros)))[-1]
     assert said.startswith(
-        "The odds would not suffice for it without readings of zero (3) or without the readings of"
+        "The odds would not suffice for it without readings of zero (3 readings), nor without the readings of"
     )
-    assert "without the readings of gate40 (9) or without the readings of gate39 (9)" in said
-    assert said.endswith("gate37 (9), nor without those of any one of 36 further sensors.")
+    assert "the readings of gate40 (9 readings), nor without the readings of gate39 (9 readings)" in said
+    assert said.endswith("gate37 (9 readings), nor without those of any one of 36 further sensors.")
 
 
 def test_the_force_profile_added_is_told() -> None:
@@ -498,7 +500,79 @@ def test_physics_and_a_fault_of_a_sensor_are_told_as_both() -> None:
     named[1] |= {"id": "sensor_bias", "group": "instrument", "sensor": "CD"}
     told = " ".join(lay_words(document))
     assert "a force is missing, and the recordings are off: friction" in told
-    assert "and one sensor reads too high or too low (CD)." in told
+    assert "; beside it, " in told and "one sensor reads too high or too low (CD)." in told
+
+
+def with_force_beside(comparison: Comparison, name: str, more: float) -> Comparison:
+    """A comparison where a force beside a mechanism adds so many nats to what it has."""
+    under = comparison.leading(name)
+    one = under.candidates[name]
+    residue = log_gain(None, one.gains) + more + math.log((1.0 - (1.0 - BESIDE) * math.exp(-more)) / BESIDE)
+    other = replace(under, candidates={**under.candidates, name: replace(one, residue=residue)})
+    return replace(
+        comparison, under_each=tuple(other if each is under else each for each in comparison.under_each)
+    )
+
+
+def test_a_name_that_counts_together_with_a_force_beside_it_says_what_it_has_by_itself() -> None:
+    found = diagnosis("tie")
+    named, tied = found.decision.names[0], next(one for one in found.decision.tied if one != UNLISTED)
+    factor = found.comparison.log_factors[named]
+    assert "force in no list beside it" not in verdict(found)["statement"]
+    for name, more, told in ((named, 20.0, True), (named, 0.5, False), (tied, 20.0, True)):
+        again = with_force_beside(found.comparison, name, more)
+        first, *others = found.steps
+        steps = (replace(first, comparison=again), *others)
+        document = document_of(replace(with_finding(found, steps=steps), comparison=again))
+        said = document["statement"]
+        if name == named:
+            with_it = again.log_factors[named]
+            sentence = f"nats by itself and {with_it:.1f} with such a force"
+            assert (sentence in said) == told
+            row = next(one for one in document["candidates"] if one["id"] == named)
+            assert row["log_bayes_factor_by_itself"] == pytest.approx(with_it - more)
+            assert with_it > factor
+        else:
+            assert ", with a force in no list beside it" in said and "by itself and" not in said
+
+
+def test_that_the_law_still_does_not_fit_is_told_to_everyone() -> None:
+    document = document_of(diagnosis("two"))
+    told = "Even so the model does not fit"
+    assert told not in " ".join(lay_words(document | {"p_value_augmented": 0.2}))
+    assert told in " ".join(lay_words(document | {"p_value_augmented": 0.01}))
+
+
+def test_of_a_second_mechanism_strength_and_how_avalanches_differ_are_told_too() -> None:
+    found = diagnosis("two")
+    document = verdict(found)
+    second = document["mechanisms"][1]
+    said = document["statement"].partition("Given that")[2]
+    assert f"Its {second['strength']['parameter'].replace('_', ' ')} is" in said
+    differing = {**second["strength"], "ways": {"common": 0.1, "spread": 0.8, "some": 0.1}}
+    others = [document["mechanisms"][0], {**second, "strength": differing, "covariate": "depth"}]
+    said = statement(found, document | {"mechanisms": others}).partition("Given that")[2]
+    assert "Avalanches probably differ in it (90 %)" in said
+    assert "Associated with, not necessarily caused by." in said
+
+
+def test_what_a_next_speed_would_split_is_read_where_something_is_recorded() -> None:
+    """Above the first recording fitted fronts differ by their releases, which a reading there would move."""
+    found = tied_with_a_dam()
+    comparison = found.comparison
+    recorded = comparison.under_each[0].base.setting.recorded_m
+    under = comparison.leading(found.decision.names[0])
+    one = under.candidates[found.decision.names[0]]
+    off = np.array([-0.1, 40.0])
+    moved = replace(one.best, fits=tuple(fit._replace(points=fit.points + off) for fit in one.best.fits))
+    candidate = replace(one, curves=(moved,), log_weights=np.zeros(1), log_between=0.0, looked=())
+    step = replace(found.steps[0], candidate=candidate)
+    campaign = found.problem.campaign
+    events = tuple(replace(event, release_sd_m=20.0) for event in campaign.events)
+    problem = replace(found.problem, campaign=replace(campaign, events=events))
+    sensor = next_sensor(with_finding(replace(found, problem=problem), steps=(step, *found.steps[1:])))
+    assert sensor is not None
+    assert sensor["splits"] and sensor["s_from_m"] >= recorded[0]
 
 
 def test_what_was_found_and_could_not_be_added_is_said() -> None:

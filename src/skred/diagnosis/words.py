@@ -50,8 +50,10 @@ def plus_minus(mean: float, sd: float, unit: str) -> str:
 
 
 def error_text(value: float, unit: str) -> str:
-    """An error of speeds or of runouts: readings are no more precise."""
-    return f"{value:.0f}" if unit == "m" else f"{value:.1f}"
+    """An error of speeds (one decimal) or of runouts (none); two significant digits of a small one."""
+    usual = 0 if unit == "m" else 1
+    small = 1 - math.floor(math.log10(value)) if value > 0.0 else usual
+    return f"{value:.{max(usual, small)}f}"
 
 
 TOLD_FROM = ENDS[0]

@@ -129,6 +129,11 @@ class Candidate:
         return self.alone + log_gain(self.residue, self.gains)
 
     @property
+    def by_force(self) -> float:
+        """What of that, in nats, comes from a force not in the list beside it."""
+        return self.log_bayes_factor - self.alone - log_gain(None, self.gains)
+
+    @property
     def in_common(self) -> float:
         """Log Bayes factor against nothing with a strength that all avalanches have in common."""
         return self.alone + log_gain(self.residue)

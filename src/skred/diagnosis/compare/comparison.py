@@ -78,6 +78,11 @@ class ComparisonUnderErrors:
         return self._factors({name: one.in_common for name, one in self.candidates.items()})
 
     @property
+    def alone(self) -> dict[str, float]:
+        """The same, no force beside them."""
+        return self._factors({name: one.alone for name, one in self.candidates.items()})
+
+    @property
     def errors(self) -> dict[str, float | None]:
         """Standard error of each id's log Bayes factor, in nats; None where it was not sampled."""
         found = {name: one.error for name, one in self.candidates.items()}
@@ -132,6 +137,12 @@ class Comparison:
         """Of anything against nothing, strengths in common: as odds of simulated campaigns are computed."""
         in_common = self._over_errors([under_errors.in_common for under_errors in self.under_each])
         return log_odds(in_common, self.odds)
+
+    @property
+    def log_odds_alone(self) -> float:
+        """The same without forces beside mechanisms."""
+        alone = self._over_errors([under_errors.alone for under_errors in self.under_each])
+        return log_odds(alone, self.odds)
 
     def leading(self, name: str) -> ComparisonUnderErrors:
         """The comparison under the error model that an id has most of its evidence under."""

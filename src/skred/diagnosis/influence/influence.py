@@ -168,7 +168,7 @@ def influence(
         again = partial(_by_mechanism, candidate, base)
         stated = candidate.alone + log_gain(None, candidate.gains)
     # What is tied with the answer explains the same recordings: without some of them it falls as much.
-    needed = max(stated - (comparison.log_odds - enough), 0.0)
+    needed = max(stated - (comparison.log_odds_alone - enough), 0.0)
     kinds = kinds_of(base)
     parts = [Part(np.ones(len(gained), dtype=bool), chosen) for _, _, chosen in kinds]
     with worker_pool() as pool, ThreadPoolExecutor(2) as waiting:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from scipy.stats import binom
+
+from skred.diagnosis.limits import LIMIT
 from skred.diagnosis.words import MOST_NAMED, counted, error_text
 from skred.inference.influence_words import enumerated
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
@@ -11,6 +14,13 @@ from skred.units import unit_text
 
 CLEAR, UNCLEAR, NOTHING_GAINED, WORSE = "better", "no clear gain", "nothing gained", "worse"
 """What may have been gained at a sensor."""
+_KINDS = {
+    CLEAR: "Better",
+    UNCLEAR: "No clear gain",
+    NOTHING_GAINED: "Practically unchanged",
+    WORSE: "Worse",
+}
+"""As it is told."""
 
 
 def given_above(document: dict[str, Any]) -> str:
@@ -18,7 +28,8 @@ def given_above(document: dict[str, Any]) -> str:
     rows = _rows(document)
     if not rows:
         return "No avalanche has two readings, so none is predicted from those above it."
-    parts = [f"Given the readings of the same avalanche above it, {_gains(rows, 'all')}"]
+    parts = [f"Given the readings of the same avalanche above it, {_gains(rows, 'all')}", _each(document)]
+    parts.append(_within(document))
     carried = [row for row in rows if row[2]["carrying"] is not None]
     if carried:
         alone = [f"{name} ({_change(sets['carrying'], unit)})" for name, unit, sets in carried]
@@ -26,7 +37,31 @@ def given_above(document: dict[str, Any]) -> str:
     rest = [row for row in carried if row[2]["others"] is not None]
     if rest:
         parts.append(f"Without them, {_gains(rest, 'others')}")
-    return " ".join((*parts, "After ± stands twice the standard error."))
+    return " ".join(part for part in (*parts, "After ± stands twice the standard error.") if part)
+
+
+def _each(document: dict[str, Any]) -> str:
+    """What is gained at the sensors one by one, where they were told of together."""
+    speeds = _speeds(document)
+    if len(speeds) <= MOST_NAMED:
+        return ""
+    gains = [gain_of(row["all"]) for row in speeds]
+    said = [f"{gains.count(gain)} {gain}" for gain in dict.fromkeys(_KINDS) if gain in gains]
+    return f"Of these sensors by themselves: {', '.join(said)}."
+
+
+def _within(document: dict[str, Any]) -> str:
+    """That errors are smaller than stated, where more readings than chance has lie in their intervals."""
+    scores = None if document["speeds"] is None else document["speeds"]["all"]
+    if scores is None:
+        return ""
+    n, inside = scores["n"], round(scores["n"] * scores["coverage_90_after"])
+    if binom.sf(inside - 1, n, 0.9) > LIMIT:
+        return ""
+    return (
+        f"In their 90 % intervals lie {inside} of {counted(n, 'speed')}, more than by chance: readings"
+        " probably scatter less than their stated errors, and with smaller ones could tell more apart."
+    )
 
 
 def _gains(rows: list[tuple[str, str, dict[str, Any]]], which: str) -> str:
@@ -37,8 +72,8 @@ def _gains(rows: list[tuple[str, str, dict[str, Any]]], which: str) -> str:
     first = "no reading is clearly predicted better with what was added."
     if told[CLEAR]:
         first = f"what was added improves the prediction of {enumerated(told[CLEAR])}."
-    kinds = ((UNCLEAR, "No clear gain"), (NOTHING_GAINED, "Practically unchanged"), (WORSE, "Worse"))
-    return " ".join((first, *(f"{words}: {enumerated(told[one])}." for one, words in kinds if told[one])))
+    others = ((one, words) for one, words in _KINDS.items() if one != CLEAR and told[one])
+    return " ".join((first, *(f"{words}: {enumerated(told[one])}." for one, words in others)))
 
 
 def gain_of(scores: dict[str, Any]) -> str:
@@ -60,13 +95,17 @@ def gain_of(scores: dict[str, Any]) -> str:
 
 def _rows(document: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
     """Name, unit and scores of what is told of."""
-    sensors = document["sensors"]
-    speeds = [row for row in sensors if row["quantity"] != "runout"]
+    sensors, speeds = document["sensors"], _speeds(document)
     rows = [(_name(row), row["unit"], row) for row in sensors]
     if len(speeds) <= MOST_NAMED:
         return rows
-    pooled = (f"the speeds at {len(speeds)} sensors", "m s-1", document["speeds"])
+    pooled = (f"the speeds at {len(speeds)} sensors together", "m s-1", document["speeds"])
     return [pooled, *(row for row, one in zip(rows, sensors, strict=True) if one["quantity"] == "runout")]
+
+
+def _speeds(document: dict[str, Any]) -> list[dict[str, Any]]:
+    """Those of sensors of speed."""
+    return [row for row in document["sensors"] if row["quantity"] != "runout"]
 
 
 def _name(row: dict[str, Any]) -> str:

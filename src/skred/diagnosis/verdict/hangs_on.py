@@ -27,13 +27,20 @@ def carried(found: Influence | None) -> str:
     return "; ".join(told)
 
 
-def hangs_on(found: Influence | None) -> list[str]:
-    """That no few avalanches carry the answer; and without which readings the odds would not suffice."""
+def hangs_on(found: Influence | None, errors: str = "") -> list[str]:
+    """That no few avalanches carry the answer; and without which readings the odds would not suffice.
+
+    Parameters
+    ----------
+    errors : str
+        The error model that this is under, where there are several.
+    """
     if found is None:
         return []
     sentences = []
     if not found.carried_by:
-        evidence = f"{found.without_a_third:.1f} nats ({found.log_bayes_factor:.1f} with all)"
+        under = f"; under {errors} errors" if errors else ""
+        evidence = f"{found.without_a_third:.1f} nats ({found.log_bayes_factor:.1f} with all{under})"
         sentences.append(
             "It does not hang on a few avalanches: without the third that carry most of it, its log Bayes"
             f" factor is still {evidence}."
@@ -41,7 +48,7 @@ def hangs_on(found: Influence | None) -> list[str]:
     lost = [one for one in found.readings if one.log_bayes_factor < found.needed]
     lost.sort(key=lambda one: (one.sensor is not None, one.log_bayes_factor))
     if lost:
-        named = " or without ".join(_words(one) for one in lost[:MOST_NAMED])
+        named = ", nor without ".join(_words(one) for one in lost[:MOST_NAMED])
         more = len(lost[MOST_NAMED:])
         any_of = "any one of " if more > 1 else ""
         rest = f", nor without those of {any_of}{counted(more, 'further sensor')}" if more else ""
@@ -51,4 +58,5 @@ def hangs_on(found: Influence | None) -> list[str]:
 
 def _words(readings: ReadingsLeftOut) -> str:
     """Some of the readings, and how many they are."""
-    return f"{_KINDS.get(readings.kind, f'the readings of {readings.sensor}')} ({readings.n})"
+    kind = _KINDS.get(readings.kind, f"the readings of {readings.sensor}")
+    return f"{kind} ({counted(readings.n, 'reading')})"

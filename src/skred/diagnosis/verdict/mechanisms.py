@@ -125,5 +125,6 @@ def _candidate(candidate: Candidate, log_factor: float) -> dict[str, Any]:
         "sensor": shape.sensor,
         "log_bayes_factor_se": candidate.error,
         "residue": candidate.residue,
+        "log_bayes_factor_by_itself": log_factor - candidate.by_force,
         "strength_with_places": None if of_places is None else of_places._asdict(),
     }

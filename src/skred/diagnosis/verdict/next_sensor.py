@@ -51,6 +51,7 @@ def _splitting(found: Diagnosis, first: Candidate, second: Candidate) -> float:
     """
     recorded = found.steps[0].comparison.under_each[0].base.setting.recorded_m
     places = places_of_a_sensor(found.problem, recorded)
+    places = places[places >= recorded[0]]  # what is read above, each front's release follows
     problem = with_sensors(found.problem, places)
     columns = np.arange(len(places)) + found.problem.campaign.n_sensors
     speeds = []

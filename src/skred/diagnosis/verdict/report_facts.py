@@ -300,7 +300,8 @@ def _comparison(comparison: Comparison, found: Diagnosis, number: int) -> dict[s
 def _candidate(comparison: Comparison, row: dict[str, Any]) -> dict[str, Any]:
     """One mechanism where it has most of its evidence; its strength and place are those of the verdict."""
     best = comparison.leading(row["id"]).candidates[row["id"]].best
-    return {"strength": row["strength"], "location": row["location"], "shape": _shape(best.shape)}
+    told = {key: row[key] for key in ("strength", "location", "residue", "log_bayes_factor_by_itself")}
+    return told | {"shape": _shape(best.shape)}
 
 
 def _shape(shape: Shape) -> dict[str, Any]:

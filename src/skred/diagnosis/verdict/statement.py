@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
+from skred.diagnosis.augment.coefficient import augmented_of
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.compare.location import Location
@@ -13,6 +14,7 @@ from skred.diagnosis.evidence.prior_odds import NOTHING, SHARES, UNLISTED
 from skred.diagnosis.limits import NOTHING_AT_MOST
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.predict.profile_law import ProfileLaw
+from skred.diagnosis.verdict.beside_force import beside_force, by_both
 from skred.diagnosis.verdict.between import between_sentence
 from skred.diagnosis.verdict.hangs_on import carried, hangs_on
 from skred.diagnosis.verdict.improvement import improvement
@@ -21,6 +23,8 @@ from skred.diagnosis.words import TOLD_FROM, percent, plus_minus
 from skred.inference.influence_words import enumerated, title_of
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.stretches import U_1, U_2
+
+_ASSOCIATED = "Associated with, not necessarily caused by."
 
 
 def statement(found: Outcome, document: dict[str, Any]) -> str:
@@ -34,7 +38,7 @@ def statement(found: Outcome, document: dict[str, Any]) -> str:
         "nothing_missing": _nothing,
         "cannot_tell": _cannot,
     }[found.decision.verdict](found, document)
-    parts = [_caution(found), *parts, moved_as_stated(found), *hangs_on(found.influence)]
+    parts = [_caution(found), *parts, moved_as_stated(found), *hangs_on(found.influence, _errors(found))]
     return " ".join(part for part in parts if part)
 
 
@@ -45,6 +49,13 @@ def _found(found: Outcome) -> str:
     name = found.not_added[0]
     leads = f"{title_of(name)} leads ({percent(found.comparison.probability[name])})"
     return f"there is an alarm ({_rare(found.check)}), and {leads}, but it could not be added; "
+
+
+def _errors(found: Diagnosis) -> str:
+    """The error model that an answer has most evidence under, where several were compared."""
+    if found.influence is None or len(found.comparison.under_each) == 1:
+        return ""
+    return found.comparison.leading(found.influence.answer).error_model
 
 
 def _caution(found: Diagnosis) -> str:
@@ -91,7 +102,8 @@ def _begins(step: Step) -> str:
     later = [one.shape.begins_m is not None for one in found.curves]
     return (
         f"With a probability of {percent(float(found.shape_weights[later].sum()))} it acts only from"
-        f" s = {begins:.0f} m on, where recordings begin; else along the whole track."
+        f" s = {begins:.0f} m on, where recordings begin; else along the whole track. Nothing is recorded"
+        " above: what fronts had lost until there is the base law's to say."
     )
 
 
@@ -108,10 +120,12 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     name, ties = document["mechanism"], document["indistinguishable"]
     strength, probability = document["strength"], document["probability"]
     first, *others = document["mechanisms"]
+    force = beside_force(found.comparison)
     sentences = [
         f"{_what(found)}: {_entry(first)}, with a probability of"
         f" {percent(probability[name])} (nothing: {percent(probability[NOTHING])}; a force not in the list:"
         f" {percent(probability[UNLISTED])}).",
+        by_both(found.comparison, name),
         f"Its {strength['parameter'].replace('_', ' ')} is"
         f" {plus_minus(strength['mean'], strength['sd'], strength['unit'])}"
         f"{_in_words(found, strength['mean'])}.",
@@ -121,20 +135,32 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         _compensated(first["constants"]),
     ]
     if document["covariate"]:
-        sentences.append("Associated with, not necessarily caused by.")
+        sentences.append(_ASSOCIATED)
     if ties:
-        sentences += [_tied([name, *ties], probability), _split(found.steps[0], document)]
-    sentences.append(_not_excluded(document))
+        sentences += [_tied([name, *ties], probability, force), _split(found.steps[0], document)]
+    sentences.append(_not_excluded(document, force))
     for step, second in zip(found.steps[1:], others, strict=True):
-        again = step.comparison.probability
-        sure = percent(again[second["id"]])
-        sentences.append(f"Given that, a second one earned its place: {_entry(second)}, {sure}.")
-        sentences.append(_tied([second["id"], *step.tied], again))
-        sentences.append(_begins(step))
-        sentences.append(_compensated(second["constants"]))
-    sentences.append(improvement(document))
+        sentences += _second(step, second)
+    sentences += [improvement(document), _other_errors(found)]
     sentences.append(_still_fired(found.steps[-1].check))
     return [*sentences, _left(document)]
+
+
+def _second(step: Step, second: dict[str, Any]) -> list[str]:
+    """What was found beside the first mechanism."""
+    again, strength = step.comparison.probability, second["strength"]
+    return [
+        f"Given that, {'a second one was added' if step.check.fired else 'a second one earned its place'}:"
+        f" {_entry(second)}, {percent(again[second['id']])}.",
+        by_both(step.comparison, second["id"]),
+        f"Its {strength['parameter'].replace('_', ' ')} is"
+        f" {plus_minus(strength['mean'], strength['sd'], strength['unit'])}.",
+        between_sentence(strength),
+        _ASSOCIATED if second["covariate"] else "",
+        _tied([second["id"], *step.tied], again, beside_force(step.comparison)),
+        _begins(step),
+        _compensated(second["constants"]),
+    ]
 
 
 def _in_words(found: Diagnosis, mean: float) -> str:
@@ -151,10 +177,16 @@ def _in_words(found: Diagnosis, mean: float) -> str:
     return f": one standard deviation up, {what} is {size} {'more' if mean > 0.0 else 'less'}"
 
 
-def _tied(names: Sequence[str], probability: Mapping[str, float]) -> str:
-    """What the recordings cannot tell from the first of these."""
+def _tied(names: Sequence[str], probability: Mapping[str, float], force: Collection[str] = ()) -> str:
+    """What the recordings cannot tell from the first of these.
+
+    Parameters
+    ----------
+    force : collection of str
+        Those that have their evidence together with a force in no list.
+    """
     ties, told = names[1:], set(names)
-    how = {other: percent(probability.get(other, 0.0)) for other in ties}
+    how = {other: percent(probability.get(other, 0.0)) + _with_force(other, force) for other in ties}
     for other in ties:
         if other != UNLISTED and mechanisms()[other].same_term_as in told:
             own = f"; in a form of its own {how[other]}" if other in probability else ""
@@ -163,14 +195,29 @@ def _tied(names: Sequence[str], probability: Mapping[str, float]) -> str:
     return f"These recordings cannot tell it from: {listed}." if ties else ""
 
 
-def _not_excluded(document: dict[str, Any]) -> str:
+def _with_force(name: str, force: Collection[str]) -> str:
+    return ", with a force in no list beside it" if name in force else ""
+
+
+def _not_excluded(document: dict[str, Any], force: Collection[str]) -> str:
     """The most probable listed candidate that is neither named nor tied, where it is not improbable."""
     told = {NOTHING, UNLISTED, document["mechanism"], *document["indistinguishable"]}
     others = {name: share for name, share in document["probability"].items() if name not in told}
     name = max(others, key=lambda one: others[one], default="")
     if not name or others[name] < TOLD_FROM:
         return ""
-    return f"Not excluded: {title_of(name)} ({percent(others[name])})."
+    return f"Not excluded: {title_of(name)} ({percent(others[name])}{_with_force(name, force)})."
+
+
+def _other_errors(found: Diagnosis) -> str:
+    """Under which errors the log score changes, where the base law was calibrated under others."""
+    own, both = (one.error_model.id for one in (found.problem, augmented_of(found.steps[-1].calibration)))
+    if own == both:
+        return ""
+    return (
+        f"Both laws are under {both} errors there, which suit the augmented one; the calibrated base law has"
+        f" {own} errors."
+    )
 
 
 def _still_fired(check: BootstrapTest) -> str:
@@ -179,7 +226,8 @@ def _still_fired(check: BootstrapTest) -> str:
         return ""
     return (
         f"The augmented law still fails the check ({_rare(check)}): something more is missing, or"
-        " the same in another form. Do not take this for the whole story."
+        " the same in another form. Do not take this for the whole story: what was added may stand for"
+        " something that no listed term describes."
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from skred.report.diagnosis.words import ends_in, law_id, short_title, stretch_in
 from skred.report.shared import document as doc
 from skred.report.shared.labels import printable
-from skred.report.shared.numbers import fixed, is_number
+from skred.report.shared.numbers import decimals_for, is_number, rounded
 
 _SURE, _LIKELY = 0.95, 0.75
 _WAYS = {
@@ -48,7 +48,7 @@ def _answer(document: doc.Document) -> list[str]:
             "The report shows how strongly it brakes or drives the avalanches, and where.",
         ]
     if verdict in ("missing_physics", "instrument"):
-        return [_named(document, verdict, where), *_tied(document)]
+        return [_named(document, verdict, where), *_tied(document), *_still_missing(document)]
     return [
         "Answer: these recordings cannot tell. That does not mean that nothing is missing.",
         *_more(document),
@@ -71,8 +71,10 @@ def _named(document: doc.Document, verdict: str, where: str) -> str:
     entries = doc.listed(document, "mechanisms")
     if len({doc.get(one, "group") for one in entries}) > 1:
         what = "a force is missing, and the recordings are off"
-    more = "".join(_second(document, one) for one in entries[1:])
-    return f"{_answer_of(document)}: {_how_sure(document)}, {what}: {name}{where}{more}."
+    probability = doc.get(document, "probability", str(doc.get(document, "mechanism")))
+    sure = _how_sure(probability, doc.listed(document, "indistinguishable"))
+    more = "".join(_second(document, number, one) for number, one in enumerate(entries) if number > 0)
+    return f"{_answer_of(document)}: {sure}, {what}: {name}{where}{more}."
 
 
 def _which(document: doc.Document) -> str:
@@ -85,27 +87,40 @@ def _which(document: doc.Document) -> str:
     return f" ({printable(about)}{'' if way is None else way[mean < 0.0].format(abs(mean))})"
 
 
-def _second(document: doc.Document, entry: doc.Document) -> str:
-    """What was found given the first, and what recordings cannot tell from it."""
+def _second(document: doc.Document, number: int, entry: doc.Document) -> str:
+    """What was found given the first, how surely, and what recordings cannot tell from it."""
     names = [doc.get(entry, "id"), *doc.listed(entry, "tied_with")]
     about = doc.get(entry, "sensor") or doc.get(entry, "covariate")
     first, *tied = (short_title(document, one) for one in names)
-    return f", and {first}{f' ({printable(about)})' if about else ''}{''.join(f' or {one}' for one in tied)}"
+    comparisons = doc.listed(document, "report", "comparisons")
+    comparison = comparisons[number] if number < len(comparisons) else {}
+    sure = _how_sure(doc.get(comparison, "probability", str(names[0])), tied)
+    either = "".join(f" or {one}" for one in tied)
+    return f"; beside it, {sure}, {first}{f' ({printable(about)})' if about else ''}{either}"
 
 
-def _how_sure(document: doc.Document) -> str:
-    """How probable the name is, in words."""
-    probability = doc.get(document, "probability", str(doc.get(document, "mechanism")))
+def _how_sure(probability: Any, tied: Sequence[Any]) -> str:
+    """How probable a name is, in words."""
     if not is_number(probability) or probability < _LIKELY:
-        return "most probably" if not doc.listed(document, "indistinguishable") else "yes"
+        return "yes" if tied else "most probably"
     return "almost surely" if probability >= _SURE else "very probably"
+
+
+def _still_missing(document: doc.Document) -> list[str]:
+    """That the law fails the check also with what was added, where it does."""
+    left, limit = doc.get(document, "p_value_augmented"), doc.get(document, "report", "limits", "p_value")
+    if not is_number(left) or not is_number(limit) or left > limit:
+        return []
+    return ["Even so the model does not fit: something more is missing, or the same in another form."]
 
 
 def _tied(document: doc.Document) -> list[str]:
     tied = doc.listed(document, "indistinguishable")
     if not tied:
         return []
-    return [f"These recordings cannot tell it from {_either([short_title(document, one) for one in tied])}."]
+    it = "it" if len(doc.listed(document, "mechanisms")) < 2 else "the first"
+    others = _either([short_title(document, one) for one in tied])
+    return [f"These recordings cannot tell {it} from {others}."]
 
 
 def _between(document: doc.Document) -> str:
@@ -148,7 +163,7 @@ def _use(document: doc.Document) -> list[str]:
     for key, words, unit, decimals in (("velocity", "speeds", "m/s", 1), ("runout", "runouts", "m", 0)):
         before, after = (doc.get(document, "held_out", f"rmse_{key}_{when}") for when in ("before", "after"))
         if is_number(before) and is_number(after):
-            ends = [fixed(one, decimals) for one in (before, after)]
+            ends = [rounded(one, max(decimals, decimals_for(one) or 0)) for one in (before, after)]
             goes = "" if any(part.startswith("goes") for part in parts) else "goes "
             way = f"stays at {ends[0]}" if ends[0] == ends[1] else f"{goes}from {ends[0]} to {ends[1]}"
             parts.append(f"{way} {unit} for {words}")

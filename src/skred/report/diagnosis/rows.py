@@ -154,6 +154,7 @@ def comparison_rows(document: doc.Document, comparison: doc.Document) -> Rows:
                 "kind": kind_of(document, name),
                 "prior": share(doc.get(comparison, "prior", name)),
                 "factor": fixed(doc.get(comparison, "log_bayes_factors", name), 1),
+                "by_itself": _by_itself(candidate),
                 "error": fixed(error, 2) if is_number(error) else "",
                 "by_model": [
                     fixed(doc.get(errors, "log_bayes_factors", name), 1)
@@ -168,6 +169,13 @@ def comparison_rows(document: doc.Document, comparison: doc.Document) -> Rows:
             }
         )
     return rows
+
+
+def _by_itself(candidate: doc.Document | None) -> str:
+    """The log Bayes factor without a force beside the mechanism; empty where none was looked for."""
+    if doc.get(candidate, "residue") is None:
+        return ""
+    return fixed(doc.get(candidate, "log_bayes_factor_by_itself"), 1)
 
 
 def _where(candidate: doc.Document | None) -> str:
