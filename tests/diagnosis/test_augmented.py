@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_pri
 from skred.diagnosis.tabulated.coefficient_grid import locate
 from skred.diagnosis.tabulated.tables import highest
 from skred.diagnosis.tabulated.tabulated_op import TabulatedLogDensity, tabulated_log_density
-from skred.inference.calibrate import calibrate
+from skred.inference.calibrate import calibrate, posterior_of
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.problem import hierarchical_problem
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
@@ -42,6 +43,7 @@ from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Shape
+from studies.another_hand.campaigns import unpack
 
 CAMPAIGN = read_campaign(find_campaign("ryggfonn"))
 DRAWS = {
@@ -177,7 +179,7 @@ def test_finer_tables_cover_what_chains_visited(problem: AugmentedProblem) -> No
 
 
 def test_finer_tables_are_at_half_the_steps_between_strengths(problem: AugmentedProblem) -> None:
-    """Once, and no more than that: little error between two is left.
+    """Little error between two is left; twice they are, and no more than that.
 
     In a narrow population beside the posterior's, whose likelihood bends most with the strength.
     """
@@ -189,9 +191,28 @@ def test_finer_tables_are_at_half_the_steps_between_strengths(problem: Augmented
     chains = {name: (("chain", "draw"), np.tile(values, (4, 1))) for name, values in samples.items()}
     finer = problem.finer(law, xr.Dataset(chains))
     assert finer is not None and np.all(finer.tables.grid.steps == 0.5 * grid.steps)
-    assert finer.finer(law, xr.Dataset(chains)) is None
+    again = finer.finer(law, xr.Dataset(chains))
+    assert again is not None and np.all(again.tables.grid.steps == 0.25 * grid.steps)
+    assert again.tables.budget == finer.tables.budget and again.finer(law, xr.Dataset(chains)) is None
     before, after = (np.abs(one.integration_errors(law, samples)).sum() for one in (problem, finer))
     assert before > 0.2 and after < 0.1 * before
+
+
+def test_tables_are_made_finer_twice_where_next_to_nothing_is_left_of_a_base_strength(tmp_path: Path) -> None:
+    """Friction in place of constant retardation, whose logarithm falls off between two tables."""
+    campaign = read_campaign(unpack("third", "e10", tmp_path))
+    base = base_of(campaign, "constant")
+    friction = curve(base, placed(mechanisms()["coulomb_friction"], base.setting, Shape()))
+    problem = augmented_problem(base, [curve_near(base, friction, Shape())])
+    settings = SamplerSettings("metropolis", draws=300, tune=300, seed=0)
+    for _ in range(2):
+        found = calibrate(problem, base.law, settings)
+        finer = problem.finer(base.law, found.tree["posterior"].to_dataset())
+        assert not found.gate.numerics and finer is not None
+        before, problem = problem, finer
+    draws = posterior_of(found)
+    first, again = (np.abs(one.integration_errors(base.law, draws)).mean(axis=1) for one in (before, problem))
+    assert first.max() > 0.01 and again.max() < 0.2 * first.max()
 
 
 @pytest.mark.slow

@@ -47,6 +47,9 @@ for 22 events.
 A claim of a mechanism rests on several nats; where fronts stop on a stretch that is added, an event's
 likelihood bends sharply with the strength, and more quadrature points do not help.
 """
+_TIMES_FINER = {1: 2, 2: 1}
+"""How many times tables are made finer at most, by the number of added strengths: of one with half the steps,
+which next to nothing left of a base strength needs twice; of two that would be four times the tables."""
 _EXACT_DRAWS = 16
 """Draws compared, evenly over the posterior; by the root of what an avalanche may have fewer."""
 _START_WIDER = 1.5
@@ -68,15 +71,15 @@ class AugmentedProblem(HierarchicalProblem):
     added : tuple of AddedStrength
         One or two.
     tables : Tables
-    refined : bool
-        Whether the first tables were too rough, and these are finer.
+    refined : int
+        How many times tables were too rough and made finer.
     """
 
     integration_limit: float = CLAIM_LIMIT
     base: Base
     added: tuple[AddedStrength, ...]
     tables: Tables = field(repr=False)
-    refined: bool = False
+    refined: int = 0
 
     def __post_init__(self) -> None:
         """Refuse recordings that the tables are not of."""
@@ -244,29 +247,30 @@ class AugmentedProblem(HierarchicalProblem):
         return speeds
 
     def finer(self, law: Law, posterior: xr.Dataset) -> AugmentedProblem | None:
-        """The same with finer tables; None where there are such already.
+        """The same with finer tables; None where they were made so as often as may be.
 
-        They also cover the populations that chains went to: far from all that the tables cover a few nodes
-        stand for all, and may show a mode that is none.
+        At first with more nodes, too. They also cover the populations that chains went to: far from all that
+        the tables cover a few nodes stand for all, and may show a mode that is none.
         """
-        if self.refined:
+        if self.refined == _TIMES_FINER[len(self.added)]:
             return None
         n_chains = posterior.sizes["chain"]
         chains = [draws_by_name(self, law, posterior.isel(chain=[k])) for k in range(n_chains)]
         moments = [moments_of(*population_of(law, chain)) for chain in chains]
         visited = Population(*(np.array(values) for values in zip(*moments, strict=True)))
         old = self.tables
-        wide = old.budget.over_population * 2 ** math.ceil(math.log2(2 + n_chains))
-        budget = old.budget.times(2)._replace(over_population=wide)
+        budget = old.budget
+        if not self.refined:
+            wide = budget.over_population * 2 ** math.ceil(math.log2(2 + n_chains))
+            budget = budget.times(2)._replace(over_population=wide)
         located = old.located
-        # Of two strengths, half the steps are four times the tables.
         if len(self.added) == 1:
             located = located.finer
             # Where avalanches differ one population is around all tables.
             if self.added[0].between is BetweenEvents.COMMON:
                 located = located.refitted(self.base, self.extension)
         tables = build_tables(self.base, self.extension, located, budget, visited)
-        return replace(self, tables=tables, refined=True)
+        return replace(self, tables=tables, refined=self.refined + 1)
 
     def surfaces(self, mechanisms: Sequence[Mechanism]) -> Surfaces:
         """Not there: surfaces would be those of the base law alone.
