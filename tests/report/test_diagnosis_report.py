@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 from diagnosis_report_cases import documents
 from page_checks import check_page
 from report_cases import picture
@@ -13,6 +14,7 @@ from test_report_html import Page, nulls
 from skred.campaign import Sensor
 from skred.report.diagnosis.conditional import conditional_rows, styles_of
 from skred.report.diagnosis.equation import equations, formula
+from skred.report.diagnosis.events import reading_rows
 from skred.report.diagnosis.report import FIGURES, diagnosis_table, render_diagnosis, save_diagnosis_figures
 
 KINDS = ("cannot", "gate", "nothing", "silent", "unexplained", "sensor", "tie", "two")
@@ -205,6 +207,17 @@ def test_a_formula_keeps_what_it_says():
         "-D<sub>f</sub> U<sup>2</sup> for s<sub>1</sub> &lt; s &lt; s<sub>2</sub>"
     )
     assert formula("mu g cos(phi)") == "μ g cos(φ)"
+
+
+def test_predictions_by_few_draws_have_a_star():
+    tree = documents("unexplained")[1].copy(deep=True)
+    given = tree["conditional"].to_dataset()
+    event, sensor = np.argwhere(given["n_above"].sel(when="after").transpose("event", "sensor").values > 0)[0]
+    given["effective"].loc[{"when": "after"}][{"event": event, "sensor": sensor}] = 12.0
+    tree["conditional"] = xr.DataTree(given)
+    stars = [band for row in reading_rows(tree) for band in row["above"] if band.endswith("*")]
+    assert len(stars) == 1
+    assert not any(band.endswith("*") for row in reading_rows(tree) for band in row["others"])
 
 
 @pytest.mark.parametrize("kind", [pytest.param("tie", marks=pytest.mark.slow), "unexplained"])

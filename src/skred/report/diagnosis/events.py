@@ -20,6 +20,8 @@ Bands = dict[str, NDArray[np.float64]]
 _WHEN, _BAND = ("before", "after"), ("mean", "low", "high")
 MOST_ROWS = 3000
 """Readings that a page lists."""
+_FEW_DRAWS = 100.0
+"""Effective draws below which a prediction is rough."""
 MOST_OPEN = 120
 """Readings of a table that is open when the page opens."""
 
@@ -100,7 +102,7 @@ def _predictions(tree: xr.DataTree, group: str) -> dict[str, Bands]:
     if group not in tree.children:
         return {}
     found = tree[group].to_dataset().load().transpose(..., "event", "sensor")
-    names = [name for name in (*_BAND, "n_above") if name in found]
+    names = [name for name in (*_BAND, "n_above", "effective") if name in found]
     return {
         str(when): {name: np.asarray(found[name].sel(when=when).values, dtype=float) for name in names}
         for when in found["when"].values
@@ -108,8 +110,9 @@ def _predictions(tree: xr.DataTree, group: str) -> dict[str, Bands]:
 
 
 def _band(found: Bands | None, event: int, column: int, zero: float, decimals: int) -> str:
-    """Mean and 90 % interval of a prediction; a dash where there is none."""
+    """Mean and 90 % interval of a prediction, a star where few draws make it; a dash where there is none."""
     if found is None or ("n_above" in found and found["n_above"][event, column] == 0):
         return "-"
     mean, low, high = (fixed(float(found[name][event, column]) - zero, decimals) for name in _BAND)
-    return f"{mean} ({low} to {high})"
+    few = "effective" in found and found["effective"][event, column] < _FEW_DRAWS
+    return f"{mean} ({low} to {high}){'*' if few else ''}"
