@@ -341,7 +341,7 @@ def test_that_few_avalanches_carry_a_name_comes_before_what_carries_the_alarm() 
     ids = found.influence.events
     rival = Rival("viscous_drag", 3.25, Few(ids[:1], -2.5))
     influence = replace(found.influence, few=Few(ids[:2], 0.5), without_them=9.0, rival=rival)
-    document = verdict(replace(found, influence=influence))
+    document = document_of(replace(found, influence=influence))
     first = document["statement"].partition(". ")[0]
     title = mechanisms()["viscous_drag"].title.partition(":")[0]
     assert first.startswith(
@@ -351,6 +351,10 @@ def test_that_few_avalanches_carry_a_name_comes_before_what_carries_the_alarm() 
     assert "3.2 nats behind with all, 2.5 ahead without" in first
     assert document["influence"]["carried_by"] == [ids[0]] and document["influence"]["without_them"] == 9.0
     assert document["influence"]["alarm"] == {"carried_by": [ids[0], ids[1]], "without_them": 0.5}
+    near = replace(influence, rival=Rival("viscous_drag", 3.25, Few(ids[:1], -0.4)))
+    less = document_of(replace(found, influence=near))
+    assert f"without it {title} would be about as probable (3.2 nats behind" in less["statement"]
+    assert "Without it another answer would be about as probable: " in " ".join(lay_words(less))
     short = short_title(document, "viscous_drag")
     assert f"Without it another answer would be more probable: {short}." in " ".join(lay_words(document))
 

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from skred.physics.mechanisms import mechanisms
 
 NOT_LISTED = "unlisted"
+ERRS_BY = 1.0
+"""Nats that what is left without some avalanches errs by, as the shapes that were looked at are kept."""
 
 
 def enumerated(names: Sequence[str]) -> str:
@@ -49,8 +51,13 @@ def too_little(with_all: float, without_them: float, needed: float) -> str:
     return f"the odds would not suffice for it (log Bayes factor {evidence}, {needed:.1f} needed)"
 
 
+def _probable_as(without_them: float) -> str:
+    """How probable a rival would be that an answer is so many nats ahead of without some avalanches."""
+    return "more probable" if without_them < -ERRS_BY else "about as probable"
+
+
 def displaced(rival: str, ahead: float, without_them: float) -> str:
-    """That something else would be more probable.
+    """That something else would be as probable, or more so.
 
     Parameters
     ----------
@@ -60,4 +67,4 @@ def displaced(rival: str, ahead: float, without_them: float) -> str:
         Nats of its log Bayes factor that the answer can lose against it, by all recordings and without some.
     """
     evidence = f"{ahead:.1f} nats behind with all, {-without_them:.1f} ahead without"
-    return f"{rival} would be more probable ({evidence})"
+    return f"{rival} would be {_probable_as(without_them)} ({evidence})"

@@ -29,6 +29,7 @@ from skred.inference.calibrate import Calibration
 from skred.inference.error_model import ERROR_MODELS
 from skred.inference.gate import ESS_LIMIT, R_HAT_LIMIT
 from skred.inference.hierarchical.problem import HierarchicalProblem
+from skred.inference.influence_words import ERRS_BY
 from skred.inference.intervals import PRACTICAL_DIFFERENCE, interval
 from skred.physics.law import Law
 from skred.physics.mechanisms import mechanisms
@@ -164,6 +165,7 @@ def _limits() -> dict[str, float]:
         "r_hat": R_HAT_LIMIT,
         "ess": ESS_LIMIT,
         "practical_difference": PRACTICAL_DIFFERENCE,
+        "influence_errs_by": ERRS_BY,
     }
 
 

@@ -152,7 +152,10 @@ def _otherwise(document: doc.Document) -> str:
     rival = doc.get(document, "influence", "rival")
     if doc.listed(rival, "carried_by") != doc.listed(document, "influence", "carried_by"):
         return "the odds would not suffice for it"
-    return f"another answer would be more probable: {short_title(document, str(doc.get(rival, 'id')))}"
+    left, errs_by = doc.get(rival, "without_them"), doc.get(document, "report", "limits", "influence_errs_by")
+    sure = is_number(left) and is_number(errs_by) and left < -errs_by
+    how = "more probable" if sure else "about as probable"
+    return f"another answer would be {how}: {short_title(document, str(doc.get(rival, 'id')))}"
 
 
 def _use(document: doc.Document) -> list[str]:
