@@ -51,7 +51,7 @@ def test_every_campaign_can_be_read_and_has_its_answer(tmp_path: Path) -> None:
     for hand in HANDS:
         for name, truth in hidden(hand).items():
             campaign = read_campaign(unpack(hand, name, tmp_path))
-            assert campaign.origin == "simulated" and campaign.n_events >= 8
+            assert campaign.origin == "simulated" and campaign.n_events >= 6
             assert load_law(truth.base_model).id == truth.base_model
             assert set(truth.ids) <= {*mechanisms(), "unlisted"}
 
