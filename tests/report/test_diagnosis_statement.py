@@ -328,8 +328,7 @@ def test_that_few_avalanches_carry_an_answer_comes_first() -> None:
     assert first.startswith(f"Take this with care: 2 of 22 avalanches carry this answer ({few})")
     assert "25.0 nats with all, 0.5 without, 4.0 needed" in first
     assert rest.endswith(
-        "The odds would not suffice for it without"
-        f" the readings of {found.influence.readings[1].sensor} (21 readings)."
+        f"The odds would not suffice for it without the 21 readings of {found.influence.readings[1].sensor}."
     )
     named = verdict(diagnosis("two"))["statement"]
     assert "Take this with care" not in named and "It does not hang on a few avalanches" in named
@@ -367,10 +366,10 @@ def test_of_many_sensors_that_an_answer_needs_five_are_named() -> None:
     zeros = ReadingsLeftOut("zeros", None, 3, found.needed - 0.5)
     said = hangs_on(replace(found, readings=(*of_gates, zeros)))[-1]
     assert said.startswith(
-        "The odds would not suffice for it without readings of zero (3 readings), nor without the readings of"
+        "The odds would not suffice for it without the 3 readings of zero, nor without the 9 readings of"
     )
-    assert "the readings of gate40 (9 readings), nor without the readings of gate39 (9 readings)" in said
-    assert said.endswith("gate37 (9 readings), nor without those of any one of 36 further sensors.")
+    assert "the 9 readings of gate40, nor without the 9 readings of gate39" in said
+    assert said.endswith("gate37, nor without those of any one of 36 further sensors.")
 
 
 def test_the_force_profile_added_is_told() -> None:

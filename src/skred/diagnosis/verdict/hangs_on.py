@@ -7,7 +7,7 @@ from skred.diagnosis.words import MOST_NAMED, counted
 from skred.inference import influence_words as words
 from skred.inference.influence_words import title_of
 
-_KINDS = {"zeros": "readings of zero", "near a stop": "speeds beside the same avalanche's stop"}
+_KINDS = {"zeros": ("reading", "of zero"), "near a stop": ("speed", "beside the same avalanche's stop")}
 
 
 def carried(found: Influence | None) -> str:
@@ -58,5 +58,5 @@ def hangs_on(found: Influence | None, errors: str = "") -> list[str]:
 
 def _words(readings: ReadingsLeftOut) -> str:
     """Some of the readings, and how many they are."""
-    kind = _KINDS.get(readings.kind, f"the readings of {readings.sensor}")
-    return f"{kind} ({counted(readings.n, 'reading')})"
+    what, which = _KINDS.get(readings.kind, ("reading", f"of {readings.sensor}"))
+    return f"the {counted(readings.n, what)} {which}"
