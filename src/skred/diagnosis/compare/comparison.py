@@ -83,6 +83,13 @@ class ComparisonUnderErrors:
         return self._factors({name: one.alone for name, one in self.candidates.items()})
 
     @property
+    def by_itself(self) -> dict[str, float]:
+        """As `log_factors`, no force beside them."""
+        return self._factors(
+            {name: one.log_bayes_factor - one.by_force for name, one in self.candidates.items()}
+        )
+
+    @property
     def errors(self) -> dict[str, float | None]:
         """Standard error of each id's log Bayes factor, in nats; None where it was not sampled."""
         found = {name: one.error for name, one in self.candidates.items()}
@@ -117,6 +124,11 @@ class Comparison:
     def log_factors(self) -> dict[str, float]:
         """Log Bayes factor of each id against nothing, over the error models."""
         return self._over_errors([under_errors.log_factors for under_errors in self.under_each])
+
+    @property
+    def by_itself(self) -> dict[str, float]:
+        """The same without forces beside mechanisms."""
+        return self._over_errors([under_errors.by_itself for under_errors in self.under_each])
 
     def _over_errors(self, factors: Sequence[Mapping[str, float]]) -> dict[str, float]:
         """Log Bayes factors from those under each error model."""

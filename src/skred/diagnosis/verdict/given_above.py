@@ -46,7 +46,7 @@ def _each(document: dict[str, Any]) -> str:
     if len(speeds) <= MOST_NAMED:
         return ""
     gains = [gain_of(row["all"]) for row in speeds]
-    said = [f"{gains.count(gain)} {gain}" for gain in dict.fromkeys(_KINDS) if gain in gains]
+    said = [f"{gains.count(gain)} {gain}" for gain in _KINDS if gain in gains]
     return f"Of these sensors by themselves: {', '.join(said)}."
 
 

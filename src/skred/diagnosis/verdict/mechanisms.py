@@ -98,15 +98,17 @@ def candidate_documents(found: Diagnosis, comparison: Comparison) -> list[dict[s
         for number, step in enumerate(found.steps)
         if step.comparison is comparison
     }
-    log_factors = comparison.log_factors
-    rows = [_candidate(one, log_factors[name]) for name, one in candidates_of(comparison).items()]
+    log_factors, by_itself = comparison.log_factors, comparison.by_itself
+    rows = [
+        _candidate(one, log_factors[name], by_itself[name]) for name, one in candidates_of(comparison).items()
+    ]
     for row in rows:
         if row["id"] in added:
             row["strength"] = strength_document(found, added[row["id"]])
     return rows
 
 
-def _candidate(candidate: Candidate, log_factor: float) -> dict[str, Any]:
+def _candidate(candidate: Candidate, log_factor: float, by_itself: float) -> dict[str, Any]:
     """One mechanism in a comparison, where and how strong it is if it is there."""
     strength, shape = candidate.mechanism.strength, candidate.best.shape
     of_places = candidate.strength_with_places
@@ -125,6 +127,6 @@ def _candidate(candidate: Candidate, log_factor: float) -> dict[str, Any]:
         "sensor": shape.sensor,
         "log_bayes_factor_se": candidate.error,
         "residue": candidate.residue,
-        "log_bayes_factor_by_itself": log_factor - candidate.by_force,
+        "log_bayes_factor_by_itself": by_itself,
         "strength_with_places": None if of_places is None else of_places._asdict(),
     }
