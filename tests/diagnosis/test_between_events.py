@@ -19,11 +19,11 @@ from skred.diagnosis.augment.added_strength import added_strengths, components_o
 from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.augment.coefficient import multiples_of_events
 from skred.diagnosis.compare.between import finer, may_differ, searched, with_ways
-from skred.diagnosis.compare.candidate import BESIDE, Candidate, all_but_place, log_gain
+from skred.diagnosis.compare.candidate import BESIDE, Candidate, all_but_place, with_or_without
 from skred.diagnosis.compare.comparison import with_errors
 from skred.diagnosis.compare.recomputed import computed_again
 from skred.diagnosis.compare.screening import curve
-from skred.diagnosis.compare.ways import Looked, gains_of, gains_over
+from skred.diagnosis.compare.ways import Looked, gains_of, gains_over, over_ways
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
 from skred.diagnosis.evidence.extension import extended, setting_of
 from skred.inference.between_events import (
@@ -271,7 +271,7 @@ def test_shapes_are_mixed_by_what_they_have(few: tuple[Base, Curve]) -> None:
     gains = gains_over(shapes)
     assert gains[COMMON] == pytest.approx(0.0)
     assert gains[SPREAD] == pytest.approx(np.log(0.8 * np.exp(-1.0) + 0.2 * np.exp(5.4)))
-    heights = [np.log(0.8) + log_gain(None, shapes[0].gains), np.log(0.2) + log_gain(None, shapes[1].gains)]
+    heights = np.log([0.8, 0.2]) + [over_ways(one.gains) for one in shapes]
     assert_allclose(candidate.shape_weights, np.exp(heights - np.logaddexp.reduce(heights)))
     assert [one for one, _ in candidate.best_of_each(all_but_place)] == [found, other]
     # Both that lead are looked at closer: with a strength in common, and where avalanches differ.
@@ -314,12 +314,13 @@ def test_shapes_from_other_processes_are_those_of_the_candidate(few: tuple[Base,
 
 def test_gains_share_the_prior() -> None:
     assert sum(PRIOR.values()) == 1.0
-    assert log_gain(None) == 0.0
-    assert log_gain(None, dict.fromkeys(BetweenEvents, 0.0)) == pytest.approx(0.0)
+    assert over_ways(dict.fromkeys(BetweenEvents, 0.0)) == pytest.approx(0.0)
     gains = {COMMON: 0.0, SPREAD: 3.0, SOME: -2.0}
     own = np.log(0.5 + 0.25 * np.exp(3.0) + 0.25 * np.exp(-2.0))
-    assert log_gain(None, gains) == pytest.approx(own)
-    assert log_gain(5.0, gains) == pytest.approx(np.log((1.0 - BESIDE) * np.exp(own) + BESIDE * np.exp(5.0)))
+    assert over_ways(gains) == pytest.approx(own)
+    assert with_or_without(own, 5.0) == pytest.approx(
+        np.log((1.0 - BESIDE) * np.exp(own) + BESIDE * np.exp(5.0))
+    )
 
 
 def test_only_physics_of_track_and_stretch_may_differ() -> None:

@@ -25,7 +25,7 @@ from skred.physics.mechanisms.spec import Shape
 
 
 def under_errors(name: str, height: float, forces: list[float]) -> ComparisonUnderErrors:
-    candidate = SimpleNamespace(log_bayes_factor=height, in_common=height, error=None)
+    candidate = SimpleNamespace(log_bayes_factor=height, error=None)
     profiles = [
         SimpleNamespace(log_bayes_factor=one, kind=kind, error=0.1)
         for one, kind in zip(forces, KINDS, strict=False)

@@ -18,7 +18,7 @@ from skred.campaign.parts import of_events
 from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.augment.step import Step
 from skred.diagnosis.compare.between import with_ways
-from skred.diagnosis.compare.candidate import Candidate
+from skred.diagnosis.compare.candidate import Beside, Candidate
 from skred.diagnosis.compare.comparison import (
     Comparison,
     ComparisonUnderErrors,
@@ -176,6 +176,25 @@ def test_an_answer_with_a_force_beside_it_is_held_against_its_rival_as_it_was_co
     assert said.rival.few is None and said.carried_by == ()
 
 
+def test_a_rival_that_cannot_be_refitted_leaves_what_the_alarm_hangs_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A step of a force beside it can lead to what no front can do."""
+    comparison = two_drags(rolling(2.4e-4, n_events=9))[0]
+    under = comparison.under_each[0]
+    force = Beside(under.candidates["viscous_drag"].best, (free_force(under.base, KINDS[0], {}),))
+    both = dict(under.candidates)
+    both["viscous_drag"] = replace(both["viscous_drag"], residue=1.0, beside=force)
+    compared = replace(comparison, under_each=(replace(under, candidates=both),))
+
+    def broken(*given: Any) -> None:
+        raise np.linalg.LinAlgError
+
+    monkeypatch.setattr("skred.diagnosis.influence.influence.fit_beside", broken)
+    said = influence(compared, DRAG.id, np.full(9, both[DRAG.id].alone / 9), ENOUGH)
+    assert said.rival is None and said.few is None and len(said.without_each) == 9
+
+
 @pytest.mark.parametrize(
     ("whole", "fewest", "against"),
     [
@@ -253,11 +272,12 @@ def test_an_answer_may_lose_what_the_alarm_has_to_spare() -> None:
     comparison = drag_in(campaign)[0]
     said = influence(comparison, DRAG.id, np.zeros(8), comparison.log_odds - 1.5)
     assert said.needed == pytest.approx(said.log_bayes_factor - 1.5)
-    # A force beside it raises the odds, and is not in what the answer has by itself: nothing more to spare.
+    # A force beside it raises no alarm, for clean campaigns are not searched for one: nothing more to spare.
     under = comparison.under_each[0]
     candidates = {DRAG.id: replace(under.candidates[DRAG.id], residue=20.0)}
     beside = replace(comparison, under_each=(replace(under, candidates=candidates),))
-    assert beside.log_odds > comparison.log_odds + 10.0
+    assert beside.log_factors[DRAG.id] > comparison.log_factors[DRAG.id] + 5.0
+    assert beside.log_odds == pytest.approx(comparison.log_odds)
     again = influence(beside, DRAG.id, np.zeros(8), comparison.log_odds - 1.5)
     assert again.needed == pytest.approx(said.needed)
 

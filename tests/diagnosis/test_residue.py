@@ -14,7 +14,7 @@ from rolling_cases import entering, rolling, speed
 from scipy.stats import norm
 
 from skred.campaign import Campaign
-from skred.diagnosis.compare.candidate import Beside, Candidate, log_gain, names_of_constants
+from skred.diagnosis.compare.candidate import Beside, Candidate, names_of_constants, with_or_without
 from skred.diagnosis.compare.comparison import compare, free_force
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.residue import Residue, with_residues
@@ -60,7 +60,7 @@ def test_a_force_that_takes_both_effects_is_behind_the_first_and_a_force_beside_
         found = with_residues(base, {DRAG.id: drag}, profiles, pool)[DRAG.id]
     assert found.residue is not None and 0.0 < found.residue < drag.alone
     assert found.alone == drag.alone
-    assert found.log_bayes_factor == pytest.approx(drag.alone + log_gain(found.residue))
+    assert found.log_bayes_factor == pytest.approx(drag.alone + with_or_without(0.0, found.residue))
     assert found.log_bayes_factor == pytest.approx(force + 4.5, abs=2.0) and force > drag.alone + 30.0
 
 
@@ -216,8 +216,9 @@ def test_what_stated_places_leave_of_a_mechanism_decides_whether_a_force_counts_
 
 def test_what_a_force_beside_adds() -> None:
     """With it or without it, at even odds."""
-    assert log_gain(-50.0) == pytest.approx(np.log(0.5)) and log_gain(0.0) == pytest.approx(0.0)
-    assert log_gain(50.0) == pytest.approx(50.0 + np.log(0.5))
+    assert with_or_without(0.0, -50.0) == pytest.approx(np.log(0.5))
+    assert with_or_without(0.0, 0.0) == pytest.approx(0.0)
+    assert with_or_without(0.0, 50.0) == pytest.approx(50.0 + np.log(0.5))
 
 
 def test_nothing_is_one_of_those_compared(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,7 @@ from skred.diagnosis.augment.coefficient import strength_of
 from skred.diagnosis.augment.step import Left, NotAugmented
 from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import Decision
-from skred.diagnosis.compare.candidate import BESIDE, FORM, Candidate, Strength, log_gain
+from skred.diagnosis.compare.candidate import BESIDE, FORM, Candidate, Strength
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.compare.sensor_places import Shifts
 from skred.diagnosis.evidence.conditional_map import Population
@@ -510,7 +510,8 @@ def with_force_beside(comparison: Comparison, name: str, more: float) -> Compari
     """A comparison where a force beside a mechanism adds so many nats to what it has."""
     under = comparison.leading(name)
     one = under.candidates[name]
-    residue = log_gain(None, one.gains) + more + math.log((1.0 - (1.0 - BESIDE) * math.exp(-more)) / BESIDE)
+    own = one.by_itself - one.alone
+    residue = own + more + math.log((1.0 - (1.0 - BESIDE) * math.exp(-more)) / BESIDE)
     other = replace(under, candidates={**under.candidates, name: replace(one, residue=residue)})
     return replace(
         comparison, under_each=tuple(other if each is under else each for each in comparison.under_each)

@@ -28,20 +28,6 @@ BESIDE = 0.5
 another one, has more evidence than it: then something acts beside it or in its place, at even odds."""
 
 
-def log_gain(residue: float | None, gains: Mapping[BetweenEvents, float] | None = None) -> float:
-    """What is added to a mechanism's log Bayes factor, of what was looked at with its prior probability.
-
-    Parameters
-    ----------
-    residue : float or None
-        Log Bayes factor of a force beside it.
-    gains : mapping of BetweenEvents to float, optional
-        What each way in which avalanches may differ has more than the strength in common.
-    """
-    own = 0.0 if gains is None else over_ways(gains)
-    return own if residue is None else with_or_without(own, residue)
-
-
 def with_or_without(own: float, both: float) -> float:
     """Log evidence of a mechanism where a force may act beside it, from that of it alone and of both."""
     return float(np.logaddexp(math.log1p(-BESIDE) + own, math.log(BESIDE) + both))
@@ -120,23 +106,19 @@ class Candidate:
 
     @property
     def alone(self) -> float:
-        """Log Bayes factor against nothing, shapes and strength integrated over, no force beside it."""
+        """Log Bayes factor against nothing, over shapes and strengths in common, no force beside it."""
         return float(np.logaddexp.reduce(self.log_factors)) + self.correction + self.of_places
 
     @property
     def log_bayes_factor(self) -> float:
         """Against nothing; differing, or with a force not in the list beside it, as far as is probable."""
-        return self.alone + log_gain(self.residue, self.gains)
+        own = self.by_itself
+        return own if self.residue is None else with_or_without(own, self.alone + self.residue)
 
     @property
-    def by_force(self) -> float:
-        """What of that, in nats, comes from a force not in the list beside it."""
-        return self.log_bayes_factor - self.alone - log_gain(None, self.gains)
-
-    @property
-    def in_common(self) -> float:
-        """Log Bayes factor against nothing with a strength that all avalanches have in common."""
-        return self.alone + log_gain(self.residue)
+    def by_itself(self) -> float:
+        """The same without such a force."""
+        return self.alone + (0.0 if self.gains is None else over_ways(self.gains))
 
     @property
     def gains(self) -> dict[BetweenEvents, float] | None:

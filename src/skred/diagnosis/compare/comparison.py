@@ -73,21 +73,14 @@ class ComparisonUnderErrors:
         return self._factors({name: one.log_bayes_factor for name, one in self.candidates.items()})
 
     @property
-    def in_common(self) -> dict[str, float]:
-        """The same with strengths that all avalanches have in common."""
-        return self._factors({name: one.in_common for name, one in self.candidates.items()})
+    def by_itself(self) -> dict[str, float]:
+        """The same, no force beside mechanisms."""
+        return self._factors({name: one.by_itself for name, one in self.candidates.items()})
 
     @property
     def alone(self) -> dict[str, float]:
-        """The same, no force beside them."""
+        """The same, and strengths that all avalanches have in common."""
         return self._factors({name: one.alone for name, one in self.candidates.items()})
-
-    @property
-    def by_itself(self) -> dict[str, float]:
-        """As `log_factors`, no force beside them."""
-        return self._factors(
-            {name: one.log_bayes_factor - one.by_force for name, one in self.candidates.items()}
-        )
 
     @property
     def errors(self) -> dict[str, float | None]:
@@ -146,13 +139,7 @@ class Comparison:
 
     @property
     def log_odds(self) -> float:
-        """Of anything against nothing, strengths in common: as odds of simulated campaigns are computed."""
-        in_common = self._over_errors([under_errors.in_common for under_errors in self.under_each])
-        return log_odds(in_common, self.odds)
-
-    @property
-    def log_odds_alone(self) -> float:
-        """The same without forces beside mechanisms."""
+        """Of anything against nothing, by one thing alone and in common: as those of clean campaigns are."""
         alone = self._over_errors([under_errors.alone for under_errors in self.under_each])
         return log_odds(alone, self.odds)
 

@@ -24,10 +24,10 @@ import numpy as np
 
 from skred.arrays import BoolArray, FloatArray
 from skred.diagnosis.compare.between import or_none, searched
-from skred.diagnosis.compare.candidate import Candidate, all_but_place, log_gain, with_or_without
-from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
+from skred.diagnosis.compare.candidate import Candidate, all_but_place, with_or_without
+from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.compare.residue import fit_beside
-from skred.diagnosis.compare.ways import gains_of
+from skred.diagnosis.compare.ways import gains_of, over_ways
 from skred.diagnosis.discrepancy.fit import fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of, most_probable
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
@@ -121,7 +121,8 @@ class Influence:
         Log Bayes factor without the third of the avalanches that take most of it.
     readings : tuple of ReadingsLeftOut
     rival : Rival or None
-        None where there is no such id under the same error model, or the answer is no listed one.
+        None where there is no such id under the same error model, it could not be refitted, or the answer is
+        no listed one.
     """
 
     answer: str
@@ -138,8 +139,7 @@ class Influence:
     @property
     def carried_by(self) -> tuple[str, ...]:
         """The fewest avalanches without which the answer would not be given; none where they are many."""
-        found = [self.few, None if self.rival is None else self.rival.few]
-        return min((one.events for one in found if one is not None), key=len, default=())
+        return _fewest(self.few, self.rival)
 
 
 def influence(
@@ -166,42 +166,42 @@ def influence(
     else:
         candidate = under_errors.candidates[answer]
         again = partial(_by_mechanism, candidate, base)
-        stated = candidate.alone + log_gain(None, candidate.gains)
+        stated = candidate.by_itself
     # What is tied with the answer explains the same recordings: without some of them it falls as much.
-    needed = max(stated - (comparison.log_odds_alone - enough), 0.0)
-    kinds = kinds_of(base)
+    needed = max(stated - (comparison.log_odds - enough), 0.0)
+    kinds, ids = kinds_of(base), base.problem.campaign.event_ids
     parts = [Part(np.ones(len(gained), dtype=bool), chosen) for _, _, chosen in kinds]
-    with worker_pool() as pool, ThreadPoolExecutor(2) as waiting:
+    with worker_pool() as pool, ThreadPoolExecutor(1) as waiting:
         own = Change(again, pool)
-        margins = [Margin(stated - needed, gained, own)]
-        name = None if answer == UNLISTED else _rival(comparison, under_errors, {answer, *tied})
-        if name is not None:
-            other = under_errors.candidates[name]
-            taken = gained - _gained(base, other.best)
-            candidate = under_errors.candidates[answer]
-            first = own if candidate.residue is None else Change(partial(_with_force, candidate, base), pool)
-            second = Change(partial(_with_force, other, base), pool)
-            margins.append(Margin(_ahead(comparison, answer, name), taken, first, second))
-        third, *without = (needed + margins[0].left_by([margins[0].without_third, *parts])).tolist()
-        few = list(waiting.map(Margin.fewest, margins))
-        least = min((one for one in few if one is not None), key=lambda one: one[0].sum(), default=None)
-        left = None if least is None else float(margins[0].left_by([Part(~least[0])])[0])
-    ids = base.problem.campaign.event_ids
+        # Without the rival, if refits beside a force lead to what no front can do.
+        against = waiting.submit(or_none, _rival, comparison, answer, tied, gained, own)
+        margin = Margin(stated - needed, gained, own)
+        third, *without = (needed + margin.left_by([margin.without_third, *parts])).tolist()
+        few = _few(ids, margin.fewest(), needed)
+        rival = against.result()
+        carriers = _fewest(few, rival)
+        left = margin.left_by([Part(~np.isin(ids, carriers))]) if carriers else None
     return Influence(
         answer,
         stated,
         needed,
         tuple(ids),
         stated - gained,
-        _few(ids, few[0], needed),
-        None if left is None else needed + left,
+        few,
+        None if left is None else needed + float(left[0]),
         third,
         tuple(
             ReadingsLeftOut(kind, sensor, int(chosen.sum()), factor)
             for (kind, sensor, chosen), factor in zip(kinds, without, strict=True)
         ),
-        None if name is None else Rival(name, margins[1].whole, _few(ids, few[1], 0.0)),
+        rival,
     )
+
+
+def _fewest(few: Few | None, rival: Rival | None) -> tuple[str, ...]:
+    """The avalanches of the smaller one of two sets; none where there is neither."""
+    found = [few, None if rival is None else rival.few]
+    return min((one.events for one in found if one is not None), key=len, default=())
 
 
 def _few(ids: Sequence[str], found: tuple[BoolArray, float] | None, needed: float) -> Few | None:
@@ -212,11 +212,24 @@ def _few(ids: Sequence[str], found: tuple[BoolArray, float] | None, needed: floa
     return Few(tuple(one for one, carries in zip(ids, chosen, strict=True) if carries), needed + margin)
 
 
-def _rival(comparison: Comparison, under_errors: ComparisonUnderErrors, given: Collection[str]) -> str | None:
-    """The most probable listed id beside those given."""
-    shares = comparison.probability
-    others = [name for name in under_errors.candidates if name not in given]
-    return max(others, key=lambda name: shares[name], default=None)
+def _rival(
+    comparison: Comparison, answer: str, tied: Collection[str], gained: FloatArray, own: Change
+) -> Rival | None:
+    """The most probable listed id that a listed answer is not tied with, and how far that is."""
+    under_errors, shares = comparison.leading(answer), comparison.probability
+    others = [name for name in under_errors.candidates if name not in {answer, *tied}]
+    if answer == UNLISTED or not others:
+        return None
+    name = max(others, key=lambda one: shares[one])
+    base, first, second = under_errors.base, under_errors.candidates[answer], under_errors.candidates[name]
+    beside = own if first.residue is None else Change(partial(_with_force, first, base), own.pool)
+    margin = Margin(
+        _ahead(comparison, answer, name),
+        gained - _gained(base, second.best),
+        beside,
+        Change(partial(_with_force, second, base), own.pool),
+    )
+    return Rival(name, margin.whole, _few(base.problem.campaign.event_ids, margin.fewest(), 0.0))
 
 
 def _ahead(comparison: Comparison, answer: str, rival: str) -> float:
@@ -282,7 +295,7 @@ def _by_shapes(candidate: Candidate, base: Base, part: Part) -> _Factor:
     gain = 0.0
     if candidate.looked:
         ways = or_none(searched, rest, at_best)
-        gain = 0.0 if ways is None else log_gain(None, gains_of(ways, at_best.log_factor_of(at_best.sign)))
+        gain = 0.0 if ways is None else over_ways(gains_of(ways, at_best.log_factor_of(at_best.sign)))
     # What another kind of shape gains where avalanches differ is not known for a part, and not counted.
     same = np.logaddexp.reduce(of_kind)
     return _Factor(*(float(np.logaddexp.reduce([*others, same + more])) for more in (0.0, gain)))
