@@ -222,10 +222,10 @@ def test_nothing_is_gained_where_before_is_after(ryggfonn: HierarchicalProblem) 
     assert document["sensors"][1]["carrying"] is None
 
 
-def of_sensor(name: str, gain: float, covered: float = 0.9, n: int = 20) -> dict[str, Any]:
+def of_sensor(name: str, gain: float, n: int = 20) -> dict[str, Any]:
     scores = {
         "n": n, "rmse_before": 1.0, "rmse_after": 0.8, "rmse_diff": -0.2, "log_score_diff": gain / n,
-        "log_score_diff_2se": 2.0 / n, "coverage_90_after": covered,
+        "log_score_diff_2se": 2.0 / n,
     }  # fmt: skip
     sets = {"all": scores, "carrying": None, "others": None}
     return {"sensor": name, "quantity": "front_velocity", "unit": "m s-1", **sets}
@@ -234,19 +234,34 @@ def of_sensor(name: str, gain: float, covered: float = 0.9, n: int = 20) -> dict
 def test_of_many_sensors_the_gain_of_each_is_counted() -> None:
     gains = [9.0, 9.0, 0.5, 0.5, 0.5, -9.0]
     sensors = [of_sensor(f"v{k}", gain) for k, gain in enumerate(gains)]
-    said = given_above({"sensors": sensors, "speeds": of_sensor("all", 10.5, n=120)})
+    said = given_above({"sensors": sensors, "speeds": of_sensor("all", 10.5, n=120)}, (0, 0))
     assert "improves the prediction of the speeds at 6 sensors together" in said
     assert "Of these sensors by themselves: 2 better, 3 nothing gained, 1 worse." in said
-    few = given_above({"sensors": sensors[:2], "speeds": of_sensor("all", 18.0, n=40)})
+    few = given_above({"sensors": sensors[:2], "speeds": of_sensor("all", 18.0, n=40)}, (0, 0))
     assert "by themselves" not in few
 
 
-@pytest.mark.parametrize(("covered", "told"), [(0.9, False), (0.95, False), (1.0, True)])
-def test_errors_stated_too_large_are_told(covered: float, told: bool) -> None:
+@pytest.mark.parametrize(("covered", "told"), [(90, False), (95, False), (100, True)])
+def test_errors_stated_too_large_are_told(covered: int, told: bool) -> None:
     """Of 100 speeds all lie in their 90 % intervals by chance in one of 37 000 cases."""
-    said = given_above({"sensors": [of_sensor("v", 9.0)], "speeds": of_sensor("all", 9.0, covered, 100)})
+    said = given_above({"sensors": [of_sensor("v", 9.0)], "speeds": of_sensor("all", 9.0)}, (100, covered))
     assert ("scatter less than their stated errors" in said) == told
     assert not told or "lie 100 of 100 speeds" in said
+
+
+def test_stopped_fronts_do_not_make_errors_too_large(
+    ryggfonn: HierarchicalProblem, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nil lies in the interval of every front that stops: only speeds above it are counted."""
+    pair = predicted(pcm(ryggfonn), draws(200))
+    inside = replace(pair, low=np.full_like(pair.low, -np.inf), high=np.full_like(pair.high, np.inf))
+    speeds = ryggfonn.values[(pair.n_above > 0) & ryggfonn.readings.is_velocity]
+    told = list[tuple[int, int]]()
+    monkeypatch.setattr(
+        "skred.diagnosis.verdict.conditional.given_above", lambda _, moving: told.append(moving)
+    )
+    conditional_document(found_of(BeforeAfter(inside, inside), ryggfonn))
+    assert told == [((speeds > 0.0).sum(),) * 2] and (speeds == 0.0).any()
 
 
 def test_a_gain_counts_beyond_twice_its_standard_error(ryggfonn: HierarchicalProblem) -> None:

@@ -147,6 +147,9 @@ def test_the_diagnosis_speaks_against_itself(
     other = displaced(title_of("obstacle"), 3.0, -1.5)
     assert first == f"Take the diagnosis with care: {carried(['c'], 3, other)}"
     assert second == f"{carried(['a<b', 'c'], 3, too_little(29.9, 3.2, 7.0), 'the alarm')}."
+    several = {"error_models": ["robust", "student"], "influence": influence | {"error_model": "student"}}
+    under = "(log Bayes factor under student errors 29.9 nats with all, 3.2 without, 7.0 needed)"
+    assert under in diagnosis_cautions(verdict | several)[0]
     write_json(folder / "verdict.json", verdict | {"influence": {"carried_by": ["a"]}})
     with pytest.raises(InputError, match="not as skred writes it"):
         source_of(folder)

@@ -31,7 +31,7 @@ from skred.diagnosis.verdict.figure_data import figure_data
 from skred.diagnosis.verdict.hangs_on import hangs_on
 from skred.diagnosis.verdict.next_sensor import next_sensor
 from skred.diagnosis.verdict.statement import statement
-from skred.diagnosis.words import percent, plus_minus
+from skred.diagnosis.words import error_texts, percent, plus_minus
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Direction, Setting, Shape
@@ -362,6 +362,9 @@ def test_of_many_sensors_that_an_answer_needs_five_are_named() -> None:
     """Those without which least is left; how many more there are is told."""
     found = diagnosis("unexplained").influence
     assert found is not None
+    less = replace(found, few=None, without_them=None, without_a_third=found.needed - 0.5)
+    assert not any("does not hang on a few" in one for one in hangs_on(less))
+    assert any("does not hang on a few" in one for one in hangs_on(replace(less, needed=less.needed - 1.0)))
     of_gates = [ReadingsLeftOut("sensor", f"gate{k:02d}", 9, found.needed - k) for k in range(1, 41)]
     zeros = ReadingsLeftOut("zeros", None, 3, found.needed - 0.5)
     said = hangs_on(replace(found, readings=(*of_gates, zeros)))[-1]
@@ -516,6 +519,32 @@ def with_force_beside(comparison: Comparison, name: str, more: float) -> Compari
     return replace(
         comparison, under_each=tuple(other if each is under else each for each in comparison.under_each)
     )
+
+
+def test_of_what_comes_closest_it_is_said_what_it_has_by_itself() -> None:
+    found = diagnosis("unexplained")
+    listed = [name for name in found.comparison.log_factors if name not in (NOTHING, UNLISTED)]
+    name = max(listed, key=lambda one: found.comparison.probability[one])
+    again = with_force_beside(found.comparison, name, 20.0)
+    by_itself = found.comparison.log_factors[name]
+    said = verdict(replace(found, comparison=again))["statement"]
+    assert f"its log Bayes factor is {by_itself:.1f} nats by itself and" in said
+    assert "with such a force allowed for" not in verdict(found)["statement"]
+
+
+def test_a_second_name_that_is_tied_is_not_called_sure() -> None:
+    document = document_of(diagnosis("two"))
+    document["mechanisms"][1]["tied_with"] = ["obstacle"]
+    document["report"]["comparisons"][1]["probability"][document["mechanisms"][1]["id"]] = 0.5
+    told = " ".join(lay_words(document))
+    assert "; beside it " in told and "; beside it, " not in told
+
+
+def test_errors_before_and_after_have_as_many_decimals() -> None:
+    assert error_texts([1.02, 0.997], "m s-1") == ["1.02", "1.00"]
+    assert error_texts([10.3, 9.96], "m") == ["10.3", "10.0"]
+    assert error_texts([0.0, 6.12], "m s-1") == ["0.0", "6.1"]
+    assert error_texts([71.0, 66.3], "m") == ["71", "66"]
 
 
 def test_a_name_that_counts_together_with_a_force_beside_it_says_what_it_has_by_itself() -> None:

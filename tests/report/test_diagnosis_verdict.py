@@ -171,8 +171,9 @@ def test_the_next_sensor_is_the_one_that_the_page_names(kind):
     assert f"A speed read at s = {sensor['s_from_m']:.0f} m helps most" in text
 
 
-def test_a_sensor_that_raises_nothing_is_not_named():
-    table = Identifiability(diagnosis("silent").table.rows, 1750.0, 0.3, 0.3)
+@pytest.mark.parametrize("power", [0.3, 0.304])
+def test_a_sensor_that_raises_nothing_is_not_named(power):
+    table = Identifiability(diagnosis("silent").table.rows, 1750.0, 0.3, power)
     found = replace(diagnosis("silent"), table=table)
     document = verdict(found)
     assert document["next_sensor"] is None and document["detection_sensor"] is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from skred.inference.influence_words import enumerated
 from skred.inference.intervals import ENDS
@@ -49,11 +50,12 @@ def plus_minus(mean: float, sd: float, unit: str) -> str:
     return f"{text if power == 0 else f'({text})e{power}'} {unit_text(unit)}".rstrip()
 
 
-def error_text(value: float, unit: str) -> str:
-    """An error of speeds (one decimal) or of runouts (none); two significant digits of a small one."""
+def error_texts(values: Sequence[float], unit: str) -> list[str]:
+    """Errors of speeds (one decimal) or runouts (none), equally many of each; two digits of small ones."""
     usual = 0 if unit == "m" else 1
-    small = 1 - math.floor(math.log10(value)) if value > 0.0 else usual
-    return f"{value:.{max(usual, small)}f}"
+    small = (1 - math.floor(math.log10(value)) for value in values if value > 0.0)
+    decimals = max([usual, *small])
+    return [f"{value:.{decimals}f}" for value in values]
 
 
 TOLD_FROM = ENDS[0]

@@ -45,10 +45,11 @@ def carried(carried_by: Sequence[str], n_events: int, otherwise: str, what: str 
     )
 
 
-def too_little(with_all: float, without_them: float, needed: float) -> str:
-    """That odds would not suffice, by log Bayes factors in nats."""
-    evidence = f"{with_all:.1f} nats with all, {without_them:.1f} without"
-    return f"the odds would not suffice for it (log Bayes factor {evidence}, {needed:.1f} needed)"
+def too_little(with_all: float, without_them: float, needed: float, errors: str = "") -> str:
+    """That odds would not suffice, by log Bayes factors in nats under an error model if there are several."""
+    under = f" under {errors} errors" if errors else ""
+    evidence = f"{with_all:.1f} nats with all, {without_them:.1f} without, {needed:.1f} needed"
+    return f"the odds would not suffice for it (log Bayes factor{under} {evidence})"
 
 
 def _probable_as(without_them: float) -> str:

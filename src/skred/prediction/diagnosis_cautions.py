@@ -22,10 +22,11 @@ def diagnosis_cautions(verdict: Mapping[str, Any]) -> list[str]:
     KeyError, TypeError, ValueError, AttributeError
         If it is not as a diagnosis writes it.
     """
-    return [*_carried(verdict.get("influence")), *_probability(verdict), *_ties(verdict)]
+    return [*_carried(verdict), *_probability(verdict), *_ties(verdict)]
 
 
-def _carried(influence: Mapping[str, Any] | None) -> list[str]:
+def _carried(verdict: Mapping[str, Any]) -> list[str]:
+    influence = verdict.get("influence")
     if not influence or not influence["carried_by"]:
         return []
     n, rival = len(influence["events"]), influence.get("rival")
@@ -36,10 +37,16 @@ def _carried(influence: Mapping[str, Any] | None) -> list[str]:
         told.append(carried(list(map(str, rival["carried_by"])), n, otherwise))
     alarm = influence.get("alarm") or influence  # without it in verdicts of older versions
     if alarm["carried_by"]:
-        otherwise = too_little(with_all, float(alarm["without_them"]), needed)
+        otherwise = too_little(with_all, float(alarm["without_them"]), needed, _errors(verdict))
         what = "the alarm" if told else "this answer"
         told.append(carried(list(map(str, alarm["carried_by"])), n, otherwise, what))
     return [f"Take the diagnosis with care: {'; '.join(told)}."]
+
+
+def _errors(verdict: Mapping[str, Any]) -> str:
+    """The error model that an answer was held against others under, where several were compared."""
+    several = len(verdict.get("error_models") or []) > 1
+    return str(verdict["influence"].get("error_model") or "") if several else ""
 
 
 def _probability(verdict: Mapping[str, Any]) -> list[str]:

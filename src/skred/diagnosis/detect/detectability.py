@@ -108,6 +108,11 @@ class Identifiability:
     power_with: float
 
     @property
+    def more_with_sensor(self) -> bool:
+        """Whether that sensor raises the power as it is told, in percent."""
+        return round(100.0 * self.power_with) > round(100.0 * self.power)
+
+    @property
     def can_tell(self) -> bool:
         """Whether a relevant strength of what is listed would be found in at least half of the cases."""
         return self.power >= 0.5

@@ -74,7 +74,7 @@ def identify_document(
         "identifiability": rows,
         "power": None if table is None else table.power,
         "can_tell": None if table is None else table.can_tell,
-        "next_sensor": None if table is None else _next_sensor(table),
+        "next_sensor": _next_sensor(table) if table is not None and table.more_with_sensor else None,
     }
     document["statement"] = [*filter(None, [prior_note(law)]), *_statement(document)]
     return document
@@ -112,7 +112,7 @@ def _statement(document: dict[str, Any]) -> list[str]:
     if alike:
         sentences.append(f"Not to be told apart, where each is seen best: {'; '.join(alike)}.")
     sensor = document["next_sensor"]
-    if sensor["power_with"] > document["power"]:
+    if sensor is not None:
         sentences.append(
             f"One more speed, at s = {sensor['s_from_m']:.0f} m, would raise that to"
             f" {percent(sensor['power_with'])}."

@@ -20,6 +20,6 @@ def by_both(comparison: Comparison, name: str) -> str:
     factors, by_itself = comparison.log_factors, comparison.by_itself[name]
     return (
         "That is its probability together with a force in no list beside it: its log Bayes factor is"
-        f" {by_itself:.1f} nats by itself and {factors[name]:.1f} with such a force, which by itself has"
-        f" {factors[UNLISTED]:.1f}."
+        f" {by_itself:.1f} nats by itself and {factors[name]:.1f} with such a force allowed for, which by"
+        f" itself has {factors[UNLISTED]:.1f}."
     )

@@ -45,7 +45,7 @@ def conditional_document(found: Diagnosis) -> dict[str, Any] | None:
         "effective_draws_min": float(effective.min()) if effective.size else None,
         "n_few_draws": int(too_few(effective).sum()),
     }
-    return document | {"statement": given_above(document)}
+    return document | {"statement": given_above(document, _moving(pair, problem, shown & velocity))}
 
 
 def conditional_dataset(pair: BeforeAfter, problem: HierarchicalProblem) -> xr.Dataset:
@@ -62,6 +62,15 @@ def conditional_dataset(pair: BeforeAfter, problem: HierarchicalProblem) -> xr.D
             "interval": "low to high holds 90 % of the readings predicted, errors included",
         },
     )
+
+
+def _moving(pair: BeforeAfter, problem: HierarchicalProblem, chosen: BoolArray) -> tuple[int, int]:
+    """How many of some speeds are above nil, and how many of these lie in their intervals.
+
+    Of a front that has stopped nothing scatters: nil is read, and is in all intervals of fronts that stop.
+    """
+    chosen = chosen & (problem.values > 0.0)
+    return int(chosen.sum()), int(pair.after.covered(problem.values)[chosen].sum())
 
 
 def _shown(pair: BeforeAfter) -> BoolArray:

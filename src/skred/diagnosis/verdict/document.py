@@ -12,7 +12,7 @@ from skred.diagnosis.augment.coefficient import augmented_of
 from skred.diagnosis.augment.step import Left
 from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER, SHARES
-from skred.diagnosis.influence.influence import Few, Influence
+from skred.diagnosis.influence.influence import Few
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.predict.held_out import HeldOut, elpd_difference, errors
 from skred.diagnosis.predict.profile_law import ProfileLaw
@@ -183,7 +183,7 @@ def _more(found: Outcome) -> dict[str, Any]:
         "calibration": {"version": CALIBRATION_VERSION, "power": POWER, "prior": found.comparison.odds},
         "error_models": [under_errors.error_model for under_errors in found.comparison.under_each],
         "candidates": candidate_documents(found, found.comparison),
-        "influence": _influence(found.influence),
+        "influence": _influence(found),
         "conditional": conditional_document(found),
         "sensor_places": places_document(found),
         **_with_what_was_added(found),
@@ -215,12 +215,14 @@ def _with_what_was_added(found: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _influence(found: Influence | None) -> dict[str, Any] | None:
+def _influence(outcome: Diagnosis) -> dict[str, Any] | None:
     """What the answer hangs on; None where none is given."""
+    found = outcome.influence
     if found is None:
         return None
     return {
         "answer": found.answer,
+        "error_model": outcome.comparison.leading(found.answer).error_model,
         "log_bayes_factor": found.log_bayes_factor,
         "needed": found.needed,
         "events": [

@@ -7,7 +7,7 @@ from typing import Any
 from scipy.stats import binom
 
 from skred.diagnosis.limits import LIMIT
-from skred.diagnosis.words import MOST_NAMED, counted, error_text
+from skred.diagnosis.words import MOST_NAMED, counted, error_texts
 from skred.inference.influence_words import enumerated
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.units import unit_text
@@ -23,13 +23,19 @@ _KINDS = {
 """As it is told."""
 
 
-def given_above(document: dict[str, Any]) -> str:
-    """What is gained at which sensor, as one sentence or a few."""
+def given_above(document: dict[str, Any], moving: tuple[int, int]) -> str:
+    """What is gained at which sensor, as one sentence or a few.
+
+    Parameters
+    ----------
+    moving : (int, int)
+        Speeds above nil that have a reading above them, and how many lie in their 90 % intervals.
+    """
     rows = _rows(document)
     if not rows:
         return "No avalanche has two readings, so none is predicted from those above it."
     parts = [f"Given the readings of the same avalanche above it, {_gains(rows, 'all')}", _each(document)]
-    parts.append(_within(document))
+    parts.append(_within(*moving))
     carried = [row for row in rows if row[2]["carrying"] is not None]
     if carried:
         alone = [f"{name} ({_change(sets['carrying'], unit)})" for name, unit, sets in carried]
@@ -50,12 +56,8 @@ def _each(document: dict[str, Any]) -> str:
     return f"Of these sensors by themselves: {', '.join(said)}."
 
 
-def _within(document: dict[str, Any]) -> str:
+def _within(n: int, inside: int) -> str:
     """That errors are smaller than stated, where more readings than chance has lie in their intervals."""
-    scores = None if document["speeds"] is None else document["speeds"]["all"]
-    if scores is None:
-        return ""
-    n, inside = scores["n"], round(scores["n"] * scores["coverage_90_after"])
     if binom.sf(inside - 1, n, 0.9) > LIMIT:
         return ""
     return (
@@ -123,7 +125,7 @@ def _change(scores: dict[str, Any], unit: str) -> str:
 
 
 def _errors(scores: dict[str, Any], unit: str) -> str:
-    before, after = (error_text(scores[f"rmse_{when}"], unit) for when in ("before", "after"))
+    before, after = error_texts([scores["rmse_before"], scores["rmse_after"]], unit)
     return (
         f"{before} {unit_text(unit)} as before"
         if before == after

@@ -10,8 +10,14 @@ from skred.inference.influence_words import title_of
 _KINDS = {"zeros": ("reading", "of zero"), "near a stop": ("speed", "beside the same avalanche's stop")}
 
 
-def carried(found: Influence | None) -> str:
-    """That few avalanches carry the answer, where they do; begins with a small letter."""
+def carried(found: Influence | None, errors: str = "") -> str:
+    """That few avalanches carry the answer, where they do; begins with a small letter.
+
+    Parameters
+    ----------
+    errors : str
+        The error model that this is under, where there are several.
+    """
     if found is None:
         return ""
     told, n = [], len(found.events)
@@ -20,7 +26,7 @@ def carried(found: Influence | None) -> str:
         otherwise = words.displaced(title_of(rival.id), rival.ahead, rival.few.left)
         told.append(words.carried(rival.few.events, n, otherwise))
     if found.few is not None:
-        otherwise = words.too_little(found.log_bayes_factor, found.few.left, found.needed)
+        otherwise = words.too_little(found.log_bayes_factor, found.few.left, found.needed, errors)
         told.append(
             words.carried(found.few.events, n, otherwise, what="the alarm" if told else "this answer")
         )
@@ -33,12 +39,12 @@ def hangs_on(found: Influence | None, errors: str = "") -> list[str]:
     Parameters
     ----------
     errors : str
-        The error model that this is under, where there are several.
+        As for `carried`.
     """
     if found is None:
         return []
     sentences = []
-    if not found.carried_by:
+    if not found.carried_by and found.without_a_third >= found.needed:
         under = f"; under {errors} errors" if errors else ""
         evidence = f"{found.without_a_third:.1f} nats ({found.log_bayes_factor:.1f} with all{under})"
         sentences.append(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from skred.diagnosis.words import error_text
+from skred.diagnosis.words import error_texts
 from skred.inference.intervals import PRACTICAL_DIFFERENCE
 from skred.units import unit_text
 
@@ -43,7 +43,7 @@ def _changes(held: dict[str, Any]) -> tuple[list[str], list[str]]:
         values = [held[f"{key}_{when}"] for when in ("before", "after")]
         if None in values:
             continue
-        before, after = (error_text(value, unit) for value in values)
+        before, after = error_texts(values, unit)
         shown = unit_text(unit)
         if before == after:
             better.append(f"the error of {what} stays at {before} {shown}")

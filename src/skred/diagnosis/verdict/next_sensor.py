@@ -26,8 +26,8 @@ def next_sensor(found: Diagnosis) -> dict[str, Any] | None:
 
 
 def detection_sensor(table: Identifiability) -> dict[str, Any] | None:
-    """The one that raises the power over the listed mechanisms most; None where none does."""
-    if table.power_with <= table.power:
+    """The one that raises the power over the listed mechanisms most; None where none does by a percent."""
+    if not table.more_with_sensor:
         return None
     return _sensor(table.sensor_m, [], table.power_with)
 

@@ -60,7 +60,8 @@ def _errors(found: Diagnosis) -> str:
 
 def _caution(found: Diagnosis) -> str:
     """The first thing to know: that few avalanches carry the answer, and what it takes for granted."""
-    reasons = carried(found.influence), _not_converged(found.refits_not_converged), place_as_stated(found)
+    few = carried(found.influence, _errors(found))
+    reasons = few, _not_converged(found.refits_not_converged), place_as_stated(found)
     given = [one for one in reasons if one]
     return f"Take this with care: {'; '.join(given)}." if given else ""
 
@@ -274,7 +275,7 @@ def _unexplained(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         f"Something is missing{_where(document['location'])} that {'most probably ' if doubt else ''}no"
         f" listed mechanism accounts for (a force not in the list: {percent(probability[UNLISTED])}; nothing:"
         f" {percent(probability[NOTHING])}; check: {_rare(found.check)}).",
-        _tied([UNLISTED, *document["indistinguishable"]], probability),
+        _tied([UNLISTED, *document["indistinguishable"]], probability, beside_force(found.comparison)),
         _by_speed(found.location),
         _closest(found, document),
         "The force profile is the answer: it says where the force acts and how much work it does.",
@@ -298,10 +299,12 @@ def _closest(found: Diagnosis, document: dict[str, Any]) -> str:
     factors, probability = found.comparison.log_factors, document["probability"]
     listed = [name for name in factors if name not in (NOTHING, UNLISTED)]
     name = max(listed, key=lambda one: probability[one])
+    closest = f"Of the listed mechanisms, {title_of(name)} comes closest ({percent(probability[name])})"
+    if together := by_both(found.comparison, name):
+        return f"{closest}. {together}"
     return (
-        f"Of the listed mechanisms, {title_of(name)} comes closest ({percent(probability[name])}):"
-        f" its log Bayes factor against nothing is {factors[name]:.1f} nats, that of a force not in the list"
-        f" {factors[UNLISTED]:.1f}."
+        f"{closest}: its log Bayes factor against nothing is {factors[name]:.1f} nats, that of a force not in"
+        f" the list {factors[UNLISTED]:.1f}."
     )
 
 
@@ -317,9 +320,10 @@ def _hint(found: Diagnosis, document: dict[str, Any]) -> str:
         if probability[NOTHING] >= NOTHING_AT_MOST
         else _too_usual(found.check)
     )
+    how = percent(probability[first]) + _with_force(first, beside_force(found.comparison))
     return (
-        f"Of what could be missing, {title_of(first)} would be the most probable"
-        f" ({percent(probability[first])}). None is claimed: {why}."
+        f"Of what could be missing, {title_of(first)} would be the most probable ({how}). None is claimed:"
+        f" {why}."
     )
 
 

@@ -72,7 +72,7 @@ def _named(document: doc.Document, verdict: str, where: str) -> str:
     if len({doc.get(one, "group") for one in entries}) > 1:
         what = "a force is missing, and the recordings are off"
     probability = doc.get(document, "probability", str(doc.get(document, "mechanism")))
-    sure = _how_sure(probability, doc.listed(document, "indistinguishable"))
+    sure = _how_sure(probability, doc.listed(document, "indistinguishable")) or "yes"
     more = "".join(_second(document, number, one) for number, one in enumerate(entries) if number > 0)
     return f"{_answer_of(document)}: {sure}, {what}: {name}{where}{more}."
 
@@ -96,13 +96,14 @@ def _second(document: doc.Document, number: int, entry: doc.Document) -> str:
     comparison = comparisons[number] if number < len(comparisons) else {}
     sure = _how_sure(doc.get(comparison, "probability", str(names[0])), tied)
     either = "".join(f" or {one}" for one in tied)
-    return f"; beside it, {sure}, {first}{f' ({printable(about)})' if about else ''}{either}"
+    how = f", {sure}," if sure else ""
+    return f"; beside it{how} {first}{f' ({printable(about)})' if about else ''}{either}"
 
 
 def _how_sure(probability: Any, tied: Sequence[Any]) -> str:
-    """How probable a name is, in words."""
+    """How probable a name is, in words; empty where others are about as probable."""
     if not is_number(probability) or probability < _LIKELY:
-        return "yes" if tied else "most probably"
+        return "" if tied else "most probably"
     return "almost surely" if probability >= _SURE else "very probably"
 
 
@@ -166,7 +167,8 @@ def _use(document: doc.Document) -> list[str]:
     for key, words, unit, decimals in (("velocity", "speeds", "m/s", 1), ("runout", "runouts", "m", 0)):
         before, after = (doc.get(document, "held_out", f"rmse_{key}_{when}") for when in ("before", "after"))
         if is_number(before) and is_number(after):
-            ends = [rounded(one, max(decimals, decimals_for(one) or 0)) for one in (before, after)]
+            decimals = max(decimals, *(decimals_for(one) or 0 for one in (before, after)))
+            ends = [rounded(one, decimals) for one in (before, after)]
             goes = "" if any(part.startswith("goes") for part in parts) else "goes "
             way = f"stays at {ends[0]}" if ends[0] == ends[1] else f"{goes}from {ends[0]} to {ends[1]}"
             parts.append(f"{way} {unit} for {words}")
