@@ -91,9 +91,18 @@ def _alarms(
         scores[k] += information[:, direction] * snr / math.sqrt(information[direction, direction])
     every = np.broadcast_to(information, (DRAWS, *information.shape))
     raw = np.broadcast_to(np.diag(information), (DRAWS, len(information)))
-    log_odds, without = (score_test.statistic(Scores(one, every, raw)) for one in (scores, clean))
+    log_odds, without = (_log_odds(score_test, Scores(one, every, raw)) for one in (scores, clean))
     alarm = (log_odds > np.quantile(without, 1.0 - LIMIT)).tolist()
     return [one if there else None for one, there in zip(alarm, reached, strict=True)]
+
+
+def _log_odds(score_test: ScoreTest, scores: Scores) -> FloatArray:
+    """Log odds that anything is missing against nothing, in the linear model, (n_groups,)."""
+    terms = [
+        np.logaddexp.reduce(one.log_factors + one.log_shares, axis=1) + one.log_odds
+        for one in score_test.by_id(scores).values()
+    ]
+    return np.asarray(np.logaddexp.reduce(terms, axis=0))
 
 
 def _one_of(

@@ -43,12 +43,16 @@ def main(*, law: str = "pcm", errors: str = "scaled", seed: int = 0) -> None:
         ),
     }
     found = {
-        name: {"elpd": one.elpd, "pointwise": one.pointwise.tolist(), "refitted": list(one.refitted)}
+        name: {
+            "elpd": float(one.pointwise.sum()),
+            "pointwise": one.pointwise.tolist(),
+            "refitted": list(one.refitted),
+        }
         for name, one in routes.items()
     }
     write(RESULT, {"law": law, "errors": errors, "seed": seed, "routes": found})
     for name, one in routes.items():
-        print(f"{name}: {one.elpd:.2f}")
+        print(f"{name}: {one.pointwise.sum():.2f}")
 
 
 if __name__ == "__main__":

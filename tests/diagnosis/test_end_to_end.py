@@ -131,7 +131,6 @@ def test_predictions_are_of_the_readings(clean: Diagnosis) -> None:
     inside = (problem.values >= found.predicted.low) & (problem.values <= found.predicted.high)
     covered = errors(found, problem, "before")["coverage_90_before"]
     assert covered == inside[seen].mean() and 0.6 < covered <= 1.0
-    assert found.elpd == pytest.approx(found.pointwise.sum())
 
 
 @pytest.mark.slow

@@ -159,7 +159,7 @@ def test_before_is_what_sampling_and_refits_say(hidden: Base, added: ProfileLaw)
     calibration = calibrate(hidden.problem, hidden.law, SamplerSettings("metropolis", 800, 1500, 4, 0))
     sampled = held_out(calibration, 0, exact=True)
     np.testing.assert_allclose(added.before.pointwise, sampled.pointwise, atol=0.5)
-    assert added.before.elpd == pytest.approx(sampled.elpd, abs=1.0)
+    assert added.before.pointwise.sum() == pytest.approx(sampled.pointwise.sum(), abs=1.0)
     # Sampling weights its draws for this, few of which count for an avalanche that is unlike the others.
     seen = hidden.problem.observed
     ratio = added.before.predicted.mean[seen] / sampled.predicted.mean[seen]

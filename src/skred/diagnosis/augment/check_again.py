@@ -13,9 +13,11 @@ from skred.diagnosis.check.bootstrap_test import BootstrapTest, odds_of_recordin
 from skred.diagnosis.compare.between import or_none
 from skred.diagnosis.compare.comparison import Comparison, compare
 from skred.diagnosis.effort import Run
-from skred.diagnosis.evidence.coefficient import Base, Curve, fit_base
-from skred.diagnosis.evidence.conditional_map import Population
+from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.diagnosis.evidence.conditional_map import Population, campaign_rows
+from skred.diagnosis.evidence.extension import extended, setting_of, typical_speed
 from skred.diagnosis.evidence.population_draws import population_draws, typical
+from skred.diagnosis.evidence.refit import Rounds, refit
 from skred.inference.calibrate import Calibration, posterior_of
 
 
@@ -59,8 +61,11 @@ def _augmented(base: Base, calibration: Calibration, chosen: Sequence[Curve], po
     if own is not None:
         directions = tuple(replace(one, own=own[:, k]) for k, one in enumerate(directions))
     strengths = augmented_of(calibration).added_rows(posterior_of(calibration)).mean(axis=0)
-    again = fit_base(base.problem, base.law, population, base.fit.points, directions, strengths)
+    extension = extended(base.problem, base.law, directions)
+    rows = campaign_rows(extension)
+    fit = refit(extension, rows, strengths[None, :], (population, base.fit.points), Rounds(least=4))[0]
+    setting = setting_of(base.problem, base.law, typical_speed(extension.speeds(fit.points, strengths)))
     # What acts along the track cannot be missing from it a second time.
     along_the_track = [one.mechanism.id for one in chosen if one.shape.place_m is None]
-    setting = replace(again.setting, base=(*base.setting.base, *along_the_track))
-    return replace(again, setting=setting)
+    setting = replace(setting, base=(*base.setting.base, *along_the_track))
+    return Base(base.problem, base.law, setting, rows, fit, directions, strengths)

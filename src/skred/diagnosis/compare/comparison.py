@@ -11,7 +11,7 @@ loads only when asked, and two threads that ask at once find half of it; NumPy's
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -70,17 +70,12 @@ class ComparisonUnderErrors:
     @property
     def log_factors(self) -> dict[str, float]:
         """Log Bayes factor of each id against nothing under the same error model."""
-        return self._factors({name: one.log_bayes_factor for name, one in self.candidates.items()})
+        return self.factors(lambda one: one.log_bayes_factor)
 
-    @property
-    def by_itself(self) -> dict[str, float]:
-        """The same, no force beside mechanisms."""
-        return self._factors({name: one.by_itself for name, one in self.candidates.items()})
-
-    @property
-    def alone(self) -> dict[str, float]:
-        """The same, and strengths that all avalanches have in common."""
-        return self._factors({name: one.alone for name, one in self.candidates.items()})
+    def factors(self, of_mechanism: Callable[[Candidate], float]) -> dict[str, float]:
+        """The same by another log Bayes factor of the mechanisms."""
+        found = {name: of_mechanism(one) for name, one in self.candidates.items()}
+        return found | ({UNLISTED: log_evidence_of(self.profiles)} if self.profiles else {}) | {NOTHING: 0.0}
 
     @property
     def errors(self) -> dict[str, float | None]:
@@ -92,9 +87,6 @@ class ComparisonUnderErrors:
     def of_places(self) -> float:
         """What stated errors of sensors' places change in the log evidence of nothing, in nats."""
         return 0.0 if self.shifts is None else self.shifts.log_factor
-
-    def _factors(self, found: dict[str, float]) -> dict[str, float]:
-        return found | ({UNLISTED: log_evidence_of(self.profiles)} if self.profiles else {}) | {NOTHING: 0.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,18 +108,17 @@ class Comparison:
     @property
     def log_factors(self) -> dict[str, float]:
         """Log Bayes factor of each id against nothing, over the error models."""
-        return self._over_errors([under_errors.log_factors for under_errors in self.under_each])
+        return self._factors(lambda one: one.log_bayes_factor)
 
     @property
     def by_itself(self) -> dict[str, float]:
         """The same without forces beside mechanisms."""
-        return self._over_errors([under_errors.by_itself for under_errors in self.under_each])
+        return self._factors(lambda one: one.by_itself)
 
-    def _over_errors(self, factors: Sequence[Mapping[str, float]]) -> dict[str, float]:
-        """Log Bayes factors from those under each error model."""
+    def _factors(self, of_mechanism: Callable[[Candidate], float]) -> dict[str, float]:
         parts: dict[str, list[float]] = {}
-        for under_errors, found in zip(self.under_each, factors, strict=True):
-            for name, factor in found.items():
+        for under_errors in self.under_each:
+            for name, factor in under_errors.factors(of_mechanism).items():
                 parts.setdefault(name, []).append(self._height(under_errors.error_model) + factor)
         nothing = float(np.logaddexp.reduce(parts[NOTHING]))
         return {name: float(np.logaddexp.reduce(values)) - nothing for name, values in parts.items()}
@@ -140,8 +131,7 @@ class Comparison:
     @property
     def log_odds(self) -> float:
         """Of anything against nothing, by one thing alone and in common: as those of clean campaigns are."""
-        alone = self._over_errors([under_errors.alone for under_errors in self.under_each])
-        return log_odds(alone, self.odds)
+        return log_odds(self._factors(lambda one: one.alone), self.odds)
 
     def leading(self, name: str) -> ComparisonUnderErrors:
         """The comparison under the error model that an id has most of its evidence under."""

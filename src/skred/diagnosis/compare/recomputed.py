@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 
@@ -48,22 +48,17 @@ def recomputed(
     with ThreadPoolExecutor(len(KINDS)) as waiting:
         sampled_of = {k: waiting.submit(sampled, base, profiles[k], pool, some) for k in worth}
         todo = [candidates[name] for name in leading if candidates[name].error is None]
-        found = {**candidates, **{one.mechanism.id: one for one in with_finer_curves(base, todo, pool)}}
+        finer = pool.map(partial(computed_again, base), [one.best for one in todo])
+        found = dict(candidates)
+        for one, (fine, error) in zip(todo, finer, strict=True):
+            changed = fine.log_bayes_factor - one.best.log_bayes_factor
+            found[one.mechanism.id] = replace(one, correction=changed, error=error)
         again = [sampled_of[k].result() if k in worth else one for k, one in enumerate(profiles)]
     lacked = log_evidence_of(again) - log_evidence_of(profiles) if worth else 0.0
     for name, one in found.items():
         if one.residue is not None:
             found[name] = replace(one, residue=one.residue + lacked)
     return found, again
-
-
-def with_finer_curves(base: Base, candidates: Sequence[Candidate], pool: Executor) -> list[Candidate]:
-    """Mechanisms with their best curve computed again."""
-    again = pool.map(partial(computed_again, base), [one.best for one in candidates])
-    return [
-        replace(one, correction=fine.log_bayes_factor - one.best.log_bayes_factor, error=error)
-        for one, (fine, error) in zip(candidates, again, strict=True)
-    ]
 
 
 def computed_again(base: Base, curve: Curve) -> tuple[Curve, float]:

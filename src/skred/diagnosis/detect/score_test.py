@@ -203,14 +203,6 @@ class ScoreTest:
             found[name] = LinearFactors(placed, factors[:, own], of_shapes, log_odds[name])
         return found
 
-    def statistic(self, scores: Scores) -> FloatArray:
-        """Log odds that anything is missing against nothing, in the linear model, (n_groups,)."""
-        terms = [
-            np.logaddexp.reduce(one.log_factors + one.log_shares, axis=1) + one.log_odds
-            for one in self.by_id(scores).values()
-        ]
-        return np.asarray(np.logaddexp.reduce(terms, axis=0))
-
 
 def log_factor_of_process(score: FloatArray, information: FloatArray, cover: FloatArray) -> FloatArray:
     """Log Bayes factor of a Gaussian process in the linear model, (n_groups,).

@@ -12,30 +12,23 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
 from skred.arrays import FloatArray
 from skred.diagnosis.discrepancy.explored import Expansion, prior_penalty
+from skred.diagnosis.discrepancy.profile import Kind
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, look_around
 from skred.diagnosis.evidence.expected_score import expected_score
 from skred.diagnosis.evidence.extension import Extension
 from skred.diagnosis.evidence.linear_mixed_model import efficient_scores, mean_prior
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
+from skred.diagnosis.evidence.stated_places import StatedPlaces
 from skred.diagnosis.evidence.tolerance import ARRIVED, MOST_ROUNDS, STEP_SHARES
-from skred.physics.mechanisms.spec import Direction, Setting
 
-
-class Values(Protocol):
-    """Values that are fitted together beside a law: what they are the strengths of."""
-
-    def each(self, setting: Setting) -> list[Direction]:
-        """A direction for each value."""
-
-    def together(self, setting: Setting, values: FloatArray) -> tuple[list[Direction], FloatArray]:
-        """All values in as few directions as may be, with their strengths."""
+Values = Kind | StatedPlaces
+"""Values that are fitted together beside a law: what they are the strengths of."""
 
 
 def expanded_at(

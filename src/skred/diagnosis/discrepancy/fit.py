@@ -88,16 +88,15 @@ def fit_profile(
     shares = priors_of(kind, at)
     covers = {prior: _with_more(scales, prior.cover(at)) for prior in shares}
     explored = ExploredPriors(height, shares, covers, least)
-    if again is None:
-        waiting, maximum_under, most = _first(kind, starts[-1], explored), _maximum_under, _PRIORS_TRIED
-    else:
-        waiting, maximum_under, most = [again], _maximum_from_one, _PRIORS_AGAIN
+    waiting, most = ([again], _PRIORS_AGAIN) if again else (_first(kind, starts[-1], explored), _PRIORS_TRIED)
     while waiting and len(explored.maxima) < most:
         prior = waiting.pop()
-        begin = [*starts, *explored.maxima.values()]
-        found = maximum_under(base, kind, begin, covers[prior])
+        begin, cover = [*starts, *explored.maxima.values()], covers[prior]
+        found = (
+            climb(base, kind, highest(begin, cover), cover) if again else _maximum(base, kind, begin, cover)
+        )
         if not explored.maxima:  # once, for it costs more: climbs under the other priors may begin there
-            found = climb(base, kind, found, covers[prior], by_modes=False)
+            found = climb(base, kind, found, cover, by_modes=False)
         explored.add(prior, found)
         waiting = waiting or explored.open
     prior = max(explored.maxima, key=explored.factor)
@@ -146,7 +145,7 @@ def _first(kind: Kind, start: Expansion, explored: ExploredPriors) -> list[Prior
     return [usual, own] if own != usual else [usual]
 
 
-def _maximum_under(base: Base, kind: Kind, starts: Sequence[Expansion], cover: FloatArray) -> Expansion:
+def _maximum(base: Base, kind: Kind, starts: Sequence[Expansion], cover: FloatArray) -> Expansion:
     """The maximum under a prior, from the start with the highest posterior and from the one that fits best.
 
     Sharp edges of a listed shape cost more under a smooth prior than they gain; but where recordings are far
@@ -158,11 +157,6 @@ def _maximum_under(base: Base, kind: Kind, starts: Sequence[Expansion], cover: F
     if best is first or best.fit.found.log_evidence < found.fit.found.log_evidence + DECIDES_NOTHING:
         return found
     return highest([found, climb(base, kind, best, cover)], cover)
-
-
-def _maximum_from_one(base: Base, kind: Kind, starts: Sequence[Expansion], cover: FloatArray) -> Expansion:
-    """The maximum under a prior, from the start with the highest posterior."""
-    return climb(base, kind, highest(starts, cover), cover)
 
 
 def as_profile(base: Base, kind: Kind, near: Curve) -> Start:

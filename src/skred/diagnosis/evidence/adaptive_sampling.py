@@ -19,8 +19,6 @@ from scipy.special import gammaln
 from skred.arrays import FloatArray
 from skred.diagnosis.evidence.tolerance import DRAWS, MOST_ROUNDS, STANDARD_ERROR
 
-_ODD = 0.1
-"""Share of all weight on one draw from which on a mode is looked for there: the proposals have missed one."""
 _DEGREES = 7.0
 """Degrees of freedom of the proposals: tails heavy enough to bound the weights."""
 
@@ -227,7 +225,7 @@ def weighted_draws(
         found = Weighted(draws[fresh], heights[fresh] - own[fresh], following)
         if last or (len(turns) > first and (found.log_integral < least or found.error < enough)):
             return found
-        if mode_near is not None and shares.max() > _ODD:
+        if mode_near is not None and shares.max() > STANDARD_ERROR:
             # Where fronts stop there are more modes than climbs find: so do Raftery and Bao, 2010,
             # doi 10.1111/j.1541-0420.2010.01399.x.
             # It gets what the draw that showed it has of all weight, and no less of the next draws.

@@ -269,32 +269,26 @@ def fit_base(
     law: Law,
     population: Population,
     points: FloatArray | None = None,
-    directions: tuple[Direction, ...] = (),
-    strengths: FloatArray | None = None,
 ) -> Base:
-    """The base law fitted, from roughly where its population is; perhaps with something in already.
+    """The base law fitted, from roughly where its population is: that of its likelihood surfaces.
 
-    With nothing in, the population is that of the law's likelihood surfaces, in which no mode is missed.
+    In them no mode is missed.
     """
-    extension = extended(problem, law, directions)
+    extension = extended(problem, law)
     rows = campaign_rows(extension)
     if points is None:
         points = np.zeros((len(rows.event), len(law.mechanisms) + 1))
         points[:, :-1] = population.mean[0]
-    given = np.empty(0) if strengths is None else strengths
-    if directions:
-        fit = refit(extension, rows, given[None, :], (population, points), Rounds(least=4))[0]
-    else:
-        nodes = problem.surfaces(law.mechanisms).nodes
-        found = evidence(nodes, median_log_scale(law), coordinates(population), 30)
-        exact = population_at(found.psi[None], len(law.mechanisms))
-        starts = (points, _best_nodes(nodes, exact))
-        likelihood = EventLikelihood(extension, rows, given)
-        tried = [event_modes(likelihood, start, exact, n_steps=20).points for start in starts]
-        heights = [log_joint(likelihood, one, exact) for one in tried]
-        fit = Fit(found, np.where((heights[1] > heights[0])[:, None], tried[1], tried[0]))
-    setting = setting_of(problem, law, typical_speed(extension.speeds(fit.points, given)))
-    return Base(problem, law, setting, rows, fit, directions, given)
+    nodes, none = problem.surfaces(law.mechanisms).nodes, np.empty(0)
+    found = evidence(nodes, median_log_scale(law), coordinates(population), 30)
+    exact = population_at(found.psi[None], len(law.mechanisms))
+    starts = (points, _best_nodes(nodes, exact))
+    likelihood = EventLikelihood(extension, rows, none)
+    tried = [event_modes(likelihood, start, exact, n_steps=20).points for start in starts]
+    heights = [log_joint(likelihood, one, exact) for one in tried]
+    fit = Fit(found, np.where((heights[1] > heights[0])[:, None], tried[1], tried[0]))
+    setting = setting_of(problem, law, typical_speed(extension.speeds(fit.points, none)))
+    return Base(problem, law, setting, rows, fit, (), none)
 
 
 def _best_nodes(nodes: Nodes, population: Population) -> FloatArray:

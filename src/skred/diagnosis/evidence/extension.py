@@ -162,9 +162,10 @@ class Extension:
         ----------
         events : (n,) integer array
         points : (n, n_base + 1) array
-        strengths : (n, n_directions) array
+        strengths : (n_directions,) or (n, n_directions) array
         """
         releases, n = self.problem.releases, self.n_base
+        strengths = np.broadcast_to(strengths, (len(events), len(self.directions)))
         place = releases.mean[events] + releases.sd[events] * points[:, -1]
         rows = np.empty((len(events), n + len(self._owner)))
         rows[:, :n] = points[:, :n]
@@ -192,17 +193,9 @@ class Extension:
         """Readings of fronts, (n, n_sensors + 1), the runout last; spans up to the stop.
 
         The runout is what noted places are compared with: where a sensor is moved by which a front is known
-        to have stopped below or above, see `StopBounds.as_noted`.
-
-        Parameters
-        ----------
-        events : (n,) integer array
-        points : (n, n_base + 1) array
-        strengths : (n_directions,) or (n, n_directions) array
+        to have stopped below or above, see `StopBounds.as_noted`. All else is as for `inputs`.
         """
-        given = np.broadcast_to(strengths, (len(events), len(self.directions)))
-        runs = self.inputs(events, points, given)
-        return self._read(events, runs)
+        return self._read(events, self.inputs(events, points, strengths))
 
     def _read(self, events: IntArray, runs: Runs) -> FloatArray:
         """Readings of runs, (n, n_sensors + 1), as `predict` has them."""
@@ -213,8 +206,7 @@ class Extension:
 
     def speeds(self, points: FloatArray, strengths: FloatArray) -> FloatArray:
         """Front speed of each event at the cells' edges [m/s], (n_events, n_cells + 1), at one point each."""
-        given = np.broadcast_to(strengths, (len(points), len(self.directions)))
-        runs = self.inputs(np.arange(len(points)), points, given)
+        runs = self.inputs(np.arange(len(points)), points, strengths)
         return front_speeds(runs.strengths, runs.releases, self.problem.path, self.contributions, runs.speeds)
 
     def tangents(
@@ -228,8 +220,7 @@ class Extension:
         by_points : (n, n_sensors + 1, n_base + 1) array
         by_strengths : (n, n_sensors + 1, n_directions) array
         """
-        given = np.broadcast_to(strengths, (len(events), len(self.directions)))
-        runs = self.inputs(events, points, given)
+        runs = self.inputs(events, points, strengths)
         rows, releases, begin, factors, shifts = runs
         noted = self.problem.releases
         by_speed = bool(noted.speed_sd.any())

@@ -2,7 +2,7 @@
 
 STANDARD_ERROR = 0.1
 """Standard error of a log integral, in nats, at which there are enough draws; and the share of an integral
-that no single place holds where there are enough places."""
+that no single place holds where there are enough places, nor a single draw where proposals miss no mode."""
 DRAWS = 200
 """Draws of a turn in which an integral is sampled where a density takes no time, and populations that every
 prediction is made of."""

@@ -16,9 +16,8 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
@@ -165,7 +164,7 @@ def influence(
         stated = log_evidence_of(under_errors.profiles)
     else:
         candidate = under_errors.candidates[answer]
-        again = partial(_by_mechanism, candidate, base)
+        again = partial(_by_mechanism, replace(candidate, residue=None), base)
         stated = candidate.by_itself
     # What is tied with the answer explains the same recordings: without some of them it falls as much.
     needed = max(stated - (comparison.log_odds - enough), 0.0)
@@ -222,12 +221,12 @@ def _rival(
         return None
     name = max(others, key=lambda one: shares[one])
     base, first, second = under_errors.base, under_errors.candidates[answer], under_errors.candidates[name]
-    beside = own if first.residue is None else Change(partial(_with_force, first, base), own.pool)
+    beside = own if first.residue is None else Change(partial(_by_mechanism, first, base), own.pool)
     margin = Margin(
         _ahead(comparison, answer, name),
         gained - _gained(base, second.best),
         beside,
-        Change(partial(_with_force, second, base), own.pool),
+        Change(partial(_by_mechanism, second, base), own.pool),
     )
     return Rival(name, margin.whole, _few(base.problem.campaign.event_ids, margin.fewest(), 0.0))
 
@@ -252,32 +251,24 @@ def _log_integrals(extension: Extension, base: Base, strengths: FloatArray, fit:
     return event_nodes(likelihood, fit.population, modes).log_integrals(fit.population, base.rows)
 
 
-class _Factor(NamedTuple):
-    """Log Bayes factor of a mechanism by itself, with a strength in common and over all ways to differ."""
-
-    in_common: float
-    differing: float
-
-
 def _by_mechanism(candidate: Candidate, base: Base, part: Part) -> float:
-    """The log Bayes factor of a mechanism by itself, by a part of the recordings."""
-    return _by_shapes(candidate, base, part).differing
+    """The log Bayes factor of a mechanism by a part of the recordings.
 
-
-def _with_force(candidate: Candidate, base: Base, part: Part) -> float:
-    """The same with a force in no list beside it, as far as it is probable then; if it was looked for."""
-    by_itself, beside = _by_shapes(candidate, base, part), candidate.beside
+    With a force in no list beside it, as far as it is probable then, if it has one.
+    """
+    (in_common, by_itself), beside = _by_shapes(candidate, base, part), candidate.beside
     if candidate.residue is None or beside is None:
-        return by_itself.differing
+        return by_itself
     rest, force = part.base(base), most_probable(beside.profiles)
     curve = _without(rest, beside.curve, beside.curve.strengths, part)
     both = fit_beside(rest, curve, -math.inf, force.kind, force.prior).log_bayes_factor
-    return with_or_without(by_itself.differing, by_itself.in_common + both - curve.log_bayes_factor)
+    return with_or_without(by_itself, in_common + both - curve.log_bayes_factor)
 
 
-def _by_shapes(candidate: Candidate, base: Base, part: Part) -> _Factor:
-    """The log Bayes factor of a mechanism by a part of the recordings, over its shapes that may count.
+def _by_shapes(candidate: Candidate, base: Base, part: Part) -> tuple[float, float]:
+    """The log Bayes factor of a mechanism by itself, with a strength in common and over all ways to differ.
 
+    By a part of the recordings, over its shapes that may count.
     All strengths are refitted at the best shape. The others follow the evidence at their best strength, and
     by as much more as the best one does over all of its own.
     """
@@ -298,7 +289,8 @@ def _by_shapes(candidate: Candidate, base: Base, part: Part) -> _Factor:
         gain = 0.0 if ways is None else over_ways(gains_of(ways, at_best.log_factor_of(at_best.sign)))
     # What another kind of shape gains where avalanches differ is not known for a part, and not counted.
     same = np.logaddexp.reduce(of_kind)
-    return _Factor(*(float(np.logaddexp.reduce([*others, same + more])) for more in (0.0, gain)))
+    in_common, differing = (float(np.logaddexp.reduce([*others, same + more])) for more in (0.0, gain))
+    return in_common, differing
 
 
 def _without(rest: Base, curve: Curve, strengths: FloatArray, part: Part) -> Curve:

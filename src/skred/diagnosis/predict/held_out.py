@@ -73,11 +73,6 @@ class HeldOut:
         k = np.zeros(len(pointwise)) if pareto_k is None else pareto_k
         return cls(pointwise, k, refitted, not_converged, predicted, tuple(others))
 
-    @property
-    def elpd(self) -> float:
-        """Sum over events."""
-        return float(self.pointwise.sum())
-
 
 def held_out(calibration: Calibration, seed: int, *, exact: bool = False) -> HeldOut:
     """Leave each avalanche out in turn.

@@ -155,15 +155,7 @@ class Predictor:
 
 
 def predictor_of(calibration: Calibration, n_draws: int = DRAWS) -> Predictor:
-    """What a calibration says of avalanches to come.
-
-    Parameters
-    ----------
-    calibration : Calibration
-        Hierarchical: of a base law, or of one with mechanisms added.
-    n_draws : int
-        Draws kept, evenly spaced over all of the posterior.
-    """
+    """What a hierarchical calibration says of avalanches to come, by draws evenly over its posterior."""
     problem = calibration.problem
     assert isinstance(problem, HierarchicalProblem)
     draws = draws_of(calibration, posterior_of(calibration), np.random.default_rng([37]))

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from pytensor.graph.basic import Variable
 from pytensor.link.numba.dispatch.basic import numba_njit, register_funcify_default_op_cache_key
 
 from skred.inference.array_op import ArrayOp
@@ -194,7 +193,8 @@ class TabulatedLogDensity(ArrayOp):
         ("points", 2, "float64"),
         ("log_weights", 1, "float64"),
     )
-    differentiable = frozenset({"means", "factor", "strengths", "log_shares"})
+
+    differentiable = frozenset({"means", "factor", "strengths", "log_shares"})  # a gradient is not there
 
     def output_shape(self, shapes: Sequence[tuple[Any, ...]]) -> tuple[Any, ...]:
         """(n_events,)."""
@@ -204,27 +204,11 @@ class TabulatedLogDensity(ArrayOp):
         """Log densities from numpy arrays."""
         return tabulated_log_density(*inputs)
 
-    def pullback(
-        self, inputs: Sequence[Variable], outputs: Sequence[Variable], cotangents: Sequence[Variable]
-    ) -> list[Variable]:
-        """Not there.
-
-        Raises
-        ------
-        TypeError
-            Always.
-        """
-        raise TypeError("TabulatedLogDensity has no gradient: use Metropolis for a law with mechanisms added")
-
 
 @register_funcify_default_op_cache_key(TabulatedLogDensity)
 def _funcify(op: TabulatedLogDensity, node: Any = None, **kwargs: Any) -> Any:
     @numba_njit
-    def tabulated_density(  # type: ignore[no-untyped-def]
-        means, factor, strengths, log_shares, origin, steps, size, centres, first, points, log_weights
-    ):
-        return tabulated_log_density(
-            means, factor, strengths, log_shares, origin, steps, size, centres, first, points, log_weights
-        )
+    def tabulated_density(*inputs):  # type: ignore[no-untyped-def]
+        return tabulated_log_density(*inputs)
 
     return tabulated_density, cache_key(tabulated_log_density)

@@ -64,8 +64,8 @@ class IntegratedLogDensityPullback(ArrayOp):
 @register_funcify_default_op_cache_key(IntegratedLogDensity)
 def _funcify_density(op: IntegratedLogDensity, node: Any = None, **kwargs: Any) -> Any:
     @numba_njit
-    def integrated_density(means, factor, first, points, log_weights):  # type: ignore[no-untyped-def]
-        return integrated_log_density(means, factor, first, points, log_weights)
+    def integrated_density(*inputs):  # type: ignore[no-untyped-def]
+        return integrated_log_density(*inputs)
 
     return integrated_density, cache_key(integrated_log_density)
 
@@ -73,9 +73,7 @@ def _funcify_density(op: IntegratedLogDensity, node: Any = None, **kwargs: Any) 
 @register_funcify_default_op_cache_key(IntegratedLogDensityPullback)
 def _funcify_pullback(op: IntegratedLogDensityPullback, node: Any = None, **kwargs: Any) -> Any:
     @numba_njit
-    def integrated_density_pullback(  # type: ignore[no-untyped-def]
-        cotangent, means, factor, first, points, log_weights
-    ):
-        return integrated_log_density_pullback(cotangent, means, factor, first, points, log_weights)
+    def integrated_density_pullback(*inputs):  # type: ignore[no-untyped-def]
+        return integrated_log_density_pullback(*inputs)
 
     return integrated_density_pullback, cache_key(integrated_log_density_pullback)
