@@ -155,9 +155,7 @@ def _fitted_anew(base: Base, nothing: Shifts, candidate: Candidate | Profile) ->
         start = np.append(np.zeros(len(nothing.mean)), candidate.mean), candidate.fit.start
         return _Changed(_with_force(base, nothing, candidate, start) - candidate.log_bayes_factor)
     found, within, strength = _with_coefficient(base, candidate.best, nothing)
-    at_exact, exact, usual = _with_coefficient(base, candidate.best, _exactly(base))
-    if usual is None:  # the curve says what the expansion at nil cannot
-        exact = at_exact.fit.found.log_evidence + candidate.best.log_bayes_factor
+    _, exact, _ = _with_coefficient(base, candidate.best, _exactly(base))
     changed = _Changed(within - nothing.log_factor - exact, strength=strength)
     if candidate.beside is None:
         return changed
@@ -187,9 +185,10 @@ def _with_coefficient(base: Base, curve: Curve, nothing: Shifts) -> tuple[Expans
     strength, fit = _top(curve)
     law = base.with_in(curve.direction, strength, fit)
     cover = np.diag(np.append(curve.scale, places.sd) ** 2)
-    values = [(np.append(strength, np.zeros_like(nothing.mean)), fit)]
+    values, moved = [(np.append(strength, np.zeros_like(nothing.mean)), fit)], curve
     if places.errors:  # where sensors stand as beside nothing, the coefficient may be another
-        strength, fit = _top(curve_of(nothing.into(base), curve))
+        moved = curve_of(nothing.into(base), curve)
+        strength, fit = _top(moved)
         values.append((np.append(strength, nothing.mean), fit))
     starts = [expanded_at(law, places, one, fit.start) for one, fit in values]
     ends = list(starts)
@@ -202,10 +201,12 @@ def _with_coefficient(base: Base, curve: Curve, nothing: Shifts) -> tuple[Expans
     # No score is followed to where nothing was computed: where fronts stop it can be any number.
     there = laplace(arrived(found, np.linalg.inv(cover)), 0.0, cover)
     moments = Strength(float(there.values[0]), math.sqrt(float(there.covariance[0, 0])))
+    if one_sided and moments.mean <= 0.0:  # the curve says what the expansion at nil cannot
+        return found, base.fit.found.log_evidence + nothing.log_factor + moved.log_bayes_factor, None
     log_evidence = _log_factor(there)
     if one_sided:
         log_evidence += log_above_nil(float(there.values[0]), float(there.covariance[0, 0]))
-    return found, log_evidence, None if one_sided and moments.mean <= 0.0 else moments
+    return found, log_evidence, moments
 
 
 def _top(curve: Curve) -> tuple[float, Fit]:
