@@ -26,6 +26,7 @@ from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.compare.ways import Looked, gains_of, gains_over, over_ways
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
 from skred.diagnosis.evidence.extension import extended, setting_of
+from skred.diagnosis.tabulated.coefficient_grid import from_nothing
 from skred.inference.between_events import (
     PRIOR,
     SPREAD_LOG_SD,
@@ -310,6 +311,14 @@ def test_shapes_from_other_processes_are_those_of_the_candidate(few: tuple[Base,
         [again] = with_ways(base, {found.mechanism.id: candidate}, pool).values()
     assert again.looked and again.error is not None and again.best is found
     assert 2.5 < again.correction < 3.5
+
+
+def test_tables_reach_what_single_avalanches_have(few: tuple[Base, Curve]) -> None:
+    """Each of few may have more than the median's prior goes to."""
+    base, found = few
+    mean, sd = found.moments
+    [end] = from_nothing(found, base.fit.found, mean, sd).grid.points[-1]
+    assert end == pytest.approx(4.0 * (mean + sd)) and end > 4.5 * found.scale
 
 
 def test_gains_share_the_prior() -> None:

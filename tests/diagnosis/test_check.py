@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,7 +10,9 @@ import numpy as np
 import pytest
 from diagnosis_cases import base_of, gates_campaign, sparse_base, trial
 
+from skred.campaign import Status
 from skred.diagnosis.check import bootstrap_test, by_fronts
+from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
 from skred.diagnosis.check.bootstrap_test import odds_of_recordings, odds_test
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.detect.score_test import LinearFactors, ScoreTest
@@ -103,6 +106,21 @@ def test_evidence_of_one_shape_is_that_of_a_comparison() -> None:
     fitted, beside = by_fronts.drawn(base, linear, np.random.default_rng(1))
     assert beside == pytest.approx(0.0)
     assert fitted.log_bayes_factor == curve(base, one).log_bayes_factor
+
+
+def test_clean_campaigns_have_errors_where_readings_state_their_own() -> None:
+    """A front of theirs may come to a sensor that the recorded one did not come to, with the usual error."""
+    campaign = sparse_base().problem.campaign
+    stated = np.where(campaign.status == Status.OBSERVED, np.where(campaign.values > 0.0, 1.5, 0.0), np.nan)
+    stated = np.where(stated == 0.0, 0.7, stated)
+    sensors = tuple(replace(one, relative_sd=0.0, absolute_sd=0.0) for one in campaign.sensors)
+    base = base_of(replace(campaign, sensors=sensors, stated_sd=stated), "coulomb")
+    assert (campaign.status == Status.NOT_REACHED).any()
+    draws = np.tile(base.population.mean, (9, 1)), np.tile(0.3 * np.eye(1), (9, 1, 1))
+    rows, _ = bootstrap_campaigns(base.extended(), base.strengths, *draws, np.random.default_rng(0))
+    assert (rows.readings.observed & (rows.readings.stated_sd == 0.0)).any()
+    assert (rows.readings.sd(np.arange(len(rows.event)), rows.readings.values) > 0.0).all()
+    assert np.isfinite(odds_test(base, draws, 5, 6.0).simulated).all()
 
 
 def test_odds_of_the_recordings_by_fronts() -> None:

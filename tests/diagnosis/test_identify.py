@@ -26,6 +26,7 @@ from skred.diagnosis.evidence.extension import extended, setting_of
 from skred.diagnosis.evidence.linear_mixed_model import efficient_scores, fit_population, mean_prior
 from skred.inference.error_model import ERROR_MODELS
 from skred.physics.mechanisms.placed import PlacedMechanism
+from skred.physics.mechanisms.stretches import is_opposed
 
 NONE = np.zeros(0)
 
@@ -125,6 +126,20 @@ def test_more_events_tell_more(base: Base, table: dict[str, Detectability]) -> N
         assert row.limit < before.limit
         assert row.limit / before.limit == pytest.approx(0.5, abs=0.06), row.mechanism.id
         assert row.power >= before.power - 1e-9
+
+
+def test_a_relevant_strength_is_that_of_the_shape(base: Base) -> None:
+    """Compensated drag has a wider prior: three times as much of it is relevant, and may be a limit."""
+    [opposed, plain] = (
+        next(
+            one
+            for one in ScoreTest(base).placed_mechanisms
+            if one.mechanism.id == "segment_drag" and is_opposed(one.shape) == compensated
+        )
+        for compensated in (True, False)
+    )
+    assert opposed.relevant == pytest.approx(3.0 * plain.relevant) and opposed.scale == 3.0 * plain.scale
+    assert plain.relevant == plain.added.relevant
 
 
 def test_an_extra_sensor_never_tells_less(base: Base, table: dict[str, Detectability]) -> None:

@@ -17,7 +17,7 @@ from skred.diagnosis.discrepancy.profile import KINDS, combined, knots
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.extension import extended, setting_of
 from skred.diagnosis.outcome import Diagnosis
-from skred.diagnosis.predict.held_out import held_out
+from skred.diagnosis.predict.held_out import held_out, largest_k
 from skred.diagnosis.predict.predictor_document import as_dict, from_dict
 from skred.diagnosis.predict.profile_law import ProfileLaw, parts_left_out, profile_law
 from skred.diagnosis.predict.unseen import ProfileTerm, log_scores
@@ -159,6 +159,8 @@ def test_before_is_what_sampling_and_refits_say(hidden: Base, added: ProfileLaw)
     calibration = calibrate(hidden.problem, hidden.law, SamplerSettings("metropolis", 800, 1500, 4, 0))
     sampled = held_out(calibration, 0, exact=True)
     np.testing.assert_allclose(added.before.pointwise, sampled.pointwise, atol=0.5)
+    assert largest_k([added.before]) is None and added.before.n_unreliable == 0
+    assert largest_k([added.before, sampled]) == sampled.pareto_k.max()
     assert added.before.pointwise.sum() == pytest.approx(sampled.pointwise.sum(), abs=1.0)
     # Sampling weights its draws for this, few of which count for an avalanche that is unlike the others.
     seen = hidden.problem.observed

@@ -149,7 +149,7 @@ class EventReadings(NamedTuple):
     stated_sd : (n_events, n_sensors) array
         Of readings that state their own, 0 elsewhere.
     relative_sd, absolute_sd : (n_sensors,) arrays
-        Of the other readings.
+        Of the other readings, new ones too: where a sensor states none, the usual one of its readings.
     is_velocity : (n_sensors,) boolean array
     reached, not_reached : (n_events,) arrays, m
         Lowest place that the front is known to have reached, -inf if none; highest that it is known not to
@@ -262,6 +262,17 @@ def fronts_seen(campaign: Campaign) -> FrontsSeen:
     )
 
 
+def _usual_sd(stated: FloatArray, is_velocity: BoolArray) -> FloatArray:
+    """Median of what each sensor's readings state; of its quantity's where they state none, (n_sensors,)."""
+    usual = np.zeros(len(is_velocity))
+    for k, quantity in enumerate(is_velocity):
+        for given in (stated[:, k], stated[:, is_velocity == quantity]):
+            if (given > 0.0).any():
+                usual[k] = np.median(given[given > 0.0])
+                break
+    return usual
+
+
 def event_readings(campaign: Campaign, place_sd_m: float = PLACE_SD_M) -> EventReadings:
     """Readings of a campaign."""
     observed = np.asarray(campaign.status == Status.OBSERVED)
@@ -270,12 +281,14 @@ def event_readings(campaign: Campaign, place_sd_m: float = PLACE_SD_M) -> EventR
     is_velocity = np.array([not sensor.is_runout for sensor in sensors])
     least, most = campaign.bounds
     known = observed | np.isfinite(least) | np.isfinite(most)
+    stated = np.nan_to_num(np.where(known, campaign.stated_sd, 0.0), nan=0.0)
+    relative, absolute = np.array([(one.relative_sd, one.absolute_sd) for one in sensors], dtype=float).T
     return EventReadings(
         values,
         observed,
-        np.nan_to_num(np.where(known, campaign.stated_sd, 0.0), nan=0.0),
-        np.array([sensor.relative_sd for sensor in sensors], dtype=float),
-        np.array([sensor.absolute_sd for sensor in sensors], dtype=float),
+        stated,
+        relative,
+        np.where((relative > 0.0) | (absolute > 0.0), absolute, _usual_sd(stated, is_velocity)),
         is_velocity,
         *fronts_seen(campaign).between(),
         float(place_sd_m),

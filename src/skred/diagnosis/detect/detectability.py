@@ -149,7 +149,7 @@ def told(score_test: ScoreTest, scores: Scores) -> list[Detectability]:
     """One row for each mechanism."""
     _, (information,), (raw,) = score_test.of_candidates(scores)
     placed, order = score_test.placed_mechanisms, score_test.order
-    scales = np.array([one.added.scale for one in placed])
+    scales, relevant = np.array([(one.scale, one.relevant) for one in placed]).T
     z, at = limit_z(len(mechanisms())), ndtri(INTERVAL_PROBABILITY)
     own = np.sqrt(information)
     cosine = np.abs(scores.information[0][np.ix_(order, order)]) / np.outer(own, own)
@@ -172,7 +172,7 @@ def told(score_test: ScoreTest, scores: Scores) -> list[Detectability]:
                 float(limits[typical]),
                 float(limits[best]),
                 stretch,
-                float(np.mean(ndtr(own[members] * added_of(mechanism).relevant - z))),
+                float(np.mean(ndtr(own[members] * relevant[members] - z))),
                 tuple(sorted(set(ids[look_alike[best]].tolist()) - {name})),
             )
         )
@@ -239,20 +239,14 @@ def with_sensors(problem: HierarchicalProblem, places: FloatArray) -> Hierarchic
 
 
 def _usual_errors(problem: HierarchicalProblem) -> tuple[float, float]:
-    """Relative and absolute standard deviation [m/s] of the campaign's usual velocity sensor.
-
-    Where sensors have none, since each reading has its own, the usual reading's.
-    """
-    campaign = problem.campaign
-    velocities = [sensor for sensor in campaign.sensors if not sensor.is_runout]
-    if not velocities:
+    """Relative and absolute standard deviation [m/s] of the campaign's usual velocity sensor."""
+    readings = problem.readings
+    if not readings.is_velocity.any():
         return 0.1, 0.5
-    relative = float(np.median([sensor.relative_sd for sensor in velocities]))
-    absolute = float(np.median([sensor.absolute_sd for sensor in velocities]))
-    if max(relative, absolute) > 0.0:
-        return relative, absolute
-    stated = campaign.stated_sd[problem.observed & problem.readings.is_velocity]
-    return 0.0, float(np.nanmedian(stated)) if np.isfinite(stated).any() else 0.5
+    relative, absolute = (
+        float(np.median(sd[readings.is_velocity])) for sd in (readings.relative_sd, readings.absolute_sd)
+    )
+    return (relative, absolute) if max(relative, absolute) > 0.0 else (0.0, 0.5)
 
 
 def _free_name(number: int, taken: set[str]) -> str:

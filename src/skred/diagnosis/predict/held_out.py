@@ -40,7 +40,7 @@ class HeldOut:
     pointwise : (n_events,) array
         Expected log predictive density of each event.
     pareto_k : (n_events,) array
-        Of the importance sampling, before refits.
+        Of the importance sampling, before refits; NaN where nothing was reweighted.
     refitted : tuple of str
         Events that it was not trusted for, refitted without.
     not_converged : tuple of str
@@ -68,10 +68,21 @@ class HeldOut:
         refitted: tuple[str, ...] = (),
         not_converged: tuple[str, ...] = (),
     ) -> HeldOut:
-        """With the predictions that the others make; nothing was reweighted where there is no Pareto k."""
+        """With the predictions that the others make."""
         predicted = predictions(others, seed).where(others[0].extension.problem.observed)
-        k = np.zeros(len(pointwise)) if pareto_k is None else pareto_k
+        k = np.full(len(pointwise), np.nan) if pareto_k is None else pareto_k
         return cls(pointwise, k, refitted, not_converged, predicted, tuple(others))
+
+    @property
+    def n_unreliable(self) -> int:
+        """Of how many avalanches importance sampling is not trusted; none where nothing was reweighted."""
+        return int(np.sum(~(self.pareto_k <= K_LIMIT))) if np.isfinite(self.pareto_k).any() else 0
+
+
+def largest_k(held: Sequence[HeldOut]) -> float | None:
+    """Largest Pareto k of some predictions; None where nothing was reweighted."""
+    known = [k for one in held for k in one.pareto_k.tolist() if np.isfinite(k)]
+    return max(known, default=None)
 
 
 def held_out(calibration: Calibration, seed: int, *, exact: bool = False) -> HeldOut:

@@ -156,8 +156,7 @@ def from_nothing(curve: Curve, found: Evidence, mean: float, sd: float) -> Locat
         Of the strength.
     """
     common, common_sd = curve.moments
-    reach = _FARTHEST * (abs(common) + common_sd)
-    farthest = math.copysign(min(reach, _MOST_SCALES * curve.scale), common)
+    farthest = math.copysign(_FARTHEST * (abs(common) + common_sd), common)
     size = TABLES[1]
     grid = Grid(np.zeros(1), np.array([[farthest / (size - 1)]]), np.array([size]))
     fits = [Fit(found, curve.nearest(float(strength)).points) for strength in grid.points[:, 0]]

@@ -14,7 +14,7 @@ from skred.diagnosis.detect.detectability import Identifiability
 from skred.diagnosis.evidence.prior_odds import CALIBRATION_VERSION, NOTHING, POWER, SHARES
 from skred.diagnosis.influence.influence import Few
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
-from skred.diagnosis.predict.held_out import HeldOut, elpd_difference, errors
+from skred.diagnosis.predict.held_out import HeldOut, elpd_difference, errors, largest_k
 from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.conditional import conditional_document
 from skred.diagnosis.verdict.mechanisms import (
@@ -126,7 +126,7 @@ def _diagnostics(
     return {
         "r_hat_max": max(gate.r_hat_max for gate in gates),
         "ess_min": min(min(gate.ess_bulk_min, gate.ess_tail_min) for gate in gates),
-        "pareto_k_max": float(np.max([one.pareto_k.max() for one in held])) if held else None,
+        "pareto_k_max": largest_k(held),
         "divergences": sum(gate.divergences for gate in gates),
     }
 

@@ -21,7 +21,7 @@ from skred.diagnosis.discrepancy.profile import AMPLITUDES, KINDS, LENGTHS_M, NE
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.limits import LIMIT, NOTHING_AT_MOST
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
-from skred.diagnosis.predict.held_out import K_LIMIT, HeldOut
+from skred.diagnosis.predict.held_out import K_LIMIT, HeldOut, largest_k
 from skred.diagnosis.predict.profile_law import ProfileLaw
 from skred.diagnosis.verdict.mechanisms import candidate_documents, standard_of_covariate, work_documents
 from skred.documents import FORMAT
@@ -200,8 +200,8 @@ def _calibration(added: Sequence[str], calibration: Calibration, held: HeldOut |
     left_out = None
     if held is not None:
         left_out = {
-            "pareto_k_max": float(held.pareto_k.max()),
-            "n_unreliable": int(np.sum(~(held.pareto_k <= K_LIMIT))),
+            "pareto_k_max": largest_k([held]),
+            "n_unreliable": held.n_unreliable,
             "refitted": list(held.refitted),
             "not_converged": list(held.not_converged),
         }

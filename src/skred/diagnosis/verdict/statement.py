@@ -201,8 +201,9 @@ def _with_force(name: str, force: Collection[str]) -> str:
 
 
 def _not_excluded(document: dict[str, Any], force: Collection[str]) -> str:
-    """The most probable listed candidate that is neither named nor tied, where it is not improbable."""
-    told = {NOTHING, UNLISTED, document["mechanism"], *document["indistinguishable"]}
+    """The most probable listed candidate that is neither added nor tied, where it is not improbable."""
+    added = [one["id"] for one in document["mechanisms"]]
+    told = {NOTHING, UNLISTED, *added, *document["indistinguishable"]}
     others = {name: share for name, share in document["probability"].items() if name not in told}
     name = max(others, key=lambda one: others[one], default="")
     if not name or others[name] < TOLD_FROM:
@@ -335,16 +336,6 @@ def _too_usual(check: BootstrapTest) -> str:
     return f"with a strength in common to all avalanches the log odds are only {check.statistic:.1f} nats"
 
 
-def _odd(found: Diagnosis, document: dict[str, Any]) -> str:
-    """What the check says where nothing is probable and yet hardly any clean campaign is as odd."""
-    if not found.check.fired or document["probability"][NOTHING] < SHARES[NOTHING]:
-        return ""
-    return (
-        "But by the check they are odder than all but 1 % of clean campaigns: by chance, or by something that"
-        " no candidate and no force along the track describes."
-    )
-
-
 def _rare(check: BootstrapTest) -> str:
     """How rare such odds are among clean campaigns."""
     return f"p {'at most' if check.is_bound else '='} {check.p_value:.2g}"
@@ -372,7 +363,7 @@ def _cannot(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         else f"{alarm} these recordings cannot tell: a relevant strength of a listed mechanism would have"
         f" been found in only {power}, so silence means little."
     )
-    sentences = [silence, _odd(found, document), _hint(found, document)]
+    sentences = [silence, _hint(found, document)]
     sensor = document["next_sensor"]
     if sensor is not None:
         sentences.append(

@@ -42,6 +42,11 @@ class PlacedMechanism:
         return self.added.scale_of(self.shape)
 
     @property
+    def relevant(self) -> float:
+        """Median of the prior of its size."""
+        return self.added.relevant * self.shape.prior_scales
+
+    @property
     def with_speed(self) -> bool:
         """Whether it enters with U itself: its fronts take the kernel four times as long as others."""
         return bool({Column.LINEAR, Column.WEAKENING} & set(self.direction.columns))
