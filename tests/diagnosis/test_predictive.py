@@ -43,3 +43,23 @@ def test_intervals_cover_under_every_error_model(ryggfonn: HierarchicalProblem, 
     found = predict_event(extension, EVENT, means, factors, np.zeros((n_draws, 0)), rng)
     for covered in found.covered(truths, np.full(truths.shape, True)).T:
         assert within_binomial_limits(covered)
+
+
+@pytest.mark.parametrize("read", [30.0, 0.0])
+def test_a_speed_that_was_read_is_predicted_by_fronts_that_come(
+    ryggfonn: HierarchicalProblem, read: float
+) -> None:
+    """Else a right law would have errors of fronts that stop above, though nothing is read of them."""
+    speeds, values = ryggfonn.readings.is_velocity, ryggfonn.campaign.values.copy()
+    values[EVENT, speeds] = read
+    problem = replace(ryggfonn, campaign=replace(ryggfonn.campaign, values=values))
+    extension, rng, n = extended(problem, load_law("pcm")), np.random.default_rng(3), 20_000
+    mean = np.log([0.45, 0.002])
+    points = np.column_stack([mean + 0.3 * rng.standard_normal((n, 2)), rng.standard_normal(n)])
+    fronts = extension.predict(np.full(n, EVENT), points, np.zeros(0))[:, :-1][:, speeds]
+    assert 0.1 < (fronts > 0.0).mean(axis=0).min() < 0.9
+    expected = [(one[one > 0.0] if read else one).mean() for one in fronts.T]
+    draws = np.tile(mean, (n, 1)), np.tile(0.3 * np.eye(2), (n, 1, 1)), np.zeros((n, 0))
+    found = predict_event(extension, EVENT, *draws, rng)
+    np.testing.assert_allclose(found.mean[speeds], expected, rtol=0.03)
+    assert (found.low[speeds] > 0.0).all() or not read

@@ -8,6 +8,7 @@ import numpy as np
 
 from skred.arrays import BoolArray, FloatArray
 from skred.diagnosis.evidence.extension import Extension
+from skred.inference.error_model import EventReadings
 from skred.inference.intervals import ENDS
 
 
@@ -17,7 +18,7 @@ class Predicted(NamedTuple):
     Attributes
     ----------
     mean : (..., n_sensors) array
-        Of the readings without errors.
+        Of the readings without errors; of a speed above nil by fronts that come there, as below.
     low, high : (..., n_sensors) arrays
         5 % and 95 % quantiles of the readings with errors.
     """
@@ -45,6 +46,8 @@ def predict_event(
 ) -> Predicted:
     """Predict one event's readings, one front for each draw of the population.
 
+    Of a speed that was read above nil it is known that the front came: it is predicted by fronts that do.
+
     Parameters
     ----------
     extension : Extension
@@ -63,5 +66,21 @@ def predict_event(
     points = np.column_stack([logs, rng.standard_normal(len(means))])
     fronts = extension.predict(np.full(len(means), event), points, added)[:, :-1]
     noisy = problem.error_model.draw(fronts, readings.sd(event, fronts), readings.is_velocity, rng)
-    low, high = np.quantile(noisy, ENDS, axis=0)
-    return Predicted(fronts.mean(axis=0), low, high)
+    known = known_to_come(readings, event, fronts)
+    low, high = np.nanquantile(np.where(known, noisy, np.nan), ENDS, axis=0)
+    return Predicted(np.nanmean(np.where(known, fronts, np.nan), axis=0), low, high)
+
+
+def known_to_come(readings: EventReadings, event: int, fronts: FloatArray) -> BoolArray:
+    """Which fronts may have given each of an event's readings: all of them but for speeds above nil.
+
+    Where none of them comes, all may.
+
+    Parameters
+    ----------
+    fronts : (n, n_sensors) array
+        What is read of them without errors.
+    """
+    came = readings.is_velocity & (readings.values[event] > 0.0)
+    may = (fronts > 0.0) | ~came
+    return np.asarray(may | ~may.any(axis=0))

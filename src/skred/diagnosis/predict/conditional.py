@@ -21,6 +21,7 @@ import numpy as np
 from skred.arrays import BoolArray, FloatArray, IntArray
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Rows
 from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.evidence.predictive import known_to_come
 from skred.diagnosis.predict.draws import Draws, LeftOut
 from skred.diagnosis.predict.event_proposal import Sample, sample
 from skred.diagnosis.predict.held_out import HeldOut
@@ -42,7 +43,8 @@ class Conditional:
     Attributes
     ----------
     mean, low, high : arrays, m/s or m
-        Of what would be read, errors included: mean, and 5 and 95 % quantiles.
+        Of what would be read, errors included: mean, and 5 and 95 % quantiles. Of a speed above nil by fronts
+        that come there.
     log_score : array
         Log predictive density of the reading.
     crps : array, m/s or m
@@ -175,9 +177,11 @@ def _event(extension: Extension, draws: Draws, event: int, seed: int) -> FloatAr
             found = sample(likelihood, draws, each, missed, rng)
     fronts = found.fronts[:, :-1]
     drawn = errors.draw(fronts, readings.sd(event, fronts), readings.is_velocity, rng)
+    outside = np.where(known_to_come(readings, event, fronts), 0.0, -np.inf)
     for sensor, before, with_it in zip(sensors, all_above, all_with_it, strict=True):
         log_weights = found.log_weights[before]
-        weights = _normalised(log_weights + _together(found, rows, before, sensor, drawn, errors))
+        together = _together(found, rows, before, sensor, drawn, errors)
+        weights = _normalised(log_weights + together + outside[:, sensor])
         value, x = readings.values[event, sensor], drawn[:, sensor]
         effective = [1.0 / np.sum(w**2) for w in (weights, _normalised(found.log_weights[with_it]))]
         score = np.logaddexp.reduce(found.log_weights[with_it]) - np.logaddexp.reduce(log_weights)
