@@ -335,7 +335,15 @@ def test_outside_the_tables_it_is_worse(problem: AugmentedProblem) -> None:
     assert np.isfinite(total).all() and np.all(np.diff(total) < -10.0)
 
 
-def test_tables_have_neither_gradients_nor_surfaces(problem: AugmentedProblem) -> None:
+def test_what_cannot_be_is_refused(base: Base, drag: Curve, problem: AugmentedProblem) -> None:
+    with pytest.raises(ValueError, match="one or 2"):
+        augmented_problem(base, [])
+    with pytest.raises(ValueError, match="one or 2"):
+        augmented_problem(base, [drag] * 3)
+    with pytest.raises(ValueError, match="another campaign"):
+        replace(problem, campaign=CAMPAIGN)
+    with pytest.raises(ValueError, match="calibrate that law"):
+        problem.log_likelihood(load_law("pcm"), {})
     with pytest.raises(TypeError, match="not surfaces"):
         problem.surfaces(problem.base.law.mechanisms)
     with pytest.raises(NotImplementedError):

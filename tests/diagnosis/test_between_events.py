@@ -353,3 +353,5 @@ def test_avalanches_differ_in_none_of_two(few: tuple[Base, Curve]) -> None:
     own, log_shares = components_of(added, samples)
     assert_allclose(own, np.tile([2.0, 1.0], (5, 1, 1)))
     assert_allclose(log_shares, np.zeros((5, 1)))
+    with pytest.raises(ValueError, match="differ in none"):
+        augmented_problem(base, [found, found], SOME)

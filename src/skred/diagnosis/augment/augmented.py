@@ -11,7 +11,7 @@ from skred.diagnosis.compare.between import finer, searched
 from skred.diagnosis.compare.ways import Ways
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import FINE
-from skred.diagnosis.tabulated.coefficient_grid import from_nothing, locate
+from skred.diagnosis.tabulated.coefficient_grid import TABLES, from_nothing, locate
 from skred.diagnosis.tabulated.tables import build_tables
 from skred.inference.between_events import BetweenEvents
 
@@ -33,11 +33,21 @@ def augmented_problem(
         How avalanches differ in what is added, where that is one.
     ways : mapping of BetweenEvents to Way, optional
         What a comparison has of it; looked for otherwise.
+
+    Raises
+    ------
+    ValueError
+        If more are added than tables can be made for, or none; if their constants exclude each other; or if
+        avalanches should differ in one of two.
     """
+    if len(curves) not in TABLES:
+        raise ValueError(f"expected one or {max(TABLES)} mechanisms to add, found {len(curves)}")
     added = added_strengths(curves, way)
     extension = base.extended(*(one.direction for one in added))
     if way is BetweenEvents.COMMON:
         located = locate(base, extension, curves)
+    elif len(curves) > 1:
+        raise ValueError("of two mechanisms that are added avalanches can differ in none")
     else:
         ways = ways or searched(base, curves[0])
         if ways[way].budget != FINE:  # a comparison takes the finer tables for what leads without a residue

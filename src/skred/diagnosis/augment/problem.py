@@ -36,6 +36,7 @@ from skred.inference.hierarchical.rough_population import moments_of
 from skred.inference.hierarchical.surface import Surfaces
 from skred.inference.results import draws_by_name
 from skred.parallel.threads import in_parts, side_by_side
+from skred.physics.kernel.fronts import front_speeds
 from skred.physics.law import Law, Parameter
 from skred.physics.mechanisms.spec import Mechanism
 
@@ -80,6 +81,11 @@ class AugmentedProblem(HierarchicalProblem):
     tables: Tables = field(repr=False)
     refined: int = 0
 
+    def __post_init__(self) -> None:
+        """Refuse recordings that the tables are not of."""
+        if self.campaign is not self.base.problem.campaign:
+            raise ValueError("the tables are of another campaign: make a new base and augmented_problem")
+
     @property
     def extension(self) -> Extension:
         """The base law with what is added."""
@@ -109,6 +115,7 @@ class AugmentedProblem(HierarchicalProblem):
 
         from skred.diagnosis.tabulated.tabulated_op import TabulatedLogDensity
 
+        self._check(mechanisms)
         tables, n_events = self.tables, self.campaign.n_events
         # As data, so that one compiled model serves many campaigns of as many events.
         held = {name: pm.Data(f"table_{name}", value) for name, value in tables.arrays.items()}
@@ -139,6 +146,7 @@ class AugmentedProblem(HierarchicalProblem):
 
     def log_likelihood(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
         """Log density of each event for many parameter vectors: arrays by name to (n, n_events)."""
+        self._check(law.mechanisms)
         together: FloatArray = np.logaddexp.reduce(self._parts(law, samples), axis=1)
         return together
 
@@ -221,6 +229,23 @@ class AugmentedProblem(HierarchicalProblem):
         together: FloatArray = np.logaddexp.reduce(parts, axis=1)
         return self.log_likelihood(law, samples)[:, chosen] - together
 
+    def speeds(
+        self,
+        mechanisms: Sequence[Mechanism],
+        strengths: FloatArray,
+        release_s_m: float | FloatArray,
+        release_speed_m_s: float | FloatArray = 0.0,
+    ) -> FloatArray:
+        """Front speed [m/s] at the cell edges, what is added as strong as its posterior mean."""
+        extension = self.extension
+        added = np.concatenate([self.base.strengths, self.tables.located.mean])
+        columns = np.repeat(added, [len(d.columns) for d in extension.directions])
+        rows = np.column_stack([np.asarray(strengths, float), np.tile(columns, (len(strengths), 1))])
+        releases = np.full(len(rows), release_s_m, dtype=float)  # where fronts start, an offset included
+        law = extension.contributions
+        speeds: FloatArray = front_speeds(rows, releases, self.path, law, release_speed_m_s)
+        return speeds
+
     def finer(self, law: Law, posterior: xr.Dataset) -> AugmentedProblem | None:
         """The same with finer tables; None where they were made so as often as may be.
 
@@ -256,3 +281,8 @@ class AugmentedProblem(HierarchicalProblem):
             Always.
         """
         raise TypeError("a law with mechanisms added has tables, not surfaces")
+
+    def _check(self, mechanisms: Sequence[Mechanism]) -> None:
+        ids = [mechanism.id for mechanism in self.base.law.mechanisms]
+        if [mechanism.id for mechanism in mechanisms] != ids:
+            raise ValueError(f"mechanisms were added to {self.base.law.id}: calibrate that law")
