@@ -193,8 +193,8 @@ class TabulatedLogDensity(ArrayOp):
         ("points", 2, "float64"),
         ("log_weights", 1, "float64"),
     )
-
-    differentiable = frozenset({"means", "factor", "strengths", "log_shares"})  # a gradient is not there
+    # So that who asks for a gradient is refused, and gets no nil.
+    differentiable = frozenset({"means", "factor", "strengths", "log_shares"})
 
     def output_shape(self, shapes: Sequence[tuple[Any, ...]]) -> tuple[Any, ...]:
         """(n_events,)."""
