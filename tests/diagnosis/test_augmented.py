@@ -346,7 +346,7 @@ def test_what_cannot_be_is_refused(base: Base, drag: Curve, problem: AugmentedPr
         problem.log_likelihood(load_law("pcm"), {})
     with pytest.raises(TypeError, match="not surfaces"):
         problem.surfaces(problem.base.law.mechanisms)
-    with pytest.raises(NotImplementedError):
+    with pytest.raises(TypeError, match="use Metropolis"):
         strengths = pt.matrix()
         inputs = [pt.as_tensor_variable(value) for value in problem.tables.arrays.values()]
         density = TabulatedLogDensity()(np.zeros((3, 1)), np.ones((1, 1)), strengths, np.zeros(1), *inputs)

@@ -196,6 +196,20 @@ def test_what_only_makes_up_for_a_shift_has_no_more_than_where_the_sensor_stands
     assert force.log_bayes_factor == pytest.approx(expected[1].log_bayes_factor, abs=1.0)
 
 
+@pytest.mark.parametrize("id_", ["viscous_drag", "velocity_weakening"])
+def test_a_place_known_to_a_centimetre_changes_nothing(id_: str) -> None:
+    """Whether a mechanism's best strength is above nil or it has less evidence the more there is of it."""
+    clean = base_of(trial(9301, "sparse", "nothing", "coulomb", 0.0).campaign, "coulomb")
+    mechanism = mechanisms()[id_]
+    found = curve(clean, placed(mechanism, clean.setting, shapes_of(mechanism, clean.setting)[0]))
+    assert found.log_bayes_factor < -1.0
+    candidates = {id_: Candidate(mechanism, (found,), np.zeros(1))}
+    with ThreadPoolExecutor(1) as pool:
+        changed, _, _ = with_stated_places(stated(clean, 0.01), candidates, [], [], pool)
+    assert (changed[id_].strength_with_places is None) == (id_ == "velocity_weakening")
+    assert changed[id_].of_places == pytest.approx(0.0, abs=0.05)
+
+
 @pytest.mark.slow
 def test_a_span_that_is_noted_to_end_below_a_sensor_that_its_fronts_did_not_reach() -> None:
     """As if they had come there and had not: but with its place known to 40 m all is as where it stands."""

@@ -270,9 +270,9 @@ def fit_base(
     population: Population,
     points: FloatArray | None = None,
 ) -> Base:
-    """The base law fitted, from roughly where its population is: that of its likelihood surfaces.
+    """The base law fitted, from roughly where its population is.
 
-    In them no mode is missed.
+    The population is that of the law's likelihood surfaces, in which no mode is missed.
     """
     extension = extended(problem, law)
     rows = campaign_rows(extension)

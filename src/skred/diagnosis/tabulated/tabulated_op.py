@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from pytensor.graph.basic import Variable
 from pytensor.link.numba.dispatch.basic import numba_njit, register_funcify_default_op_cache_key
 
 from skred.inference.array_op import ArrayOp
@@ -193,7 +194,6 @@ class TabulatedLogDensity(ArrayOp):
         ("points", 2, "float64"),
         ("log_weights", 1, "float64"),
     )
-    # So that who asks for a gradient is refused, and gets no nil.
     differentiable = frozenset({"means", "factor", "strengths", "log_shares"})
 
     def output_shape(self, shapes: Sequence[tuple[Any, ...]]) -> tuple[Any, ...]:
@@ -203,6 +203,18 @@ class TabulatedLogDensity(ArrayOp):
     def evaluate(self, inputs: Sequence[Any]) -> Any:
         """Log densities from numpy arrays."""
         return tabulated_log_density(*inputs)
+
+    def pullback(
+        self, inputs: Sequence[Variable], outputs: Sequence[Variable], cotangents: Sequence[Variable]
+    ) -> list[Variable]:
+        """Not there.
+
+        Raises
+        ------
+        TypeError
+            Always.
+        """
+        raise TypeError("TabulatedLogDensity has no gradient: use Metropolis for a law with mechanisms added")
 
 
 @register_funcify_default_op_cache_key(TabulatedLogDensity)

@@ -333,7 +333,10 @@ def _too_usual(check: BootstrapTest) -> str:
     above, of = int((check.simulated >= check.statistic).sum()), len(check.simulated)
     if above:
         return f"{above} of {of} clean campaigns {'has' if above == 1 else 'have'} such odds"
-    return f"with a strength in common to all avalanches the log odds are only {check.statistic:.1f} nats"
+    return (
+        "by one thing alone and with a strength in common to all avalanches the log odds are only"
+        f" {check.statistic:.1f} nats"
+    )
 
 
 def _rare(check: BootstrapTest) -> str:
