@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from diagnosis_cases import base_of, first_events, trial, with_sensors
+from scipy.stats import norm
 
 from skred.campaign.parts import of_events
 from skred.diagnosis.check.bootstrap_campaigns import bootstrap_campaigns
@@ -15,6 +16,7 @@ from skred.diagnosis.detect.detectability import (
     Detectability,
     extra_sensors,
     identify,
+    limit_z,
     mean_power,
     told,
 )
@@ -25,6 +27,7 @@ from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population
 from skred.diagnosis.evidence.extension import extended, setting_of
 from skred.diagnosis.evidence.linear_mixed_model import efficient_scores, fit_population, mean_prior
 from skred.inference.error_model import ERROR_MODELS
+from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import PlacedMechanism
 from skred.physics.mechanisms.stretches import is_opposed
 
@@ -92,6 +95,23 @@ def test_detection_limit_by_simulation(base: Base, table: dict[str, Detectabilit
     assert abs(null.mean()) < 0.6 and 0.7 < null.std() < 1.35
     assert (effect.mean() - null.mean()) / null.std() == pytest.approx(LIMIT_Z + 1.2816, rel=0.15)
     assert np.mean(effect > LIMIT_Z) > 0.8  # stated: 0.9
+
+
+def test_power_is_a_mean_over_the_prior(base: Base) -> None:
+    """Drag is opposed with probability 0.3, however many shapes that is. Of a fiftieth of the information."""
+    score_test = ScoreTest(base)
+    scores = score_test.scores(base.rows, base.fit.points, base.population)
+    scores = scores._replace(information=scores.information / 50.0)
+    _, (information,), _ = score_test.of_candidates(scores)
+    own = [k for k, one in enumerate(score_test.placed_mechanisms) if one.mechanism.id == "segment_drag"]
+    shapes = [score_test.placed_mechanisms[k].shape for k in own]
+    relevant = np.array([score_test.placed_mechanisms[k].relevant for k in own])
+    found = norm.cdf(np.sqrt(information[own]) * relevant - limit_z(len(mechanisms())))
+    opposed, weight = np.array([(is_opposed(one), one.prior_weight) for one in shapes]).T
+    of_kinds = [np.average(found[of], weights=weight[of]) for of in (opposed > 0, opposed == 0)]
+    assert abs(of_kinds[0] - of_kinds[1]) > 0.05 and abs((opposed > 0).mean() - 0.3) > 0.05
+    (power,) = (row.power for row in told(score_test, scores) if row.mechanism.id == "segment_drag")
+    assert power == pytest.approx(0.3 * of_kinds[0] + 0.7 * of_kinds[1], rel=1e-9)
 
 
 def test_one_more_sensor_is_as_good_as_readings_say_where_sensors_do_not(base: Base) -> None:

@@ -26,6 +26,7 @@ from skred.inference.intervals import INTERVAL_PROBABILITY
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import added_of
 from skred.physics.mechanisms.spec import Group, Mechanism
+from skred.physics.mechanisms.stretches import shares
 
 LIMIT_Z = 2.85
 """Score above which a mechanism counts as seen: the largest of `_CALCULATED_FOR` is above it in about 3 of a
@@ -58,7 +59,7 @@ class Detectability:
     best_limit : float
         The limit there.
     power : float
-        Probability that a relevant strength is found, over its places.
+        Probability that a relevant strength is found, over its shapes by their prior probability.
     alike : tuple of str
         Ids that it cannot be told from.
     """
@@ -152,6 +153,7 @@ def told(score_test: ScoreTest, scores: Scores) -> list[Detectability]:
     scales, relevant = np.array([(one.scale, one.relevant) for one in placed]).T
     z, at = limit_z(len(mechanisms())), ndtri(INTERVAL_PROBABILITY)
     own = np.sqrt(information)
+    found = ndtr(own * relevant - z)
     cosine = np.abs(scores.information[0][np.ix_(order, order)]) / np.outer(own, own)
     seen = (z + at) / own < NO_LIMIT * scales
     limits = np.where(seen, (z + at) / own, np.inf)
@@ -172,7 +174,7 @@ def told(score_test: ScoreTest, scores: Scores) -> list[Detectability]:
                 float(limits[typical]),
                 float(limits[best]),
                 stretch,
-                float(np.mean(ndtr(own[members] * relevant[members] - z))),
+                float(np.average(found[members], weights=shares([placed[k].shape for k in members]))),
                 tuple(sorted(set(ids[look_alike[best]].tolist()) - {name})),
             )
         )
