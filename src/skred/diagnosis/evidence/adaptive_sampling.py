@@ -177,6 +177,13 @@ class Weighted(NamedTuple):
             return math.inf
         return float(self.shares.std() * math.sqrt(len(self.log_weights)))
 
+    @property
+    def moments(self) -> tuple[FloatArray, FloatArray]:
+        """Mean and covariance of the density, (size,) and (size, size)."""
+        mean = self.shares @ self.draws
+        away = self.draws - mean
+        return mean, away.T @ (self.shares[:, None] * away)
+
     def resampled(self, n: int, rng: np.random.Generator) -> FloatArray:
         """So many of the draws, by their weights."""
         return self.draws[rng.choice(len(self.draws), size=n, p=self.shares)]

@@ -6,6 +6,7 @@ A population is in the coordinates of `population_target`.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -71,7 +72,7 @@ class Evidence(NamedTuple):
     log_evidence : float
         By Laplace's formula, or by importance sampling.
     psi : (n_psi,) array
-        Most probable population, in the coordinates of `population_target`.
+        Most probable population, in the coordinates of `population_target`; their mean where sampled.
     covariance : (n_psi, n_psi) array
     error : float
         Standard error by importance sampling, in nats; 0 where nothing was sampled.
@@ -87,6 +88,24 @@ def population_at(psi: FloatArray, n: int) -> Population:
     """Populations of `n` strengths at coordinates, (n_groups, n_coordinates)."""
     factors = np.array([factor_at(one, n) for one in psi])
     return Population(psi[:, :n].copy(), np.einsum("gij,gkj->gik", factors, factors))
+
+
+def wide_populations(found: Sequence[Evidence], n: int) -> Population:
+    """Populations of `n` strengths as wide as what is known of them: they differ in mean and in spread.
+
+    No wider than by a standard deviation of 0.7 of a log spread and of 1 of a mean.
+    """
+    population = population_at(np.stack([one.psi for one in found]), n)
+    covariances = np.stack([one.covariance for one in found])
+    wider = np.exp(np.minimum(np.sqrt(np.einsum("tii->ti", covariances)[:, n : 2 * n]), 0.7))
+    wide = population.covariance * wider[:, :, None] * wider[:, None, :]
+    return Population(population.mean, wide + _at_most_one(covariances[:, :n, :n]))
+
+
+def _at_most_one(covariances: FloatArray) -> FloatArray:
+    """Covariances of logarithms whose standard deviations are 1 at most, correlations as they are."""
+    least = 1.0 / np.maximum(np.sqrt(np.einsum("tii->ti", covariances)), 1.0)
+    return covariances * least[:, :, None] * least[:, None, :]
 
 
 def coordinates(population: Population) -> FloatArray:
@@ -130,9 +149,9 @@ def curvatures(hessian: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def importance_evidence(nodes: Nodes, log_scale: FloatArray, found: Evidence, seed: int = 0) -> Evidence:
-    """What was found, with evidence by importance sampling from the Laplace approximation on."""
+    """Evidence by importance sampling from the Laplace approximation on, with the populations' moments."""
     weighted = _weighted(nodes, log_scale, found, np.random.default_rng([seed, 11]), DRAWS, STANDARD_ERROR)
-    return found._replace(log_evidence=weighted.log_integral, error=weighted.error)
+    return Evidence(weighted.log_integral, *weighted.moments, weighted.error)
 
 
 def importance_draws(

@@ -25,6 +25,7 @@ from skred.diagnosis.evidence.marginal import (
     evidence,
     importance_evidence,
     population_at,
+    wide_populations,
 )
 from skred.diagnosis.evidence.tolerance import MOST_ROUNDS
 from skred.inference.hierarchical.rough_population import STARTING_SPREAD
@@ -102,7 +103,6 @@ def refit(
         Where to begin instead, one for each group.
     """
     n_groups, n_events, n = len(strengths), len(rows.event), start[0].mean.shape[1]
-    log_scale = median_log_scale(extension.law)
     state = list(fits) if fits is not None else [Fit(unfitted(start[0]), start[1])] * n_groups
     active = list(range(n_groups))
     for number in range(MOST_ROUNDS):
@@ -114,12 +114,11 @@ def refit(
             found = _round(likelihood, begin, spent, start[0])
             if number == 0:
                 found = _led_on(likelihood, found, spent, start[0])
-            for k, before, (after, nodes) in zip(some, begin, found, strict=True):
+            for of, (k, before, (after, nodes)) in enumerate(zip(some, begin, found, strict=True)):
                 if number + 1 < rounds.least or _moved(before.found.psi, after.found.psi, n):
                     moved.append(k)
                 if rounds.sampled and (k not in moved or number + 1 == MOST_ROUNDS):
-                    sampled = importance_evidence(nodes, log_scale, after.found)
-                    after = after._replace(found=sampled)
+                    after = _sampled(likelihood.of_groups(np.array([of])), after, nodes, spent, start[0])
                 state[k] = after
         active = moved
         if not active:
@@ -128,7 +127,11 @@ def refit(
 
 
 def _round(
-    likelihood: EventLikelihood, begin: Sequence[Fit], budget: Budget, reference: Population
+    likelihood: EventLikelihood,
+    begin: Sequence[Fit],
+    budget: Budget,
+    reference: Population,
+    around: Population | None = None,
 ) -> list[tuple[Fit, Nodes]]:
     """One round of a refit: the events' modes, quadrature points around them, the population by these.
 
@@ -136,10 +139,12 @@ def _round(
     ----------
     likelihood : EventLikelihood
         Of as many groups of rows as there are fits.
+    around : Population, optional
+        Where points are put; without, around the fits' most probable ones.
     """
     n, n_groups = begin[0].points.shape[1] - 1, len(begin)
     log_scale = median_log_scale(likelihood.extension.law)
-    population = population_at(np.stack([fit.found.psi for fit in begin]), n)
+    population = population_at(np.stack([fit.found.psi for fit in begin]), n) if around is None else around
     points = np.concatenate([fit.points for fit in begin])
     modes = event_modes(likelihood, points, population, n_steps=6)
     spread = event_nodes(likelihood, population, modes, budget, reference)
@@ -147,6 +152,20 @@ def _round(
     found = [evidence(one, log_scale, fit.found.psi) for one, fit in zip(nodes, begin, strict=True)]
     fits = [Fit(*one) for one in zip(found, np.split(modes.points, n_groups), strict=True)]
     return list(zip(fits, nodes, strict=True))
+
+
+def _sampled(
+    likelihood: EventLikelihood, fit: Fit, nodes: Nodes, budget: Budget, reference: Population
+) -> Fit:
+    """A fit of one group with evidence by importance sampling, by points around all populations that may be.
+
+    Around the most probable population alone points miss what an avalanche does under wider ones.
+    """
+    log_scale = median_log_scale(likelihood.extension.law)
+    found = importance_evidence(nodes, log_scale, fit.found)
+    around = wide_populations([found], fit.points.shape[1] - 1)
+    [(again, nodes)] = _round(likelihood, [fit], budget, reference, around)
+    return again._replace(found=importance_evidence(nodes, log_scale, again.found))
 
 
 def _led_on(

@@ -134,9 +134,8 @@ def between_evidence(target: BetweenTarget, proposal: Mixture, seed: int = 72) -
     found = weighted_draws(target, proposal, np.random.default_rng([0, seed]))
     shares = found.shares
     psi, strengths, _, _ = target.split(found.draws)
-    mean, middle = shares @ psi, float(shares @ strengths)
-    away = psi - mean
-    populations = Evidence(found.log_integral, mean, away.T @ (shares[:, None] * away), found.error)
+    middle, moments = float(shares @ strengths), found._replace(draws=psi).moments
+    populations = Evidence(found.log_integral, *moments, found.error)
     sd = math.sqrt(float(shares @ (strengths - middle) ** 2))
     budget = target.tables.budget
     nothing = target.base.with_nothing(budget, sampled=True).found.log_evidence

@@ -13,7 +13,7 @@ from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, event_modes, log_joint
 from skred.diagnosis.evidence.event_quadrature import Budget, Spread, event_nodes
 from skred.diagnosis.evidence.extension import Extension
-from skred.diagnosis.evidence.marginal import Evidence, population_at
+from skred.diagnosis.evidence.marginal import Evidence, population_at, wide_populations
 from skred.diagnosis.evidence.refit import MOST_NODES
 from skred.diagnosis.tabulated.coefficient_grid import Grid, Located, from_nothing
 from skred.inference.hierarchical.event_density import integrated_log_density
@@ -69,13 +69,8 @@ def build_tables(
     likelihood = EventLikelihood(extension, base.rows, base.strengths).in_groups(base.given(grid.points))
     population = population_at(np.stack([fit.found.psi for fit in fits]), n)
     start = highest(likelihood, np.stack([fit.points for fit in fits]), population)
-    # Populations of the posterior differ in mean and in spread.
-    covariances = np.stack([fit.found.covariance for fit in fits])
-    wider = np.exp(np.minimum(np.sqrt(np.einsum("tii->ti", covariances)[:, n : 2 * n]), 0.7))
-    wide = population.covariance * wider[:, :, None] * wider[:, None, :]
-    wide = wide + _at_most_one(covariances[:, :n, :n])
     reference = base.population if visited is None else base.population.with_more(visited)
-    around = Population(population.mean, wide)
+    around = wide_populations([fit.found for fit in fits], n)
 
     def spread(part: slice) -> tuple[Spread, FloatArray]:
         own = likelihood.part(part)
@@ -85,12 +80,6 @@ def build_tables(
     spreads, modes = zip(*side_by_side(spread, _lots(n_tables, n_events, budget)), strict=True)
     nodes, points = Spread.joined(spreads), np.concatenate(modes).reshape(n_tables, n_events, n + 1)
     return Tables(located, nodes.nodes, nodes.points[:, :, n].ravel(), points, budget)
-
-
-def _at_most_one(covariances: FloatArray) -> FloatArray:
-    """Covariances of logarithms whose standard deviations are 1 at most, correlations as they are."""
-    least = 1.0 / np.maximum(np.sqrt(np.einsum("tii->ti", covariances)), 1.0)
-    return covariances * least[:, :, None] * least[:, None, :]
 
 
 def wide_tables(base: Base, curve: Curve, found: Evidence, budget: Budget) -> Tables:
