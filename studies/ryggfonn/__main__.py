@@ -16,6 +16,7 @@ from typing import Annotated, Any, NamedTuple
 
 import cyclopts
 
+from benchmarks.commit import commit
 from skred.output import write_text
 from studies.files import FIGURES, RESULTS, ROOT, read, shrink, write
 from studies.ryggfonn import page as ryggfonn_page
@@ -173,7 +174,7 @@ def main(
         file = folder / f"{case.name}.json"
         if not file.exists():
             print(f"== {case.name}", flush=True)
-            write(file, diagnose_case(case, figures=out is None))
+            write(file, diagnose_case(case, figures=out is None) | {"commit": commit()})
     if out is not None:
         return
     found = {case.name: read(ANSWERS / f"{case.name}.json") for case in CASES}

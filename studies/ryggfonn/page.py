@@ -24,7 +24,8 @@ UNSEEN = "-unseen"
 _HEAD = """# Ryggfonn: what the block models leave out
 
 Written by `python -m studies.ryggfonn` from `studies/results/ryggfonn/`. Every figure is the
-tool's own. The campaign has 22 avalanches on the natural terrain. The catching dam is withheld: 15 m high,
+tool's own. Cases were computed as time allowed, not all by one version of the code: *code* is its commit.
+The campaign has 22 avalanches on the natural terrain. The catching dam is withheld: 15 m high,
 crown at s = 1940 m, upstream foot at 1910 m.
 
 - *Log Bayes factors* are against `nothing`, in nats. Coefficients and shapes are integrated over, and the
@@ -276,7 +277,7 @@ def _robust(found: Mapping[str, Found]) -> str:
         said = one["verdict"] + _named(one) + (f": {one['reason']}" if one.get("reason") else "")
         share = _share(one["probability"].get("unlisted", 0.0))
         p_value = _number(one["evidence"]["p_value"])
-        rows.append(f"| {name} | {said} | {p_value} | {what} | {share} | {_differ(one)} |")
+        rows.append(f"| {name} | {said} | {p_value} | {what} | {share} | {_differ(one)} | {_code(one)} |")
     scales = found["pcm"].get("prior_scales", {})
     priors = "\n".join(
         f"| `{name}` | {values['0.5']:.1f} | {values['1.0']:.1f} | {values['2.0']:.1f} |"
@@ -297,12 +298,12 @@ uncertain: both up, both down, towards each other |
 | `pcm-with-dam` | the surveyed terrain, with the dam in it |
 
 | case | verdict | p of the check | leading candidates, log Bayes factor | probability of `unlisted` | \
-common, spread, some |
-| --- | --- | --- | --- | --- | --- |
+common, spread, some | code |
+| --- | --- | --- | --- | --- | --- | --- |
 {chr(10).join(rows)}
 
-The last column: how probably all avalanches have the same strength, differ log-normally, or have it only in
-part. *Along the track* is all of it, or from the first recording on.
+*Common, spread, some*: how probably all avalanches have the same strength, differ log-normally, or have it
+only in part. *Along the track* is all of it, or from the first recording on.
 
 Log Bayes factor of the best shape with the prior of the coefficient half, once and twice as wide:
 
@@ -310,6 +311,11 @@ Log Bayes factor of the best shape with the prior of the coefficient half, once 
 | --- | --- | --- | --- |
 {priors}
 """
+
+
+def _code(one: Found) -> str:
+    """The commit that a case was computed by."""
+    return one["commit"]
 
 
 def _differ(one: Found) -> str:
@@ -324,20 +330,21 @@ def _left(found: Mapping[str, Found]) -> str:
     for name in LAWS:
         one = found[name]
         if not one["mechanisms"] and not one.get("profile"):
-            rows.append(f"| `{name}` | nothing ({one['verdict']}) | | | |")
+            rows.append(f"| `{name}` | nothing ({one['verdict']}) | | | | {_code(one)} |")
             continue
         held, gain = one["held_out"], _gain(one["evidence"])
         runout = f"{held['rmse_runout_before']:.0f}, {held['rmse_runout_after']:.0f} m"
         p_value = _number(one.get("p_value_augmented"))
-        rows.append(f"| `{name}` | {_added_terms(one)} | {p_value} | {gain} | {runout} |")
+        rows.append(f"| `{name}` | {_added_terms(one)} | {p_value} | {gain} | {runout} | {_code(one)} |")
     return f"""## With what was added
 
 The check of the augmented law, and each avalanche predicted from the others. A force profile is fitted again
 without each avalanche. Where odds allow no claim the check simulates nine clean campaigns at most, so p is
 coarse: on another processor PCM had 0.3.
 
-| base | added | p of the check | held-out log score (doubled standard error) | runout error before, after |
-| --- | --- | --- | --- | --- |
+| base | added | p of the check | held-out log score (doubled standard error) | runout error before, after \
+| code |
+| --- | --- | --- | --- | --- | --- |
 {chr(10).join(rows)}
 """
 
@@ -349,7 +356,7 @@ def _unseen(found: Mapping[str, Found]) -> str:
         usual, exact = found[name]["evidence"], found[name + UNSEEN]["evidence"]
         outer = found[name + UNSEEN]["outer_folds"]
         gains = " | ".join(_gain(one) for one in (usual, exact, outer))
-        rows.append(f"| `{name}` | {_added_terms(found[name])} | {gains} |")
+        rows.append(f"| `{name}` | {_added_terms(found[name])} | {gains} | {_code(found[name + UNSEEN])} |")
         for number, one in enumerate(outer["folds"], start=1):
             names = " and ".join(_named_in_fold(mechanism) for mechanism in one["mechanisms"]) or "nothing"
             without = ", ".join(one["events"])
@@ -365,8 +372,9 @@ repeated without each of {k} parts of them. Each part then judges what was added
 where that is unreliable, and as a check by a refit without each (`--exact-loo`). Changes of the log score,
 with doubled standard errors:
 
-| base | added by all | each left out by weights | refitted without each | whole diagnosis without it |
-| --- | --- | --- | --- | --- |
+| base | added by all | each left out by weights | refitted without each | whole diagnosis without it \
+| code of the last two |
+| --- | --- | --- | --- | --- | --- |
 {chr(10).join(rows)}
 
 Part by part:

@@ -354,9 +354,19 @@ def test_that_few_avalanches_carry_a_name_comes_before_what_carries_the_alarm() 
     near = replace(influence, rival=Rival("viscous_drag", 3.25, Few(ids[:1], -0.4)))
     less = document_of(replace(found, influence=near))
     assert f"without it {title} would be about as probable (3.2 nats behind" in less["statement"]
-    assert "Without it another answer would be about as probable: " in " ".join(lay_words(less))
+    assert f"without {ids[0]} another answer would be about as probable: " in " ".join(lay_words(less))
     short = short_title(document, "viscous_drag")
-    assert f"Without it another answer would be more probable: {short}." in " ".join(lay_words(document))
+    said = " ".join(lay_words(document))
+    assert f"Take it with care: without {ids[0]} another answer would be more probable: {short}." in said
+
+
+def test_that_a_force_in_no_list_is_more_probable_than_the_name_is_told() -> None:
+    found = diagnosis("two")
+    document = verdict(found)
+    probability = document["probability"] | {UNLISTED: 0.39, document["mechanism"]: 0.31}
+    said = statement(found, document | {"probability": probability})
+    assert "a force not in the list, which is more probable: 39 %" in said
+    assert "which is more probable" not in document["statement"]
 
 
 def test_of_many_sensors_that_an_answer_needs_five_are_named() -> None:

@@ -122,10 +122,11 @@ def _named(found: Diagnosis, document: dict[str, Any]) -> list[str]:
     strength, probability = document["strength"], document["probability"]
     first, *others = document["mechanisms"]
     force = beside_force(found.comparison)
+    more_probable = ", which is more probable" if probability[UNLISTED] > probability[name] else ""
     sentences = [
         f"{_what(found)}: {_entry(first)}, with a probability of"
-        f" {percent(probability[name])} (nothing: {percent(probability[NOTHING])}; a force not in the list:"
-        f" {percent(probability[UNLISTED])}).",
+        f" {percent(probability[name])} (nothing: {percent(probability[NOTHING])}; a force not in the list"
+        f"{more_probable}: {percent(probability[UNLISTED])}).",
         by_both(found.comparison, name),
         f"Its {strength['parameter'].replace('_', ' ')} is"
         f" {plus_minus(strength['mean'], strength['sd'], strength['unit'])}"

@@ -138,18 +138,15 @@ def _between(document: doc.Document) -> str:
 
 
 def _hangs_on(document: doc.Document) -> list[str]:
-    """Whether few avalanches carry the answer."""
+    """What would be without the avalanches that carry the answer, where few do."""
     carried = list(map(printable, doc.listed(document, "influence", "carried_by")))
     if not carried:
         return []
-    n, are = len(carried), "avalanche carries" if len(carried) == 1 else "avalanches carry"
-    them = "it" if n == 1 else "them"
-    names = ", ".join(carried)
-    return [f"Take it with care: {n} {are} it ({names}). Without {them} {_otherwise(document)}."]
+    return [f"Take it with care: without {_either(carried, 'and')} {_otherwise(document)}."]
 
 
 def _otherwise(document: doc.Document) -> str:
-    """What would be without the avalanches that carry the answer."""
+    """What would be said without them."""
     rival = doc.get(document, "influence", "rival")
     if doc.listed(rival, "carried_by") != doc.listed(document, "influence", "carried_by"):
         return "the odds would not suffice for it"
@@ -186,5 +183,5 @@ def _more(document: doc.Document) -> list[str]:
     return [f"One more speed sensor would help most at s = {where:.0f} m."] if is_number(where) else []
 
 
-def _either(names: Sequence[Any]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(map(str, names[:-1]))} or {names[-1]}"
+def _either(names: Sequence[Any], word: str = "or") -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(map(str, names[:-1]))} {word} {names[-1]}"
