@@ -82,7 +82,7 @@ def _steps(calibration: Calibration, run: Run) -> Outcome:
     table = identify(base)
 
     clock.stage("comparison", "what could be missing: every candidate refitted")
-    comparison = compare(base, clock.progress)
+    comparison = compare(base, clock.progress, clock.tell)
 
     clock.stage("check", "is anything wrong: clean campaigns simulated and refitted")
     check = odds_test(base, draws, run.seed, comparison.log_odds, clock.progress)

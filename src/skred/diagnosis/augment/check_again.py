@@ -48,7 +48,7 @@ def check_again(
     log_odds = odds_of_recordings(again, seed)
     if run.effort.max_mechanisms > 1 and log_odds > 0.0:
         run.clock.stage("compare again", "what could be missing still: every candidate refitted once more")
-        comparison = or_none(compare, again, run.clock.progress)
+        comparison = or_none(compare, again, run.clock.progress, run.clock.tell)
         log_odds = log_odds if comparison is None else comparison.log_odds
         run.clock.stage("check again", "is that more than clean campaigns of the augmented law have")
     return odds_test(again, draws, seed, log_odds, run.clock.progress), comparison

@@ -19,7 +19,7 @@ from functools import partial
 import numpy as np
 
 from skred.arrays import FloatArray
-from skred.diagnosis.clock import Progress
+from skred.diagnosis.clock import Progress, Tell
 from skred.diagnosis.compare.between import SEARCH, with_ways
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.recomputed import recomputed
@@ -143,7 +143,9 @@ class Comparison:
         return math.log(ERROR_SHARES[error_model]) + self.base_evidence[error_model]
 
 
-def compare(base: Base, progress: Progress = lambda done, of: None) -> Comparison:
+def compare(
+    base: Base, progress: Progress = lambda done, of: None, tell: Tell = lambda line: None
+) -> Comparison:
     """Run the comparison from a fitted base law.
 
     Parameters
@@ -152,6 +154,8 @@ def compare(base: Base, progress: Progress = lambda done, of: None) -> Compariso
         Under any error model.
     progress : callable
         Is told how many candidates are screened, and of how many, under each error model.
+    tell : callable
+        Is told in a line what is computed then.
     """
     fitted = side_by_side(lambda name: with_errors(base, name), list(ERROR_SHARES))
     bases = dict(zip(ERROR_SHARES, fitted, strict=True))
@@ -167,7 +171,7 @@ def compare(base: Base, progress: Progress = lambda done, of: None) -> Compariso
             before = curves[preferred] if ahead <= COUNTS else worth_comparing(curves[preferred], ahead)
             if before:
                 curves[DEFAULT_ERRORS] = screened(bases[DEFAULT_ERRORS], pool, progress, before)
-        under = _under_each({name: bases[name] for name in curves}, curves, height, pool)
+        under = _under_each({name: bases[name] for name in curves}, curves, height, pool, tell)
     # The evidence of an error model that is left out counts for nothing and everything alike.
     listed = [candidate.mechanism for candidate in under[preferred].candidates.values()]
     evidence = {name: heights[name] + one.of_places for name, one in under.items()}
@@ -218,6 +222,7 @@ def _under_each(
     curves: Mapping[str, list[Curve]],
     height: Mapping[str, float],
     pool: ThreadPoolExecutor,
+    tell: Tell,
 ) -> dict[str, ComparisonUnderErrors]:
     """The comparison under each error model, first under that of the highest candidate.
 
@@ -234,7 +239,7 @@ def _under_each(
     """
     top = {name: height[name] + _most(curves[name]) for name in curves}
     first = max(top, key=lambda name: top[name])
-    found = {first: _under_errors(first, bases[first], curves[first], pool)}
+    found = {first: _under_errors(first, bases[first], curves[first], pool, tell)}
     leads = max(found[first].candidates.values(), key=lambda one: one.log_bayes_factor).best
     reached = height[first] + max(found[first].log_factors.values())
     if found[first].of_places:  # of exact places, which what is compared first has, that says nothing
@@ -247,7 +252,8 @@ def _under_each(
             # Stated places change nothing there: beside candidates that are only screened they are not known.
             found[name] = ComparisonUnderErrors(name, bases[name], candidates, [])
         else:
-            found[name] = _under_errors(name, bases[name], curves[name], pool, reached - height[name])
+            least = reached - height[name]
+            found[name] = _under_errors(name, bases[name], curves[name], pool, tell, least)
     return found
 
 
@@ -257,7 +263,12 @@ def _most(curves: Sequence[Curve]) -> float:
 
 
 def _under_errors(
-    error_model: str, base: Base, curves: list[Curve], pool: ThreadPoolExecutor, best: float = -math.inf
+    error_model: str,
+    base: Base,
+    curves: list[Curve],
+    pool: ThreadPoolExecutor,
+    tell: Tell,
+    best: float = -math.inf,
 ) -> ComparisonUnderErrors:
     """The comparison under one error model, from what was screened under it.
 
@@ -268,11 +279,14 @@ def _under_errors(
     """
     for budget, sampled in ((USUAL, False), (SEARCH, True), (FINE, True)):  # before every worker does it
         base.with_nothing(budget, sampled=sampled)
+    tell(f"  under {error_model} errors: places of what may count")
     candidates = refine(base.setting, curves, partial(curve_near, base), pool, best)
+    tell("  strengths that differ, and a force in no list")
     fitted = pool.map(partial(free_force, base, candidates=candidates), KINDS)  # and meanwhile:
     candidates = with_ways(base, candidates, pool, best)
     profiles = list(fitted)
     candidates = with_residues(base, candidates, profiles, pool, best)
+    tell("  what leads once more, by more points")
     candidates, again = recomputed(base, candidates, profiles, pool, best)
     candidates, again, shifts = with_stated_places(base, candidates, again, profiles, pool)
     return ComparisonUnderErrors(error_model, base, candidates, again, shifts)
