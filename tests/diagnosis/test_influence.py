@@ -30,7 +30,7 @@ from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.compare.ways import Looked
 from skred.diagnosis.discrepancy.profile import KINDS
 from skred.diagnosis.evidence.coefficient import Curve, curve_at, curve_near
-from skred.diagnosis.evidence.prior_odds import prior_odds
+from skred.diagnosis.evidence.prior_odds import UNLISTED, prior_odds
 from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
 from skred.diagnosis.influence.influence import FloatArray, influence
 from skred.diagnosis.influence.margin import MOST, Change, Margin
@@ -160,6 +160,21 @@ def test_a_rival_is_what_is_most_probable_and_not_tied() -> None:
     # All runs were drawn with the same drag: none of them tells alone which one it is.
     assert said.rival.few is None and said.carried_by == ()
     assert influence(comparison, DRAG.id, said.without_each, ENOUGH, ["viscous_drag"]).rival is None
+
+
+def test_a_force_in_no_list_is_a_rival_and_has_one() -> None:
+    comparison = two_drags(rolling(2.4e-4, n_events=9))[0]
+    under = comparison.under_each[0]
+    profiles = [free_force(under.base, kind, {}) for kind in KINDS]
+    compared = replace(comparison, under_each=(replace(under, profiles=profiles),))
+    gained = np.full(9, compared.log_factors[DRAG.id] / 9)
+    drag = influence(compared, DRAG.id, gained, ENOUGH, ["viscous_drag"])
+    assert drag.rival is not None and drag.rival.id == UNLISTED
+    # Every run was drawn with the same drag, which needs no shape: no few of them tell.
+    assert drag.rival.ahead > 3.0 and drag.rival.few is None
+    force = influence(compared, UNLISTED, gained, ENOUGH)
+    assert force.rival is not None and force.rival.id == DRAG.id
+    assert force.rival.ahead == pytest.approx(-drag.rival.ahead)
 
 
 def test_an_answer_with_a_force_beside_it_is_held_against_its_rival_as_it_was_compared() -> None:

@@ -5,16 +5,16 @@ given them. So the Bayes factor without it is that of all, less what it is predi
 (nearly, where many are left out in parts). Without several, or without a kind of reading, population and
 every avalanche are refitted to what is left, with the named mechanism's leading shapes, or with the whole
 profile. Nothing is looked for again: the question is whether what was answered would still
-stand. It does not where the odds would not suffice for it, or where its rival, the listed id that is most
-probable of those it is not tied with, would be more probable. Where either has much of its evidence together
-with a force in no list, so it is held against the other. Of a speed that is left out it stays known that the
-front came there.
+stand. It does not where the odds would not suffice for it, or where its rival, the id that is most
+probable of those it is not tied with, would be more probable. Where a mechanism has much of its evidence
+together with a force in no list, so it is held against its rival. Of a speed that is left out it stays known
+that the front came there.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -24,16 +24,16 @@ import numpy as np
 from skred.arrays import BoolArray, FloatArray
 from skred.diagnosis.compare.between import or_none, searched
 from skred.diagnosis.compare.candidate import Candidate, all_but_place, with_or_without
-from skred.diagnosis.compare.comparison import Comparison
+from skred.diagnosis.compare.comparison import Comparison, ComparisonUnderErrors
 from skred.diagnosis.compare.residue import fit_beside
 from skred.diagnosis.compare.ways import gains_of, over_ways
 from skred.diagnosis.discrepancy.fit import fit_profile
-from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of, most_probable
+from skred.diagnosis.discrepancy.profile import Profile, most_probable
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, event_modes
 from skred.diagnosis.evidence.event_quadrature import USUAL, event_nodes
 from skred.diagnosis.evidence.extension import Extension
-from skred.diagnosis.evidence.prior_odds import POWER, UNLISTED
+from skred.diagnosis.evidence.prior_odds import NOTHING, POWER, UNLISTED
 from skred.diagnosis.evidence.refit import Fit
 from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.diagnosis.influence.margin import Change, Margin
@@ -81,7 +81,7 @@ class Few:
 
 @dataclass(frozen=True)
 class Rival:
-    """The most probable listed id that an answer is not tied with.
+    """The most probable id that an answer is not tied with.
 
     Attributes
     ----------
@@ -120,8 +120,7 @@ class Influence:
         Log Bayes factor without the third of the avalanches that take most of it.
     readings : tuple of ReadingsLeftOut
     rival : Rival or None
-        None where there is no such id under the same error model, it could not be refitted, or the answer is
-        no listed one.
+        None where there is no such id under the same error model, or it could not be refitted.
     """
 
     answer: str
@@ -158,20 +157,13 @@ def influence(
         Ids that recordings cannot tell from the answer.
     """
     under_errors = comparison.leading(answer)
-    base = under_errors.base
-    if answer == UNLISTED:
-        again = partial(_by_profile, most_probable(under_errors.profiles), base)
-        stated = log_evidence_of(under_errors.profiles)
-    else:
-        candidate = under_errors.candidates[answer]
-        again = partial(_by_mechanism, replace(candidate, residue=None), base)
-        stated = candidate.by_itself
+    base, stated = under_errors.base, under_errors.factors(lambda one: one.by_itself)[answer]
     # What is tied with the answer explains the same recordings: without some of them it falls as much.
     needed = max(stated - (comparison.log_odds - enough), 0.0)
     kinds, ids = kinds_of(base), base.problem.campaign.event_ids
     parts = [Part(np.ones(len(gained), dtype=bool), chosen) for _, _, chosen in kinds]
     with worker_pool() as pool, ThreadPoolExecutor(1) as waiting:
-        own = Change(again, pool)
+        own = Change(_again(under_errors, answer, beside=False), pool)
         # Without the rival, if refits beside a force lead to what no front can do.
         against = waiting.submit(or_none, _rival, comparison, answer, tied, gained, own)
         margin = Margin(stated - needed, gained, own)
@@ -214,21 +206,22 @@ def _few(ids: Sequence[str], found: tuple[BoolArray, float] | None, needed: floa
 def _rival(
     comparison: Comparison, answer: str, tied: Collection[str], gained: FloatArray, own: Change
 ) -> Rival | None:
-    """The most probable listed id that a listed answer is not tied with, and how far that is."""
+    """The most probable id that an answer is not tied with, and how far that is."""
     under_errors, shares = comparison.leading(answer), comparison.probability
-    others = [name for name in under_errors.candidates if name not in {answer, *tied}]
-    if answer == UNLISTED or not others:
+    others = [name for name in under_errors.log_factors if name not in {answer, NOTHING, *tied}]
+    if not others:
         return None
     name = max(others, key=lambda one: shares[one])
-    base, first, second = under_errors.base, under_errors.candidates[answer], under_errors.candidates[name]
-    beside = own if first.residue is None else Change(partial(_by_mechanism, first, base), own.pool)
+    first = under_errors.candidates.get(answer)
+    with_force = first is not None and first.residue is not None
     margin = Margin(
         _ahead(comparison, answer, name),
-        gained - _gained(base, second.best),
-        beside,
-        Change(partial(_by_mechanism, second, base), own.pool),
+        gained - _gained(under_errors, name),
+        Change(_again(under_errors, answer, beside=True), own.pool) if with_force else own,
+        Change(_again(under_errors, name, beside=True), own.pool),
     )
-    return Rival(name, margin.whole, _few(base.problem.campaign.event_ids, margin.fewest(), 0.0))
+    ids = under_errors.base.problem.campaign.event_ids
+    return Rival(name, margin.whole, _few(ids, margin.fewest(), 0.0))
 
 
 def _ahead(comparison: Comparison, answer: str, rival: str) -> float:
@@ -237,10 +230,32 @@ def _ahead(comparison: Comparison, answer: str, rival: str) -> float:
     return factors[answer] - factors[rival] + math.log(odds[answer] / odds[rival]) / POWER
 
 
-def _gained(base: Base, curve: Curve) -> FloatArray:
-    """What each avalanche's log integral gains by a mechanism at its best strength, where all is fitted."""
-    strength, fit = curve.top
-    with_it = _log_integrals(base.extended(curve.direction), base, np.append(base.strengths, strength), fit)
+def _again(under_errors: ComparisonUnderErrors, name: str, *, beside: bool) -> Callable[[Part], float]:
+    """What computes an id's log Bayes factor by a part of the recordings.
+
+    Parameters
+    ----------
+    beside : bool
+        Whether a mechanism has a force in no list beside it, as far as that is probable.
+    """
+    if name == UNLISTED:
+        return partial(_by_profile, most_probable(under_errors.profiles), under_errors.base)
+    candidate = under_errors.candidates[name]
+    chosen = candidate if beside else replace(candidate, residue=None)
+    return partial(_by_mechanism, chosen, under_errors.base)
+
+
+def _gained(under_errors: ComparisonUnderErrors, name: str) -> FloatArray:
+    """What each avalanche's log integral gains by an id at its best, where all is fitted."""
+    base = under_errors.base
+    if name == UNLISTED:
+        profile = most_probable(under_errors.profiles)
+        extension, strengths, fit = base.extended(*profile.kind.each(base.setting)), profile.mean, profile.fit
+    else:
+        best = under_errors.candidates[name].best
+        strength, fit = best.top
+        extension, strengths = base.extended(best.direction), np.array([strength])
+    with_it = _log_integrals(extension, base, np.append(base.strengths, strengths), fit)
     return with_it - _log_integrals(base.extended(), base, base.strengths, base.fit)
 
 
