@@ -18,9 +18,11 @@ from skred.diagnosis.detect.detectability import (
     identify,
     limit_z,
     mean_power,
+    places_of_a_sensor,
     told,
 )
 from skred.diagnosis.detect.detectability import with_sensors as with_more_sensors
+from skred.diagnosis.detect.run import identify_document
 from skred.diagnosis.detect.score_test import ScoreTest, placed_mechanisms
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, campaign_rows, look_around
@@ -112,6 +114,25 @@ def test_power_is_a_mean_over_the_prior(base: Base) -> None:
     assert abs(of_kinds[0] - of_kinds[1]) > 0.05 and abs((opposed > 0).mean() - 0.3) > 0.05
     (power,) = (row.power for row in told(score_test, scores) if row.mechanism.id == "segment_drag")
     assert power == pytest.approx(0.3 * of_kinds[0] + 0.7 * of_kinds[1], rel=1e-9)
+
+
+def test_one_more_sensor_stands_on_the_track_and_below_the_release(base: Base) -> None:
+    """Of a chute a few metres long, too."""
+    release = float(base.problem.releases.mean.max())
+    places = places_of_a_sensor(base.problem, (release + 0.5, release + 1.5))
+    assert release < places[0] and (np.diff(places) > 0.0).all() and places[-1] == release + 1.5
+    beyond = places_of_a_sensor(base.problem, (release + 0.5, base.problem.terrain.length_m + 10.0))
+    assert beyond[-1] < base.problem.terrain.length_m
+
+
+def test_that_nothing_is_looked_for_on_a_stretch_is_told(base: Base, table: dict[str, Detectability]) -> None:
+    found = identify(base)
+    of_sensors = replace(found, rows=(table["sensor_bias"], table["viscous_drag"]))
+    said, less = (
+        " ".join(identify_document(base.problem, base.law, one)["statement"]) for one in (found, of_sensors)
+    )
+    assert "shorter than the shortest stretch looked at (75 m)" in less
+    assert "Nothing was looked for on a stretch" not in said
 
 
 def test_one_more_sensor_is_as_good_as_readings_say_where_sensors_do_not(base: Base) -> None:

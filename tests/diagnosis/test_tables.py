@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import curve_near
@@ -14,6 +17,22 @@ from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Shape
 from tests.diagnosis.diagnosis_cases import base_of, first_events, trial
+
+
+def test_tables_go_as_far_as_the_posterior_does() -> None:
+    """A sensor that reads twice as much: the logarithm of that is 4.6 scales of its prior."""
+    campaign = first_events(trial(1003, "dense", "nothing", "constant").campaign, 10)
+    values = campaign.values.copy()
+    values[:, 10] *= 2.0
+    base = base_of(replace(campaign, values=values), "constant")
+    shape = Shape(sensor=campaign.sensors[10].id)
+    near = curve(base, placed(mechanisms()["sensor_bias"], base.setting, shape))
+    near = curve_near(base, near, shape)
+    mean, sd = near.moments
+    located = locate(base, extended(base.problem, base.law, (near.direction,)), [near])
+    assert mean + 3.0 * sd > 4.5 * near.scale
+    assert located.mean[0] == pytest.approx(mean, abs=0.3 * sd)
+    assert located.grid.points.max() > mean + 3.0 * sd
 
 
 def test_medians_that_are_hardly_known_leave_a_covariance() -> None:

@@ -33,6 +33,14 @@ def prior_note(law: Law) -> str:
     )
 
 
+def no_room(shortest_m: float) -> str:
+    """That nothing was looked for on a stretch, of which the shortest is so long."""
+    return (
+        "Nothing was looked for on a stretch of the track, no obstacle either: the recorded part is shorter"
+        f" than the shortest stretch looked at ({shortest_m:.0f} m)."
+    )
+
+
 def counted(n: int, one: str) -> str:
     """A number and what it counts, in the singular where it is one."""
     return f"{n} {one if n == 1 else one + 's'}"

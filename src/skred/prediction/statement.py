@@ -8,6 +8,7 @@ from typing import Any
 
 from skred.chances import percent
 from skred.inference.between_events import BetweenEvents
+from skred.inference.influence_words import NOT_LISTED
 from skred.prediction.without_added import comparison_sentences
 from skred.prediction.words import chance, ranged
 
@@ -58,6 +59,8 @@ def source_sentences(document: dict[str, Any]) -> list[str]:
         where, begins = _stretch(rows), rows[0].get("begins_m")
         if begins is not None:
             told.append(f"Used: {title}, {_from_where(begins, document['track']['is_own'])}.")
+        elif where and rows[0]["mechanism"] == NOT_LISTED:
+            told.append(f"Used: {title}{where}. (The verdict gives only where it stands out most.)")
         elif where:
             told.append(
                 f"Used: {title}{where}, at the most probable place; how uncertain the place is does not widen"

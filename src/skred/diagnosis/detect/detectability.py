@@ -25,7 +25,7 @@ from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.intervals import INTERVAL_PROBABILITY
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import added_of
-from skred.physics.mechanisms.spec import Group, Mechanism
+from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism
 from skred.physics.mechanisms.stretches import shares
 
 LIMIT_Z = 2.85
@@ -114,6 +114,11 @@ class Identifiability:
         return round(100.0 * self.power_with) > round(100.0 * self.power)
 
     @property
+    def lacks_room(self) -> bool:
+        """Whether nothing is looked for on a stretch: what is recorded is shorter than the shortest one."""
+        return not any(added_of(row.mechanism).bound_to is BoundTo.PLACE for row in self.rows)
+
+    @property
     def can_tell(self) -> bool:
         """Whether a relevant strength of what is listed would be found in at least half of the cases."""
         return self.power >= 0.5
@@ -182,11 +187,14 @@ def told(score_test: ScoreTest, scores: Scores) -> list[Detectability]:
 
 
 def places_of_a_sensor(problem: HierarchicalProblem, recorded_m: tuple[float, float]) -> FloatArray:
-    """Places to try for one more velocity sensor: evenly over the recorded part and a little above."""
+    """Places to try for one more velocity sensor: evenly over the recorded part and a little above.
+
+    No higher than halfway from the releases: fronts that have hardly begun to move tell nothing.
+    """
     first, last = recorded_m
     release = float(problem.releases.mean.max())
-    low = max(release + 20.0, first - 0.5 * (last - first))
-    return np.linspace(low, min(last, problem.terrain.length_m - 1.0), _PLACES)
+    low = max(first - 0.5 * max(first - release, 0.0), first - 0.5 * (last - first))
+    return np.linspace(low, min(last, float(problem.terrain.middle_s_m[-1])), _PLACES)
 
 
 def extra_sensors(base: Base) -> tuple[FloatArray, list[Scores]]:

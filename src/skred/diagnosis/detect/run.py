@@ -14,10 +14,11 @@ from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
-from skred.diagnosis.words import percent, prior_note
+from skred.diagnosis.words import no_room, percent, prior_note
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.output import write_json
 from skred.physics.law import Law
+from skred.physics.mechanisms.stretches import STRETCHES_M
 
 FILE = "identify.json"
 
@@ -77,6 +78,8 @@ def identify_document(
         "next_sensor": _next_sensor(table) if table is not None and table.more_with_sensor else None,
     }
     document["statement"] = [*filter(None, [prior_note(law)]), *_statement(document)]
+    if table is not None and table.lacks_room:
+        document["statement"].append(no_room(min(STRETCHES_M)))
     return document
 
 

@@ -18,8 +18,6 @@ from skred.parallel.threads import in_parts, side_by_side
 
 TABLES = {1: 13, 2: 8}
 """Strengths along each axis of the tables, between which cubic polynomials go, by the number of axes."""
-_MOST_SCALES = 4.5
-"""Scales of its prior that a strength reaches at most: beyond are seven in a million."""
 _REACH = 5.0
 """Standard deviations that a grid reaches from the mean at first."""
 _ENDS_NATS = 8.0
@@ -109,23 +107,22 @@ class Located(NamedTuple):
 def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located:
     """Put a grid where curves have the strengths, and move its ends until it covers their posterior."""
     scale = np.array([curve.scale for curve in curves])
-    high, slack = _MOST_SCALES * scale, 1e-9 * scale
-    low = np.where([curve.added.either_sign for curve in curves], -high, 0.0)
+    low, slack = np.where([curve.added.either_sign for curve in curves], -np.inf, 0.0), 1e-9 * scale
     mean, sd = (np.array(values) for values in zip(*(curve.moments for curve in curves), strict=True))
     factor, ends = np.diag(np.clip(sd, 0.01 * scale, scale)), np.full(len(curves), _REACH)
-    grid = _grid(mean, factor, (-ends, ends), (low, high))
+    grid = _grid(mean, factor, (-ends, ends), low)
     near = [curves[-1].nearest(strength) for strength in grid.points[:, -1]]
     for look in range(MOST_ROUNDS):
         points = grid.points
         fits = _fitted(base, extension, points, near)
         density = np.array([fit.found.log_evidence for fit in fits])
         density -= 0.5 * np.sum((points / scale) ** 2, axis=1)
-        allowed = np.all((points >= low - slack) & (points <= high + slack), axis=1)
+        allowed = np.all(points >= low - slack, axis=1)
         density = np.where(allowed & np.isfinite(density), density, -np.inf)
         counts = density > density.max() - _ENDS_NATS
         mean, factor = _moments(grid, density)
         at = np.stack(np.unravel_index(np.flatnonzero(counts), grid.size), axis=1)
-        inside = (points[counts] > low + slack) & (points[counts] < high - slack)
+        inside = points[counts] > low + slack
         below, above = (((at == edge) & inside).any(axis=0) for edge in (0, grid.size - 1))
         # The first grid is of what each curve says alone.
         if look > 0 and not (below | above).any():
@@ -136,7 +133,7 @@ def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located
         # Where the posterior goes on beyond an end, half as far again; else one step beyond what counts.
         farther = np.maximum(0.5 * (last - first), step)
         reach = first - np.where(below, farther, step), last + np.where(above, farther, step)
-        before, grid = grid, _grid(mean, factor, reach, (low, high))
+        before, grid = grid, _grid(mean, factor, reach, low)
         near = [fits[k] for k in before.nearest(grid.points)]
     else:
         fits = _fitted(base, extension, grid.points, near)
@@ -178,20 +175,16 @@ def _fitted(base: Base, extension: Extension, added: FloatArray, near: Sequence[
 
 
 def _grid(
-    mean: FloatArray,
-    factor: FloatArray,
-    reach: tuple[FloatArray, FloatArray],
-    support: tuple[FloatArray, FloatArray],
+    mean: FloatArray, factor: FloatArray, reach: tuple[FloatArray, FloatArray], least: FloatArray
 ) -> Grid:
-    """A grid that reaches so many of the factor's columns from the mean along each, inside the support.
+    """A grid that reaches so many of the factor's columns from the mean along each, from the least on.
 
-    A second strength that goes with the first can leave the support; its prior does not.
+    A second strength that goes with the first can be less than that; its prior is not.
     """
     size, (low, high) = TABLES[len(mean)], (side.copy() for side in reach)
     for axis in range(len(mean)):
         if not factor[axis, :axis].any():
-            low[axis] = max(low[axis], (support[0][axis] - mean[axis]) / factor[axis, axis])
-            high[axis] = min(high[axis], (support[1][axis] - mean[axis]) / factor[axis, axis])
+            low[axis] = max(low[axis], (least[axis] - mean[axis]) / factor[axis, axis])
     steps = factor * ((high - low) / (size - 1))
     return Grid(mean + factor @ low, steps, np.full(len(mean), size, dtype=np.int64))
 

@@ -19,10 +19,10 @@ from skred.diagnosis.verdict.between import between_sentence
 from skred.diagnosis.verdict.hangs_on import carried, hangs_on
 from skred.diagnosis.verdict.improvement import improvement
 from skred.diagnosis.verdict.stated_places import moved_as_stated, place_as_stated, strength_with_places
-from skred.diagnosis.words import TOLD_FROM, percent, plus_minus
+from skred.diagnosis.words import TOLD_FROM, no_room, percent, plus_minus
 from skred.inference.influence_words import enumerated, title_of
 from skred.physics.mechanisms import mechanisms
-from skred.physics.mechanisms.stretches import U_1, U_2
+from skred.physics.mechanisms.stretches import STRETCHES_M, U_1, U_2
 
 _ASSOCIATED = "Associated with, not necessarily caused by."
 
@@ -39,6 +39,7 @@ def statement(found: Outcome, document: dict[str, Any]) -> str:
         "cannot_tell": _cannot,
     }[found.decision.verdict](found, document)
     parts = [_caution(found), *parts, moved_as_stated(found), *hangs_on(found.influence, _errors(found))]
+    parts.append(no_room(min(STRETCHES_M)) if found.table.lacks_room else "")
     return " ".join(part for part in parts if part)
 
 
@@ -360,12 +361,13 @@ def _cannot(found: Diagnosis, document: dict[str, Any]) -> list[str]:
         f" {percent(document['probability'][NOTHING])}), but"
     )
     power = f"{percent(found.table.power)} of cases on average"
+    only = "" if power.startswith("less") else "only "
     silence = (
         f"{alarm} no silence either: these recordings cannot tell whether anything is missing. A relevant"
         f" strength of a listed mechanism would have been found in {power}."
         if found.table.can_tell
         else f"{alarm} these recordings cannot tell: a relevant strength of a listed mechanism would have"
-        f" been found in only {power}, so silence means little."
+        f" been found in {only}{power}, so silence means little."
     )
     sentences = [silence, _hint(found, document)]
     sensor = document["next_sensor"]
