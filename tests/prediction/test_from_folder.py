@@ -146,6 +146,9 @@ def test_what_begins_at_the_first_recording_acts_from_the_top_of_another_track(
         made = {"from": None, "added": [row], "track": {"is_own": track.is_own}}
         (told,) = source_sentences(made)
         assert ("from s = 800 m on" if track.is_own else "along the whole track") in told
+        force = row | {"mechanism": "unlisted", "place_m": [350.0, 1626.0], "begins_m": None}
+        (told,) = source_sentences(made | {"added": [force]})
+        assert "(s = 350 to 1626 m)" in told and "median of each end" not in told
 
 
 @pytest.mark.slow
