@@ -206,3 +206,16 @@ def test_how_it_was_made_is_on_the_page(problem: HierarchicalProblem, tmp_path: 
         assert said in page, said
     assert "What was recorded is black" not in page
     assert "density of 200 kg/m3, taken as exact" in " ".join(document["statement"])
+
+
+def test_that_a_misreading_sensor_comes_closest_to_a_force_in_no_list_is_told() -> None:
+    """With such a force a front hardly passes the sensor that in truth reads too little."""
+    groups = {"sensor_bias": "instrument", "segment_friction": "physics"}
+    verdict = {
+        "verdict": "unexplained",
+        "probability": {"nothing": 0.0, "unlisted": 0.9, "sensor_bias": 0.07, "segment_friction": 0.03},
+        "candidates": [{"id": name, "group": group} for name, group in groups.items()],
+    }
+    assert "reads too high or too low comes closest" in diagnosis_cautions(verdict)[-1]
+    other = {**verdict["probability"], "sensor_bias": 0.01}
+    assert not any("comes closest" in one for one in diagnosis_cautions(verdict | {"probability": other}))

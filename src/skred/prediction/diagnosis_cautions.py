@@ -7,10 +7,11 @@ from typing import Any
 
 from skred.chances import percent
 from skred.inference.influence_words import NOT_LISTED, carried, displaced, title_of, too_little
+from skred.physics.mechanisms.spec import Group
 
 
 def diagnosis_cautions(verdict: Mapping[str, Any]) -> list[str]:
-    """Sentences: which avalanches carry the answer, how probable its name is, and what it is tied with.
+    """Sentences: which avalanches carry the answer, how probable its name is, and what it could be instead.
 
     Parameters
     ----------
@@ -22,7 +23,7 @@ def diagnosis_cautions(verdict: Mapping[str, Any]) -> list[str]:
     KeyError, TypeError, ValueError, AttributeError
         If it is not as a diagnosis writes it.
     """
-    return [*_carried(verdict), *_probability(verdict), *_ties(verdict)]
+    return [*_carried(verdict), *_probability(verdict), *_ties(verdict), *_fault(verdict)]
 
 
 def _carried(verdict: Mapping[str, Any]) -> list[str]:
@@ -64,3 +65,18 @@ def _ties(verdict: Mapping[str, Any]) -> list[str]:
     tied, probability = verdict.get("indistinguishable") or [], verdict.get("probability") or {}
     told = [f"{title_of(name)} ({percent(float(probability[name]))})" for name in tied]
     return [f"Its recordings cannot tell that from: {', '.join(told)}."] if told else []
+
+
+def _fault(verdict: Mapping[str, Any]) -> list[str]:
+    """That a fault of the recordings comes closest to a force in no list, where it does: then none acts."""
+    if verdict.get("verdict") != "unexplained":
+        return []
+    group = {one["id"]: one["group"] for one in verdict.get("candidates") or []}
+    probability = verdict.get("probability") or {}
+    closest = max(group, key=lambda name: float(probability.get(name, 0.0)), default="")
+    if group.get(closest) != Group.INSTRUMENT:
+        return []
+    return [
+        f"Of the listed causes {title_of(closest)} comes closest. If that is it, no force acts, and what is"
+        " predicted with one is wrong."
+    ]
