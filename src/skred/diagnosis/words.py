@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from skred.inference.influence_words import enumerated
 from skred.inference.intervals import ENDS
 from skred.physics.law import Law
+from skred.physics.mechanisms.stretches import STRETCHES_M
 from skred.units import unit_text
 
 
@@ -33,11 +34,11 @@ def prior_note(law: Law) -> str:
     )
 
 
-def no_room(shortest_m: float) -> str:
-    """That nothing was looked for on a stretch, of which the shortest is so long."""
+def no_room() -> str:
+    """That nothing was looked for on a stretch."""
     return (
         "Nothing was looked for on a stretch of the track, no obstacle either: the recorded part is shorter"
-        f" than the shortest stretch looked at ({shortest_m:.0f} m)."
+        f" than the shortest stretch looked at ({min(STRETCHES_M):.0f} m)."
     )
 
 

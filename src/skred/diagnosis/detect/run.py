@@ -18,7 +18,6 @@ from skred.diagnosis.words import no_room, percent, prior_note
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.output import write_json
 from skred.physics.law import Law
-from skred.physics.mechanisms.stretches import STRETCHES_M
 
 FILE = "identify.json"
 
@@ -79,7 +78,7 @@ def identify_document(
     }
     document["statement"] = [*filter(None, [prior_note(law)]), *_statement(document)]
     if table is not None and table.lacks_room:
-        document["statement"].append(no_room(min(STRETCHES_M)))
+        document["statement"].append(no_room())
     return document
 
 

@@ -22,7 +22,7 @@ from skred.diagnosis.verdict.stated_places import moved_as_stated, place_as_stat
 from skred.diagnosis.words import TOLD_FROM, no_room, percent, plus_minus
 from skred.inference.influence_words import enumerated, title_of
 from skred.physics.mechanisms import mechanisms
-from skred.physics.mechanisms.stretches import STRETCHES_M, U_1, U_2
+from skred.physics.mechanisms.stretches import U_1, U_2
 
 _ASSOCIATED = "Associated with, not necessarily caused by."
 
@@ -39,7 +39,7 @@ def statement(found: Outcome, document: dict[str, Any]) -> str:
         "cannot_tell": _cannot,
     }[found.decision.verdict](found, document)
     parts = [_caution(found), *parts, moved_as_stated(found), *hangs_on(found.influence, _errors(found))]
-    parts.append(no_room(min(STRETCHES_M)) if found.table.lacks_room else "")
+    parts.append(no_room() if found.table.lacks_room else "")
     return " ".join(part for part in parts if part)
 
 
