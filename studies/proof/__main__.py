@@ -87,8 +87,8 @@ out; these have a table of their own.
 _EARLIER = f"""The same campaigns by the code of commit 7d03b1a as well. That *earlier* version had no global
 starts, took avalanches to have every added strength in common, named a term that two mechanisms share by one
 of them, and compared no mechanism with a force beside it. *Later* is the version that the batch was sealed
-for. It diagnosed the first batch side by side with the other on one machine; the times of the second one are
-of different days, beside other work. *p* is that of a sign test of trials that one version has right and the
+for. It diagnosed the first batch side by side with the other on one machine; times of the others are of
+different days, beside other work. *p* is that of a sign test of trials that one version has right and the
 other has not. Rows on effects take those with a signal-to-noise of {STRONG:g} and more, and open ones but for
 the row on compensated effects.
 """
@@ -134,8 +134,8 @@ def page(figures: Sequence[str], run: Found) -> str:
     parts += [f"![{name.replace('_', ' ')}](figures/proof-{name}.png)\n" for name in figures]
     parts += ["Open and compensated effects of the blind run:\n", _open_and_compensated(run)]
     parts += ["What was hidden in the blind run:\n", _by_hidden(run["trials"])]
-    parts += ["## Two batches by an earlier version\n", _EARLIER]
-    for batch in [one for one in every if EARLIER in answers_of(one)][-2:]:
+    parts += ["## Batches by an earlier version\n", _EARLIER]
+    for batch in [one for one in every if EARLIER in answers_of(one)]:
         trials, answers = gathered([batch])
         parts += [f"Batch {batch.name}, {len(trials)} trials:\n", beside(trials, answers)]
     parts += ["## Every batch\n", _ORDER.format(strong=STRONG), _by_batch(every, lines)]
