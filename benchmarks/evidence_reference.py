@@ -9,8 +9,9 @@ and are not copied.
 
 The reference is `benchmarks.reference`. Each avalanche is a sum over a lattice at each coefficient, laid
 where a search of a wide box finds its likelihood. The population is integrated by tempered population Monte
-Carlo, the coefficient on a grid to five prior scales that refines itself. At the best coefficient all is
-computed a second time on finer lattices, and for every fifth pair by nested sampling (dynesty) too.
+Carlo, the coefficient on a grid to thirteen scales of its mechanism that refines itself. At the best
+coefficient all is computed a second time on finer lattices, and for every fifth pair by nested sampling
+(dynesty) too.
 """
 
 from __future__ import annotations

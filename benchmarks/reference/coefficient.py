@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
+from scipy.stats import norm
 
 from benchmarks.reference.lattice import Cloud, Resolved, narrow_precision, population_envelope, resolve
 from benchmarks.reference.population_integral import PopulationIntegral, integrate_population, nested_evidence
@@ -19,8 +20,10 @@ from skred.physics.law import Law
 from skred.physics.mechanisms.spec import Direction
 
 FloatArray = NDArray[np.float64]
-GRID = (0.004, 0.012, 0.035, 0.09, 0.2, 0.4, 0.75, 1.25, 2.0, 3.2, 5.0)
-"""Coefficients at first, in scales of the prior."""
+GRID = (0.004, 0.012, 0.035, 0.09, 0.2, 0.4, 0.75, 1.25, 2.0, 3.2, 5.0, 8.0, 13.0)
+"""Coefficients at first, in scales of the mechanism."""
+_SCALES = np.array([1.0, 3.0, 9.0]) / 3.0
+"""Those of the prior, in scales of the mechanism: one of these, each as probable."""
 _COUNTS, _HOPELESS = 7.0, 25.0
 """Nats below the best at which the grid is not refined, and at which nothing is computed finely."""
 _APART = 1.3
@@ -137,7 +140,7 @@ def curve(added: Reference, nothing: At, scale: float, either_sign: bool) -> Cur
     nothing : At
         Without anything added.
     scale : float
-        Of the coefficient's prior.
+        Of the mechanism, in the coefficient's unit.
     either_sign : bool
     """
     grid = scale * np.array(GRID)
@@ -165,8 +168,9 @@ def curve(added: Reference, nothing: At, scale: float, either_sign: bool) -> Cur
 
 
 def _log_prior(coefficient: float, scale: float, either_sign: bool) -> float:
-    density = -0.5 * (coefficient / scale) ** 2 - 0.5 * math.log(2.0 * math.pi) - math.log(scale)
-    return density if either_sign else density + math.log(2.0)
+    density = float(norm.pdf(coefficient, scale=_SCALES * scale).mean())
+    # Far out numbers end before logarithms do.
+    return math.log(max(density if either_sign else 2.0 * density, 1e-300))
 
 
 def _wanted(height: dict[float, float]) -> list[float]:

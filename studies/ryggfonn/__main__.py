@@ -18,6 +18,7 @@ import cyclopts
 
 from benchmarks.commit import commit
 from skred.output import write_text
+from skred.physics.mechanisms.strength_prior import SCALES
 from studies.files import FIGURES, RESULTS, ROOT, read, shrink, write
 from studies.ryggfonn import page as ryggfonn_page
 from studies.ryggfonn.groups import groups_figure, retardations
@@ -152,8 +153,7 @@ def clean_log_odds(found: Any) -> list[float]:
 def _best_factor(comparison: Any, name: str, factor: float) -> float:
     """Log Bayes factor of a mechanism's best shape if its prior were wider or narrower."""
     candidate = comparison.leading(name).candidates[name]
-    scale = candidate.mechanism.added.scale_of(candidate.best.shape)
-    return float(candidate.best.log_factor_of(scale=factor * scale))
+    return float(candidate.best.log_factor_of(scales=[factor * one for one in SCALES]))
 
 
 app = cyclopts.App(help=__doc__)

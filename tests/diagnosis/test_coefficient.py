@@ -19,8 +19,18 @@ def quadratic(name: str, strengths: np.ndarray, top: float, sd: float) -> Curve:
     return Curve(mechanisms()[name], Shape(), Direction(), strengths, log_evidence, ())
 
 
-def closed_form(top: float, sd: float, scale: float, either_sign: bool) -> tuple[float, float, float]:
-    """Log Bayes factor, posterior mean and standard deviation."""
+def closed_form(top: float, sd: float, either_sign: bool) -> tuple[float, float, float]:
+    """Log Bayes factor, posterior mean and standard deviation; everything in scales of the mechanism."""
+    each = [of_one_scale(top, sd, scale, either_sign) for scale in (1.0 / 3.0, 1.0, 3.0)]
+    factors, means, widths = (np.array(part) for part in zip(*each, strict=True))
+    shares = np.exp(factors - factors.max()) / np.exp(factors - factors.max()).sum()
+    mean = float(shares @ means)
+    width = math.sqrt(float(shares @ (widths**2 + (means - mean) ** 2)))
+    return float(np.logaddexp.reduce(factors)) - math.log(3.0), mean, width
+
+
+def of_one_scale(top: float, sd: float, scale: float, either_sign: bool) -> tuple[float, float, float]:
+    """The same with a prior of one scale."""
     precision = sd**-2.0 + scale**-2.0
     mean, width = top / sd**2 / precision, precision**-0.5
     factor = 0.5 * mean**2 * precision + math.log(width / scale)
@@ -36,9 +46,9 @@ def closed_form(top: float, sd: float, scale: float, either_sign: bool) -> tuple
 def test_half_normal(top: float, sd: float) -> None:
     """The comparison's grid: strengths in scales of the prior."""
     scale = mechanisms()["segment_drag"].added.scale  # type: ignore[union-attr]
-    grid = scale * np.array([0.0, 0.2, 0.6, 1.2, 2.2, 3.5])
+    grid = scale * np.array([0.0, 0.2, 0.6, 1.2, 2.2, 3.5, 6.0, 10.0])
     one = quadratic("segment_drag", grid, top * scale, sd * scale)
-    factor, mean, width = closed_form(top, sd, 1.0, False)
+    factor, mean, width = closed_form(top, sd, False)
     assert one.log_bayes_factor == pytest.approx(factor, abs=0.1, rel=0.015)
     found = one.moments
     assert found[0] / scale == pytest.approx(mean, abs=0.06) and found[1] / scale == pytest.approx(
@@ -50,11 +60,11 @@ def test_half_normal(top: float, sd: float) -> None:
 @pytest.mark.parametrize("sd", [0.3, 0.8])
 def test_normal(top: float, sd: float) -> None:
     scale = mechanisms()["sensor_bias"].added.scale  # type: ignore[union-attr]
-    grid = np.array([0.2, 0.6, 1.2, 2.2, 3.5])
+    grid = np.array([0.2, 0.6, 1.2, 2.2, 3.5, 6.0, 10.0])
     one = quadratic(
         "sensor_bias", scale * np.concatenate([-grid[::-1], [0.0], grid]), top * scale, sd * scale
     )
-    factor, mean, width = closed_form(top, sd, 1.0, True)
+    factor, mean, width = closed_form(top, sd, True)
     assert one.log_bayes_factor == pytest.approx(factor, abs=0.1, rel=0.015)
     found = one.moments
     assert found[0] / scale == pytest.approx(mean, abs=0.06) and found[1] / scale == pytest.approx(
@@ -70,7 +80,7 @@ def test_odd_spacing_around_what_was_found(either: bool) -> None:
     top, sd = 1.3, 0.15
     near = scale * (top + sd * np.array([-3.5, -2.0, -1.0, 0.0, 1.0, 2.0, 3.5]))
     one = quadratic(name, np.append(0.0, near), top * scale, sd * scale)
-    factor, mean, width = closed_form(top, sd, 1.0, either)
+    factor, mean, width = closed_form(top, sd, either)
     assert one.log_bayes_factor == pytest.approx(factor, abs=0.05)
     found = one.moments
     assert found[0] / scale == pytest.approx(mean, abs=0.02) and found[1] / scale == pytest.approx(
@@ -80,16 +90,29 @@ def test_odd_spacing_around_what_was_found(either: bool) -> None:
 
 def test_nothing_to_see_is_nearly_even() -> None:
     """A flat curve says nothing: a Bayes factor of 1 but for the prior's tail beyond the grid."""
-    grid = 0.15 * np.array([-3.5, -2.2, -1.2, -0.6, -0.2, 0.0, 0.2, 0.6, 1.2, 2.2, 3.5])
-    one = quadratic("sensor_bias", grid, 0.0, 1e9)
+    side = np.array([0.2, 0.6, 1.2, 2.2, 3.5, 6.0, 12.0])
+    one = quadratic("sensor_bias", 0.15 * np.concatenate([-side[::-1], [0.0], side]), 0.0, 1e9)
     assert one.log_bayes_factor == pytest.approx(0.0, abs=2e-3)
     assert one.moments[0] == pytest.approx(0.0, abs=1e-6)
-    assert one.moments[1] == pytest.approx(0.15, rel=0.02)
+    of_prior = math.sqrt((1.0 / 9.0 + 1.0 + 9.0) / 3.0)
+    assert one.moments[1] == pytest.approx(0.15 * of_prior, rel=0.02)
 
 
 def test_other_scales_of_the_prior() -> None:
     grid = 0.15 * np.array([-3.5, -2.2, -1.2, -0.6, -0.2, 0.0, 0.2, 0.6, 1.2, 2.2, 3.5])
     one = quadratic("sensor_bias", grid, 0.06, 0.08)
     for scale in (0.05, 0.1, 0.15):
-        expected = closed_form(0.06, 0.08, scale, True)[0]
-        assert one.log_factor_of(scale=scale) == pytest.approx(expected, abs=0.1)
+        expected = of_one_scale(0.06, 0.08, scale, True)[0]
+        assert one.log_factor_of(scales=(scale / 0.15,)) == pytest.approx(expected, abs=0.1)
+
+
+def test_a_strong_effect_costs_little_and_an_ordinary_one_hardly_more() -> None:
+    """Six scales of a mechanism: 15 nats less under one scale alone; around one scale less than 0.7 more."""
+    for top, gains in ((0.5, -0.7), (1.0, -0.7), (2.0, -0.7), (3.0, 1.0), (6.0, 13.0)):
+        scale = mechanisms()["segment_drag"].added.scale  # type: ignore[union-attr]
+        near = scale * (top + 0.1 * np.array([-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0]))
+        one = quadratic("segment_drag", np.append(0.0, near), top * scale, 0.1 * scale)
+        gained = one.log_bayes_factor - one.log_factor_of(scales=(1.0,))
+        assert gained > gains and (top > 2.0 or gained < 0.2)
+        assert one.likely == {0.5: 1.0 / 3.0, 1.0: 1.0}.get(top, 3.0)
+        assert one.log_factor_at_likely == pytest.approx(one.log_factor_of(scales=(one.likely,)))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from diagnosis_cases import base_of, ryggfonn_base, sparse_base, trial
 from numpy.testing import assert_allclose
-from scipy.stats import qmc
+from scipy.stats import halfnorm, qmc
 
 import skred.diagnosis.evidence.refit as refits
 from skred.diagnosis.compare.candidate import FORM, Candidate
@@ -29,6 +29,7 @@ from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING, STANDARD
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Direction, Shape
+from skred.physics.mechanisms.strength_prior import SCALES
 
 
 @pytest.fixture(scope="module")
@@ -384,7 +385,7 @@ def test_screening_sees_strengths_far_below_the_grid() -> None:
 
 
 def test_moments_of_a_curve_on_uneven_strengths(base: Base) -> None:
-    """A normal likelihood, narrow beside the grid, under a half-normal prior."""
+    """A normal likelihood, narrow beside the grid, under half-normal priors."""
     drag = mechanisms()["turbulent_drag"]
     assert drag.added is not None
     scale, mean, sd = drag.added.scale, 0.1 * drag.added.scale, 0.01 * drag.added.scale
@@ -395,5 +396,6 @@ def test_moments_of_a_curve_on_uneven_strengths(base: Base) -> None:
     direction = drag.added.direction(base.setting, Shape())
     one = Curve(drag, Shape(), direction, strengths, heights, (base.fit,) * len(strengths))
     assert one.moments[0] == pytest.approx(mean, rel=0.01) and one.moments[1] == pytest.approx(sd, rel=0.05)
-    exact = 50.0 + np.log(2.0 * sd / scale) - 0.5 * 0.1**2
+    density = np.mean([halfnorm.pdf(0.1, scale=part) for part in SCALES])
+    exact = 50.0 + np.log(np.sqrt(2.0 * np.pi) * sd / scale * density)
     assert one.log_bayes_factor == pytest.approx(exact, abs=0.1)

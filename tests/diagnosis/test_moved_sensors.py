@@ -168,7 +168,9 @@ def test_a_shift_that_stated_places_allow_for_is_no_finding(base: Base) -> None:
     with ThreadPoolExecutor(1) as pool:
         for sd in (10.0, 20.0, 40.0):
             changed, _, nothing = with_stated_places(stated(base, sd), candidates, [], [], pool)
-            of_error, of_both = (found.log_factor_of(scale=one) for one in (sd, np.hypot(sd, found.scale)))
+            of_error, of_both = (
+                found.log_factor_of(scales=(one / found.scale,)) for one in (sd, np.hypot(sd, found.scale))
+            )
             assert nothing.log_factor == pytest.approx(of_error, abs=1.0)
             assert changed[PLACE.id].log_bayes_factor == pytest.approx(of_both - of_error, abs=1.0)
         assert changed[PLACE.id].log_bayes_factor < 1.0

@@ -11,6 +11,7 @@ from skred.errors import InputError
 from skred.physics.mechanisms import library, mechanisms
 from skred.physics.mechanisms.placed import added_of, can_join, direction_of, parts_of, shapes_of
 from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism, Setting, Shape
+from skred.physics.mechanisms.strength_prior import KIND
 from skred.physics.mechanisms.stretches import OPPOSED_SCALES, ends_of, is_opposed
 from skred.physics.plugins import OWN_PACKAGE
 from skred.physics.terrain import Terrain
@@ -61,7 +62,7 @@ def mechanism_document(mechanism: Mechanism, laws: Sequence[Law]) -> dict[str, A
             "either_sign": added.either_sign,
         },
         "prior": {
-            "kind": "normal" if added.either_sign else "half-normal",
+            "kind": KIND[added.either_sign],
             "scale": added.scale,
             "relevant": added.relevant,
             "reason": added.reason,
@@ -183,7 +184,8 @@ def mechanisms_table(documents: Sequence[dict[str, Any]], n_laws: int) -> Table:
         words = (one["id"], one["title"], one["group"], symbol, scale, _missing_from(one, n_laws))
         table.add_row(*map(plain_text, words))
     table.caption = plain_text(
-        "Prior scale: of the coefficient as an added mechanism; half-normal, or with ± normal, either sign."
+        "Prior scale: of the coefficient as an added mechanism; half-normal, or with ± normal, either sign,"
+        " of a third, one or three times that."
         " Missing from: base laws that may leave it out. One in full: skred mechanisms ID."
     )
     table.caption_justify = "left"
@@ -201,7 +203,7 @@ def mechanism_rows(document: dict[str, Any], n_laws: int) -> dict[str, str]:
         "coefficient": f"{strength['parameter']}, symbol {strength['symbol']}{paper}",
         "unit": unit_text(strength["unit"]),
         "sign": "either" if strength["either_sign"] else "positive only",
-        "prior": f"{prior['kind']}, scale {prior['scale']:g}{unit}: {prior['reason']}",
+        "prior": f"{prior['kind']}; scale {prior['scale']:g}{unit}: {prior['reason']}",
         "relevant": f"{prior['relevant']:.2g}{unit} or more: the median size under that prior",
         "in a base law": "cannot be part of one"
         if in_base is None

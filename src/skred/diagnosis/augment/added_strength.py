@@ -35,10 +35,18 @@ class AddedStrength(PlacedMechanism):
         Of the parameter: the strength's own, numbered if two of a kind are added.
     between : BetweenEvents
         How it differs between avalanches.
+    likely : float
+        Which of the prior's scales is taken, in the mechanism's own: the most probable one.
     """
 
     name: str
     between: BetweenEvents = BetweenEvents.COMMON
+    likely: float = 1.0
+
+    @property
+    def scale(self) -> float:
+        """Scale of the strength's prior."""
+        return self.likely * super().scale
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -65,7 +73,7 @@ def added_strengths(curves: Sequence[Curve], way: BetweenEvents) -> tuple[AddedS
         name = curve.mechanism.strength.name
         count[name] += 1
         own = name if count[name] == 1 else f"{name}_{count[name]}"
-        added.append(AddedStrength(curve.mechanism, curve.shape, curve.direction, own, way))
+        added.append(AddedStrength(curve.mechanism, curve.shape, curve.direction, own, way, curve.likely))
     return tuple(added)
 
 

@@ -184,7 +184,7 @@ def _with_coefficient(base: Base, curve: Curve, nothing: Shifts) -> tuple[Expans
     places, one_sided = nothing.places, not curve.added.either_sign
     strength, fit = _top(curve)
     law = base.with_in(curve.direction, strength, fit)
-    cover = np.diag(np.append(curve.scale, places.sd) ** 2)
+    cover = np.diag(np.append(curve.likely * curve.scale, places.sd) ** 2)
     values, moved = [(np.append(strength, np.zeros_like(nothing.mean)), fit)], curve
     if places.errors:  # where sensors stand as beside nothing, the coefficient may be another
         moved = curve_of(nothing.into(base), curve)
@@ -202,7 +202,8 @@ def _with_coefficient(base: Base, curve: Curve, nothing: Shifts) -> tuple[Expans
     there = laplace(arrived(found, np.linalg.inv(cover)), 0.0, cover)
     moments = Strength(float(there.values[0]), math.sqrt(float(there.covariance[0, 0])))
     if one_sided and moments.mean <= 0.0:  # the curve says what the expansion at nil cannot
-        return found, base.fit.found.log_evidence + nothing.log_factor + moved.log_bayes_factor, None
+        at_nil = moved.log_factor_of(scales=(curve.likely,))
+        return found, base.fit.found.log_evidence + nothing.log_factor + at_nil, None
     log_evidence = _log_factor(there)
     if one_sided:
         log_evidence += log_above_nil(float(there.values[0]), float(there.covariance[0, 0]))
@@ -211,7 +212,7 @@ def _with_coefficient(base: Base, curve: Curve, nothing: Shifts) -> tuple[Expans
 
 def _top(curve: Curve) -> tuple[float, Fit]:
     """The most probable of a curve's strengths, and the fit there."""
-    top = int(np.argmax(curve.log_evidence + curve.log_prior(curve.strengths, curve.scale)))
+    top = int(np.argmax(curve.log_evidence + curve.log_prior(curve.strengths)))
     return float(curve.strengths[top]), curve.fits[top]
 
 

@@ -29,6 +29,7 @@ from skred.diagnosis.evidence.stated_places import StatedPlaces, stated_places
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import PlacedMechanism, can_join, placed, shapes_of
 from skred.physics.mechanisms.spec import Direction, Setting
+from skred.physics.mechanisms.strength_prior import SCALES
 from skred.physics.mechanisms.stretches import shares
 
 
@@ -165,11 +166,12 @@ class ScoreTest:
         score, information, _ = self.of_candidates(scores)
         result = np.empty_like(score)
         for k, candidate in enumerate(self.placed_mechanisms):
-            scale = candidate.scale
-            precision = information[:, k] + scale**-2.0
-            result[:, k] = 0.5 * score[:, k] ** 2 / precision - 0.5 * np.log(scale**2 * precision)
+            scales = candidate.scale * np.array(SCALES)[:, None]
+            precision = information[:, k] + scales**-2.0
+            of_each = 0.5 * score[:, k] ** 2 / precision - 0.5 * np.log(scales**2 * precision)
             if not candidate.added.either_sign:
-                result[:, k] += math.log(2.0) + log_ndtr(score[:, k] / np.sqrt(precision))
+                of_each += math.log(2.0) + log_ndtr(score[:, k] / np.sqrt(precision))
+            result[:, k] = np.logaddexp.reduce(of_each, axis=0) - math.log(len(scales))
         return result
 
     def log_factors_of_kinds(self, scores: Scores) -> FloatArray:

@@ -77,7 +77,10 @@ def fit_profile(
         Log Bayes factor below which none counts: that of no force, or more where something else leads.
         Climbs end where even the approximations of priors not climbed under have less.
     """
-    at, scales = knots(base.setting), np.append([] if beside is None else [beside.scale], shifts.sd)
+    at, scales = (
+        knots(base.setting),
+        np.append([] if beside is None else [beside.likely * beside.scale], shifts.sd),
+    )
     n_beside = len(scales)
     # Nothing like everything else, so that what is left of integration errors is the same there.
     none = np.zeros(n_beside + len(at))

@@ -25,6 +25,7 @@ from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.refit import Fit
 from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.spec import Direction, Setting
+from skred.physics.mechanisms.strength_prior import SCALES
 from skred.physics.mechanisms.stretches import OPPOSED_SCALES, OPPOSED_SHARE, is_opposed
 from skred.physics.terrain import Terrain
 
@@ -40,7 +41,7 @@ class Kind:
     opposed : bool
         Whether it is nil at the typical speed.
     amplitude : float
-        Typical standard deviation of the profile; `AMPLITUDES` are relative to it.
+        Typical standard deviation of the profile; `SCALES` are relative to it.
     share : float
         Prior probability among the kinds.
     equation : str
@@ -98,9 +99,6 @@ KINDS = (
 )
 """The ways to go with speed. Amplitudes and shares are those of listed mechanisms of the same kind, so that
 neither has an advantage by its prior."""
-AMPLITUDES = (1.0 / 3.0, 1.0, 3.0)
-"""Amplitudes in typical ones, all of equal prior probability. With one amplitude alone the Occam penalty
-applies to every coefficient of the profile, but only once to a one-parameter mechanism."""
 LENGTHS_M = (40.0, 120.0, 400.0)
 """Correlation lengths, all of equal prior probability: from a dam to a good part of a track."""
 NEAR_M = LENGTHS_M[1]
@@ -156,7 +154,7 @@ def priors_of(kind: Kind, at: FloatArray) -> dict[Prior, float]:
     """
     n = max(round((at[-1] - at[0]) / NEAR_M), 1)
     centres = at[0] + (np.arange(n) + 0.5) * (at[-1] - at[0]) / n
-    sizes = [(kind.amplitude * part, length) for part in AMPLITUDES for length in LENGTHS_M]
+    sizes = [(kind.amplitude * part, length) for part in SCALES for length in LENGTHS_M]
     everywhere = [Prior(*size) for size in sizes]
     local = [Prior(*size, float(centre)) for size in sizes if size[1] <= NEAR_M for centre in centres]
     return {one: -math.log(2.0 * len(group)) for group in (everywhere, local) for one in group}

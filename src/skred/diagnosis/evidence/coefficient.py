@@ -7,7 +7,7 @@ which shows only where it is added.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -34,6 +34,7 @@ from skred.inference.hierarchical.surface import Nodes
 from skred.physics.law import Law
 from skred.physics.mechanisms.placed import PlacedMechanism, placed
 from skred.physics.mechanisms.spec import Direction, Setting, Shape
+from skred.physics.mechanisms.strength_prior import SCALES, log_prior_density
 
 NEAR = (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0)
 """Strengths around what was found before, in its standard deviations: a normal posterior has fallen by eight
@@ -139,22 +140,29 @@ class Curve(PlacedMechanism):
         """The fits by strength."""
         return dict(zip(self.strengths.tolist(), self.fits, strict=True))
 
-    def fine(self, scale: float | None = None) -> tuple[FloatArray, FloatArray]:
+    def fine(self, scales: Sequence[float] = SCALES) -> tuple[FloatArray, FloatArray]:
         """Strengths on a fine grid, and the log posterior density there, not normalised."""
-        scale = self.scale if scale is None else scale
         # As many between each two that were computed: these lie close where the curve is narrow.
         parts = np.linspace(self.strengths[:-1], self.strengths[1:], _BETWEEN, endpoint=False, axis=1)
         strengths = np.append(parts.ravel(), self.strengths[-1])
         floor = self.log_evidence.max() - _DEEP
         heights = np.maximum(self.log_evidence, floor)
         spline = Akima1DInterpolator(self.strengths, heights, method="makima")
-        return strengths, spline(strengths) + self.log_prior(strengths, scale)
+        return strengths, spline(strengths) + self.log_prior(strengths, scales)
 
-    def log_prior(self, strengths: FloatArray, scale: float) -> FloatArray:
-        """Log density of the strength's prior if it had some scale: normal, or half of it."""
-        constant = -0.5 * math.log(2.0 * math.pi * scale**2)
-        constant += 0.0 if self.added.either_sign else math.log(2.0)
-        return np.asarray(constant - 0.5 * (strengths / scale) ** 2)
+    def log_prior(self, strengths: FloatArray, scales: Sequence[float] = SCALES) -> FloatArray:
+        """Log density of the strength's prior, of some scales in its mechanism's."""
+        return log_prior_density(strengths, self.scale, either_sign=self.added.either_sign, scales=scales)
+
+    @cached_property
+    def likely(self) -> float:
+        """The most probable of the prior's scales, in the mechanism's."""
+        return max(SCALES, key=lambda one: self.log_factor_of(scales=(one,)))
+
+    @property
+    def log_factor_at_likely(self) -> float:
+        """Against strength 0, in nats, under that scale alone."""
+        return self.log_factor_of(scales=(self.likely,))
 
     @property
     def is_cut(self) -> bool:
@@ -168,9 +176,9 @@ class Curve(PlacedMechanism):
         """Against strength 0, in nats."""
         return self.log_factor_of()
 
-    def log_factor_of(self, sign: float = 0.0, scale: float | None = None) -> float:
-        """Against strength 0, in nats, by strengths of one sign alone, or with the prior of another scale."""
-        strengths, log_density = self.fine(scale)
+    def log_factor_of(self, sign: float = 0.0, scales: Sequence[float] = SCALES) -> float:
+        """Against strength 0, in nats, by strengths of one sign alone, or with a prior of other scales."""
+        strengths, log_density = self.fine(scales)
         own = strengths * sign >= 0.0
         most = float(log_density.max())
         return most + math.log(float(np.trapezoid(np.exp(log_density[own] - most), strengths[own])))

@@ -36,9 +36,10 @@ from skred.diagnosis.evidence.linear_mixed_model import (
 from skred.diagnosis.evidence.refit import Fit, unfitted
 from skred.diagnosis.evidence.tolerance import ARRIVED, STEP_SHARES
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
+from skred.physics.mechanisms.strength_prior import SCALES
 
 STARTS = (0.0, 0.3, 1.2)
-"""Where climbs begin, in scales of the prior: nil, and either side of its median (0.67)."""
+"""Where climbs begin, in scales of the prior: nil, and either side of its median (0.57)."""
 _ROUNDS = 15
 """Steps at most. Where fronts stop a climb could go to and fro."""
 _CLIMB = 4
@@ -99,7 +100,7 @@ class _Climb:
         self, extension: Extension, rows: Rows, held: FloatArray, scale: float, either_sign: bool
     ) -> None:
         self.extension, self.rows, self.held = extension, rows, held
-        self.either_sign, self.precision = either_sign, scale**-2.0
+        self.either_sign, self.precision = either_sign, (SCALES[-1] * scale) ** -2.0
         self.prior: MeanPrior = mean_prior(extension.law)
 
     def at(self, strengths: FloatArray, population: Population, points: FloatArray, n_steps: int) -> _State:

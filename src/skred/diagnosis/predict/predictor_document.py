@@ -11,7 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 from skred.arrays import FloatArray
 from skred.campaign.problems import shown
 from skred.diagnosis.detect.detectability import NO_LIMIT
-from skred.diagnosis.discrepancy.profile import AMPLITUDES, MOST_KNOTS
+from skred.diagnosis.discrepancy.profile import MOST_KNOTS
 from skred.diagnosis.predict.unseen import Predictor, ProfileTerm, Term
 from skred.documents import FORMAT
 from skred.errors import InputError
@@ -20,6 +20,7 @@ from skred.inference.hierarchical.event_draws import FARTHEST
 from skred.physics.law import Law
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
+from skred.physics.mechanisms.strength_prior import SCALES
 
 _ADAPTER = TypeAdapter(Predictor)
 
@@ -49,7 +50,7 @@ def from_dict(document: Any) -> Predictor:
     scales = [(term.mechanism, _scale(term, law)) for term in predictor.terms]
     if predictor.profile is not None:
         _check_profile(predictor.profile)
-        scale = max(AMPLITUDES) * predictor.profile.kind.amplitude
+        scale = max(SCALES) * predictor.profile.kind.amplitude
         scales += [("the force profile", scale)] * len(predictor.profile.knots_m)
     _check_draws(predictor, len(law.mechanisms), scales)
     return predictor

@@ -85,7 +85,7 @@ class BetweenTarget:
         """Populations, strengths, parameters, and log priors of the last two, from coordinates (n, size)."""
         n_psi = self.base.fit.found.psi.size
         size = np.exp(np.minimum(x[:, n_psi], 50.0))
-        log_p = self.curve.log_prior(size, self.curve.scale) + x[:, n_psi]
+        log_p = self.curve.log_prior(size) + x[:, n_psi]
         log_p = np.where(size <= abs(self.farthest), log_p, -np.inf)
         parameter, more = from_unbounded(self.kind, x[:, n_psi + 1])
         return x[:, :n_psi], np.copysign(size, self.farthest), parameter, log_p + more

@@ -116,7 +116,7 @@ def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located
         points = grid.points
         fits = _fitted(base, extension, points, near)
         density = np.array([fit.found.log_evidence for fit in fits])
-        density -= 0.5 * np.sum((points / scale) ** 2, axis=1)
+        density += sum(curve.log_prior(points[:, k]) for k, curve in enumerate(curves))
         allowed = np.all(points >= low - slack, axis=1)
         density = np.where(allowed & np.isfinite(density), density, -np.inf)
         counts = density > density.max() - _ENDS_NATS

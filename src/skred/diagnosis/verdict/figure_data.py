@@ -24,6 +24,7 @@ from skred.diagnosis.verdict.report_facts import checks_of, comparisons_of
 from skred.diagnosis.words import TOLD_FROM
 from skred.inference.recorded_data import recorded_groups
 from skred.inference.results import FORMAT
+from skred.physics.mechanisms.strength_prior import SCALES
 from skred.physics.mechanisms.stretches import is_opposed
 
 PRIOR_SCALES = np.geomspace(0.1, 10.0, 13)
@@ -155,13 +156,14 @@ def _looked_at(comparison: Comparison, names: Sequence[str]) -> list[int]:
 def _fine(curve: Curve) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Strengths on a fine grid, log evidence and log prior density there."""
     strengths, log_density = curve.fine()
-    log_prior = curve.log_prior(strengths, curve.scale)
+    log_prior = curve.log_prior(strengths)
     return strengths, log_density - log_prior, log_prior
 
 
 def _factor_at(candidate: Candidate, relative: float) -> float:
     """Log Bayes factor of a candidate with its prior scale multiplied; re-computed at its own scale alone."""
-    factors = [one.log_factor_of(scale=relative * one.scale) for one in candidate.curves]
+    scales = [relative * one for one in SCALES]
+    factors = [one.log_factor_of(scales=scales) for one in candidate.curves]
     moved = float(logsumexp(candidate.log_weights + np.array(factors)) - logsumexp(candidate.log_factors))
     return candidate.log_bayes_factor + moved
 

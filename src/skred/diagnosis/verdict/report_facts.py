@@ -17,7 +17,7 @@ from skred.diagnosis.check.bootstrap_test import BootstrapTest
 from skred.diagnosis.check.decision import TIED_NATS
 from skred.diagnosis.compare.comparison import ERROR_SHARES, Comparison
 from skred.diagnosis.compare.location import Location
-from skred.diagnosis.discrepancy.profile import AMPLITUDES, KINDS, LENGTHS_M, NEAR_M
+from skred.diagnosis.discrepancy.profile import KINDS, LENGTHS_M, NEAR_M
 from skred.diagnosis.evidence.prior_odds import NOTHING, UNLISTED
 from skred.diagnosis.limits import LIMIT, NOTHING_AT_MOST
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
@@ -35,6 +35,7 @@ from skred.physics.law import Law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import added_of
 from skred.physics.mechanisms.spec import Mechanism, Shape
+from skred.physics.mechanisms.strength_prior import KIND, SCALES
 from skred.physics.mechanisms.stretches import is_opposed
 
 
@@ -147,7 +148,7 @@ def _mechanisms(found: Diagnosis) -> dict[str, Any]:
     for name, mechanism in listed.items():
         added = added_of(mechanism)
         prior = {
-            "kind": "normal" if added.either_sign else "half-normal",
+            "kind": KIND[added.either_sign],
             "scale": added.scale,
             "reason": added.reason,
         }
@@ -175,7 +176,7 @@ def _profile_prior() -> dict[str, Any]:
         "kinds": [
             {"sd": kind.amplitude, "unit": kind.unit, "nil_at_typical_speed": kind.opposed} for kind in KINDS
         ],
-        "sd_times": list(AMPLITUDES),
+        "sd_times": list(SCALES),
         "correlation_lengths_m": list(LENGTHS_M),
         "window_m": 2.0 * NEAR_M,
     }

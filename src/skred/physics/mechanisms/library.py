@@ -21,7 +21,7 @@ from skred.physics.mechanisms.spec import BoundTo, Mechanism
 from skred.physics.plugins import OWN_PACKAGE, Refused, RefusedError, entries_of, in_a_line, load, package_of
 
 GROUP = "skred.mechanisms"
-NOT_MECHANISMS = ("library", "placed", "spec", "stretches")
+NOT_MECHANISMS = ("library", "placed", "spec", "strength_prior", "stretches")
 RESERVED = ("nothing", "unlisted")
 """Ids of the two ways out of the list."""
 _NAME = re.compile(r"[a-z][a-z0-9_]*")

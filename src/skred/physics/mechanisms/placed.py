@@ -38,7 +38,7 @@ class PlacedMechanism:
 
     @property
     def scale(self) -> float:
-        """Scale of the strength's prior: half-normal, or normal where either sign may be."""
+        """The mechanism's own, which those of the strength's prior are multiples of."""
         return self.added.scale_of(self.shape)
 
     @property

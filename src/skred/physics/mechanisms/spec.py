@@ -10,6 +10,7 @@ import numpy as np
 
 from skred.arrays import FloatArray
 from skred.physics.kernel.columns import Column
+from skred.physics.mechanisms.strength_prior import MEDIAN
 from skred.physics.terrain import Terrain
 
 Profile = Callable[[Terrain], FloatArray]
@@ -200,8 +201,8 @@ class Added:
     Attributes
     ----------
     scale : float
-        Scale of the normal prior of its coefficient, in the coefficient's unit: half-normal unless
-        `either_sign`.
+        How large its coefficient is, in its unit: the middle scale of the coefficient's prior
+        (`strength_prior`), which is half-normal unless `either_sign`.
     reason : str
         Why that scale.
     direction : callable
@@ -248,7 +249,7 @@ class Added:
     @property
     def relevant(self) -> float:
         """Median of the prior of its size: a coefficient that matters."""
-        return 0.6745 * self.scale
+        return MEDIAN * self.scale
 
 
 @dataclass(frozen=True)
