@@ -59,6 +59,7 @@ def compute(
         Whether nested sampling checks the reference.
     """
     from benchmarks.reference.bayes_factor import nothing_added, reference_factor
+    from benchmarks.reference.coefficient import SCALES
     from benchmarks.reference.engine import engine_log_bayes_factor, fitted_base
     from skred.inference.hierarchical.problem import hierarchical_problem
     from skred.physics.laws import load_law
@@ -66,7 +67,8 @@ def compute(
 
     drawn = draw_pair(seed, number, also)
     problem, law = hierarchical_problem(drawn.campaign), load_law(drawn.base)
-    fingerprint = drawn.campaign.fingerprint()[:12]
+    # Of the recordings, and of the prior that the reference integrates over.
+    fingerprint = f"{drawn.campaign.fingerprint()[:12]}-{len(SCALES)}"
     record: dict[str, Any] = {"pair": number, "seed": seed, **drawn.as_dict(), "fingerprint": fingerprint}
     if before is not None and before.get("fingerprint") == fingerprint and "reference" in before:
         mechanism = mechanisms()[before["mechanism"]]

@@ -22,7 +22,7 @@ from skred.physics.mechanisms.spec import Direction
 FloatArray = NDArray[np.float64]
 GRID = (0.004, 0.012, 0.035, 0.09, 0.2, 0.4, 0.75, 1.25, 2.0, 3.2, 5.0, 8.0, 13.0)
 """Coefficients at first, in scales of the mechanism."""
-_SCALES = np.array([1.0, 3.0, 9.0]) / 3.0
+SCALES = np.array([1.0, 3.0, 9.0]) / 3.0
 """Those of the prior, in scales of the mechanism: one of these, each as probable."""
 _COUNTS, _HOPELESS = 7.0, 25.0
 """Nats below the best at which the grid is not refined, and at which nothing is computed finely."""
@@ -168,7 +168,7 @@ def curve(added: Reference, nothing: At, scale: float, either_sign: bool) -> Cur
 
 
 def _log_prior(coefficient: float, scale: float, either_sign: bool) -> float:
-    density = float(norm.pdf(coefficient, scale=_SCALES * scale).mean())
+    density = float(norm.pdf(coefficient, scale=SCALES * scale).mean())
     # Far out numbers end before logarithms do.
     return math.log(max(density if either_sign else 2.0 * density, 1e-300))
 

@@ -43,6 +43,7 @@ from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Shape
+from skred.physics.mechanisms.strength_prior import log_prior_density
 from studies.another_hand.campaigns import unpack
 
 CAMPAIGN = read_campaign(find_campaign("ryggfonn"))
@@ -230,7 +231,8 @@ def test_posterior_is_that_of_a_dense_grid(problem: AugmentedProblem, calibratio
     prior += lognorm.logpdf(np.exp(log_spread), SPREAD_LOG_SD, scale=SPREAD_MEDIAN) + log_spread
     top = likelihoods.max(axis=2, keepdims=True)
     integrated = np.log(np.einsum("ael,pl->aep", np.exp(likelihoods - top), population) + 1e-300) + top
-    joint = integrated.sum(axis=1) + prior - 0.5 * (added[:, None] / problem.added[0].scale) ** 2
+    of_added = log_prior_density(added, problem.added[0].scale, either_sign=False)
+    joint = integrated.sum(axis=1) + prior + of_added[:, None]
     weights = np.exp(joint - joint.max())
     weights /= weights.sum()
     posterior = calibration.tree["posterior"]

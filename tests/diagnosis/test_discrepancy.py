@@ -22,7 +22,6 @@ from skred.diagnosis.discrepancy.explored import (
     Expansion,
     ExploredPriors,
     laplace,
-    log_above_nil,
     prior_penalty,
 )
 from skred.diagnosis.discrepancy.fit import as_profile, fit_profile
@@ -159,15 +158,6 @@ def made_profile(base: Base, kind: int) -> Profile:
 def location_of(base: Base, profile: Profile) -> Location:
     """Where, by this profile alone."""
     return locate(ComparisonUnderErrors("robust", base, {}, [profile]))
-
-
-@pytest.mark.parametrize("mean", [1.5, 0.0, -3.0, -60.0])
-def test_a_half_normal_prior_has_twice_what_is_above_nil(mean: float) -> None:
-    """Against the trapezium rule, also where the maximum is too far below nil for a float of its share."""
-    x = np.linspace(0.0, 8.0, 200_001)
-    inside = np.log(2.0 * np.trapezoid(np.exp(mean * x - 0.5 * x**2), x)) - 0.5 * np.log(2.0 * np.pi)
-    above = log_above_nil(2.0 * mean, 4.0) + 0.5 * mean**2
-    assert above == pytest.approx(inside, abs=1e-6)
 
 
 def test_work_is_the_integral_of_the_force(base: Base) -> None:

@@ -23,6 +23,7 @@ from skred.inference.between_events import (
 )
 from skred.physics.law import Parameter
 from skred.physics.mechanisms.placed import PlacedMechanism
+from skred.physics.mechanisms.strength_prior import SCALES
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,18 +36,10 @@ class AddedStrength(PlacedMechanism):
         Of the parameter: the strength's own, numbered if two of a kind are added.
     between : BetweenEvents
         How it differs between avalanches.
-    likely : float
-        Which of the prior's scales is taken, in the mechanism's own: the most probable one.
     """
 
     name: str
     between: BetweenEvents = BetweenEvents.COMMON
-    likely: float = 1.0
-
-    @property
-    def scale(self) -> float:
-        """Scale of the strength's prior."""
-        return self.likely * super().scale
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -73,15 +66,20 @@ def added_strengths(curves: Sequence[Curve], way: BetweenEvents) -> tuple[AddedS
         name = curve.mechanism.strength.name
         count[name] += 1
         own = name if count[name] == 1 else f"{name}_{count[name]}"
-        added.append(AddedStrength(curve.mechanism, curve.shape, curve.direction, own, way, curve.likely))
+        added.append(AddedStrength(curve.mechanism, curve.shape, curve.direction, own, way))
     return tuple(added)
 
 
-def truncated_normal(name: str, scale: Any, low: Any, high: Any) -> Any:
-    """Normal variable around 0 between two values, as PyTensor's numba backend can draw it.
+def strength_variable(name: str, scale: Any, low: Any, high: Any) -> Any:
+    """An added strength under its prior between two values, as PyTensor's numba backend can draw it.
 
-    Half-normal where the lower one is 0: with the support's part that is left out, its density is only
-    higher by a factor.
+    Above nil where the lower one is 0: with the support's part that is left out, its density is only higher
+    by a factor.
+
+    Parameters
+    ----------
+    scale : float or symbolic
+        The mechanism's own (`strength_prior`).
     """
     import pymc as pm
     import pytensor.tensor as pt
@@ -89,16 +87,23 @@ def truncated_normal(name: str, scale: Any, low: Any, high: Any) -> Any:
 
     root = np.sqrt(2.0)
 
+    def of_each(scale: Any, low: Any, high: Any) -> tuple[Any, Any, Any]:
+        scales = scale * np.array(SCALES)
+        return scales, pt.erf(low / scales / root), pt.erf(high / scales / root)
+
     def drawn(scale: Any, low: Any, high: Any, size: Any) -> Any:
-        share = pm.Uniform.dist(0.0, 1.0, size=size)
-        first, last = pt.erf(low / scale / root), pt.erf(high / scale / root)
-        inside: Any = pt.clip(scale * root * pt.erfinv(first + share * (last - first)), low, high)
-        return inside
+        share, which = pm.Uniform.dist(0.0, 1.0, size=size), pm.Uniform.dist(0.0, 1.0, size=size)
+        scales, first, last = of_each(scale, low, high)
+        up_to = pt.cumsum(last - first) / pt.sum(last - first)
+        k = pt.sum(which[..., None] > up_to[:-1], axis=-1)
+        inside = scales[k] * root * pt.erfinv(first[k] + share * (last - first)[k])
+        return pt.clip(inside, low, high)
 
     def logp(value: Any, scale: Any, low: Any, high: Any) -> Any:
-        share = 0.5 * (pt.erf(high / scale / root) - pt.erf(low / scale / root))
-        density = -0.5 * (value / scale) ** 2 - pt.log(scale * share) - 0.5 * np.log(2.0 * np.pi)
-        return pt.switch((value >= low) & (value <= high), density, -np.inf)
+        scales, first, last = of_each(scale, low, high)
+        density = pt.sum(pt.exp(-0.5 * (value / scales) ** 2) / scales) / pt.sum(last - first)
+        log_density = pt.log(density) - 0.5 * np.log(0.5 * np.pi)
+        return pt.switch((value >= low) & (value <= high), log_density, -np.inf)
 
     between = Interval(bounds_fn=lambda *_: (low, high))
     return pm.CustomDist(name, scale, low, high, dist=drawn, logp=logp, default_transform=between)

@@ -20,8 +20,8 @@ from skred.arrays import FloatArray
 from skred.diagnosis.augment.added_strength import (
     AddedStrength,
     components_of,
+    strength_variable,
     symbolic_components_of,
-    truncated_normal,
 )
 from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
@@ -123,7 +123,7 @@ class AugmentedProblem(HierarchicalProblem):
             held[name] = pt.cast(held[name], "int64")  # PyMC makes integers int32
         scales = pm.Data("added_scale", np.array([one.scale for one in self.added]))
         low, high = pm.Data("added_low", self.range[0]), pm.Data("added_high", self.range[1])
-        added = [truncated_normal(one.name, scales[k], low[k], high[k]) for k, one in enumerate(self.added)]
+        added = [strength_variable(one.name, scales[k], low[k], high[k]) for k, one in enumerate(self.added)]
         own, log_shares = symbolic_components_of(self.added, added)
         factor = population_variables(mechanisms)
         means = pt.alloc(pt.log(pt.stack(list(strengths))), n_events, len(mechanisms))

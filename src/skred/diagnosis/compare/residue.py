@@ -98,7 +98,7 @@ def residues(
     for curve, lowest, fitted in zip(curves, least, fits, strict=True):
         profiles = tuple(one for one in fitted if one is not None)
         known = len(profiles) == len(KINDS)
-        log_factor = log_evidence_of(profiles) - curve.log_factor_at_likely if known else -math.inf
+        log_factor = log_evidence_of(profiles) - curve.log_bayes_factor if known else -math.inf
         found.append(Residue(log_factor, Beside(curve, profiles)) if log_factor > lowest else None)
     return found
 
@@ -120,4 +120,4 @@ def fit_beside(base: Base, curve: Curve, least: float, kind: Kind, again: Prior 
     directions = (*base.directions, curve.direction)
     wide = replace(base, directions=directions, strengths=np.append(base.strengths, 0.0))
     near = np.append(strength, np.zeros(len(knots(base.setting)))), fit.start
-    return fit_profile(wide, kind, near, again, beside=curve, least=curve.log_factor_at_likely + least)
+    return fit_profile(wide, kind, near, again, beside=curve, least=curve.log_bayes_factor + least)

@@ -7,7 +7,6 @@ that changes for a candidate, its coefficient fitted anew, is set against what i
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
@@ -21,10 +20,11 @@ from skred.arrays import FloatArray
 from skred.diagnosis.compare.candidate import Candidate, Strength
 from skred.diagnosis.compare.screening import curve as curve_of
 from skred.diagnosis.discrepancy.climb import arrived, climb, expanded_at, highest
-from skred.diagnosis.discrepancy.explored import Expansion, Laplace, laplace, log_above_nil
+from skred.diagnosis.discrepancy.explored import Expansion, Laplace, laplace
 from skred.diagnosis.discrepancy.fit import Start, fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.diagnosis.evidence.over_scales import over_scales
 from skred.diagnosis.evidence.refit import Fit
 from skred.diagnosis.evidence.stated_places import EXACT, StatedPlaces, stated_places
 
@@ -184,7 +184,7 @@ def _with_coefficient(base: Base, curve: Curve, nothing: Shifts) -> tuple[Expans
     places, one_sided = nothing.places, not curve.added.either_sign
     strength, fit = _top(curve)
     law = base.with_in(curve.direction, strength, fit)
-    cover = np.diag(np.append(curve.likely * curve.scale, places.sd) ** 2)
+    cover = np.diag(np.append(curve.widest, places.sd) ** 2)
     values, moved = [(np.append(strength, np.zeros_like(nothing.mean)), fit)], curve
     if places.errors:  # where sensors stand as beside nothing, the coefficient may be another
         moved = curve_of(nothing.into(base), curve)
@@ -200,14 +200,10 @@ def _with_coefficient(base: Base, curve: Curve, nothing: Shifts) -> tuple[Expans
         found = expanded_at(law, places, np.append(0.0, nothing.mean), law.fit.start)
     # No score is followed to where nothing was computed: where fronts stop it can be any number.
     there = laplace(arrived(found, np.linalg.inv(cover)), 0.0, cover)
-    moments = Strength(float(there.values[0]), math.sqrt(float(there.covariance[0, 0])))
-    if one_sided and moments.mean <= 0.0:  # the curve says what the expansion at nil cannot
-        at_nil = moved.log_factor_of(scales=(curve.likely,))
-        return found, base.fit.found.log_evidence + nothing.log_factor + at_nil, None
-    log_evidence = _log_factor(there)
-    if one_sided:
-        log_evidence += log_above_nil(float(there.values[0]), float(there.covariance[0, 0]))
-    return found, log_evidence, moments
+    if one_sided and there.values[0] <= 0.0:  # the curve says what the expansion at nil cannot
+        return found, base.fit.found.log_evidence + nothing.log_factor + moved.log_bayes_factor, None
+    over = over_scales(float(there.values[0]), float(there.covariance[0, 0]), curve)
+    return found, _log_factor(there) + over.log_factor, Strength(over.mean, over.sd)
 
 
 def _top(curve: Curve) -> tuple[float, Fit]:

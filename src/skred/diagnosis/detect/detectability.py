@@ -37,7 +37,7 @@ ALIKE = 0.9
 """Size of the cosine between two efficient scores above which mechanisms look alike: then four fifths of the
 information about one is information about the other."""
 NO_LIMIT = 20.0
-"""Prior scales from which on a detection limit is none: no strength that could be is so large."""
+"""Scales of a mechanism from which on a detection limit is none: no strength that could be is so large."""
 _PLACES = 12
 """Places tried for one more sensor: close enough to each other for what a reading there says to change little
 between them."""

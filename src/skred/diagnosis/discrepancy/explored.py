@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import log_ndtr
 
 from skred.arrays import FloatArray
 from skred.diagnosis.discrepancy.profile import Prior
@@ -202,8 +201,3 @@ def occam_penalty(maximum: Expansion, cover: FloatArray) -> float:
     """What the room that a prior gives to the values takes off the log evidence."""
     _, log_det = np.linalg.slogdet(np.eye(len(cover)) + cover @ maximum.information)
     return 0.5 * float(log_det)
-
-
-def log_above_nil(value: float, variance: float) -> float:
-    """What a half-normal prior adds to the log evidence under the normal one: twice that, above nil alone."""
-    return math.log(2.0) + float(log_ndtr(value / math.sqrt(variance)))

@@ -16,7 +16,6 @@ from skred.diagnosis.discrepancy.explored import (
     Expansion,
     ExploredPriors,
     laplace,
-    log_above_nil,
     occam_penalty,
     prior_penalty,
 )
@@ -33,6 +32,7 @@ from skred.diagnosis.discrepancy.profile import (
 from skred.diagnosis.evidence.adaptive_sampling import Mode
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import Population
+from skred.diagnosis.evidence.over_scales import over_scales
 from skred.diagnosis.evidence.stated_places import EXACT, StatedPlaces
 from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
 
@@ -77,10 +77,7 @@ def fit_profile(
         Log Bayes factor below which none counts: that of no force, or more where something else leads.
         Climbs end where even the approximations of priors not climbed under have less.
     """
-    at, scales = (
-        knots(base.setting),
-        np.append([] if beside is None else [beside.likely * beside.scale], shifts.sd),
-    )
+    at, scales = knots(base.setting), np.append([] if beside is None else [beside.widest], shifts.sd)
     n_beside = len(scales)
     # Nothing like everything else, so that what is left of integration errors is the same there.
     none = np.zeros(n_beside + len(at))
@@ -107,8 +104,8 @@ def fit_profile(
     values, cover, factor, modes = there.values, there.covariance, explored.log_factor, explored.modes
     if n_beside:
         modes = ()  # of all together, and so of no force by itself
-    if beside is not None and not beside.added.either_sign:
-        factor += log_above_nil(float(values[0]), float(cover[0, 0]))
+    if beside is not None:
+        factor += over_scales(float(values[0]), float(cover[0, 0]), beside).log_factor
     gain, values, cover = fit.found.log_evidence - height, values[n_beside:], cover[n_beside:, n_beside:]
     return Profile(kind, prior, at, values, cover, factor, gain, fit, modes)
 

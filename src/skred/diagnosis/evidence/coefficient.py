@@ -40,7 +40,7 @@ NEAR = (-4.0, -2.0, -1.0, 0.0, 1.0, 2.0, 4.0)
 """Strengths around what was found before, in its standard deviations: a normal posterior has fallen by eight
 nats at the ends, more than `COUNTS`."""
 _SMALLEST = 1e-3
-"""Strength, and standard deviation of one, below which nothing is told apart, in scales of the prior."""
+"""Strength, and standard deviation of one, below which nothing is told apart, in scales of the mechanism."""
 _BETWEEN = 60
 """Points at which a curve is integrated between each two strengths."""
 _DEEP = 40.0
@@ -153,16 +153,6 @@ class Curve(PlacedMechanism):
     def log_prior(self, strengths: FloatArray, scales: Sequence[float] = SCALES) -> FloatArray:
         """Log density of the strength's prior, of some scales in its mechanism's."""
         return log_prior_density(strengths, self.scale, either_sign=self.added.either_sign, scales=scales)
-
-    @cached_property
-    def likely(self) -> float:
-        """The most probable of the prior's scales, in the mechanism's."""
-        return max(SCALES, key=lambda one: self.log_factor_of(scales=(one,)))
-
-    @property
-    def log_factor_at_likely(self) -> float:
-        """Against strength 0, in nats, under that scale alone."""
-        return self.log_factor_of(scales=(self.likely,))
 
     @property
     def is_cut(self) -> bool:

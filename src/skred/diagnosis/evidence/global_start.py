@@ -5,7 +5,7 @@ the coefficient, all at once. A step therefore moves all of them together. A dra
 has absorbed comes in while friction falls to a third; neither a derivative at nil nor a refit at a fixed
 coefficient gets there. Each event's point follows the step in the linear model, so that fronts stay with
 their readings. This is Gauss and Newton's method for a nonlinear mixed model (Lindstrom and Bates, 1990, doi
-10.2307/2532087), with spreads by expectation-maximisation. It begins at nil and at the prior's scale.
+10.2307/2532087), with spreads by expectation-maximisation. It begins at nil and at the mechanism's scale.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_
 from skred.physics.mechanisms.strength_prior import SCALES
 
 STARTS = (0.0, 0.3, 1.2)
-"""Where climbs begin, in scales of the prior: nil, and either side of its median (0.57)."""
+"""Where climbs begin, in scales of the mechanism: nil, and either side of its median (0.57)."""
 _ROUNDS = 15
 """Steps at most. Where fronts stop a climb could go to and fro."""
 _CLIMB = 4
@@ -183,7 +183,7 @@ def global_starts(
     begin : (Population, (n_events, n_base + 1) array)
         The fit without the last direction.
     scale : float
-        Of the coefficient's prior, in its unit.
+        The mechanism's own, in the coefficient's unit.
     either_sign : bool
         Whether the coefficient may be negative.
     """

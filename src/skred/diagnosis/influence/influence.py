@@ -277,7 +277,7 @@ def _by_mechanism(candidate: Candidate, base: Base, part: Part) -> float:
     rest, force = part.base(base), most_probable(beside.profiles)
     curve = _without(rest, beside.curve, beside.curve.strengths, part)
     both = fit_beside(rest, curve, -math.inf, force.kind, force.prior).log_bayes_factor
-    return with_or_without(by_itself, in_common + both - curve.log_factor_at_likely)
+    return with_or_without(by_itself, in_common + both - curve.log_bayes_factor)
 
 
 def _by_shapes(candidate: Candidate, base: Base, part: Part) -> tuple[float, float]:

@@ -21,6 +21,7 @@ from skred.physics.law import Law
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.strength_prior import SCALES
+from skred.physics.mechanisms.stretches import OPPOSED_SCALES
 
 _ADAPTER = TypeAdapter(Predictor)
 
@@ -67,7 +68,7 @@ def _told(error: ValidationError) -> str:
 
 
 def _scale(term: Term, law: Law) -> float:
-    """Prior scale of a term's strength, if it is one."""
+    """The widest that the prior of a term's strength may be, if it is one."""
     name, shape, by = term.mechanism, term.shape, term.standard
     mechanism = mechanisms().get(name)
     if mechanism is None or mechanism.added is None:
@@ -81,7 +82,7 @@ def _scale(term: Term, law: Law) -> float:
         raise InputError(f"predictor: {name}: constants: expected positive numbers")
     if by is not None and (by.scale <= 1e-12 or len(by.kinds) not in (0, 2)):
         raise InputError(f"predictor: {name}: standard: expected a positive scale, and two kinds or none")
-    return mechanism.added.scale
+    return max(SCALES) * OPPOSED_SCALES * mechanism.added.scale
 
 
 def _check_profile(term: ProfileTerm) -> None:

@@ -12,6 +12,7 @@ from skred.errors import InputError
 from skred.physics.kernel.columns import Column
 from skred.physics.mechanisms.library import library
 from skred.physics.mechanisms.spec import Added, BoundTo, Direction, Mechanism, Setting, Shape
+from skred.physics.mechanisms.strength_prior import SCALES
 from skred.physics.plugins import OWN_PACKAGE, in_a_line
 
 
@@ -40,6 +41,11 @@ class PlacedMechanism:
     def scale(self) -> float:
         """The mechanism's own, which those of the strength's prior are multiples of."""
         return self.added.scale_of(self.shape)
+
+    @property
+    def widest(self) -> float:
+        """The widest scale of the strength's prior."""
+        return SCALES[-1] * self.scale
 
     @property
     def relevant(self) -> float:

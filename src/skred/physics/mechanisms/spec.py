@@ -122,7 +122,7 @@ class Shape:
     constants : tuple of (str, float)
         Other constants by symbol with unit, as ``U_c [m s-1]``; positive numbers.
     prior_scales : float
-        The prior scale of the coefficient of this shape, in that of its mechanism.
+        How large the coefficient of this shape is, in scales of its mechanism.
     prior_weight : float
         Prior probability of this shape, relative to the mechanism's others.
     """
@@ -243,7 +243,7 @@ class Added:
         return self.bound_to is BoundTo.PLACE and self.split is not without_parts
 
     def scale_of(self, shape: Shape) -> float:
-        """Scale of the prior of the coefficient of a shape."""
+        """How large the coefficient of a shape is."""
         return self.scale * shape.prior_scales
 
     @property
