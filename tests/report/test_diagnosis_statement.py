@@ -287,6 +287,20 @@ def test_what_no_further_speed_splits(tied: tuple[str, ...]) -> None:
     assert (same in document["statement"]) == ("entrainment" in tied)
 
 
+def test_which_term_is_the_same_is_told_where_it_is_not_the_first() -> None:
+    """ "The same term" alone would be that of the name that leads, which it is not."""
+    found = diagnosis("tie")
+    document = verdict(found)
+    tied = document["mechanisms"][0] | {
+        "id": "segment_friction",
+        "tied_with": ["entrainment", "segment_drag"],
+    }
+    ids = {"mechanism": "segment_friction", "indistinguishable": tied["tied_with"], "mechanisms": [tied]}
+    told = statement(found, document | ids)
+    assert "snow at rest picked up on a stretch (the same term as extra drag on a stretch" in told
+    assert "(the same term" in document["statement"] and "(the same term as" not in document["statement"]
+
+
 def test_a_candidate_that_is_not_excluded_is_told() -> None:
     """Of another group, where it is not improbable; those that are tied have a sentence of their own."""
     found = diagnosis("tie")

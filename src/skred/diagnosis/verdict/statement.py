@@ -191,9 +191,10 @@ def _tied(names: Sequence[str], probability: Mapping[str, float], force: Collect
     ties, told = names[1:], set(names)
     how = {other: percent(probability.get(other, 0.0)) + _with_force(other, force) for other in ties}
     for other in ties:
-        if other != UNLISTED and mechanisms()[other].same_term_as in told:
+        same = mechanisms()[other].same_term_as if other != UNLISTED else None
+        if same is not None and same in told:
             own = f"; in a form of its own {how[other]}" if other in probability else ""
-            how[other] = f"the same term{own}"
+            how[other] = f"the same term{'' if same == names[0] else f' as {title_of(same)}'}{own}"
     listed = ", ".join(f"{title_of(other)} ({sure})" for other, sure in how.items())
     return f"These recordings cannot tell it from: {listed}." if ties else ""
 
