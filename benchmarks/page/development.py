@@ -31,7 +31,8 @@ ones, two at once, and nothing, all of a signal-to-noise drawn evenly from 2 to 
 on other seeds (and on trials of the [record](../docs/proof.md) once they were opened), so on other tracks,
 avalanches and effects: nothing was on these before this table. They were not sealed; claims are made from the
 record, which has more trials and another mix: here a mechanism is as frequent as another, and {unlisted} hide
-a force that is in no list.
+a force that is in no list. By the code of 24 November 2026, before issue 34: today's is slower and has other
+priors.
 """
 
 

@@ -57,7 +57,10 @@ with the diagnosis. Its forces have other shapes than the mechanisms of the list
    settings and source is written before the first diagnosis.
 2. **Diagnosed** (`skred prove run`): each trial by a process that is given the campaign alone.
 3. **Opened** (`skred prove reveal`): truths are compared with the ledger, and answers are scored. A crash or
-   a time-out is a wrong answer. Every trial of every opened batch counts.
+   a time-out is a wrong answer. Every trial of every opened batch counts. Two exceptions are in the record's
+   notes: in 1269020304 five answers that were ended from outside or ran beside other work were set aside
+   unopened and made again, and the beginning of one truth was seen early; the first run of 1274408422 failed
+   as a whole, for want of a folder, and was repeated.
 
 Words used here:
 

@@ -24,7 +24,6 @@ from studies.ryggfonn import page as ryggfonn_page
 from studies.ryggfonn.groups import groups_figure, retardations
 
 ANSWERS = RESULTS / "ryggfonn"
-MOVED = ("LC", "CD")
 PRIOR_FACTORS = (0.5, 1.0, 2.0)
 SHOWN = ("where",)
 """Figures of the page."""
@@ -56,7 +55,6 @@ CASES = (
     Case("pcm-smoothing-20", "pcm", smoothing_m=20.0),
     Case("pcm-student", "pcm", errors="student"),
     Case("pcm-spans", "pcm", spans=True),
-    # Their places were inferred, to within 40 and 20 m (data README).
     Case("pcm-sensors-up", "pcm", sensors_m=(-40.0, -20.0)),
     Case("pcm-sensors-down", "pcm", sensors_m=(40.0, 20.0)),
     Case("pcm-sensors-closer", "pcm", sensors_m=(40.0, -20.0)),
@@ -74,14 +72,14 @@ def campaign_of(case: Case) -> Any:
     if case.spans:
         return build(find_campaign("ryggfonn") / "raw", spans=True)
     campaign = read_campaign(find_campaign(case.campaign))
-    shifts = dict(zip(MOVED, case.sensors_m, strict=True))
+    shifts = dict(zip(ryggfonn_page.MOVED, case.sensors_m, strict=True))
     sensors = [
         replace(one, s_from_m=one.s_from_m + by, s_to_m=one.s_to_m + by)
         if (by := shifts.get(one.id)) and one.s_from_m is not None and one.s_to_m is not None
         else one
         for one in campaign.sensors
     ]
-    errors = {} if case.place_sd_m is None else dict(zip(MOVED, case.place_sd_m, strict=True))
+    errors = {} if case.place_sd_m is None else dict(zip(ryggfonn_page.MOVED, case.place_sd_m, strict=True))
     sensors = [replace(one, place_sd_m=errors.get(one.id)) for one in sensors]
     return replace(campaign, sensors=tuple(sensors))
 

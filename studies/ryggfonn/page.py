@@ -6,17 +6,19 @@ from collections.abc import Mapping
 from typing import Any
 
 from studies.ryggfonn.before import before_and_now, beside_the_audit
+from studies.ryggfonn.cells import number_text, share_text, where_text
 from studies.ryggfonn.groups import words
+from studies.ryggfonn.questions import between, dam, growing
 
 Found = Mapping[str, Any]
-DAM_CROWN_M, DAM_HEIGHT_M = 1940.0, 15.0
-_NEAR_M = 60.0
 LAWS = {
     "coulomb": "Base M1, dry friction",
     "pcm": "Base M2, PCM",
     "constant": "Base M3, constant retardation",
     "voellmy": "The Voellmy model: friction without curvature, and drag",
 }
+MOVED = ("LC", "CD")
+"""Sensors whose places are inferred, to within 40 and 20 m (data README)."""
 PUBLISHED = ("coulomb", "pcm", "constant")
 """Those of the published calibration, whose diagnosis is repeated without some avalanches."""
 UNSEEN = "-unseen"
@@ -34,6 +36,10 @@ crown at s = 1940 m, upstream foot at 1910 m.
 - *Held-out* gains are changes of the log score when each avalanche is predicted from the others. Augmented
   and base law are compared under one error model, the one in which the first name is most probable.
 - *Force not in the list* is the model discrepancy, a Gaussian process along the track.
+- Drag on a stretch has one and a half parts of the prior of listed physics, entrainment half a part, every
+  other mechanism one: drag and entrainment at a constant rate are one term.
+- `data/ryggfonn/README.md` says what was assumed: all releases at s = 0, sensors' places inferred, five
+  readings of unknown meaning.
 """
 _UNITS = {"1": "", "m-1": " 1/m", "s-1": " 1/s", "m s-2": " m/s²", "m": " m"}
 
@@ -42,9 +48,9 @@ def page(found: Mapping[str, Found]) -> str:
     """The whole page."""
     parts = [_HEAD, *(_base(title, found[name]) for name, title in LAWS.items())]
     parts += [
-        _growing(found),
-        _dam(found),
-        _between(found),
+        growing(found),
+        dam(found),
+        between(found, tuple(LAWS)),
         words(found["pcm"].get("retardations", [])),
         _robust(found),
         _left(found),
@@ -70,7 +76,7 @@ The six candidates with the most evidence, and the force that is not in the list
 
 | candidate | log Bayes factor | probability | coefficient | where |
 | --- | --- | --- | --- | --- |
-{table}| force not in the list | {unlisted:.1f} | {_share(one["probability"].get("unlisted", 0.0))} | | |
+{table}| force not in the list | {unlisted:.1f} | {share_text(one["probability"].get("unlisted", 0.0))} | | |
 
 ![Where: the missing retardation along the track](figures/ryggfonn-{name}-where.png)
 """
@@ -87,25 +93,25 @@ def _answers(one: Found) -> dict[str, str]:
         )
     if one.get("profile"):
         said["added: a force profile"] = (
-            f"{one['profile']['equation']}, most clearly at {_where(one['location'])}"
+            f"{one['profile']['equation']}, most clearly at {where_text(one['location'])}"
         )
         fronts = {"fast front": "none on a typical front; faster and slower ones feel it with opposite signs"}
         said["mean effect"] = fronts.get(one["missing_work_of"], "on all fronts")
-    said["check"] = (
-        f"p = {_number(evidence['p_value'])}; with what was added {_number(one.get('p_value_augmented'))}"
-    )
+    p_value, again = number_text(evidence["p_value"]), number_text(one.get("p_value_augmented"))
+    said["check"] = f"p = {p_value}; with what was added {again}"
     if clean := one.get("clean"):
         odds = clean["log_odds"]
         said["log odds of anything against `nothing`"] = (
             f"{clean['recordings']:.1f}; of {len(odds)} clean campaigns at most {max(odds):.1f}"
         )
-    said["probability of `nothing`"] = _share(shares["nothing"])
+    said["probability of `nothing`"] = share_text(shares["nothing"])
     said["error models compared"] = f"{', '.join(one.get('error_models', []))}{_under(one)}"
     if one["next_sensor"] and one["next_sensor"]["splits"]:
         place, splits = one["next_sensor"]["s_from_m"], one["next_sensor"]["splits"]
         said["speed that would split the tie best"] = f"at s = {place:.0f} m ({' from '.join(splits)})"
     said["avalanches differ in it: common, spread, some"] = _differ(one)
     said["carried by"] = _carried(one["influence"])
+    said["of the readings"] = _by_readings(one["influence"])
     said["held-out log score"] = (
         f"{evidence['elpd_diff']:+.1f} (doubled standard error {2.0 * evidence['elpd_se']:.1f})"
     )
@@ -129,10 +135,21 @@ def _carried(found: Found) -> str:
     return f"{name}the alarm by {few}: without them {left}"
 
 
+def _by_readings(found: Found) -> str:
+    """Which sensor or kind of readings most hangs on, and what is left without it."""
+    least = min(found["readings"], key=lambda one: one["log_bayes_factor"])
+    without = f"the {least['n']} " + (
+        f"readings of {least['sensor']}" if least["sensor"] else f"readings that are {least['kind']}"
+    )
+    left, needed = least["log_bayes_factor"], found["needed"]
+    enough = "more than" if left > needed else "and not"
+    return f"most hangs on {without}: without them {left:.1f} nats are left, {enough} the {needed:.1f} needed"
+
+
 def _added(row: Found) -> str:
     strength = row["strength"]
     size = f"{strength['mean']:.3g} ± {strength['sd']:.2g}{_UNITS[strength['unit']]}"
-    return f"{size}, {_where(row['location']) or 'along the track'}"
+    return f"{size}, {where_text(row['location']) or 'along the track'}"
 
 
 def _before_after(held: Found, key: str, unit: str, digits: int) -> str:
@@ -146,9 +163,9 @@ def _under(one: Found) -> str:
 def _row(row: Found, probability: float) -> str:
     strength = row["strength"]
     unit = _UNITS[strength["unit"]]
-    where = _where(row["location"]) or row["covariate"] or row["sensor"] or "along the track"
+    where = where_text(row["location"]) or row["covariate"] or row["sensor"] or "along the track"
     return (
-        f"| `{row['id']}` | {row['log_bayes_factor']:.1f} | {_share(probability)} |"
+        f"| `{row['id']}` | {row['log_bayes_factor']:.1f} | {share_text(probability)} |"
         f" {strength['mean']:.3g} ± {strength['sd']:.2g}{unit} | {where} |\n"
     )
 
@@ -160,109 +177,6 @@ def _named(one: Found) -> str:
     return f": {one['mechanism']}{ties}"
 
 
-def _where(location: Found | None) -> str:
-    return "" if location is None else f"{location['s_from_m']:.0f}-{location['s_to_m']:.0f} m"
-
-
-def _share(probability: float) -> str:
-    return f"{probability:.2f}" if probability >= 0.005 else "<0.01"
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2g}"
-
-
-def _candidate(one: Found, name: str) -> Found | None:
-    return next((row for row in one.get("candidates", []) if row["id"] == name), None)
-
-
-def _growing(found: Mapping[str, Found]) -> str:
-    """Whether what M1 lacks grows with speed."""
-    factors = found["coulomb"]["log_bayes_factors"]
-    drags = ("turbulent_drag", "viscous_drag", "segment_drag")
-    others = (
-        "obstacle",
-        "constant_retardation",
-        "segment_friction",
-        "velocity_weakening",
-        "covariate_friction",
-    )
-    best = max(factors, key=lambda name: factors[name])
-    rows = [(name, "yes") for name in drags] + [(name, "no") for name in others]
-    rows.sort(key=lambda row: -factors[row[0]])
-    table = "".join(f"| `{name}` | {grows} | {factors[name]:.1f} |\n" for name, grows in rows)
-    word = "grows with speed" if best in (*drags, "entrainment") else "does not grow with speed"
-    return (
-        "## Does M1 lack a drag that grows with speed?\n\n"
-        "| candidate | grows with speed | log Bayes factor |\n| --- | --- | --- |\n" + table + "\n"
-        f"The candidate with the most evidence, `{best}`, {word}.\n"
-    )
-
-
-def _between(found: Mapping[str, Found]) -> str:
-    """The missing work between the sensors, where the data's README tells of two groups of retardation."""
-    rows = "".join(
-        f"| {name} | {row['s_from_m']:.0f}-{row['s_to_m']:.0f} | {found[name]['missing_work_of']} |"
-        f" {row['mean']:.0f} ± {row['sd']:.0f} |\n"
-        for name in LAWS
-        for row in found[name].get("missing_work", [])
-    )
-    stretch = _candidate(found["pcm"], "segment_friction")
-    said = ""
-    if stretch is not None:
-        said = (
-            f"\nUnder M2 the best friction on a stretch acts at {_where(stretch['location'])}:"
-            f" {stretch['strength']['mean']:.2g} ± {stretch['strength']['sd']:.1g} m/s² beside dry friction"
-            " and drag.\n"
-        )
-    return (
-        "## Between LC and CD\n\n"
-        "LC and CD are sensors at 1650 and 1810 m. Missing specific work is positive where the law\n"
-        "decelerates fronts too little. It is the work of the most probable discrepancy that depends on\n"
-        "speed as the first name does. A compensated force does no work on a typical front. Its row is\n"
-        "for a front that is faster than the typical one by the fronts' spread.\n\n"
-        "| base | s [m] | work on a | missing work [J/kg] |\n| --- | --- | --- | --- |\n" + rows + said
-    )
-
-
-def _dam(found: Mapping[str, Found]) -> str:
-    """The best obstacle under each law, beside the dam."""
-    rows = []
-    for name in ("pcm", "constant"):
-        row = _candidate(found[name], "obstacle")
-        if row is None:
-            rows.append(f"| `{name}` | no comparison was run: {found[name]['reason']} | | | | |")
-            continue
-        middle = 0.5 * (row["location"]["s_from_m"] + row["location"]["s_to_m"])
-        best = max(one["log_bayes_factor"] for one in found[name]["candidates"])
-        near = "yes" if abs(middle - DAM_CROWN_M) <= _NEAR_M else "no"
-        height, share = row["strength"], _share(found[name]["probability"]["obstacle"])
-        rows.append(
-            f"| `{name}` | s = {middle:.0f} m | {near} | {height['mean']:.1f} ± {height['sd']:.1f} m |"
-            f" {row['log_bayes_factor']:.1f}; {row['log_bayes_factor'] - best:+.1f} | {share} |"
-        )
-    return (
-        "## Did the dam stop the avalanches that rest at it?\n\n"
-        "| base | best obstacle | at the dam's crown | height | log Bayes factor against `nothing`; against"
-        " the best | probability |\n| --- | --- | --- | --- | --- | --- |\n" + "\n".join(rows) + "\n\n"
-    ) + _answer(found)
-
-
-def _answer(found: Mapping[str, Found]) -> str:
-    """The answer that the numbers give, and what it would take where they give none."""
-    wins = [name for name in ("pcm", "constant") if found[name]["mechanism"] == "obstacle"]
-    if wins:
-        return f"The diagnosis names an obstacle under {' and '.join(wins)}.\n"
-    return (
-        "The diagnosis does not name the dam under either law. Another candidate explains more of the same\n"
-        "recordings. So these recordings, with these laws, cannot tell whether the dam stopped the\n"
-        "avalanches that rest at it. Two things would help:\n\n"
-        "- speeds of one avalanche just above the foot and just below the crown. The diagnostic signature\n"
-        "  of a dam is the threshold U² = 2 g h between avalanches that pass and those that stop;\n"
-        "- better known places of the upper sensors. They are known to ±20 and ±40 m.\n"
-    )
-
-
 def _robust(found: Mapping[str, Found]) -> str:
     """The sensitivity runs side by side."""
     rows = []
@@ -271,13 +185,18 @@ def _robust(found: Mapping[str, Found]) -> str:
             continue
         listed = sorted(one.get("candidates", []), key=lambda row: -row["log_bayes_factor"])[:2]
         what = "; ".join(
-            f"`{row['id']}` {row['log_bayes_factor']:.1f}, {_where(row['location']) or 'along the track'}"
+            f"`{row['id']}` {row['log_bayes_factor']:.1f}, {where_text(row['location']) or 'along the track'}"
             for row in listed
         )
         said = one["verdict"] + _named(one) + (f": {one['reason']}" if one.get("reason") else "")
-        share = _share(one["probability"].get("unlisted", 0.0))
-        p_value = _number(one["evidence"]["p_value"])
-        rows.append(f"| {name} | {said} | {p_value} | {what} | {share} | {_differ(one)} | {_code(one)} |")
+        share = share_text(one["probability"].get("unlisted", 0.0))
+        p_value, again = number_text(one["evidence"]["p_value"]), number_text(one.get("p_value_augmented"))
+        lc = next(row for row in one["influence"]["readings"] if row["sensor"] == MOVED[0])
+        carried, needed = lc["log_bayes_factor"], one["influence"]["needed"]
+        rows.append(
+            f"| {name} | {said} | {p_value}, {again} | {what} | {share} | {_differ(one)} |"
+            f" {carried:.1f} of {needed:.1f} | {_code(one)} |"
+        )
     scales = found["pcm"].get("prior_scales", {})
     priors = "\n".join(
         f"| `{name}` | {values['0.5']:.1f} | {values['1.0']:.1f} | {values['2.0']:.1f} |"
@@ -297,13 +216,15 @@ uncertain: both up, both down, towards each other |
 | `pcm-places-stated` | these 40 and 20 m are stated as errors (`place_sd_m`), a nuisance of every model |
 | `pcm-with-dam` | the surveyed terrain, with the dam in it |
 
-| case | verdict | p of the check | leading candidates, log Bayes factor | probability of `unlisted` | \
-common, spread, some | code |
-| --- | --- | --- | --- | --- | --- | --- |
+| case | verdict | p of the check, and with what was added | leading candidates, log Bayes factor | \
+probability of `unlisted` | common, spread, some | left without LC, of nats needed | code |
+| --- | --- | --- | --- | --- | --- | --- | --- |
 {chr(10).join(rows)}
 
 *Common, spread, some*: how probably all avalanches have the same strength, differ log-normally, or have it
-only in part. *Along the track* is all of it, or from the first recording on.
+only in part. *Along the track* is all of it, or from the first recording on. *Left without LC*: the log
+Bayes factor of the name without the readings of LC, whose place is inferred, and what a claim needs. At p of
+0.01 the law with what was added is still not all: do not take it for the whole story.
 
 Log Bayes factor of the best shape with the prior of the coefficient half, once and twice as wide:
 
@@ -321,7 +242,7 @@ def _code(one: Found) -> str:
 def _differ(one: Found) -> str:
     """How probable each way is in which avalanches may differ in what was added first."""
     ways = (one.get("strength") or {}).get("ways")
-    return "" if not ways else ", ".join(_share(ways[name]) for name in ("common", "spread", "some"))
+    return "" if not ways else ", ".join(share_text(ways[name]) for name in ("common", "spread", "some"))
 
 
 def _left(found: Mapping[str, Found]) -> str:
@@ -334,7 +255,7 @@ def _left(found: Mapping[str, Found]) -> str:
             continue
         held, gain = one["held_out"], _gain(one["evidence"])
         runout = f"{held['rmse_runout_before']:.0f}, {held['rmse_runout_after']:.0f} m"
-        p_value = _number(one.get("p_value_augmented"))
+        p_value = number_text(one.get("p_value_augmented"))
         rows.append(f"| `{name}` | {_added_terms(one)} | {p_value} | {gain} | {runout} | {_code(one)} |")
     return f"""## With what was added
 
@@ -356,7 +277,8 @@ def _unseen(found: Mapping[str, Found]) -> str:
         usual, exact = found[name]["evidence"], found[name + UNSEEN]["evidence"]
         outer = found[name + UNSEEN]["outer_folds"]
         gains = " | ".join(_gain(one) for one in (usual, exact, outer))
-        rows.append(f"| `{name}` | {_added_terms(found[name])} | {gains} | {_code(found[name + UNSEEN])} |")
+        added = f"{_added_terms(found[name])}; {_added_terms(found[name + UNSEEN])}"
+        rows.append(f"| `{name}` | {added} | {gains} | {_code(found[name + UNSEEN])} |")
         for number, one in enumerate(outer["folds"], start=1):
             names = " and ".join(_named_in_fold(mechanism) for mechanism in one["mechanisms"]) or "nothing"
             without = ", ".join(one["events"])
@@ -372,8 +294,8 @@ repeated without each of {k} parts of them. Each part then judges what was added
 where that is unreliable, and as a check by a refit without each (`--exact-loo`). Changes of the log score,
 with doubled standard errors:
 
-| base | added by all | each left out by weights | refitted without each | whole diagnosis without it \
-| code of the last two |
+| base | added by all: now; by the code of the last two columns | each left out by weights (now) | \
+refitted without each | whole diagnosis without it | that code |
 | --- | --- | --- | --- | --- | --- |
 {chr(10).join(rows)}
 
