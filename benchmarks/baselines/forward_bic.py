@@ -30,7 +30,8 @@ TEMPERATURE = 1.0
 _PLACES = 2
 """Places of a mechanism that are refitted."""
 _GRID = (0.25, 0.7, 1.4, 2.6)
-"""Strengths tried, in scales of the mechanism's prior; and once around the best."""
+"""Strengths tried, in scales of the mechanism; and once around the best. Of the time when a prior had one
+scale, as the limits are that were tuned: a baseline stays what it was."""
 _ROUNDS = 8
 
 

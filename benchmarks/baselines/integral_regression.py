@@ -212,7 +212,10 @@ def _without_outliers(made: Regression, fits: Fits) -> Regression:
 
 
 def log_factors(made: Regression) -> tuple[list[PlacedMechanism], FloatArray]:
-    """Log Bayes factor of every candidate of every shape."""
+    """Log Bayes factor of every candidate of every shape.
+
+    By a prior of one scale, as the limits were tuned by: a baseline stays what it was.
+    """
     todo = placed_mechanisms(made.setting)
     n_base = made.x.shape[2] - 1
     of = products(made.x, made.y, made.columns([one.direction for one in todo]))

@@ -41,7 +41,7 @@ FloatArray = NDArray[np.float64]
 DRAWS = 100
 """Effects of each arm hidden in a campaign, their signal-to-noise evenly over the whole range."""
 STRONGEST = 4.0
-"""Strength of a hidden effect in scales of its prior, at most."""
+"""Strength of a hidden effect in scales of its mechanism, at most."""
 BY_COVARIATE = "covariate_friction"
 ARMS: dict[str, Callable[[PlacedMechanism], bool]] = {
     "masked": lambda one: (

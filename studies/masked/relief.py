@@ -32,7 +32,7 @@ FACTORS = (0.9, 0.95, 1.0, 1.05, 1.1)
 LEFT_OUT = ("1471600277", "1152334902", "1324747921")
 """Batches whose diagnoses did not look for what is opposed; and what came of this study was in the last."""
 STRENGTHS = (0.1, 0.25, 0.5, 1.0, 2.0, 3.5)
-"""In scales of the prior."""
+"""In scales of the mechanism."""
 app = cyclopts.App(help=__doc__)
 
 
@@ -51,13 +51,13 @@ def told_of(sealed: dict[str, Any], found: float | None) -> dict[str, Any]:
 
 def _at(base: Base, name: str, place: tuple[float, float], factor: float) -> float:
     """Log Bayes factor of a mechanism on a stretch, opposed at a multiple of the typical speed."""
-    # The prior as it was in those diagnoses, not three times as wide.
+    # The prior as it was in those diagnoses: of one scale, not three times as wide where opposed.
     mechanism = mechanisms()[name]
     speeds = factor * np.interp(place, base.setting.terrain.edge_s_m, base.setting.front_speed)
     shape = Shape(*place, constants=((U_1, float(speeds[0])), (U_2, float(speeds[1]))))
     candidate = placed(mechanism, base.setting, shape)
     rough = curve_at(base, candidate, candidate.added.scale * np.array(STRENGTHS), USUAL)
-    return curve_near(base, rough, shape).log_bayes_factor
+    return curve_near(base, rough, shape).log_factor_of(scales=(1.0,))
 
 
 def opposed_trials() -> dict[str, tuple[dict[str, Any], float | None]]:

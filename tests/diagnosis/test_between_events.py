@@ -18,7 +18,7 @@ from skred.campaign import Campaign, Status, find_campaign, read_campaign
 from skred.diagnosis.augment.added_strength import added_strengths, components_of, new_rows
 from skred.diagnosis.augment.augmented import augmented_problem
 from skred.diagnosis.augment.coefficient import multiples_of_events
-from skred.diagnosis.compare.between import finer, may_differ, searched, with_ways
+from skred.diagnosis.compare.between import SEARCH, finer, may_differ, searched, with_ways
 from skred.diagnosis.compare.candidate import BESIDE, Candidate, all_but_place, with_or_without
 from skred.diagnosis.compare.comparison import with_errors
 from skred.diagnosis.compare.recomputed import computed_again
@@ -26,7 +26,9 @@ from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.compare.ways import Looked, gains_of, gains_over, over_ways
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
 from skred.diagnosis.evidence.extension import extended, setting_of
+from skred.diagnosis.tabulated.between_evidence import BetweenTarget, searched_evidence
 from skred.diagnosis.tabulated.coefficient_grid import from_nothing
+from skred.diagnosis.tabulated.tables import wide_tables
 from skred.inference.between_events import (
     PRIOR,
     SPREAD_LOG_SD,
@@ -46,6 +48,7 @@ from skred.inference.sampling import SamplerSettings
 from skred.physics.laws import load_law
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import direction_of, placed
+from skred.physics.mechanisms.strength_prior import log_prior_density
 
 COMMON, SPREAD, SOME = BetweenEvents
 RYGGFONN = read_campaign(find_campaign("ryggfonn"))
@@ -123,7 +126,7 @@ def dense_log_evidence(base: Base, found: Curve, way: BetweenEvents) -> float:
     prior = halfnorm.logpdf(np.exp(means), scale=scale) + means + np.log(width)
     of_spread = lognorm.logpdf(spreads, TAU_LOG_SD, scale=TAU_MEDIAN) + np.log(np.gradient(spreads))
     population = prior[:, None] + of_spread
-    density = norm.logpdf(strengths, 0.0, found.scale) + (0.0 if found.added.either_sign else np.log(2.0))
+    density = log_prior_density(strengths, found.scale, either_sign=found.added.either_sign)
     width = np.full(len(strengths), strengths[1])
     width[[0, -1]] *= 0.5
     of_strength = density + np.log(width)
@@ -319,6 +322,21 @@ def test_tables_reach_what_single_avalanches_have(few: tuple[Base, Curve]) -> No
     mean, sd = found.moments
     [end] = from_nothing(found, base.fit.found, mean, sd).grid.points[-1]
     assert end == pytest.approx(4.0 * (mean + sd)) and end > 4.5 * found.scale
+
+
+def test_tables_reach_farther_where_few_avalanches_have_it() -> None:
+    """Three of 22 have ten times what all could have in common."""
+    own = np.where(np.isin(np.arange(22), (9, 15, 21)), 9.6, 0.0)
+    base = base_of(made_campaign("coulomb", [0.36], [0.2], own, seed=44), "coulomb")
+    found = stretch_curve(base)
+    assert 0.0 < found.moments[0] < 1.2
+    ways = searched(base, found)
+    near = found.nearest(found.moments[0]).found
+    target = BetweenTarget(base, found, wide_tables(base, found, near, SEARCH), SOME)
+    as_usual = searched_evidence(target, near)
+    assert as_usual.at_end > 0.5 and ways[SOME].times > 1 and ways[SOME].at_end < 1e-3
+    assert ways[SOME].strength[0] == pytest.approx(9.6, rel=0.2)
+    assert ways[SOME].log_factor > as_usual.log_factor + 5.0
 
 
 def test_gains_share_the_prior() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from skred.diagnosis.evidence.over_scales import over_scales
+from skred.diagnosis.evidence.over_scales import log_over_scales, moments_over_scales
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import PlacedMechanism
 from skred.physics.mechanisms.spec import Direction, Shape
@@ -25,7 +25,7 @@ def test_against_the_trapezium_rule(name: str, top: float, sd: float) -> None:
     either, wide = one.added.either_sign, one.widest / one.scale
     variance = 1.0 / (sd**-2.0 + wide**-2.0)
     mean = variance * top / sd**2
-    found = over_scales(mean * one.scale, variance * one.scale**2, one)
+    given = mean * one.scale, variance * one.scale**2, one
     x = np.linspace(-60.0 if either else 0.0, 60.0, 400_001)
     log_likelihood = -0.5 * ((x - top) / sd) ** 2
     whole = np.exp(log_likelihood + log_prior_density(x, 1.0, either_sign=either))
@@ -33,17 +33,17 @@ def test_against_the_trapezium_rule(name: str, top: float, sd: float) -> None:
     under_widest = np.exp(-0.5 * ((both - top) / sd) ** 2 - 0.5 * (both / wide) ** 2) / wide
     expected = np.log(np.trapezoid(whole, x))
     expected -= np.log(np.trapezoid(under_widest, both) / np.sqrt(2.0 * np.pi))
-    assert found.log_factor == pytest.approx(expected, abs=1e-4)
-    if either:
-        share = whole / np.trapezoid(whole, x)
-        middle = np.trapezoid(share * x, x)
-        assert found.mean / one.scale == pytest.approx(middle, abs=1e-4)
-        assert found.sd / one.scale == pytest.approx(
-            np.trapezoid(share * (x - middle) ** 2, x) ** 0.5, rel=1e-4
-        )
+    assert log_over_scales(*given) == pytest.approx(expected, abs=1e-4)
+    share = whole / np.trapezoid(whole, x)
+    middle = np.trapezoid(share * x, x)
+    found_mean, found_sd = moments_over_scales(*given)
+    assert found_mean / one.scale == pytest.approx(middle, abs=1e-4)
+    assert found_sd / one.scale == pytest.approx(np.trapezoid(share * (x - middle) ** 2, x) ** 0.5, rel=1e-4)
 
 
 def test_far_below_nil_there_is_no_float_of_its_share() -> None:
     one = placed("segment_drag")
-    found = over_scales(-60.0 * one.scale, 4.0 * one.scale**2, one)
-    assert np.isfinite(found.log_factor) and found.log_factor < -100.0
+    given = -60.0 * one.scale, 4.0 * one.scale**2, one
+    log_factor, (mean, sd) = log_over_scales(*given), moments_over_scales(*given)
+    assert np.isfinite(log_factor) and log_factor < -100.0
+    assert 0.0 < mean < one.scale and 0.0 < sd < one.scale

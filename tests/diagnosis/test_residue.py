@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from diagnosis_cases import base_of
 from rolling_cases import entering, rolling, speed
-from scipy.stats import norm
 
 from skred.campaign import Campaign
 from skred.diagnosis.compare.candidate import Beside, Candidate, names_of_constants, with_or_without
@@ -29,6 +28,7 @@ from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Shape
+from skred.physics.mechanisms.strength_prior import log_prior_density
 
 DRAG = mechanisms()["turbulent_drag"]
 
@@ -113,7 +113,7 @@ def test_evidence_of_both_is_that_of_the_force_at_each_strength_of_the_mechanism
             held = replace(base, directions=(along.direction,), strengths=np.array([strength]), fit=near)
             forces = [sampled(held, fit_profile(held, kind), pool) for kind in KINDS]
             heights.append(along.log_evidence[-1] + log_evidence_of(forces))
-    log_density = np.array(heights) + norm(scale=DRAG.added.scale).logpdf(strengths) + np.log(2.0)
+    log_density = np.array(heights) + log_prior_density(strengths, DRAG.added.scale, either_sign=False)
     by_strength = np.log(np.trapezoid(np.exp(log_density - 100.0)[::-1], strengths[::-1])) + 100.0
     before = laplace[DRAG.id].residue
     assert one.residue is not None and before is not None and before < one.residue

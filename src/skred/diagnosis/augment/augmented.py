@@ -54,7 +54,7 @@ def augmented_problem(
             ways = finer(base, curves[0], ways)
         found = ways[way]
         # Half the steps of a comparison's: what is left of errors there is between the strengths.
-        located = from_nothing(curves[0], found.populations, *found.strength).finer
+        located = from_nothing(curves[0], found.populations, *found.strength, found.times).finer
     old, tables = base.problem, build_tables(base, extension, located, FINE)
     return AugmentedProblem(
         old.campaign, old.terrain, old.error_model, old.place_sd_m, base=base, added=added, tables=tables

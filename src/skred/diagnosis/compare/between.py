@@ -36,6 +36,8 @@ from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism
 
 SEARCH = Budget(64, 64, 128, 1.5, 1.8)
 """Quadrature points of an event in the tables by which modes are looked for."""
+_MOST_TIMES = 4
+"""How many times as far as usual tables reach at most, which bounds the time."""
 _DIFFERING = BetweenEvents.SPREAD, BetweenEvents.SOME
 
 
@@ -98,17 +100,28 @@ def or_none[Found](compute: Callable[..., Found], *given: Any) -> Found | None:
 
 
 def searched(base: Base, curve: Curve) -> Ways:
-    """Each way at a curve's shape, by tables that are fine enough to find where it is."""
-    near = curve.nearest(curve.moments[0]).found
-    tables = wide_tables(base, curve, near, SEARCH)
-    return {kind: searched_evidence(BetweenTarget(base, curve, tables, kind), near) for kind in _DIFFERING}
+    """Each way at a curve's shape, by tables that are fine enough to find where it is.
+
+    Twice as far as long as there is something at their end: where few avalanches have it, each has many times
+    what all could have in common.
+    """
+    near, times = curve.nearest(curve.moments[0]).found, 1
+    while True:
+        tables = wide_tables(base, curve, near, SEARCH, times)
+        ways = {
+            kind: searched_evidence(BetweenTarget(base, curve, tables, kind), near) for kind in _DIFFERING
+        }
+        if all(one.at_end < math.exp(-COUNTS) for one in ways.values()) or times >= _MOST_TIMES:
+            return ways
+        times *= 2
 
 
 def finer(base: Base, curve: Curve, ways: Ways) -> Ways:
     """The same by many more quadrature points, around the populations of the most probable way."""
     if not ways:
         return {}
-    tables = wide_tables(base, curve, _most_probable(ways).populations, FINE)
+    likely = _most_probable(ways)
+    tables = wide_tables(base, curve, likely.populations, FINE, likely.times)
     return {
         kind: between_evidence(BetweenTarget(base, curve, tables, kind), way.proposal)
         for kind, way in ways.items()

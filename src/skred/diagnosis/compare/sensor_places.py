@@ -24,7 +24,7 @@ from skred.diagnosis.discrepancy.explored import Expansion, Laplace, laplace
 from skred.diagnosis.discrepancy.fit import Start, fit_profile
 from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of
 from skred.diagnosis.evidence.coefficient import Base, Curve
-from skred.diagnosis.evidence.over_scales import over_scales
+from skred.diagnosis.evidence.over_scales import moments_over_scales
 from skred.diagnosis.evidence.refit import Fit
 from skred.diagnosis.evidence.stated_places import EXACT, StatedPlaces, stated_places
 
@@ -121,7 +121,7 @@ def _maximum(law: Base, places: StatedPlaces, start: Expansion, cover: FloatArra
 
 def _log_factor(there: Laplace) -> float:
     """Log evidence, against that of what the gain is over."""
-    return there.gain - there.prior_penalty - there.occam_penalty
+    return there.gain - there.prior_penalty - there.occam_penalty + there.of_scales
 
 
 class _Changed(NamedTuple):
@@ -199,11 +199,11 @@ def _with_coefficient(base: Base, curve: Curve, nothing: Shifts) -> tuple[Expans
     if one_sided and found.values[0] <= 0.0:  # where no front goes
         found = expanded_at(law, places, np.append(0.0, nothing.mean), law.fit.start)
     # No score is followed to where nothing was computed: where fronts stop it can be any number.
-    there = laplace(arrived(found, np.linalg.inv(cover)), 0.0, cover)
+    there = laplace(arrived(found, np.linalg.inv(cover)), 0.0, cover, curve)
     if one_sided and there.values[0] <= 0.0:  # the curve says what the expansion at nil cannot
         return found, base.fit.found.log_evidence + nothing.log_factor + moved.log_bayes_factor, None
-    over = over_scales(float(there.values[0]), float(there.covariance[0, 0]), curve)
-    return found, _log_factor(there) + over.log_factor, Strength(over.mean, over.sd)
+    moments = moments_over_scales(float(there.values[0]), float(there.covariance[0, 0]), curve)
+    return found, _log_factor(there), Strength(*moments)
 
 
 def _top(curve: Curve) -> tuple[float, Fit]:

@@ -14,8 +14,10 @@ import numpy as np
 from skred.arrays import FloatArray
 from skred.diagnosis.discrepancy.profile import Prior
 from skred.diagnosis.evidence.adaptive_sampling import Mode
+from skred.diagnosis.evidence.over_scales import log_over_scales
 from skred.diagnosis.evidence.refit import Fit
 from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING
+from skred.physics.mechanisms.placed import PlacedMechanism
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +56,8 @@ class Laplace(NamedTuple):
     values : (n,) array
     covariance : (n, n) array
         Of the values, by prior and recordings together.
+    of_scales : float
+        What the other scales of the first value's prior add, if that is the strength of a mechanism.
     """
 
     gain: float
@@ -61,10 +65,11 @@ class Laplace(NamedTuple):
     occam_penalty: float
     values: FloatArray
     covariance: FloatArray
+    of_scales: float = 0.0
 
     def log_factor(self, most: float = math.inf) -> float:
         """Log Bayes factor if no values gain more than `most`; at least that of no force at all."""
-        return max(self._above_none(most), 0.0) - self.occam_penalty
+        return max(self._above_none(most), 0.0) - self.occam_penalty + self.of_scales
 
     def mode(self, most: float) -> Mode:
         """Where values are; around none where no force at all is better."""
@@ -93,6 +98,8 @@ class ExploredPriors:
         Covariance of the values under each.
     least : float
         Log Bayes factor below which nothing more need be known.
+    beside : PlacedMechanism, optional
+        Whose strength is the first of the values.
     """
 
     def __init__(
@@ -101,7 +108,9 @@ class ExploredPriors:
         shares: dict[Prior, float],
         covers: dict[Prior, FloatArray],
         least: float = 0.0,
+        beside: PlacedMechanism | None = None,
     ) -> None:
+        self.beside = beside
         self.height, self.shares, self.covers, self.least = height, shares, covers, least
         self.maxima: dict[Prior, Expansion] = {}
         self.approximations: dict[Prior, dict[Prior, Laplace]] = {prior: {} for prior in shares}
@@ -110,7 +119,7 @@ class ExploredPriors:
         """A maximum under a prior."""
         self.maxima[climbed] = maximum
         for prior, cover in self.covers.items():
-            self.approximations[prior][climbed] = laplace(maximum, self.height, cover)
+            self.approximations[prior][climbed] = laplace(maximum, self.height, cover, self.beside)
 
     def factor(self, prior: Prior, most: float = math.inf) -> float:
         """Log Bayes factor and log prior probability of a prior, as far as is known."""
@@ -170,7 +179,9 @@ class ExploredPriors:
         return max(most, 0.0)
 
 
-def laplace(maximum: Expansion, height: float, cover: FloatArray) -> Laplace:
+def laplace(
+    maximum: Expansion, height: float, cover: FloatArray, beside: PlacedMechanism | None = None
+) -> Laplace:
     """The Laplace approximation of a prior's evidence.
 
     Parameters
@@ -180,7 +191,9 @@ def laplace(maximum: Expansion, height: float, cover: FloatArray) -> Laplace:
     height : float
         Log evidence of no force.
     cover : (n, n) array
-        Covariance of the values under the prior.
+        Covariance of the values under the prior: of a mechanism's strength, under the widest of its scales.
+    beside : PlacedMechanism, optional
+        Whose strength is the first of the values.
     """
     precision = np.linalg.inv(cover)
     left = np.linalg.inv(maximum.information + precision)
@@ -189,7 +202,8 @@ def laplace(maximum: Expansion, height: float, cover: FloatArray) -> Laplace:
     gain = maximum.fit.found.log_evidence - height + score @ step - 0.5 * step @ information @ step
     values = maximum.values + step
     penalties = prior_penalty(values, precision), occam_penalty(maximum, cover)
-    return Laplace(float(gain), *penalties, values, 0.5 * (left + left.T))
+    of_scales = 0.0 if beside is None else log_over_scales(float(values[0]), float(left[0, 0]), beside)
+    return Laplace(float(gain), *penalties, values, 0.5 * (left + left.T), of_scales)
 
 
 def prior_penalty(values: FloatArray, precision: FloatArray) -> float:

@@ -32,7 +32,6 @@ from skred.diagnosis.discrepancy.profile import (
 from skred.diagnosis.evidence.adaptive_sampling import Mode
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.conditional_map import Population
-from skred.diagnosis.evidence.over_scales import over_scales
 from skred.diagnosis.evidence.stated_places import EXACT, StatedPlaces
 from skred.diagnosis.evidence.tolerance import DECIDES_NOTHING
 
@@ -87,7 +86,7 @@ def fit_profile(
         starts.append(expanded_at(base, kind, *near))
     shares = priors_of(kind, at)
     covers = {prior: _with_more(scales, prior.cover(at)) for prior in shares}
-    explored = ExploredPriors(height, shares, covers, least)
+    explored = ExploredPriors(height, shares, covers, least, beside)
     waiting, most = ([again], _PRIORS_AGAIN) if again else (_first(kind, starts[-1], explored), _PRIORS_TRIED)
     while waiting and len(explored.maxima) < most:
         prior = waiting.pop()
@@ -104,8 +103,6 @@ def fit_profile(
     values, cover, factor, modes = there.values, there.covariance, explored.log_factor, explored.modes
     if n_beside:
         modes = ()  # of all together, and so of no force by itself
-    if beside is not None:
-        factor += over_scales(float(values[0]), float(cover[0, 0]), beside).log_factor
     gain, values, cover = fit.found.log_evidence - height, values[n_beside:], cover[n_beside:, n_beside:]
     return Profile(kind, prior, at, values, cover, factor, gain, fit, modes)
 

@@ -145,14 +145,18 @@ class Curve(PlacedMechanism):
         # As many between each two that were computed: these lie close where the curve is narrow.
         parts = np.linspace(self.strengths[:-1], self.strengths[1:], _BETWEEN, endpoint=False, axis=1)
         strengths = np.append(parts.ravel(), self.strengths[-1])
-        floor = self.log_evidence.max() - _DEEP
-        heights = np.maximum(self.log_evidence, floor)
+        heights = np.maximum(self.log_evidence, self.floor)
         spline = Akima1DInterpolator(self.strengths, heights, method="makima")
         return strengths, spline(strengths) + self.log_prior(strengths, scales)
 
     def log_prior(self, strengths: FloatArray, scales: Sequence[float] = SCALES) -> FloatArray:
         """Log density of the strength's prior, of some scales in its mechanism's."""
         return log_prior_density(strengths, self.scale, either_sign=self.added.either_sign, scales=scales)
+
+    @property
+    def floor(self) -> float:
+        """Log evidence that all counts for which has less."""
+        return float(self.log_evidence.max()) - _DEEP
 
     @property
     def is_cut(self) -> bool:

@@ -3,33 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from scipy.special import log_ndtr
+from scipy.stats import truncnorm
 
+from skred.arrays import FloatArray
 from skred.physics.mechanisms.placed import PlacedMechanism
 from skred.physics.mechanisms.strength_prior import SCALES
 
 
-class OverScales(NamedTuple):
-    """What the other scales change.
-
-    Attributes
-    ----------
-    log_factor : float
-        To be added to the log evidence under the widest normal prior.
-    mean, sd : float
-        Of the strength.
-    """
-
-    log_factor: float
-    mean: float
-    sd: float
-
-
-def over_scales(mean: float, variance: float, placed: PlacedMechanism) -> OverScales:
-    """Evidence and moments of a strength under its whole prior, of all scales and one side of nil or both.
+def log_over_scales(mean: float, variance: float, placed: PlacedMechanism) -> float:
+    """What all scales, and one side of nil or both, add to the log evidence under the widest normal prior.
 
     Parameters
     ----------
@@ -38,6 +23,24 @@ def over_scales(mean: float, variance: float, placed: PlacedMechanism) -> OverSc
     placed : PlacedMechanism
         Whose strength it is.
     """
+    log_each, _, _ = _each(mean, variance, placed)
+    return float(np.logaddexp.reduce(log_each)) - math.log(len(SCALES))
+
+
+def moments_over_scales(mean: float, variance: float, placed: PlacedMechanism) -> tuple[float, float]:
+    """Mean and standard deviation of the strength under its whole prior; parameters as `log_over_scales`."""
+    log_each, means, variances = _each(mean, variance, placed)
+    if not placed.added.either_sign:
+        sds = np.sqrt(variances)
+        cut = truncnorm.stats(-means / sds, np.inf, means, sds, moments="mv")
+        means, variances = (np.asarray(one) for one in cut)
+    shares = np.exp(log_each - np.logaddexp.reduce(log_each))
+    middle = float(shares @ means)
+    return middle, math.sqrt(float(shares @ (variances + (means - middle) ** 2)))
+
+
+def _each(mean: float, variance: float, placed: PlacedMechanism) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """What each scale adds to the log evidence, and mean and variance under it at either side of nil."""
     scales = placed.scale * np.array(SCALES)
     sharper = scales**-2.0 - placed.widest**-2.0
     room = 1.0 + variance * sharper
@@ -45,8 +48,4 @@ def over_scales(mean: float, variance: float, placed: PlacedMechanism) -> OverSc
     log_each = np.log(placed.widest / scales) - 0.5 * np.log(room) - 0.5 * mean**2 * sharper / room
     if not placed.added.either_sign:
         log_each += math.log(2.0) + log_ndtr(means / np.sqrt(variances))
-    total = float(np.logaddexp.reduce(log_each))
-    shares = np.exp(log_each - total)
-    middle = float(shares @ means)
-    sd = math.sqrt(float(shares @ (variances + (means - middle) ** 2)))
-    return OverScales(total - math.log(len(scales)), middle, sd)
+    return log_each, means, variances

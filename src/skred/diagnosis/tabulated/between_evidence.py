@@ -22,6 +22,7 @@ from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.marginal import Evidence, curvatures, population_at
 from skred.diagnosis.evidence.population_target import NARROWEST, log_prior
+from skred.diagnosis.tabulated.coefficient_grid import TABLES
 from skred.diagnosis.tabulated.tables import Tables
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.between_events import BetweenEvents, components, from_unbounded
@@ -55,6 +56,10 @@ class Way(NamedTuple):
         Adapted to it.
     budget : Budget
         Quadrature points of the tables that it is by.
+    times : int
+        How many times as far as usual these tables reach.
+    at_end : float
+        Share of it that is in the last step of the tables.
     """
 
     log_factor: float
@@ -62,6 +67,8 @@ class Way(NamedTuple):
     strength: tuple[float, float]
     proposal: Mixture
     budget: Budget
+    times: int = 1
+    at_end: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,9 +144,12 @@ def between_evidence(target: BetweenTarget, proposal: Mixture, seed: int = 72) -
     middle, moments = float(shares @ strengths), found._replace(draws=psi).moments
     populations = Evidence(found.log_integral, *moments, found.error)
     sd = math.sqrt(float(shares @ (strengths - middle) ** 2))
-    budget = target.tables.budget
+    grid, budget = target.tables.grid, target.tables.budget
+    at_end = float(shares @ (np.abs(strengths) > np.abs(grid.points[-2, 0])))
+    times = int(grid.size[0] - 1) // (TABLES[1] - 1)
     nothing = target.base.with_nothing(budget, sampled=True).found.log_evidence
-    return Way(found.log_integral - nothing, populations, (middle, sd), found.proposal, budget)
+    log_factor = found.log_integral - nothing
+    return Way(log_factor, populations, (middle, sd), found.proposal, budget, times, at_end)
 
 
 def _climbed(target: BetweenTarget, start: FloatArray) -> FloatArray:

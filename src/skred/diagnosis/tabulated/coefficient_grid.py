@@ -23,7 +23,7 @@ _REACH = 5.0
 _ENDS_NATS = 8.0
 """How far below the maximum the edge of a grid must be to be the end: four standard deviations."""
 _FARTHEST = 4.0
-"""How many times what all may have in common tables reach where avalanches differ in it."""
+"""How many times what all may have in common tables reach at first where avalanches differ in it."""
 
 
 class Grid(NamedTuple):
@@ -106,10 +106,10 @@ class Located(NamedTuple):
 
 def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located:
     """Put a grid where curves have the strengths, and move its ends until it covers their posterior."""
-    scale = np.array([curve.scale for curve in curves])
+    scale, widest = (np.array(of) for of in zip(*((one.scale, one.widest) for one in curves), strict=True))
     low, slack = np.where([curve.added.either_sign for curve in curves], -np.inf, 0.0), 1e-9 * scale
     mean, sd = (np.array(values) for values in zip(*(curve.moments for curve in curves), strict=True))
-    factor, ends = np.diag(np.clip(sd, 0.01 * scale, scale)), np.full(len(curves), _REACH)
+    factor, ends = np.diag(np.clip(sd, 0.01 * scale, widest)), np.full(len(curves), _REACH)
     grid = _grid(mean, factor, (-ends, ends), low)
     near = [curves[-1].nearest(strength) for strength in grid.points[:, -1]]
     for look in range(MOST_ROUNDS):
@@ -140,7 +140,7 @@ def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located
     return Located(grid, fits, mean, factor)
 
 
-def from_nothing(curve: Curve, found: Evidence, mean: float, sd: float) -> Located:
+def from_nothing(curve: Curve, found: Evidence, mean: float, sd: float, times: int = 1) -> Located:
     """A grid of one strength from none at all to far beyond what all avalanches could have in common.
 
     Where avalanches differ in it, some have none and others several times as much.
@@ -151,11 +151,13 @@ def from_nothing(curve: Curve, found: Evidence, mean: float, sd: float) -> Locat
         Populations around all of it.
     mean, sd : float
         Of the strength.
+    times : int
+        How many times as far as usual it reaches, by as many more tables.
     """
     common, common_sd = curve.moments
-    farthest = math.copysign(_FARTHEST * (abs(common) + common_sd), common)
-    size = TABLES[1]
-    grid = Grid(np.zeros(1), np.array([[farthest / (size - 1)]]), np.array([size]))
+    step = math.copysign(_FARTHEST * (abs(common) + common_sd), common) / (TABLES[1] - 1)
+    size = times * (TABLES[1] - 1) + 1
+    grid = Grid(np.zeros(1), np.array([[step]]), np.array([size]))
     fits = [Fit(found, curve.nearest(float(strength)).points) for strength in grid.points[:, 0]]
     return Located(grid, fits, np.array([mean]), np.array([[sd]]))
 

@@ -82,9 +82,9 @@ def build_tables(
     return Tables(located, nodes.nodes, nodes.points[:, :, n].ravel(), points, budget)
 
 
-def wide_tables(base: Base, curve: Curve, found: Evidence, budget: Budget) -> Tables:
-    """Tables of one mechanism in which avalanches differ; populations as `from_nothing` has them."""
-    located = from_nothing(curve, found, *curve.moments)
+def wide_tables(base: Base, curve: Curve, found: Evidence, budget: Budget, times: int = 1) -> Tables:
+    """Tables of one mechanism in which avalanches differ; parameters as `from_nothing` has them."""
+    located = from_nothing(curve, found, *curve.moments, times)
     return build_tables(base, base.extended(curve.direction), located, budget)
 
 

@@ -17,6 +17,7 @@ from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.comparison import Comparison
 from skred.diagnosis.compare.location import Location
 from skred.diagnosis.evidence.coefficient import Curve
+from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.diagnosis.outcome import Diagnosis, NotDiagnosed, Outcome
 from skred.diagnosis.verdict.conditional import conditional_dataset
 from skred.diagnosis.verdict.mechanisms import candidates_of
@@ -161,8 +162,13 @@ def _fine(curve: Curve) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def _factor_at(candidate: Candidate, relative: float) -> float:
-    """Log Bayes factor of a candidate with its prior scale multiplied; re-computed at its own scale alone."""
+    """Log Bayes factor of a candidate with its prior scales multiplied; re-computed at its own alone.
+
+    NaN where so little of a narrow prior is near the evidence that none of it is known.
+    """
     scales = [relative * one for one in SCALES]
+    if candidate.best.log_factor_of(scales=scales) < candidate.best.floor + COUNTS:
+        return math.nan
     factors = [one.log_factor_of(scales=scales) for one in candidate.curves]
     moved = float(logsumexp(candidate.log_weights + np.array(factors)) - logsumexp(candidate.log_factors))
     return candidate.log_bayes_factor + moved

@@ -225,7 +225,7 @@ def _scales(
     ticks = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
     axes.set_xticks(ticks, [fixed(t, 1) if t < 1 else f"{t:.0f}" for t in ticks])
     axes.minorticks_off()
-    axes.set_xlabel("scale of the coefficient's prior, relative to the one used (dashed) [-]")
+    axes.set_xlabel("scales of the coefficient's prior, relative to those used (dashed) [-]")
     axes.set_ylabel("log Bayes factor\nagainst nothing [nats]")
     axes.grid(axis="y", color=PALE)
     columns = 1 if is_narrow() else 2
