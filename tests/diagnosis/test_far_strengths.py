@@ -11,6 +11,7 @@ from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.evidence.coefficient import curve_at, curve_near
 from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.refit import Rounds, refit
+from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.inference.hierarchical.population import population_samples
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import placed
@@ -41,6 +42,16 @@ def test_a_curve_goes_on_to_a_maximum_far_away() -> None:
     shape = Shape(s_from_m=1599.0, s_to_m=1674.0)
     found = curve_near(base, curve(base, placed(mechanisms()["segment_drag"], base.setting, shape)), shape)
     assert not found.is_cut and 0 < np.argmax(found.log_evidence) < len(found.strengths) - 1
+
+
+@pytest.mark.parametrize("law", ["coulomb", "constant"])
+def test_screening_goes_on_where_evidence_rises_to_the_last_strength(law: str) -> None:
+    """A climb that ends on the way up left a place tens of nats too low, and it was not looked at again."""
+    base, shape = ryggfonn_base(law), Shape(s_from_m=1599.0, s_to_m=1674.0)
+    screened = curve(base, placed(mechanisms()["segment_drag"], base.setting, shape))
+    closer = curve_near(base, screened, shape)
+    assert screened.rising_end is None and closer.log_bayes_factor > 80.0
+    assert screened.log_bayes_factor == pytest.approx(closer.log_bayes_factor, abs=COUNTS)
 
 
 @pytest.mark.slow

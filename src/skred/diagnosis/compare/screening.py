@@ -14,8 +14,11 @@ from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.evidence.coefficient import NEAR, Base, Curve, curve_at
 from skred.diagnosis.evidence.event_quadrature import SCREENING
 from skred.diagnosis.evidence.global_start import Start, first_strengths, global_starts
-from skred.diagnosis.evidence.tolerance import COUNTS
+from skred.diagnosis.evidence.tolerance import COUNTS, MOST_ROUNDS
 from skred.physics.mechanisms.placed import PlacedMechanism
+
+_FARTHER = np.array([1.4, 2.0])
+"""How many times as far a curve goes on that rises to its end: a climb can end long before the top."""
 
 
 def curve(base: Base, candidate: PlacedMechanism) -> Curve:
@@ -29,7 +32,8 @@ def curve_about(base: Base, candidate: PlacedMechanism, starts: Sequence[Start])
     """Evidence along the strength of a mechanism where climbs begin, and about where some have led.
 
     Many recordings tell strengths far below the prior's scale, or far beyond what a refit from the base law
-    reaches; strengths over the prior alone would miss where the evidence is.
+    reaches; strengths over the prior alone would miss where the evidence is. Where it rises to the last of
+    them, others beyond are looked at.
     """
     scale, either_sign = candidate.scale, candidate.added.either_sign
     begin = {0.0: base.fit} | {one.strength: one.fit for one in starts if one.strength != 0.0}
@@ -37,7 +41,12 @@ def curve_about(base: Base, candidate: PlacedMechanism, starts: Sequence[Start])
     strengths = np.append(first_strengths(scale, either_sign), about)
     if not either_sign:
         strengths = strengths[strengths > 0.0]
-    return curve_at(base, candidate, np.unique(strengths), SCREENING, begin=begin)
+    found = curve_at(base, candidate, np.unique(strengths), SCREENING, begin=begin)
+    for _ in range(MOST_ROUNDS):
+        if (end := found.rising_end) is None:
+            break
+        found = found.with_more(curve_at(base, candidate, end * _FARTHER, SCREENING, begin=found.known))
+    return found
 
 
 def screened(

@@ -28,7 +28,7 @@ from skred.diagnosis.evidence.extension import Extension, extended, setting_of, 
 from skred.diagnosis.evidence.linear_mixed_model import median_log_scale
 from skred.diagnosis.evidence.marginal import coordinates, evidence, population_at
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
-from skred.diagnosis.evidence.tolerance import COUNTS, MOST_ROUNDS
+from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING, MOST_ROUNDS
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.hierarchical.surface import Nodes
 from skred.physics.law import Law
@@ -152,6 +152,27 @@ class Curve(PlacedMechanism):
     def log_prior(self, strengths: FloatArray, scales: Sequence[float] = SCALES) -> FloatArray:
         """Log density of the strength's prior, of some scales in its mechanism's."""
         return log_prior_density(strengths, self.scale, either_sign=self.added.either_sign, scales=scales)
+
+    @property
+    def rising_end(self) -> float | None:
+        """The strength at an end where it is most probable, if that decides anything: it is no maximum."""
+        density = self.log_evidence + self.log_prior(self.strengths)
+        top = int(np.argmax(density))
+        nothing = int(np.searchsorted(self.strengths, 0.0))
+        at_end = top != nothing and top in (0, len(density) - 1)
+        return (
+            float(self.strengths[top])
+            if at_end and density[top] > density[nothing] + DECIDES_NOTHING
+            else None
+        )
+
+    def with_more(self, other: Curve) -> Curve:
+        """With the strengths of another curve of the same mechanism and shape as well."""
+        found = dict(zip(other.strengths, zip(other.log_evidence, other.fits, strict=True), strict=True))
+        found |= dict(zip(self.strengths, zip(self.log_evidence, self.fits, strict=True), strict=True))
+        strengths = sorted(found)
+        heights, fits = zip(*(found[one] for one in strengths), strict=True)
+        return replace(self, strengths=np.array(strengths), log_evidence=np.array(heights), fits=fits)
 
     @property
     def floor(self) -> float:
