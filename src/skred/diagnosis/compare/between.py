@@ -22,7 +22,7 @@ from skred.diagnosis.compare.recomputed import computed_again
 from skred.diagnosis.compare.ways import Looked, Ways
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import FINE, Budget
-from skred.diagnosis.evidence.tolerance import COUNTS
+from skred.diagnosis.evidence.tolerance import COUNTS, STANDARD_ERROR
 from skred.diagnosis.tabulated.between_evidence import (
     BetweenTarget,
     Way,
@@ -36,7 +36,7 @@ from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism
 
 SEARCH = Budget(64, 64, 128, 1.5, 1.8)
 """Quadrature points of an event in the tables by which modes are looked for."""
-_MOST_TIMES = 4
+_MOST_TIMES = 8
 """How many times as far as usual tables reach at most, which bounds the time."""
 _DIFFERING = BetweenEvents.SPREAD, BetweenEvents.SOME
 
@@ -111,7 +111,7 @@ def searched(base: Base, curve: Curve) -> Ways:
         ways = {
             kind: searched_evidence(BetweenTarget(base, curve, tables, kind), near) for kind in _DIFFERING
         }
-        if all(one.at_end < math.exp(-COUNTS) for one in ways.values()) or times >= _MOST_TIMES:
+        if all(one.at_end < STANDARD_ERROR for one in ways.values()) or times >= _MOST_TIMES:
             return ways
         times *= 2
 

@@ -59,7 +59,7 @@ class Way(NamedTuple):
     times : int
         How many times as far as usual these tables reach.
     at_end : float
-        Share of it that is in the last step of the tables.
+        How probably the avalanche that most probably has so much has more than all tables but the last.
     """
 
     log_factor: float
@@ -105,17 +105,41 @@ class BetweenTarget:
         result = np.full(len(x), -np.inf)
         if not inside.any():
             return result
-        population = population_at(psi[inside], n)
+        _, densities = self._of_events(psi[inside], strength[inside], parameter[inside])
+        total = np.logaddexp.reduce(densities, axis=1).sum(axis=1)
+        total += [log_prior(one, n, self.base.log_scale) for one in psi[inside]]
+        result[inside] = np.nan_to_num(total + log_p[inside], nan=-np.inf)
+        return result
+
+    def _of_events(
+        self, psi: FloatArray, strength: FloatArray, parameter: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Strengths that avalanches may have, (n, n_components), and the events' log densities with each.
+
+        The latter with its share, (n, n_components, n_events).
+        """
+        population = population_at(psi, len(self.base.law.mechanisms))
         factors = np.linalg.cholesky(population.covariance)
-        own, log_shares = components(self.kind, strength[inside], parameter[inside])
+        own, log_shares = components(self.kind, strength, parameter)
         densities = tabulated_log_densities(
             population.mean, factors, np.ascontiguousarray(own[:, :, None]), len(self.base.rows.event),
             *self.tables.arrays.values(),
         )  # fmt: skip
-        of_events = np.logaddexp.reduce(densities + log_shares[:, :, None], axis=1)
-        total = of_events.sum(axis=1) + [log_prior(one, n, self.base.log_scale) for one in psi[inside]]
-        result[inside] = np.nan_to_num(total + log_p[inside], nan=-np.inf)
-        return result
+        return own, densities + log_shares[:, :, None]
+
+    def at_end(self, x: FloatArray, shares: FloatArray) -> float:
+        """How probably the avalanche that most probably does so goes beyond all tables but the last.
+
+        Parameters
+        ----------
+        x, shares : (n, size) and (n,) arrays
+            Weighted draws of the coordinates.
+        """
+        psi, strength, parameter, _ = self.split(x)
+        own, densities = self._of_events(psi, strength, parameter)
+        beyond = np.abs(own) > np.abs(self.tables.grid.points[-2, 0])
+        of_each = np.exp(densities - np.logaddexp.reduce(densities, axis=1)[:, None])
+        return float((shares @ np.einsum("nce,nc->ne", of_each, beyond)).max())
 
 
 def searched_evidence(target: BetweenTarget, near: Evidence) -> Way:
@@ -145,7 +169,8 @@ def between_evidence(target: BetweenTarget, proposal: Mixture, seed: int = 72) -
     populations = Evidence(found.log_integral, *moments, found.error)
     sd = math.sqrt(float(shares @ (strengths - middle) ** 2))
     grid, budget = target.tables.grid, target.tables.budget
-    at_end = float(shares @ (np.abs(strengths) > np.abs(grid.points[-2, 0])))
+    counted = shares > 0.0
+    at_end = target.at_end(found.draws[counted], shares[counted])
     times = int(grid.size[0] - 1) // (TABLES[1] - 1)
     nothing = target.base.with_nothing(budget, sampled=True).found.log_evidence
     log_factor = found.log_integral - nothing
