@@ -349,7 +349,8 @@ def test_tables_reach_what_the_strongest_avalanche_has() -> None:
     near = found.nearest(found.moments[0]).found
     target = BetweenTarget(base, found, wide_tables(base, found, near, SEARCH), SPREAD)
     way, as_usual = searched(base, found)[SPREAD], searched_evidence(target, near)
-    assert as_usual.at_end > STANDARD_ERROR > way.at_end and way.log_factor > as_usual.log_factor + 10.0
+    assert as_usual.at_end > STANDARD_ERROR and way.times > 1
+    assert way.log_factor > as_usual.log_factor + 10.0
 
 
 def test_gains_share_the_prior() -> None:

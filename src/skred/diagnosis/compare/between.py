@@ -36,8 +36,8 @@ from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism
 
 SEARCH = Budget(64, 64, 128, 1.5, 1.8)
 """Quadrature points of an event in the tables by which modes are looked for."""
-_MOST_TIMES = 8
-"""How many times as far as usual tables reach at most, which bounds the time."""
+_MOST_TIMES = 4
+"""How many times as far as usual tables reach at most, which bounds time and memory."""
 _DIFFERING = BetweenEvents.SPREAD, BetweenEvents.SOME
 
 
