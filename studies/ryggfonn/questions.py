@@ -10,8 +10,6 @@ from studies.ryggfonn.cells import share_text, where_text
 Found = Mapping[str, Any]
 DAM_CROWN_M = 1940.0
 _NEAR_M = 60.0
-
-
 _GROWS = {
     "turbulent_drag": "yes",
     "viscous_drag": "yes",
