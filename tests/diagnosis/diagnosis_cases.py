@@ -133,4 +133,4 @@ def recorded(base: Base, direction: Direction) -> Base:
 def made_way(log_factor: float) -> Way:
     """A way in which avalanches differ that has a log Bayes factor, and nothing behind it."""
     mixture = Mixture.on([Mode(np.zeros(1), np.eye(1))])
-    return Way(log_factor, Evidence(0.0, np.zeros(1), np.eye(1)), (1.0, 0.1), mixture, FINE)
+    return Way(log_factor, Evidence(0.0, np.zeros(1), np.eye(1)), (1.0, 0.1), mixture, FINE, 1.0)

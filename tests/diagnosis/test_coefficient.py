@@ -44,9 +44,9 @@ def of_one_scale(top: float, sd: float, scale: float, either_sign: bool) -> tupl
 @pytest.mark.parametrize("top", [-0.8, 0.0, 0.3, 1.0, 1.9])
 @pytest.mark.parametrize("sd", [0.3, 0.6, 1.5])
 def test_half_normal(top: float, sd: float) -> None:
-    """The comparison's grid: strengths in scales of the prior."""
+    """Strengths in scales of the prior, as close as curves have them where the posterior is."""
     scale = mechanisms()["segment_drag"].added.scale  # type: ignore[union-attr]
-    grid = scale * np.array([0.0, 0.2, 0.6, 1.2, 2.2, 3.5, 6.0, 10.0])
+    grid = scale * np.concatenate([0.3 * np.arange(10), [3.5, 6.0, 10.0]])
     one = quadratic("segment_drag", grid, top * scale, sd * scale)
     factor, mean, width = closed_form(top, sd, False)
     assert one.log_bayes_factor == pytest.approx(factor, abs=0.1, rel=0.015)
@@ -60,7 +60,7 @@ def test_half_normal(top: float, sd: float) -> None:
 @pytest.mark.parametrize("sd", [0.3, 0.8])
 def test_normal(top: float, sd: float) -> None:
     scale = mechanisms()["sensor_bias"].added.scale  # type: ignore[union-attr]
-    grid = np.array([0.2, 0.6, 1.2, 2.2, 3.5, 6.0, 10.0])
+    grid = np.concatenate([0.3 * np.arange(1, 10), [3.5, 6.0, 10.0]])
     one = quadratic(
         "sensor_bias", scale * np.concatenate([-grid[::-1], [0.0], grid]), top * scale, sd * scale
     )
@@ -86,6 +86,14 @@ def test_odd_spacing_around_what_was_found(either: bool) -> None:
     assert found[0] / scale == pytest.approx(mean, abs=0.02) and found[1] / scale == pytest.approx(
         width, rel=0.1
     )
+
+
+def test_nothing_is_above_what_was_computed() -> None:
+    """Two strengths that nearly coincide, of fits that differ: nats came from a slope between them."""
+    drag = mechanisms()["segment_drag"]
+    strengths = drag.added.scale * np.array([0.0, 0.3, 0.3093, 1.2])  # type: ignore[union-attr]
+    one = Curve(drag, Shape(), Direction(), strengths, np.array([0.0, -3.9, -2.7, -21.2]), ())
+    assert one.log_bayes_factor < 0.0
 
 
 def test_nothing_to_see_is_nearly_even() -> None:

@@ -41,7 +41,7 @@ def test_a_curve_goes_on_to_a_maximum_far_away() -> None:
     base = ryggfonn_base("coulomb")
     shape = Shape(s_from_m=1599.0, s_to_m=1674.0)
     found = curve_near(base, curve(base, placed(mechanisms()["segment_drag"], base.setting, shape)), shape)
-    assert not found.is_cut and 0 < np.argmax(found.log_evidence) < len(found.strengths) - 1
+    assert not len(found.open_ends) and 0 < np.argmax(found.log_evidence) < len(found.strengths) - 1
 
 
 @pytest.mark.parametrize("law", ["coulomb", "constant"])
@@ -50,7 +50,7 @@ def test_screening_goes_on_where_evidence_rises_to_the_last_strength(law: str) -
     base, shape = ryggfonn_base(law), Shape(s_from_m=1599.0, s_to_m=1674.0)
     screened = curve(base, placed(mechanisms()["segment_drag"], base.setting, shape))
     closer = curve_near(base, screened, shape)
-    assert screened.rising_end is None and closer.log_bayes_factor > 80.0
+    assert not len(screened.open_ends) and closer.log_bayes_factor > 80.0
     assert screened.log_bayes_factor == pytest.approx(closer.log_bayes_factor, abs=COUNTS)
 
 

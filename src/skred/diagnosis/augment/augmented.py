@@ -53,10 +53,7 @@ def augmented_problem(
         if ways[way].budget != FINE:  # a comparison takes the finer tables for what leads without a residue
             ways = finer(base, curves[0], ways)
         found = ways[way]
-        located = from_nothing(curves[0], found.populations, *found.strength, found.times)
-        if found.times == 1:  # else there are many, and they are made finer only where the check asks for it
-            # Half the steps of a comparison's: what is left of errors there is between the strengths.
-            located = located.finer
+        located = from_nothing(curves[0], found.populations, found.farthest, found.strength).finer
     old, tables = base.problem, build_tables(base, extension, located, FINE)
     return AugmentedProblem(
         old.campaign, old.terrain, old.error_model, old.place_sd_m, base=base, added=added, tables=tables

@@ -22,22 +22,21 @@ from skred.diagnosis.compare.recomputed import computed_again
 from skred.diagnosis.compare.ways import Looked, Ways
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import FINE, Budget
-from skred.diagnosis.evidence.tolerance import COUNTS, STANDARD_ERROR
+from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.diagnosis.tabulated.between_evidence import (
     BetweenTarget,
     Way,
     between_evidence,
     searched_evidence,
 )
-from skred.diagnosis.tabulated.tables import wide_tables
+from skred.diagnosis.tabulated.coefficient_grid import from_nothing
+from skred.diagnosis.tabulated.tables import build_tables
 from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.physics.mechanisms.placed import added_of
 from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism
 
 SEARCH = Budget(64, 64, 128, 1.5, 1.8)
 """Quadrature points of an event in the tables by which modes are looked for."""
-_MOST_TIMES = 4
-"""How many times as far as usual tables reach at most, which bounds time and memory."""
 _DIFFERING = BetweenEvents.SPREAD, BetweenEvents.SOME
 
 
@@ -100,28 +99,22 @@ def or_none[Found](compute: Callable[..., Found], *given: Any) -> Found | None:
 
 
 def searched(base: Base, curve: Curve) -> Ways:
-    """Each way at a curve's shape, by tables that are fine enough to find where it is.
-
-    Twice as far as long as there is something at their end: where few avalanches have it, each has many times
-    what all could have in common.
-    """
-    near, times = curve.nearest(curve.moments[0]).found, 1
-    while True:
-        tables = wide_tables(base, curve, near, SEARCH, times)
-        ways = {
-            kind: searched_evidence(BetweenTarget(base, curve, tables, kind), near) for kind in _DIFFERING
-        }
-        if all(one.at_end < STANDARD_ERROR for one in ways.values()) or times >= _MOST_TIMES:
-            return ways
-        times *= 2
+    """Each way at a curve's shape, by tables that are fine enough to find where it is."""
+    near = curve.nearest(curve.moments[0]).found
+    tables = build_tables(base, base.extended(curve.direction), from_nothing(curve, near), SEARCH)
+    return {kind: searched_evidence(BetweenTarget(base, curve, tables, kind), near) for kind in _DIFFERING}
 
 
 def finer(base: Base, curve: Curve, ways: Ways) -> Ways:
-    """The same by many more quadrature points, around the populations of the most probable way."""
+    """The same by many more quadrature points, around the populations of the most probable way.
+
+    At half the steps between strengths, too: most of what errors are left is there.
+    """
     if not ways:
         return {}
     likely = _most_probable(ways)
-    tables = wide_tables(base, curve, likely.populations, FINE, likely.times)
+    located = from_nothing(curve, likely.populations, max(one.farthest for one in ways.values())).finer
+    tables = build_tables(base, base.extended(curve.direction), located, FINE)
     return {
         kind: between_evidence(BetweenTarget(base, curve, tables, kind), way.proposal)
         for kind, way in ways.items()

@@ -86,22 +86,19 @@ class Kind:
         return self.log_share + self._over.log_weights
 
     def finer(self, setting: Setting, number: int) -> list[Shape]:
-        """Shapes to compute beside a part, or with it where it was screened only."""
+        """Shapes to compute beside a part."""
         part, known = self.parts[number], {_known_by(one.curve.shape) for one in self.parts}
-        shape = part.curve.shape
-        around = parts_of(self.mechanism, setting, shape, _SMALLER**part.level)
-        own = [] if part.level else [shape]
-        return own + [one for one in around if _known_by(one) not in known]
+        around = parts_of(self.mechanism, setting, part.curve.shape, _SMALLER**part.level)
+        return [one for one in around if _known_by(one) not in known]
 
     def parted(self, others: Mapping[int, Sequence[Curve]]) -> Kind:
-        """With others beside some parts; they alone where it was screened only."""
+        """With others beside some parts."""
         parts = list[Part]()
         for number, one in enumerate(self.parts):
             if number not in others:
                 parts.append(one)
                 continue
-            curves = [one.curve, *others[number]] if one.level else others[number]
-            parts += [Part(curve, one.level + 1) for curve in curves]
+            parts += [Part(curve, one.level + 1) for curve in (one.curve, *others[number])]
         return replace(self, parts=tuple(parts))
 
 

@@ -11,14 +11,11 @@ import numpy as np
 
 from skred.diagnosis.clock import Progress
 from skred.diagnosis.detect.score_test import placed_mechanisms
-from skred.diagnosis.evidence.coefficient import NEAR, Base, Curve, curve_at
+from skred.diagnosis.evidence.coefficient import NEAR, Base, Curve, curve_at, curve_near, followed
 from skred.diagnosis.evidence.event_quadrature import SCREENING
 from skred.diagnosis.evidence.global_start import Start, first_strengths, global_starts
-from skred.diagnosis.evidence.tolerance import COUNTS, MOST_ROUNDS
+from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING
 from skred.physics.mechanisms.placed import PlacedMechanism
-
-_FARTHER = np.array([1.4, 2.0])
-"""How many times as far a curve goes on that rises to its end: a climb can end long before the top."""
 
 
 def curve(base: Base, candidate: PlacedMechanism) -> Curve:
@@ -28,12 +25,18 @@ def curve(base: Base, candidate: PlacedMechanism) -> Curve:
     return curve_about(base, candidate, global_starts(extension, *given))
 
 
+def whole_curve(base: Base, candidate: PlacedMechanism) -> Curve:
+    """The same, and closer to where there is evidence: it can have its maximum between two strengths."""
+    found = curve(base, candidate)
+    has_some = found.log_evidence.max() > DECIDES_NOTHING
+    return curve_near(base, found, candidate.shape) if has_some else found
+
+
 def curve_about(base: Base, candidate: PlacedMechanism, starts: Sequence[Start]) -> Curve:
     """Evidence along the strength of a mechanism where climbs begin, and about where some have led.
 
     Many recordings tell strengths far below the prior's scale, or far beyond what a refit from the base law
-    reaches; strengths over the prior alone would miss where the evidence is. Where it rises to the last of
-    them, others beyond are looked at.
+    reaches; strengths over the prior alone would miss where the evidence is.
     """
     scale, either_sign = candidate.scale, candidate.added.either_sign
     begin = {0.0: base.fit} | {one.strength: one.fit for one in starts if one.strength != 0.0}
@@ -41,12 +44,7 @@ def curve_about(base: Base, candidate: PlacedMechanism, starts: Sequence[Start])
     strengths = np.append(first_strengths(scale, either_sign), about)
     if not either_sign:
         strengths = strengths[strengths > 0.0]
-    found = curve_at(base, candidate, np.unique(strengths), SCREENING, begin=begin)
-    for _ in range(MOST_ROUNDS):
-        if (end := found.rising_end) is None:
-            break
-        found = found.with_more(curve_at(base, candidate, end * _FARTHER, SCREENING, begin=found.known))
-    return found
+    return followed(base, curve_at(base, candidate, np.unique(strengths), SCREENING, begin=begin), SCREENING)
 
 
 def screened(
@@ -72,7 +70,7 @@ def screened(
     base.with_nothing(SCREENING)  # before every worker does it once more
     while jobs := sorted(set(_that_count(curves) if curves else range(len(todo))) - looked):
         looked |= set(jobs)
-        found = pool.map(partial(curve, base), [todo[number] for number in jobs])
+        found = pool.map(partial(whole_curve, base), [todo[number] for number in jobs])
         for done, (number, one) in enumerate(zip(jobs, found, strict=True), start=1):
             curves[number] = one
             progress(len(todo) - len(jobs) + done, len(todo))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.interpolate import Akima1DInterpolator
+from scipy.interpolate import PchipInterpolator
 
 from skred.arrays import FloatArray
 from skred.diagnosis.evidence.conditional_map import (
@@ -28,7 +28,7 @@ from skred.diagnosis.evidence.extension import Extension, extended, setting_of, 
 from skred.diagnosis.evidence.linear_mixed_model import median_log_scale
 from skred.diagnosis.evidence.marginal import coordinates, evidence, population_at
 from skred.diagnosis.evidence.refit import Fit, Rounds, refit
-from skred.diagnosis.evidence.tolerance import COUNTS, DECIDES_NOTHING, MOST_ROUNDS
+from skred.diagnosis.evidence.tolerance import COUNTS, MOST_ROUNDS
 from skred.inference.hierarchical.problem import HierarchicalProblem
 from skred.inference.hierarchical.surface import Nodes
 from skred.physics.law import Law
@@ -44,7 +44,9 @@ _SMALLEST = 1e-3
 _BETWEEN = 60
 """Points at which a curve is integrated between each two strengths."""
 _DEEP = 40.0
-"""Nats below the maximum from which on evidence counts as equally small: a spline through it is smooth."""
+"""Nats below the maximum from which on evidence counts as equally small."""
+_FARTHER = (1.4, 2.0)
+"""How many times as far a curve is followed beyond an end: a climb can end long before the maximum."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,34 +147,34 @@ class Curve(PlacedMechanism):
         # As many between each two that were computed: these lie close where the curve is narrow.
         parts = np.linspace(self.strengths[:-1], self.strengths[1:], _BETWEEN, endpoint=False, axis=1)
         strengths = np.append(parts.ravel(), self.strengths[-1])
-        heights = np.maximum(self.log_evidence, self.floor)
-        spline = Akima1DInterpolator(self.strengths, heights, method="makima")
-        return strengths, spline(strengths) + self.log_prior(strengths, scales)
+        # Of a monotone spline: others overshoot where two strengths nearly coincide.
+        heights = PchipInterpolator(self.strengths, self._heights)(strengths)
+        return strengths, heights + self.log_prior(strengths, scales)
 
     def log_prior(self, strengths: FloatArray, scales: Sequence[float] = SCALES) -> FloatArray:
         """Log density of the strength's prior, of some scales in its mechanism's."""
         return log_prior_density(strengths, self.scale, either_sign=self.added.either_sign, scales=scales)
 
     @property
-    def rising_end(self) -> float | None:
-        """The strength at an end where it is most probable, if that decides anything: it is no maximum."""
-        density = self.log_evidence + self.log_prior(self.strengths)
-        top = int(np.argmax(density))
-        nothing = int(np.searchsorted(self.strengths, 0.0))
-        at_end = top != nothing and top in (0, len(density) - 1)
-        return (
-            float(self.strengths[top])
-            if at_end and density[top] > density[nothing] + DECIDES_NOTHING
-            else None
-        )
+    def open_ends(self) -> FloatArray:
+        """Strengths at ends, but 0, beyond which the posterior may go on: it rises there, or is not small."""
+        density = self._heights + self.log_prior(self.strengths)
+        ends, inward = density[[0, -1]], density[[1, -2]]
+        on = (ends > inward) | (ends > density.max() - COUNTS)
+        strengths: FloatArray = self.strengths[[0, -1]]
+        return strengths[on & (strengths != 0.0)]
 
     def with_more(self, other: Curve) -> Curve:
-        """With the strengths of another curve of the same mechanism and shape as well."""
-        found = dict(zip(other.strengths, zip(other.log_evidence, other.fits, strict=True), strict=True))
-        found |= dict(zip(self.strengths, zip(self.log_evidence, self.fits, strict=True), strict=True))
-        strengths = sorted(found)
-        heights, fits = zip(*(found[one] for one in strengths), strict=True)
-        return replace(self, strengths=np.array(strengths), log_evidence=np.array(heights), fits=fits)
+        """With those strengths of another curve of the same shape that lie outside of its own."""
+        own = self.strengths[self.strengths != 0.0]
+        outside = (other.strengths < own.min()) | (other.strengths > own.max())
+        more = np.flatnonzero(outside & (other.strengths != 0.0))
+        strengths = np.append(self.strengths, other.strengths[more])
+        order = np.argsort(strengths)
+        heights = np.append(self.log_evidence, other.log_evidence[more])[order]
+        every = (*self.fits, *(other.fits[k] for k in more))
+        fits = tuple(every[k] for k in order)
+        return replace(self, strengths=strengths[order], log_evidence=heights, fits=fits)
 
     @property
     def floor(self) -> float:
@@ -180,11 +182,9 @@ class Curve(PlacedMechanism):
         return float(self.log_evidence.max()) - _DEEP
 
     @property
-    def is_cut(self) -> bool:
-        """Whether the posterior goes on beyond the strengths at an end that is not 0."""
-        strengths, log_density = self.fine()
-        ends = log_density[[0, -1]][strengths[[0, -1]] != 0.0]
-        return bool((ends > log_density.max() - COUNTS).any())
+    def _heights(self) -> FloatArray:
+        """Log evidence, nowhere less than the floor."""
+        return np.maximum(self.log_evidence, self.floor)
 
     @cached_property
     def log_bayes_factor(self) -> float:
@@ -222,24 +222,32 @@ def curve_near(base: Base, near: Curve, shape: Shape) -> Curve:
         Of the same mechanism and nearly the same shape.
     """
     candidate = placed(near.mechanism, base.setting, shape)
-    least, wider = _SMALLEST * candidate.scale, 1.0
+    least, found = _SMALLEST * candidate.scale, None
     for _ in range(MOST_ROUNDS):
         before = near.moments
-        # On a slope that goes on a curve's own standard deviation says little of how far.
-        wider = 2.0 * wider if near.is_cut else 1.0
-        near = curve_at(base, candidate, _strengths_near(near, wider), USUAL, near.known)
+        around = curve_at(base, candidate, _strengths_near(near), USUAL, near.known)
+        near = found = followed(base, around if found is None else around.with_more(found), USUAL)
         after = near.moments
         sd = max(before[1], least), max(after[1], least)
-        settled = abs(after[0] - before[0]) < sd[0] and 0.5 < sd[1] / sd[0] < 2.0
-        if settled and not near.is_cut:
+        if abs(after[0] - before[0]) < sd[0] and 0.5 < sd[1] / sd[0] < 2.0:
             break
     return near
 
 
-def _strengths_near(near: Curve, wider: float) -> FloatArray:
-    """Strengths around the mean of a curve, without 0, so many times as far apart as it says."""
+def followed(base: Base, curve: Curve, budget: Budget) -> Curve:
+    """A curve with strengths farther and farther beyond each end at which its posterior may go on."""
+    for _ in range(MOST_ROUNDS):
+        if not len(ends := curve.open_ends):
+            break
+        beyond = np.multiply.outer(ends, _FARTHER).ravel()
+        curve = curve.with_more(curve_at(base, curve, beyond, budget, begin=curve.known))
+    return curve
+
+
+def _strengths_near(near: Curve) -> FloatArray:
+    """Strengths around the mean of a curve, without 0, as far apart as it says."""
     mean, sd = near.moments
-    sd = wider * max(sd, _SMALLEST * near.scale)
+    sd = max(sd, _SMALLEST * near.scale)
     strengths = mean + sd * np.array(NEAR)
     if abs(mean) > 2.0 * abs(NEAR[0]) * sd:  # nothing between 0 and there otherwise
         strengths = np.append(strengths, 0.5 * (mean - math.copysign(abs(NEAR[0]) * sd, mean)))

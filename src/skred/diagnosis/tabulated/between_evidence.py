@@ -22,7 +22,6 @@ from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.marginal import Evidence, curvatures, population_at
 from skred.diagnosis.evidence.population_target import NARROWEST, log_prior
-from skred.diagnosis.tabulated.coefficient_grid import TABLES
 from skred.diagnosis.tabulated.tables import Tables
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.between_events import BetweenEvents, components, from_unbounded
@@ -56,10 +55,8 @@ class Way(NamedTuple):
         Adapted to it.
     budget : Budget
         Quadrature points of the tables that it is by.
-    times : int
-        How many times as far as usual these tables reach.
-    at_end : float
-        How probably the avalanche that most probably has so much has more than all tables but the last.
+    farthest : float
+        Size of the strength that each avalanche has less than, but for one in a hundred draws.
     """
 
     log_factor: float
@@ -67,8 +64,7 @@ class Way(NamedTuple):
     strength: tuple[float, float]
     proposal: Mixture
     budget: Budget
-    times: int = 1
-    at_end: float = 0.0
+    farthest: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +80,7 @@ class BetweenTarget:
     kind: BetweenEvents
 
     @cached_property
-    def farthest(self) -> float:
+    def end(self) -> float:
         """The farthest strength that there are tables for, with its sign."""
         return float(self.tables.grid.points[-1, 0])
 
@@ -93,9 +89,9 @@ class BetweenTarget:
         n_psi = self.base.fit.found.psi.size
         size = np.exp(np.minimum(x[:, n_psi], 50.0))
         log_p = self.curve.log_prior(size) + x[:, n_psi]
-        log_p = np.where(size <= abs(self.farthest), log_p, -np.inf)
+        log_p = np.where(size <= abs(self.end), log_p, -np.inf)
         parameter, more = from_unbounded(self.kind, x[:, n_psi + 1])
-        return x[:, :n_psi], np.copysign(size, self.farthest), parameter, log_p + more
+        return x[:, :n_psi], np.copysign(size, self.end), parameter, log_p + more
 
     def __call__(self, x: FloatArray) -> FloatArray:
         """Log density at coordinates, (n, size) to (n,); not normalised by the evidence."""
@@ -127,8 +123,8 @@ class BetweenTarget:
         )  # fmt: skip
         return own, densities + log_shares[:, :, None]
 
-    def at_end(self, x: FloatArray, shares: FloatArray) -> float:
-        """How probably the avalanche that most probably does so goes beyond all tables but the last.
+    def farthest(self, x: FloatArray, shares: FloatArray) -> float:
+        """Size of the strength that each avalanche has less than, but for one in a hundred draws.
 
         Parameters
         ----------
@@ -137,9 +133,11 @@ class BetweenTarget:
         """
         psi, strength, parameter, _ = self.split(x)
         own, densities = self._of_events(psi, strength, parameter)
-        beyond = np.abs(own) > np.abs(self.tables.grid.points[-2, 0])
-        of_each = np.exp(densities - np.logaddexp.reduce(densities, axis=1)[:, None])
-        return float((shares @ np.einsum("nce,nc->ne", of_each, beyond)).max())
+        of_each = shares[:, None, None] * np.exp(densities - np.logaddexp.reduce(densities, axis=1)[:, None])
+        sizes = np.abs(own).ravel()
+        order = np.argsort(sizes)
+        up_to = of_each.reshape(len(sizes), -1)[order].cumsum(axis=0)
+        return float(sizes[order[(up_to < 0.99).sum(axis=0).max().clip(max=len(sizes) - 1)]])
 
 
 def searched_evidence(target: BetweenTarget, near: Evidence) -> Way:
@@ -151,7 +149,7 @@ def searched_evidence(target: BetweenTarget, near: Evidence) -> Way:
         Populations around a mode.
     """
     log_size = math.log(abs(target.curve.moments[0]))
-    most = math.log(0.9 * abs(target.farthest))
+    most = math.log(0.9 * abs(target.end))
     tops = []
     for multiple, coordinate in _STARTS[target.kind]:
         start = [*near.psi, min(log_size + math.log(multiple), most), coordinate]
@@ -168,13 +166,12 @@ def between_evidence(target: BetweenTarget, proposal: Mixture, seed: int = 72) -
     middle, moments = float(shares @ strengths), found._replace(draws=psi).moments
     populations = Evidence(found.log_integral, *moments, found.error)
     sd = math.sqrt(float(shares @ (strengths - middle) ** 2))
-    grid, budget = target.tables.grid, target.tables.budget
-    counted = shares > 0.0
-    at_end = target.at_end(found.draws[counted], shares[counted])
-    times = int(grid.size[0] - 1) // (TABLES[1] - 1)
+    budget = target.tables.budget
     nothing = target.base.with_nothing(budget, sampled=True).found.log_evidence
     log_factor = found.log_integral - nothing
-    return Way(log_factor, populations, (middle, sd), found.proposal, budget, times, at_end)
+    counted = shares > 0.0
+    farthest = target.farthest(found.draws[counted], shares[counted])
+    return Way(log_factor, populations, (middle, sd), found.proposal, budget, farthest)
 
 
 def _climbed(target: BetweenTarget, start: FloatArray) -> FloatArray:

@@ -22,12 +22,17 @@ _REACH = 5.0
 """Standard deviations that a grid reaches from the mean at first."""
 _ENDS_NATS = 8.0
 """How far below the maximum the edge of a grid must be to be the end: four standard deviations."""
-_FARTHEST = 4.0
-"""How many times what all may have in common tables reach at first where avalanches differ in it."""
+_FARTHEST = 32.0
+"""How many times what all may have in common an avalanche may have where they differ in it: one of thirty has
+so much more than all."""
+_BEYOND = 2.0
+"""How many times as far as any avalanche is such tables reach."""
+_FIRST_STEP, _BEND = 1.0 / 6.0, 1.0 / 16.0
+"""The first step of such tables, in what all may have in common; and the last ones, in the strength there."""
 
 
 class Grid(NamedTuple):
-    """Regular grid of the added strengths, skewed where two go together.
+    """Grid of the added strengths, skewed where two go together: regular, or with steps that grow with them.
 
     Attributes
     ----------
@@ -35,12 +40,16 @@ class Grid(NamedTuple):
         Strengths of the first table.
     steps : (n_added, n_added) array
         Lower triangular: each column is the step from table to table along an axis.
+    bends : (n_added,) array
+        0 for equal steps along an axis; else steps grow with the hyperbolic sine of the way from the origin,
+        this is its scale, and far away they are so large a share of it.
     size : (n_added,) integer array
         Tables along each axis.
     """
 
     origin: FloatArray
     steps: FloatArray
+    bends: FloatArray
     size: IntArray
 
     @property
@@ -51,12 +60,16 @@ class Grid(NamedTuple):
         return self.strengths(places)
 
     def strengths(self, places: FloatArray) -> FloatArray:
-        """Strengths at places in steps from the first table, (n, n_added) both."""
-        return self.origin + places @ self.steps.T
+        """Strengths at places in tables from the first one, (n, n_added) both."""
+        bends = np.where(self.bends == 0.0, 1.0, self.bends)
+        ways = np.where(self.bends == 0.0, places, np.sinh(bends * places) / bends)
+        return self.origin + ways @ self.steps.T
 
     def places(self, strengths: FloatArray) -> FloatArray:
-        """Places on the grid in steps from the first table, at its edge at most."""
-        places = np.linalg.solve(self.steps, (strengths - self.origin).T).T
+        """Places on the grid in tables from the first one, at its edge at most."""
+        ways = np.linalg.solve(self.steps, (strengths - self.origin).T).T
+        bends = np.where(self.bends == 0.0, 1.0, self.bends)
+        places = np.where(self.bends == 0.0, ways, np.arcsinh(bends * ways) / bends)
         return np.clip(places, 0.0, self.size - 1.0)
 
     def table(self, index: IntArray) -> IntArray:
@@ -96,7 +109,7 @@ class Located(NamedTuple):
     @property
     def finer(self) -> Located:
         """With half the steps between strengths, and at each the population of the nearest."""
-        grid = Grid(self.grid.origin, 0.5 * self.grid.steps, 2 * self.grid.size - 1)
+        grid = Grid(self.grid.origin, 0.5 * self.grid.steps, 0.5 * self.grid.bends, 2 * self.grid.size - 1)
         return self._replace(grid=grid, fits=[self.fits[k] for k in self.grid.nearest(grid.points)])
 
     def refitted(self, base: Base, extension: Extension) -> Located:
@@ -140,25 +153,34 @@ def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located
     return Located(grid, fits, mean, factor)
 
 
-def from_nothing(curve: Curve, found: Evidence, mean: float, sd: float, times: int = 1) -> Located:
+def from_nothing(
+    curve: Curve,
+    found: Evidence,
+    farthest: float | None = None,
+    strength: tuple[float, float] | None = None,
+) -> Located:
     """A grid of one strength from none at all to far beyond what all avalanches could have in common.
 
-    Where avalanches differ in it, some have none and others several times as much.
+    Where avalanches differ in it, some have none and others many times as much: each knows its own to some
+    percent at best.
 
     Parameters
     ----------
     found : Evidence
         Populations around all of it.
-    mean, sd : float
-        Of the strength.
-    times : int
-        How many times as far as usual it reaches, by as many more tables.
+    farthest : float, optional
+        The size of the largest that an avalanche has, where that is known.
+    strength : (float, float), optional
+        Its mean and standard deviation; those of the curve without.
     """
     common, common_sd = curve.moments
-    step = math.copysign(_FARTHEST * (abs(common) + common_sd), common) / (TABLES[1] - 1)
-    size = times * (TABLES[1] - 1) + 1
-    grid = Grid(np.zeros(1), np.array([[step]]), np.array([size]))
+    in_common = abs(common) + common_sd
+    step, end = _FIRST_STEP * in_common, _BEYOND * (farthest or _FARTHEST * in_common)
+    last = max(math.ceil(math.asinh(_BEND * end / step) / _BEND), 3)
+    steps = np.array([[math.copysign(step, common)]])
+    grid = Grid(np.zeros(1), steps, np.array([_BEND]), np.array([last + 1]))
     fits = [Fit(found, curve.nearest(float(strength)).points) for strength in grid.points[:, 0]]
+    mean, sd = strength or curve.moments
     return Located(grid, fits, np.array([mean]), np.array([[sd]]))
 
 
@@ -188,7 +210,7 @@ def _grid(
         if not factor[axis, :axis].any():
             low[axis] = max(low[axis], (least[axis] - mean[axis]) / factor[axis, axis])
     steps = factor * ((high - low) / (size - 1))
-    return Grid(mean + factor @ low, steps, np.full(len(mean), size, dtype=np.int64))
+    return Grid(mean + factor @ low, steps, np.zeros(len(mean)), np.full(len(mean), size, dtype=np.int64))
 
 
 def _moments(grid: Grid, density: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from skred.arrays import FloatArray
-from skred.diagnosis.evidence.coefficient import Base, Curve
+from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, event_modes, log_joint
 from skred.diagnosis.evidence.event_quadrature import Budget, Spread, event_nodes
 from skred.diagnosis.evidence.extension import Extension
-from skred.diagnosis.evidence.marginal import Evidence, population_at, wide_populations
+from skred.diagnosis.evidence.marginal import population_at, wide_populations
 from skred.diagnosis.evidence.refit import MOST_NODES
-from skred.diagnosis.tabulated.coefficient_grid import Grid, Located, from_nothing
+from skred.diagnosis.tabulated.coefficient_grid import Grid, Located
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.surface import Nodes
 from skred.parallel.threads import in_parts, side_by_side
@@ -80,12 +80,6 @@ def build_tables(
     spreads, modes = zip(*side_by_side(spread, _lots(n_tables, n_events, budget)), strict=True)
     nodes, points = Spread.joined(spreads), np.concatenate(modes).reshape(n_tables, n_events, n + 1)
     return Tables(located, nodes.nodes, nodes.points[:, :, n].ravel(), points, budget)
-
-
-def wide_tables(base: Base, curve: Curve, found: Evidence, budget: Budget, times: int = 1) -> Tables:
-    """Tables of one mechanism in which avalanches differ; parameters as `from_nothing` has them."""
-    located = from_nothing(curve, found, *curve.moments, times)
-    return build_tables(base, base.extended(curve.direction), located, budget)
 
 
 def highest(likelihood: EventLikelihood, points: FloatArray, population: Population) -> FloatArray:

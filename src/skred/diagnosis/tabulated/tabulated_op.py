@@ -1,6 +1,6 @@
 """Integrated log densities of a law with mechanisms added, interpolated between tables of quadrature points.
 
-Tables stand on a regular grid of the added strengths, skewed where two go together. Between them the log
+Tables stand on a grid of the added strengths, skewed where two go together. Between them the log
 density of each event is interpolated by cubic polynomials, along every axis through the four tables nearest.
 It bends least along the ridge, where the population follows what is added: a drag that friction has absorbed
 comes in while friction falls to a third. So each table is asked at the population moved by as much as the one
@@ -40,8 +40,8 @@ def _cubic_weights(place, size, weights):  # type: ignore[no-untyped-def]
 
 
 @inner()
-def _neighbours(own, origin, steps, size):  # type: ignore[no-untyped-def]
-    """Numbers of the tables around some added strengths, their weights, and steps outside the grid."""
+def _neighbours(own, origin, steps, bends, size):  # type: ignore[no-untyped-def]
+    """Numbers of the tables around some added strengths, their weights, and how many tables outside."""
     n_axes = own.size
     along, lowest = np.empty((n_axes, 4)), np.empty(n_axes, np.int64)
     place, outside = np.empty(n_axes), 0.0
@@ -51,6 +51,8 @@ def _neighbours(own, origin, steps, size):  # type: ignore[no-untyped-def]
             place[axis] -= steps[axis, before] * place[before]
         place[axis] /= steps[axis, axis]
     for axis in range(n_axes):
+        if bends[axis] != 0.0:
+            place[axis] = math.asinh(bends[axis] * place[axis]) / bends[axis]
         inside = min(max(place[axis], 0.0), size[axis] - 1.0)
         outside += abs(place[axis] - inside)
         lowest[axis] = _cubic_weights(inside, size[axis], along[axis])
@@ -66,12 +68,25 @@ def _neighbours(own, origin, steps, size):  # type: ignore[no-untyped-def]
 
 @inner()
 def _interpolated(  # type: ignore[no-untyped-def]
-    own, known, at_tables, means, factor, origin, steps, size, centres, first, points, log_weights, density
+    own,
+    known,
+    at_tables,
+    means,
+    factor,
+    origin,
+    steps,
+    bends,
+    size,
+    centres,
+    first,
+    points,
+    log_weights,
+    density,
 ):
     """Fill the log density of each event that has some added strengths; tables asked for are kept."""
     n_events = density.size
     least, most = np.full(n_events, np.inf), np.full(n_events, -np.inf)
-    tables, weights, outside = _neighbours(own, origin, steps, size)
+    tables, weights, outside = _neighbours(own, origin, steps, bends, size)
     centre = np.zeros(means.shape[1])
     for corner in range(tables.size):
         centre += weights[corner] * centres[tables[corner]]
@@ -98,7 +113,7 @@ def _interpolated(  # type: ignore[no-untyped-def]
 
 @inner()
 def _components(  # type: ignore[no-untyped-def]
-    means, factor, strengths, origin, steps, size, centres, first, points, log_weights, densities
+    means, factor, strengths, origin, steps, bends, size, centres, first, points, log_weights, densities
 ):
     """Fill the log density of each event with each of some added strengths, (n_components, n_events)."""
     n_tables, one_centre = len(centres), np.all(centres == centres[0])
@@ -107,14 +122,14 @@ def _components(  # type: ignore[no-untyped-def]
         if not one_centre:
             known[:] = False  # what was kept is of a population moved otherwise
         _interpolated(
-            strengths[component], known, at_tables, means, factor, origin, steps, size, centres, first,
+            strengths[component], known, at_tables, means, factor, origin, steps, bends, size, centres, first,
             points, log_weights, densities[component],
         )  # fmt: skip
 
 
 @compiled()
 def tabulated_log_density(  # type: ignore[no-untyped-def]
-    means, factor, strengths, log_shares, origin, steps, size, centres, first, points, log_weights
+    means, factor, strengths, log_shares, origin, steps, bends, size, centres, first, points, log_weights
 ):
     """Log likelihood of each event, its own strengths integrated over the population.
 
@@ -132,6 +147,8 @@ def tabulated_log_density(  # type: ignore[no-untyped-def]
         Strengths of the first table.
     steps : (n_added, n_added) array
         Lower triangular: each column is the step from table to table along an axis.
+    bends : (n_added,) array
+        How steps grow along each axis: see `Grid`.
     size : (n_added,) integer array
         Tables along each axis, at least four.
     centres : (n_tables, n_strengths) array
@@ -148,7 +165,9 @@ def tabulated_log_density(  # type: ignore[no-untyped-def]
     """
     n_events, n_components = means.shape[0], log_shares.size
     densities = np.empty((n_components, n_events))
-    _components(means, factor, strengths, origin, steps, size, centres, first, points, log_weights, densities)
+    _components(
+        means, factor, strengths, origin, steps, bends, size, centres, first, points, log_weights, densities
+    )
     total = np.full(n_events, -np.inf)
     for component in range(n_components):
         for event in range(n_events):
@@ -158,7 +177,7 @@ def tabulated_log_density(  # type: ignore[no-untyped-def]
 
 @compiled()
 def tabulated_log_densities(  # type: ignore[no-untyped-def]
-    means, factors, strengths, n_events, origin, steps, size, centres, first, points, log_weights
+    means, factors, strengths, n_events, origin, steps, bends, size, centres, first, points, log_weights
 ):
     """Each event's log density with each component, for many draws: (n, n_components, n_events).
 
@@ -169,8 +188,8 @@ def tabulated_log_densities(  # type: ignore[no-untyped-def]
     for k in range(len(means)):
         of_event[:] = means[k]
         _components(
-            of_event, factors[k], strengths[k], origin, steps, size, centres, first, points, log_weights,
-            result[k],
+            of_event, factors[k], strengths[k], origin, steps, bends, size, centres, first, points,
+            log_weights, result[k],
         )  # fmt: skip
     return result
 
@@ -188,6 +207,7 @@ class TabulatedLogDensity(ArrayOp):
         ("log_shares", 1, "float64"),
         ("origin", 1, "float64"),
         ("steps", 2, "float64"),
+        ("bends", 1, "float64"),
         ("size", 1, "int64"),
         ("centres", 2, "float64"),
         ("first", 1, "int64"),
