@@ -7,14 +7,14 @@ import pytest
 from diagnosis_cases import base_of, ryggfonn_base
 
 from skred.diagnosis.augment.augmented import augmented_problem
-from skred.diagnosis.compare.screening import curve
+from skred.diagnosis.compare.screening import curve, whole_curve
 from skred.diagnosis.evidence.coefficient import curve_at, curve_near
 from skred.diagnosis.evidence.event_quadrature import USUAL
 from skred.diagnosis.evidence.refit import Rounds, refit
 from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.inference.hierarchical.population import population_samples
 from skred.physics.mechanisms import mechanisms
-from skred.physics.mechanisms.placed import placed
+from skred.physics.mechanisms.placed import placed, shapes_of
 from skred.physics.mechanisms.spec import Shape
 from skred.simulator.draw import draw_trial
 
@@ -52,6 +52,28 @@ def test_screening_goes_on_where_evidence_rises_to_the_last_strength(law: str) -
     closer = curve_near(base, screened, shape)
     assert not len(screened.open_ends) and closer.log_bayes_factor > 80.0
     assert screened.log_bayes_factor == pytest.approx(closer.log_bayes_factor, abs=COUNTS)
+
+
+@pytest.mark.parametrize(
+    ("law", "mechanism_id", "stretch", "least"),
+    [
+        # Its maximum below nil is the lower one, and above nil evidence still rose at the last strength.
+        ("voellmy", "segment_friction", (1599.0, 1674.0), 34.0),
+        # Flat at first; it rises from four scales on.
+        ("pcm", "entrainment", (1599.0, 1674.0), 8.0),
+        # The maximum lies between two of the strengths that are looked at first.
+        ("pcm", "segment_drag", (1278.75, 1778.75), 12.0),
+    ],
+)
+def test_no_place_is_lost(law: str, mechanism_id: str, stretch: tuple[float, float], least: float) -> None:
+    """Fifteen nats were, at Ryggfonn."""
+    base, (first, last) = ryggfonn_base(law), stretch
+    shape = next(
+        one
+        for one in shapes_of(mechanisms()[mechanism_id], base.setting)
+        if one.s_from_m == pytest.approx(first, abs=0.5) and one.s_to_m == pytest.approx(last, abs=0.5)
+    )
+    assert whole_curve(base, placed(mechanisms()[mechanism_id], base.setting, shape)).log_bayes_factor > least
 
 
 @pytest.mark.slow
