@@ -22,7 +22,7 @@ from benchmarks.reference.engine import fitted_base
 from benchmarks.reference.pairs import Drawn
 from skred.diagnosis.compare.over_places import Area
 from skred.diagnosis.compare.refinement import refine
-from skred.diagnosis.compare.screening import curve
+from skred.diagnosis.compare.screening import whole_curve
 from skred.diagnosis.detect.score_test import placed_mechanisms
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
 from skred.inference.hierarchical.problem import hierarchical_problem
@@ -45,7 +45,7 @@ def look(drawn: Drawn) -> dict[str, Any] | None:
     """Log Bayes factor of the leading mechanism of a stretch by both ways; None where there is none."""
     base = fitted_base(hierarchical_problem(drawn.campaign), load_law(drawn.base))
     curves = [
-        curve(base, one)
+        whole_curve(base, one)
         for one in placed_mechanisms(base.setting)
         if one.added.bound_to is BoundTo.PLACE and not one.shape.constants and not is_opposed(one.shape)
     ]
@@ -99,7 +99,7 @@ def heights(base: Base, mechanism: Mechanism, points: FloatArray, area: Area) ->
     """Log Bayes factors at places and lengths in the unit square."""
     found = []
     for shape in map(area.shape, points):
-        rough = curve(base, placed(mechanism, base.setting, shape))
+        rough = whole_curve(base, placed(mechanism, base.setting, shape))
         found.append(curve_near(base, rough, shape).log_bayes_factor)
     return np.array(found)
 

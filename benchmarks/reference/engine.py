@@ -10,9 +10,9 @@ import numpy as np
 from skred.diagnosis.augment.problem import as_diagnosed
 from skred.diagnosis.compare.comparison import with_errors
 from skred.diagnosis.compare.recomputed import recomputed
-from skred.diagnosis.compare.refinement import Kind, Part, candidates_of, leading
-from skred.diagnosis.compare.screening import curve
-from skred.diagnosis.evidence.coefficient import Base, curve_near, fit_base
+from skred.diagnosis.compare.refinement import Kind, Part, candidates_of
+from skred.diagnosis.compare.screening import whole_curve
+from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.conditional_map import Population
 from skred.diagnosis.evidence.linear_mixed_model import mean_prior
 from skred.inference.hierarchical.problem import HierarchicalProblem
@@ -38,16 +38,12 @@ def fitted_base(problem: HierarchicalProblem, law: Law) -> Base:
 def engine_log_bayes_factor(base: Base, mechanism: Mechanism, shapes: Sequence[Shape]) -> float:
     """Log Bayes factor of a mechanism against nothing, averaged over some shapes alone.
 
-    Screened, the leading shapes computed anew, and then with more quadrature points, as a comparison does; no
-    shape is parted, and between them nothing is interpolated.
+    Screened, and then with more quadrature points, as a comparison does; no shape is parted, and between them
+    nothing is interpolated.
     """
     log_shares = np.log(shares(shapes))
-    curves = [curve(base, placed(mechanism, base.setting, one)) for one in shapes]
+    curves = [whole_curve(base, placed(mechanism, base.setting, one)) for one in shapes]
     kinds = [Kind(share, (Part(one),)) for share, one in zip(log_shares, curves, strict=True)]
-    while todo := [k for k, _ in leading(kinds) if kinds[k].parts[0].level == 0]:
-        for k in todo:
-            one = kinds[k].parts[0].curve
-            kinds[k] = kinds[k].parted({0: [curve_near(base, one, one.shape)]})
     candidates = candidates_of(kinds)
     with ThreadPoolExecutor(1) as pool:
         again, _ = recomputed(base, candidates, [], pool)
