@@ -97,11 +97,8 @@ def by_draws(base: Base, own: list[Curve], rng: np.random.Generator) -> tuple[fl
 
 def heights(base: Base, mechanism: Mechanism, points: FloatArray, area: Area) -> FloatArray:
     """Log Bayes factors at places and lengths in the unit square."""
-    found = []
-    for shape in map(area.shape, points):
-        rough = whole_curve(base, placed(mechanism, base.setting, shape))
-        found.append(curve_near(base, rough, shape).log_bayes_factor)
-    return np.array(found)
+    every = [placed(mechanism, base.setting, shape) for shape in map(area.shape, points)]
+    return np.array([whole_curve(base, one).log_bayes_factor for one in every])
 
 
 def _mixture(points: FloatArray, log_weights: FloatArray, size: int, rng: np.random.Generator) -> list[Any]:
