@@ -65,6 +65,15 @@ class Budget(NamedTuple):
             adapted=more * self.adapted,
         )
 
+    @property
+    def halved(self) -> Budget:
+        """Half the points."""
+        return self._replace(
+            around_mode=self.around_mode // 2,
+            over_population=self.over_population // 2,
+            adapted=self.adapted // 2,
+        )
+
 
 USUAL = Budget()
 """Of every integral that counts: the same for all that is compared, so that errors left are alike."""

@@ -20,6 +20,9 @@ from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.surface import Nodes
 from skred.parallel.threads import in_parts, side_by_side
 
+_MOST_TABULATED = 30_000_000
+"""Quadrature points in all tables, a gigabyte; where there would be more each avalanche has fewer."""
+
 
 @dataclass(frozen=True, eq=False)
 class Tables:
@@ -35,6 +38,7 @@ class Tables:
     modes : (n_tables, n_events, n_base + 1) array
         Most probable points of the events.
     budget : Budget
+        As was asked for.
     """
 
     located: Located
@@ -68,6 +72,9 @@ def build_tables(
     n, n_tables, n_events = len(base.law.mechanisms), len(fits), len(base.rows.event)
     likelihood = EventLikelihood(extension, base.rows, base.strengths).in_groups(base.given(grid.points))
     population = population_at(np.stack([fit.found.psi for fit in fits]), n)
+    given = budget
+    while n_tables * n_events * given.total > _MOST_TABULATED:
+        given = given.halved
     start = highest(likelihood, np.stack([fit.points for fit in fits]), population)
     reference = base.population if visited is None else base.population.with_more(visited)
     around = wide_populations([fit.found for fit in fits], n)
@@ -75,9 +82,9 @@ def build_tables(
     def spread(part: slice) -> tuple[Spread, FloatArray]:
         own = likelihood.part(part)
         modes = event_modes(own, start[part], population, n_steps=8)
-        return event_nodes(own, around, modes, budget, reference), modes.points
+        return event_nodes(own, around, modes, given, reference), modes.points
 
-    spreads, modes = zip(*side_by_side(spread, _lots(n_tables, n_events, budget)), strict=True)
+    spreads, modes = zip(*side_by_side(spread, _lots(n_tables, n_events, given)), strict=True)
     nodes, points = Spread.joined(spreads), np.concatenate(modes).reshape(n_tables, n_events, n + 1)
     return Tables(located, nodes.nodes, nodes.points[:, :, n].ravel(), points, budget)
 
