@@ -27,7 +27,7 @@ from skred.diagnosis.compare.ways import Looked, gains_of, gains_over, over_ways
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_near
 from skred.diagnosis.evidence.extension import extended, setting_of
 from skred.diagnosis.evidence.population_target import log_prior
-from skred.diagnosis.tabulated.between_evidence import BetweenTarget, searched_evidence
+from skred.diagnosis.tabulated.between_evidence import BetweenTarget, Way, searched_evidence
 from skred.diagnosis.tabulated.coefficient_grid import from_nothing
 from skred.diagnosis.tabulated.tables import build_tables
 from skred.inference.between_events import (
@@ -335,6 +335,23 @@ def test_tables_reach_what_single_avalanches_have(few: tuple[Base, Curve]) -> No
     assert np.all(np.diff(strengths)[far] < 0.08 * strengths[1:][far])
 
 
+def to_four_times(base: Base, found: Curve, way: BetweenEvents) -> Way:
+    """By tables that reach four times what all may have in common."""
+    mean, sd = found.moments
+    near = found.nearest(mean).found
+    located = from_nothing(found, near, 2.0 * (mean + sd))
+    tables = build_tables(base, base.extended(found.direction), located, SEARCH)
+    return searched_evidence(BetweenTarget(base, found, tables, way), near)
+
+
+def test_places_on_a_grid_whose_steps_grow(few: tuple[Base, Curve]) -> None:
+    base, found = few
+    located = from_nothing(found, base.fit.found)
+    places = np.linspace(0.0, located.grid.size[0] - 1.0, 50)[:, None]
+    assert_allclose(located.grid.places(located.grid.strengths(places)), places, atol=1e-9)
+    assert_allclose(located.finer.grid.points[::2], located.grid.points, rtol=1e-12, atol=1e-12)
+
+
 def test_tables_reach_farther_where_few_avalanches_have_it() -> None:
     """Three of 22 have ten times what all could have in common."""
     own = np.where(np.isin(np.arange(22), (9, 15, 21)), 9.6, 0.0)
@@ -343,6 +360,7 @@ def test_tables_reach_farther_where_few_avalanches_have_it() -> None:
     assert 0.0 < found.moments[0] < 1.2
     ways = searched(base, found)
     assert ways[SOME].strength[0] == pytest.approx(9.6, rel=0.2)
+    assert ways[SOME].log_factor > to_four_times(base, found, SOME).log_factor + 5.0
 
 
 @pytest.mark.slow
@@ -355,7 +373,7 @@ def test_tables_reach_what_the_strongest_avalanche_has() -> None:
     twice = from_nothing(found, near).finer
     closer = build_tables(base, base.extended(found.direction), twice, SEARCH)
     way = searched(base, found)[SPREAD]
-    assert way.log_factor > 38.0
+    assert way.log_factor > 38.0 and way.log_factor > to_four_times(base, found, SPREAD).log_factor + 10.0
     half = searched_evidence(BetweenTarget(base, found, closer, SPREAD), near)
     assert way.log_factor == pytest.approx(half.log_factor, abs=1.0)
 

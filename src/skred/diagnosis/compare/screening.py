@@ -26,7 +26,7 @@ def curve(base: Base, candidate: PlacedMechanism) -> Curve:
 
 
 def whole_curve(base: Base, candidate: PlacedMechanism) -> Curve:
-    """The same, and closer to where there is evidence: it can have its maximum between two strengths."""
+    """As `curve`, and closer to where there is evidence: it can have its maximum between two strengths."""
     found = curve(base, candidate)
     has_some = found.log_evidence.max() > DECIDES_NOTHING
     return curve_near(base, found, candidate.shape) if has_some else found
