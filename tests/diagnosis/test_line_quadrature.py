@@ -15,7 +15,8 @@ def log_integrals(log_likelihood, others=OTHERS, mode=0.0):
     """Of likelihoods over two populations, by nodes on a line; the mode in standard deviations."""
     widths = np.column_stack([1.6 * SD, 1.6 * SD, 0.3 * SD])
     centres = np.column_stack([MEAN, MEAN + 0.5 * SD, MEAN + mode * SD])
-    points, log_weights = line_nodes(log_likelihood, centres, widths, (MEAN[:, None], SD[:, None]), others)
+    populations, shifts = (MEAN[:, None], SD[:, None]), np.zeros(2)
+    points, log_weights = line_nodes(log_likelihood, centres, widths, populations, others, shifts)
     assert np.all(np.diff(points, axis=1) >= 0.0)
     log_density = norm.logpdf(points, MEAN[:, None], SD[:, None])
     return np.logaddexp.reduce(log_weights + log_density, axis=1)
@@ -55,6 +56,24 @@ def test_a_spike_beside_an_edge_is_seen(edge):
     spike = 4.0 - rate * edge + 0.5 * rate**2 + norm.logcdf(edge - rate)
     exact = np.logaddexp(spike, norm.logcdf(edge))
     assert log_integrals(log_likelihood, mode=edge) == pytest.approx(exact, abs=0.1)
+
+
+def test_no_narrow_population_has_more_than_all_of_itself():
+    """Avalanches that a strength does nothing for have the same likelihood, and much the same nodes.
+
+    Around a narrow population far from the reference; at an edge of a gathering of nodes one stood for all
+    of the gap beside it, a hundred nats for these avalanches.
+    """
+    n, own, reference = 22, -7.767, -0.62
+    centres = np.tile([own, own, reference], (n, 1))
+    widths = np.tile([1.35 * 0.0036, 1.6 * 0.0036, 1.6 * 0.022], (n, 1))
+    populations = np.tile([own, reference], (n, 1)), np.tile([0.0036, 0.022], (n, 1))
+    shifts = 0.618034 * np.arange(n) % 1.0 - 0.5
+    points, log_weights = line_nodes(np.zeros_like, centres, widths, populations, OTHERS, shifts)
+    means, sds = np.meshgrid(np.linspace(-8.2, -7.3, 451), [0.0036, 0.01, 0.03, 0.1, 0.3])
+    for mean, sd in zip(means.ravel(), sds.ravel(), strict=True):
+        of_each = np.logaddexp.reduce(log_weights + norm.logpdf(points, mean, sd), axis=1)
+        assert of_each.sum() < 15.0
 
 
 def test_four_times_as_many_are_nearer():

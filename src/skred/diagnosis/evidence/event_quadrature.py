@@ -26,6 +26,7 @@ from skred.inference.reading_density import log_likelihoods
 from skred.parallel.compile_cache import compiled
 
 _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 class Budget(NamedTuple):
@@ -275,8 +276,9 @@ def on_a_line(
         return _log_likelihoods(likelihood, points[:, :, None])
 
     populations = centres[:, 1:], np.column_stack([factor[:, 0, 0] for _, factor in over])
+    shifts = np.asarray(_GOLDEN * rows.event % 1.0 - 0.5)
     points, log_weights = line_nodes(
-        log_likelihoods_at, centres, np.column_stack(widths), populations, budget.total
+        log_likelihoods_at, centres, np.column_stack(widths), populations, budget.total, shifts
     )
     full = np.zeros((*points.shape, 2))
     full[:, :, 0] = points

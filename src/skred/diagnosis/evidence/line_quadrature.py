@@ -32,6 +32,7 @@ def line_nodes(
     widths: FloatArray,
     populations: tuple[FloatArray, FloatArray],
     others: int,
+    shifts: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     """Nodes of all rows, (n_rows, n_nodes), in order along the line, and their log weights.
 
@@ -48,10 +49,20 @@ def line_nodes(
         Means and standard deviations of the strength: its own, which counts as much as all others together.
     others : int
         How many importance nodes there would be.
+    shifts : (n_rows,) array
+        By which share of a step the even ones are moved, less than a half. Avalanches that a strength does
+        nothing for have nodes at the same places otherwise, and a population narrower than their distance
+        has all of its probability there, of every avalanche.
     """
     size = _PER_ROOT * math.sqrt(others)
     each = math.ceil(0.5 * size / centres.shape[1])
-    points = centres[:, :, None] + _REACH * widths[:, :, None] * np.linspace(-1.0, 1.0, each)
+    evenly = np.linspace(-1.0, 1.0, each) + 2.0 / (each - 1) * shifts[:, None]
+    # Each at least as far as to all others, in steps that grow with the way: no narrow gathering of nodes has
+    # an edge that stands for all of a gap beside it.
+    farthest = np.abs(centres[:, :, None] - centres[:, None, :]).max(axis=2)
+    reach = np.maximum(farthest / widths, _REACH)
+    ways = np.sinh(np.arcsinh(reach)[:, :, None] * evenly[:, None, :])
+    points = centres[:, :, None] + widths[:, :, None] * ways
     points = np.sort(points.reshape(len(centres), -1), axis=1)
     log_l = log_likelihoods(points)
     for _ in range(_TURNS):
