@@ -13,6 +13,7 @@ from skred.diagnosis.evidence.event_quadrature import SCREENING
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.tabulated.coefficient_grid import locate
 from skred.diagnosis.tabulated.tables import build_tables
+from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.physics.mechanisms import mechanisms
 from skred.physics.mechanisms.placed import placed
 from skred.physics.mechanisms.spec import Shape
@@ -49,3 +50,38 @@ def test_medians_that_are_hardly_known_leave_a_covariance() -> None:
         fits.append(fit._replace(found=fit.found._replace(covariance=covariance)))
     tables = build_tables(base, extension, located._replace(fits=fits), SCREENING)
     assert np.isfinite(tables.modes).all()
+
+
+def between_tables(heights: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Log densities of one avalanche at places on tables of one node each, less what the population has."""
+    axes, n = heights.ndim, len(places)
+    found = tabulated_log_densities(
+        np.zeros((n, 1)), np.ones((n, 1, 1)), places.reshape(n, 1, axes), 1, np.zeros(axes), np.eye(axes),
+        np.zeros(axes), np.array(heights.shape), np.zeros((heights.size, 1)), np.arange(heights.size + 1),
+        np.zeros((1, heights.size)), heights.ravel(),
+    )  # fmt: skip
+    return found[:, 0, 0] + 0.5 * np.log(2.0 * np.pi)
+
+
+def test_between_tables_that_fall_off_a_cliff_nothing_is_above_the_two_nearest() -> None:
+    """As where a strength leaves nothing of the base's: polynomials of any slopes were 39 nats above."""
+    heights, places = np.array([-275.0, -274.6, -281.5, -622.0]), np.linspace(0.0, 3.0, 61)
+    found, nearest = between_tables(heights, places[:, None]), np.minimum(places.astype(int), 2)
+    high, low = (order(heights[nearest], heights[nearest + 1]) for order in (np.maximum, np.minimum))
+    assert (found <= high + 1e-9).all() and (found >= low - 1e-9).all()
+    assert found[::20] == pytest.approx(heights)
+
+
+@pytest.mark.parametrize("top", [3.0, 3.5, 5.2])
+def test_between_tables_a_maximum_is_nearly_as_high(top: float) -> None:
+    """Two tables for each standard deviation: within 0.03 nats, which only where the maximum is."""
+    places = np.linspace(0.0, 9.0, 91)
+    found = between_tables(-0.125 * (np.arange(10) - top) ** 2, places[:, None])
+    assert found == pytest.approx(-0.125 * (places - top) ** 2, abs=0.035)
+
+
+def test_between_tables_of_two_strengths() -> None:
+    """What is straight along both is so between; the first strength's tables are the farthest apart."""
+    places = np.random.default_rng(2).uniform(0.0, [4.0, 5.0], (20, 2))
+    x, y = np.mgrid[:5, :6]
+    assert between_tables(2.0 * x - 0.7 * y, places) == pytest.approx(2.0 * places[:, 0] - 0.7 * places[:, 1])

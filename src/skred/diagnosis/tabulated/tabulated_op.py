@@ -1,10 +1,12 @@
 """Integrated log densities of a law with mechanisms added, interpolated between tables of quadrature points.
 
 Tables stand on a grid of the added strengths, skewed where two go together. Between them the log
-density of each event is interpolated by cubic polynomials, along every axis through the four tables nearest.
-It bends least along the ridge, where the population follows what is added: a drag that friction has absorbed
-comes in while friction falls to a third. So each table is asked at the population moved by as much as the one
-that it was made around differs from those of its neighbours, interpolated in the same way.
+density of each event is interpolated by monotone cubic polynomials, along every axis through the four tables
+nearest: polynomials of any slopes overshoot by hundreds of nats where a density falls off a cliff, as beyond
+the strength that leaves nothing of the base's. It bends least along the ridge, where the population follows
+what is added: a drag that friction has absorbed comes in while friction falls to a third. So each table is
+asked at the population moved by as much as the one that it was made around differs from those of its
+neighbours, interpolated in the same way.
 """
 
 from __future__ import annotations
@@ -23,27 +25,60 @@ from skred.parallel.compile_cache import cache_key, compiled, inner
 
 _WALL = 12.0
 """Nats that all events lose a step outside the tables: chains turn back, and yet find in from anywhere."""
-_OVERSHOOT = 0.5
-"""How far beyond the densities at the tables an interpolated one may be, in nats."""
 
 
 @inner()
-def _cubic_weights(place, size, weights):  # type: ignore[no-untyped-def]
-    """Fill the weights of four neighbours on the grid 0, 1, ..., size - 1; returns the first of them."""
-    lowest = int(min(max(math.floor(place) - 1.0, 0.0), size - 4.0))
-    t = place - lowest
-    weights[0] = -(t - 1.0) * (t - 2.0) * (t - 3.0) / 6.0
-    weights[1] = t * (t - 2.0) * (t - 3.0) / 2.0
-    weights[2] = -t * (t - 1.0) * (t - 3.0) / 2.0
-    weights[3] = t * (t - 1.0) * (t - 2.0) / 6.0
-    return lowest
+def _slope(before, after):  # type: ignore[no-untyped-def]
+    """Slope at a table between two steps: their harmonic mean, or nil at a maximum or minimum."""
+    return 2.0 * before * after / (before + after) if before * after > 0.0 else 0.0
+
+
+@inner()
+def _slope_at_end(first, second):  # type: ignore[no-untyped-def]
+    """Slope at the last table of all, from the step to it and the one before."""
+    slope = 1.5 * first - 0.5 * second
+    if slope * first <= 0.0:
+        return 0.0
+    return 3.0 * first if first * second <= 0.0 and abs(slope) > 3.0 * abs(first) else slope
+
+
+@inner()
+def _monotone(values, start, t):  # type: ignore[no-untyped-def]
+    """Between four values, t steps from the first of them: never beyond the two nearest.
+
+    Fritsch and Butland, 1984, doi 10.1137/0905021.
+    """
+    cell = min(int(t), 2)
+    steps = np.empty(3)
+    for k in range(3):
+        steps[k] = values[start + k + 1] - values[start + k]
+    here = _slope_at_end(steps[0], steps[1]) if cell == 0 else _slope(steps[cell - 1], steps[cell])
+    there = _slope_at_end(steps[2], steps[1]) if cell == 2 else _slope(steps[cell], steps[cell + 1])
+    share = t - cell
+    left, rise = 1.0 - share, steps[cell]
+    bend = share * left * (left * (here - rise) - share * (there - rise))
+    return values[start + cell] + share * rise + bend
+
+
+@inner()
+def _between(values, t):  # type: ignore[no-untyped-def]
+    """Between values at the corners, (4^n_axes,), along one axis after the other; `values` is used up."""
+    left = values.size
+    for axis in range(t.size):
+        left //= 4
+        for k in range(left):
+            values[k] = _monotone(values, 4 * k, t[axis])
+    return values[0]
 
 
 @inner()
 def _neighbours(own, origin, steps, bends, size):  # type: ignore[no-untyped-def]
-    """Numbers of the tables around some added strengths, their weights, and how many tables outside."""
+    """Numbers of the tables at the corners around some added strengths, and how many tables outside.
+
+    With the way from the first of them along each axis; a corner that nothing hangs on has the number -1.
+    """
     n_axes = own.size
-    along, lowest = np.empty((n_axes, 4)), np.empty(n_axes, np.int64)
+    t, lowest = np.empty(n_axes), np.empty(n_axes, np.int64)
     place, outside = np.empty(n_axes), 0.0
     for axis in range(n_axes):
         place[axis] = own[axis] - origin[axis]
@@ -55,15 +90,18 @@ def _neighbours(own, origin, steps, bends, size):  # type: ignore[no-untyped-def
             place[axis] = math.asinh(bends[axis] * place[axis]) / bends[axis]
         inside = min(max(place[axis], 0.0), size[axis] - 1.0)
         outside += abs(place[axis] - inside)
-        lowest[axis] = _cubic_weights(inside, size[axis], along[axis])
-    tables, weights = np.zeros(4**n_axes, np.int64), np.ones(4**n_axes)
+        lowest[axis] = int(min(max(math.floor(inside) - 1.0, 0.0), size[axis] - 4.0))
+        t[axis] = inside - lowest[axis]
+    tables = np.zeros(4**n_axes, np.int64)
     for corner in range(4**n_axes):
-        rest = corner
+        rest, counts = corner, True
         for axis in range(n_axes):
             tables[corner] = tables[corner] * size[axis] + lowest[axis] + rest % 4
-            weights[corner] *= along[axis, rest % 4]
+            counts = counts and (t[axis] != math.floor(t[axis]) or rest % 4 == t[axis])
             rest //= 4
-    return tables, weights, outside
+        if not counts:
+            tables[corner] = -1
+    return tables, t, outside
 
 
 @inner()
@@ -85,30 +123,23 @@ def _interpolated(  # type: ignore[no-untyped-def]
 ):
     """Fill the log density of each event that has some added strengths; tables asked for are kept."""
     n_events = density.size
-    least, most = np.full(n_events, np.inf), np.full(n_events, -np.inf)
-    tables, weights, outside = _neighbours(own, origin, steps, bends, size)
-    centre = np.zeros(means.shape[1])
-    for corner in range(tables.size):
-        centre += weights[corner] * centres[tables[corner]]
-    density[:] = 0.0
-    for corner in range(tables.size):
-        if abs(weights[corner]) < 1e-12:
-            continue
-        table = tables[corner]
-        if not known[table]:
+    tables, t, outside = _neighbours(own, origin, steps, bends, size)
+    centre, values = np.empty(means.shape[1]), np.zeros(tables.size)
+    for i in range(centre.size):
+        for corner in range(tables.size):
+            if tables[corner] >= 0:
+                values[corner] = centres[tables[corner], i]
+        centre[i] = _between(values, t)
+    for table in tables:
+        if table >= 0 and not known[table]:
             of_table = first[table * n_events : (table + 1) * n_events + 1]
             moved = means + (centres[table] - centre)
             at_tables[table] = integrated_log_density(moved, factor, of_table, points, log_weights)
             known[table] = True
-        for event in range(n_events):
-            there = at_tables[table, event]
-            density[event] += weights[corner] * there
-            least[event] = min(least[event], there)
-            most[event] = max(most[event], there)
-    # Far from all nodes tables differ by hundreds, and polynomials through them overshoot.
     for event in range(n_events):
-        density[event] = min(max(density[event], least[event] - _OVERSHOOT), most[event] + _OVERSHOOT)
-        density[event] -= _WALL * outside / n_events
+        for corner in range(tables.size):
+            values[corner] = at_tables[tables[corner], event] if tables[corner] >= 0 else 0.0
+        density[event] = _between(values, t) - _WALL * outside / n_events
 
 
 @inner()
