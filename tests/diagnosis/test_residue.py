@@ -16,12 +16,12 @@ from skred.campaign import Campaign
 from skred.diagnosis.compare.candidate import Beside, Candidate, names_of_constants, with_or_without
 from skred.diagnosis.compare.comparison import compare, free_force
 from skred.diagnosis.compare.recomputed import recomputed
-from skred.diagnosis.compare.residue import Residue, with_residues
+from skred.diagnosis.compare.residue import Residue, residues, with_residues
 from skred.diagnosis.compare.screening import curve
 from skred.diagnosis.discrepancy.climb import climb
 from skred.diagnosis.discrepancy.explored import Expansion
 from skred.diagnosis.discrepancy.fit import fit_profile
-from skred.diagnosis.discrepancy.profile import KINDS, Profile, log_evidence_of
+from skred.diagnosis.discrepancy.profile import KINDS, Kind, Profile, log_evidence_of
 from skred.diagnosis.discrepancy.sampled_evidence import sampled
 from skred.diagnosis.evidence.coefficient import Base, Curve, curve_at, curve_near
 from skred.diagnosis.evidence.tolerance import COUNTS
@@ -212,6 +212,30 @@ def test_what_stated_places_leave_of_a_mechanism_decides_whether_a_force_counts_
     still, nothing_left = one.with_places(-8.0, -12.0, None), one.with_places(-22.0, -18.0, None)
     assert still.alone == pytest.approx(12.0) and still.residue == pytest.approx(6.0)
     assert nothing_left.residue is None and nothing_left.log_bayes_factor == pytest.approx(-2.0)
+
+
+def test_a_kind_of_force_that_breaks_down_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It counts for nothing, with its prior probability; where all do there is no residue."""
+    base, drag, profiles = fitted(rolling(2.4e-4, n_events=6))
+    breaking = set[str]()
+
+    def beside(base: Base, curve: Curve, least: float, kind: Kind) -> Profile:
+        if kind.equation in breaking:
+            raise np.linalg.LinAlgError
+        return replace(profiles[KINDS.index(kind)], log_bayes_factor=curve.log_bayes_factor + 8.0)
+
+    monkeypatch.setattr("skred.diagnosis.compare.residue.fit_beside", beside)
+
+    def found() -> Residue | None:
+        with ThreadPoolExecutor(1) as pool:
+            return residues(base, [drag.best], [-np.inf], pool)[0]
+
+    every, breaking = found(), {KINDS[1].equation}
+    two, breaking = found(), {kind.equation for kind in KINDS}
+    assert every is not None and every.log_factor == pytest.approx(8.0)
+    assert two is not None and [one.kind for one in two.beside.profiles] == [KINDS[0], KINDS[2]]
+    assert two.log_factor == pytest.approx(8.0 + np.log(KINDS[0].share + KINDS[2].share))
+    assert found() is None
 
 
 def test_what_a_force_beside_adds() -> None:

@@ -21,7 +21,15 @@ import numpy as np
 from skred.diagnosis.compare.between import or_none
 from skred.diagnosis.compare.candidate import Beside, Candidate, names_of_constants
 from skred.diagnosis.discrepancy.fit import fit_profile
-from skred.diagnosis.discrepancy.profile import KINDS, Kind, Prior, Profile, knots, log_evidence_of
+from skred.diagnosis.discrepancy.profile import (
+    KINDS,
+    Kind,
+    Prior,
+    Profile,
+    knots,
+    log_evidence_of,
+    log_evidence_of_some,
+)
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.physics.mechanisms.spec import Group
@@ -84,8 +92,8 @@ def residues(
 ) -> list[Residue | None]:
     """Forces not in the list beside mechanisms, against these alone.
 
-    None where that is less than what counts, or where a step leads to what no front can do, as a drag far
-    below nil.
+    None where that is less than what counts. A kind of force that no front can do beside a mechanism, as a
+    drag far below nil, counts for nothing there.
 
     Parameters
     ----------
@@ -97,8 +105,7 @@ def residues(
     found = list[Residue | None]()
     for curve, lowest, fitted in zip(curves, least, fits, strict=True):
         profiles = tuple(one for one in fitted if one is not None)
-        known = len(profiles) == len(KINDS)
-        log_factor = log_evidence_of(profiles) - curve.log_bayes_factor if known else -math.inf
+        log_factor = log_evidence_of_some(profiles) - curve.log_bayes_factor
         found.append(Residue(log_factor, Beside(curve, profiles)) if log_factor > lowest else None)
     return found
 

@@ -17,12 +17,13 @@ from typing import NamedTuple
 import numpy as np
 
 from skred.arrays import FloatArray
+from skred.diagnosis.compare.between import or_none
 from skred.diagnosis.compare.candidate import Candidate, Strength
 from skred.diagnosis.compare.screening import curve as curve_of
 from skred.diagnosis.discrepancy.climb import arrived, climb, expanded_at, highest
 from skred.diagnosis.discrepancy.explored import Expansion, Laplace, laplace
 from skred.diagnosis.discrepancy.fit import Start, fit_profile
-from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of
+from skred.diagnosis.discrepancy.profile import Profile, log_evidence_of_some
 from skred.diagnosis.evidence.coefficient import Base, Curve
 from skred.diagnosis.evidence.over_scales import moments_over_scales
 from skred.diagnosis.evidence.refit import Fit
@@ -130,8 +131,7 @@ class _Changed(NamedTuple):
     Attributes
     ----------
     beside : float or None
-        For a mechanism with the force beside it; None where there is none, or where a step leads to what no
-        front can do.
+        For a mechanism with the force beside it, of the kinds that fronts can do; None where there is none.
     strength : Strength or None
         Of a mechanism at its best shape.
     """
@@ -163,14 +163,15 @@ def _fitted_anew(base: Base, nothing: Shifts, candidate: Candidate | Profile) ->
     if curve is not candidate.best:
         found, _, _ = _with_coefficient(base, curve, nothing)
     start = np.append(found.values, np.zeros_like(profiles[0].mean)), found.fit.start
-    try:
-        again = [_with_force(base, nothing, one, start, curve) for one in profiles]
-    except np.linalg.LinAlgError:
+    again = [or_none(_with_force, base, nothing, one, start, curve) for one in profiles]
+    both = [
+        replace(one, log_bayes_factor=new)
+        for one, new in zip(profiles, again, strict=True)
+        if new is not None
+    ]
+    if not both:
         return changed
-    both = log_evidence_of(
-        [replace(one, log_bayes_factor=new) for one, new in zip(profiles, again, strict=True)]
-    )
-    return changed._replace(beside=both - log_evidence_of(profiles))
+    return changed._replace(beside=log_evidence_of_some(both) - log_evidence_of_some(profiles))
 
 
 def _with_coefficient(base: Base, curve: Curve, nothing: Shifts) -> tuple[Expansion, float, Strength | None]:

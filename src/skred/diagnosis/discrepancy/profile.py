@@ -216,3 +216,9 @@ def log_evidence_of(profiles: Sequence[Profile]) -> float:
     factors = [profile.log_bayes_factor for profile in profiles]
     shares = np.array([profile.kind.share for profile in profiles])
     return float(np.logaddexp.reduce(np.array(factors) + np.log(shares / shares.sum())))
+
+
+def log_evidence_of_some(profiles: Sequence[Profile]) -> float:
+    """The same where others of its kinds lead to what no front can do, and count for nothing."""
+    share = sum(profile.kind.share for profile in profiles)
+    return log_evidence_of(profiles) + math.log(share) if profiles else -math.inf
