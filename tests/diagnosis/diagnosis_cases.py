@@ -15,7 +15,6 @@ from skred.diagnosis.effort import Effort
 from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode
 from skred.diagnosis.evidence.coefficient import Base, fit_base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, campaign_rows
-from skred.diagnosis.evidence.event_quadrature import FINE
 from skred.diagnosis.evidence.extension import extended
 from skred.diagnosis.evidence.linear_mixed_model import fit_population, mean_prior, starting_population
 from skred.diagnosis.evidence.marginal import Evidence
@@ -133,4 +132,4 @@ def recorded(base: Base, direction: Direction) -> Base:
 def made_way(log_factor: float) -> Way:
     """A way in which avalanches differ that has a log Bayes factor, and nothing behind it."""
     mixture = Mixture.on([Mode(np.zeros(1), np.eye(1))])
-    return Way(log_factor, Evidence(0.0, np.zeros(1), np.eye(1)), (1.0, 0.1), mixture, FINE, 1.0)
+    return Way(log_factor, Evidence(0.0, np.zeros(1), np.eye(1)), (1.0, 0.1), mixture, 1.0)

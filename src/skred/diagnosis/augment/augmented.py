@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import skred.diagnosis.augment.results  # noqa: F401 - registers what it says of readings
 from skred.diagnosis.augment.added_strength import added_strengths
 from skred.diagnosis.augment.problem import AugmentedProblem
-from skred.diagnosis.compare.between import finer, searched
+from skred.diagnosis.compare.between import searched
 from skred.diagnosis.compare.ways import Ways
 from skred.diagnosis.evidence.coefficient import Base, Curve
-from skred.diagnosis.evidence.event_quadrature import FINE
+from skred.diagnosis.evidence.event_quadrature import FINE, USUAL
 from skred.diagnosis.tabulated.coefficient_grid import TABLES, from_nothing, locate
 from skred.diagnosis.tabulated.tables import build_tables
 from skred.inference.between_events import BetweenEvents
@@ -44,17 +44,16 @@ def augmented_problem(
         raise ValueError(f"expected one or {max(TABLES)} mechanisms to add, found {len(curves)}")
     added = added_strengths(curves, way)
     extension = base.extended(*(one.direction for one in added))
+    budget = FINE
     if way is BetweenEvents.COMMON:
         located = locate(base, extension, curves)
     elif len(curves) > 1:
         raise ValueError("of two mechanisms that are added avalanches can differ in none")
     else:
-        ways = ways or searched(base, curves[0])
-        if ways[way].budget != FINE:  # a comparison takes the finer tables for what leads without a residue
-            ways = finer(base, curves[0], ways)
-        found = ways[way]
-        located = from_nothing(curves[0], found.populations, found.farthest, found.strength).finer
-    old, tables = base.problem, build_tables(base, extension, located, FINE)
+        found = (ways or searched(base, curves[0]))[way]
+        located = from_nothing(curves[0], found.populations, found.farthest, found.strength)
+        budget = USUAL  # where avalanches differ by degree each draw takes nearly all of these tables
+    old, tables = base.problem, build_tables(base, extension, located, budget)
     return AugmentedProblem(
         old.campaign, old.terrain, old.error_model, old.place_sd_m, base=base, added=added, tables=tables
     )

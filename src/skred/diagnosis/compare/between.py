@@ -21,7 +21,7 @@ from skred.diagnosis.compare.candidate import Candidate, all_but_place
 from skred.diagnosis.compare.recomputed import computed_again
 from skred.diagnosis.compare.ways import Looked, Ways
 from skred.diagnosis.evidence.coefficient import Base, Curve
-from skred.diagnosis.evidence.event_quadrature import FINE, Budget
+from skred.diagnosis.evidence.event_quadrature import FINE, USUAL
 from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.diagnosis.tabulated.between_evidence import (
     BetweenTarget,
@@ -35,8 +35,6 @@ from skred.inference.between_events import PRIOR, BetweenEvents
 from skred.physics.mechanisms.placed import added_of
 from skred.physics.mechanisms.spec import BoundTo, Group, Mechanism
 
-SEARCH = Budget(64, 64, 128, 1.5, 1.8)
-"""Quadrature points of an event in the tables by which modes are looked for."""
 _DIFFERING = BetweenEvents.SPREAD, BetweenEvents.SOME
 
 
@@ -101,19 +99,16 @@ def or_none[Found](compute: Callable[..., Found], *given: Any) -> Found | None:
 def searched(base: Base, curve: Curve) -> Ways:
     """Each way at a curve's shape, by tables that are fine enough to find where it is."""
     near = curve.nearest(curve.moments[0]).found
-    tables = build_tables(base, base.extended(curve.direction), from_nothing(curve, near), SEARCH)
+    tables = build_tables(base, base.extended(curve.direction), from_nothing(curve, near), USUAL)
     return {kind: searched_evidence(BetweenTarget(base, curve, tables, kind), near) for kind in _DIFFERING}
 
 
 def finer(base: Base, curve: Curve, ways: Ways) -> Ways:
-    """The same by many more quadrature points, around the populations of the most probable way.
-
-    At half the steps between strengths, too: most of what errors are left is there.
-    """
+    """The same by many more quadrature points, around the populations of the most probable way."""
     if not ways:
         return {}
     likely = _most_probable(ways)
-    located = from_nothing(curve, likely.populations, max(one.farthest for one in ways.values())).finer
+    located = from_nothing(curve, likely.populations, max(one.farthest for one in ways.values()))
     tables = build_tables(base, base.extended(curve.direction), located, FINE)
     return {
         kind: between_evidence(BetweenTarget(base, curve, tables, kind), way.proposal)

@@ -20,7 +20,7 @@ import numpy as np
 
 from skred.arrays import FloatArray
 from skred.diagnosis.clock import Progress, Tell
-from skred.diagnosis.compare.between import SEARCH, with_ways
+from skred.diagnosis.compare.between import with_ways
 from skred.diagnosis.compare.candidate import Candidate
 from skred.diagnosis.compare.recomputed import recomputed
 from skred.diagnosis.compare.refinement import candidates_of, kinds_of, refine
@@ -277,7 +277,7 @@ def _under_errors(
     best : float
         The most that a candidate has under another error model, in nats above nothing under this one.
     """
-    for budget, sampled in ((USUAL, False), (SEARCH, True), (FINE, True)):  # before every worker does it
+    for budget, sampled in ((USUAL, False), (USUAL, True), (FINE, True)):  # before every worker does it
         base.with_nothing(budget, sampled=sampled)
     tell(f"  under {error_model} errors: places of what may count")
     candidates = refine(base.setting, curves, partial(curve_near, base), pool, best)

@@ -19,7 +19,6 @@ from scipy.optimize import minimize
 from skred.arrays import FloatArray
 from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, weighted_draws
 from skred.diagnosis.evidence.coefficient import Base, Curve
-from skred.diagnosis.evidence.event_quadrature import Budget
 from skred.diagnosis.evidence.marginal import Evidence, curvatures, population_at
 from skred.diagnosis.evidence.population_target import NARROWEST, log_prior
 from skred.diagnosis.tabulated.tables import Tables
@@ -53,8 +52,6 @@ class Way(NamedTuple):
         Mean and standard deviation over it.
     proposal : Mixture
         Adapted to it.
-    budget : Budget
-        Quadrature points of the tables that it is by.
     farthest : float
         Size of the strength that each avalanche has less than, but for one in a hundred draws.
     """
@@ -63,7 +60,6 @@ class Way(NamedTuple):
     populations: Evidence
     strength: tuple[float, float]
     proposal: Mixture
-    budget: Budget
     farthest: float
 
 
@@ -166,12 +162,11 @@ def between_evidence(target: BetweenTarget, proposal: Mixture, seed: int = 72) -
     middle, moments = float(shares @ strengths), found._replace(draws=psi).moments
     populations = Evidence(found.log_integral, *moments, found.error)
     sd = math.sqrt(float(shares @ (strengths - middle) ** 2))
-    budget = target.tables.budget
-    nothing = target.base.with_nothing(budget, sampled=True).found.log_evidence
+    nothing = target.base.with_nothing(target.tables.budget, sampled=True).found.log_evidence
     log_factor = found.log_integral - nothing
     counted = shares > 0.0
     farthest = target.farthest(found.draws[counted], shares[counted])
-    return Way(log_factor, populations, (middle, sd), found.proposal, budget, farthest)
+    return Way(log_factor, populations, (middle, sd), found.proposal, farthest)
 
 
 def _climbed(target: BetweenTarget, start: FloatArray) -> FloatArray:

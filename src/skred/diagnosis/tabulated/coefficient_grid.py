@@ -27,7 +27,7 @@ _FARTHEST = 32.0
 so much more than all."""
 _BEYOND = 2.0
 """How many times as far as any avalanche is such tables reach."""
-_FIRST_STEP, _BEND = 1.0 / 6.0, 1.0 / 16.0
+_FIRST_STEP, _BEND = 1.0 / 12.0, 1.0 / 16.0
 """The first step of such tables, in what all may have in common; and the last ones, in the strength there."""
 
 
