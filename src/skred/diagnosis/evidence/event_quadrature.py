@@ -276,7 +276,7 @@ def on_a_line(
         return _log_likelihoods(likelihood, points[:, :, None])
 
     populations = centres[:, 1:], np.column_stack([factor[:, 0, 0] for _, factor in over])
-    shifts = np.asarray(_GOLDEN * rows.event % 1.0 - 0.5)
+    shifts = np.asarray(0.5 * (_GOLDEN * rows.event % 1.0) - 0.25)
     points, log_weights = line_nodes(
         log_likelihoods_at, centres, np.column_stack(widths), populations, budget.total, shifts
     )

@@ -50,7 +50,7 @@ def line_nodes(
     others : int
         How many importance nodes there would be.
     shifts : (n_rows,) array
-        By which share of a step the even ones are moved, less than a half. Avalanches that a strength does
+        By which share of a step the even ones are moved, a quarter at most: farther, the last ones miss a tail. Avalanches that a strength does
         nothing for have nodes at the same places otherwise, and a population narrower than their distance
         has all of its probability there, of every avalanche.
     """
