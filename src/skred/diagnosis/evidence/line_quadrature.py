@@ -50,9 +50,9 @@ def line_nodes(
     others : int
         How many importance nodes there would be.
     shifts : (n_rows,) array
-        By which share of a step the even ones are moved, a quarter at most: farther, the last ones miss a tail. Avalanches that a strength does
-        nothing for have nodes at the same places otherwise, and a population narrower than their distance
-        has all of its probability there, of every avalanche.
+        By which share of a step the even ones are moved, a quarter at most: farther, the last ones miss a
+        tail. Avalanches that a strength does nothing for have nodes at the same places otherwise, and a
+        population narrower than their distance has all of its probability there, of every avalanche.
     """
     size = _PER_ROOT * math.sqrt(others)
     each = math.ceil(0.5 * size / centres.shape[1])
