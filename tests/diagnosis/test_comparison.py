@@ -363,9 +363,6 @@ def test_nothing_is_the_same_whatever_is_not_added() -> None:
     assert replace(base).with_nothing(SCREENING) is not base.with_nothing(SCREENING)
 
 
-@pytest.mark.xfail(
-    reason="1e-4 nats apart at one strength since nodes on a line have growing steps; cause not known"
-)
 def test_refits_of_few_points_at_a_time_are_the_same(base: Base, monkeypatch: pytest.MonkeyPatch) -> None:
     """Groups one by one, as of campaigns of a thousand avalanches."""
     job = next(one for one in placed_mechanisms(base.setting) if one.mechanism.id == "turbulent_drag")

@@ -192,14 +192,19 @@ def _led_on(
 
 
 def _asked_for(likelihood: EventLikelihood, fits: Sequence[Fit]) -> list[Fit]:
-    """The populations that events ask for, fitted from a wide one around each fit's."""
+    """The populations that events ask for, fitted from a wide one around each fit's.
+
+    One by one: together they would go on until the last has settled, and depend on which others there are.
+    """
     n = fits[0].points.shape[1] - 1
     wide = population_at(np.stack([fit.found.psi for fit in fits]), n)
     wide = wide._replace(covariance=wide.covariance + STARTING_SPREAD**2 * np.eye(n))
-    points = np.concatenate([fit.points for fit in fits])
-    found, points = fit_population(likelihood, mean_prior(likelihood.extension.law), (wide, points))
-    of_each = np.split(points, len(fits))
-    return [Fit(unfitted(one), own) for one, own in zip(found.groups, of_each, strict=True)]
+    prior = mean_prior(likelihood.extension.law)
+    found = [
+        fit_population(likelihood.of_groups(np.array([k])), prior, (one, fits[k].points))
+        for k, one in enumerate(wide.groups)
+    ]
+    return [Fit(unfitted(population), points) for population, points in found]
 
 
 def unfitted(population: Population) -> Evidence:
