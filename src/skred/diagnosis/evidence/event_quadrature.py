@@ -202,12 +202,12 @@ def event_nodes(
         Other populations that the points of all rows must cover: those over the population are shared with
         them. Without any, a population that has become too narrow would never see what it misses.
     shifts : (n_rows, n_base + 1) array, optional
-        By which each row's quasi-random numbers are moved round along each axis, 0 to 1. For means over
-        rows, not differences: what is left of the integration errors then averages out. On a line there are
-        no such numbers, and nothing is moved.
+        By which each row's points are moved: its quasi-random numbers round along each axis, 0 to 1, those
+        on a line by so much of half a step. For means over rows, not differences: what is left of the
+        integration errors then averages out.
     """
     if _axes(likelihood) == 1:
-        return on_a_line(likelihood, population, modes, budget, reference)
+        return on_a_line(likelihood, population, modes, budget, reference, shifts)
     return importance_nodes(likelihood, population, modes, budget, reference, shifts)
 
 
@@ -263,6 +263,7 @@ def on_a_line(
     modes: Modes,
     budget: Budget,
     reference: Population | None = None,
+    shifts: FloatArray | None = None,
 ) -> Spread:
     """As `event_nodes`, where one strength is all that is free; see `line_nodes`."""
     rows = likelihood.rows
@@ -276,9 +277,14 @@ def on_a_line(
         return _log_likelihoods(likelihood, points[:, :, None])
 
     populations = centres[:, 1:], np.column_stack([factor[:, 0, 0] for _, factor in over])
-    shifts = np.asarray(0.5 * (_GOLDEN * rows.event % 1.0) - 0.25)
+    moved = np.asarray(_GOLDEN * rows.event) if shifts is None else shifts[:, 0]
     points, log_weights = line_nodes(
-        log_likelihoods_at, centres, np.column_stack(widths), populations, budget.total, shifts
+        log_likelihoods_at,
+        centres,
+        np.column_stack(widths),
+        populations,
+        budget.total,
+        0.5 * (moved % 1.0) - 0.25,
     )
     full = np.zeros((*points.shape, 2))
     full[:, :, 0] = points
