@@ -130,6 +130,7 @@ def test_odds_of_the_recordings_by_fronts() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1800)  # a whole diagnosis with two mechanisms: nine minutes alone
 def test_a_second_effect_is_not_lost_among_what_tangents_overstate() -> None:
     """The linear model had odds of e^6 for the recordings, and clean campaigns of its own had more."""
     campaign = trial(41001, "sparse", "two", "pcm", 10.0).campaign
