@@ -19,9 +19,9 @@ from skred.arrays import FloatArray
 SPREAD_MEDIAN, SPREAD_LOG_SD = 0.4, 0.6
 """Median of the prior of the sd of log strengths, and sd of its logarithm: an effect that differs by less
 than a tenth is in common for all that recordings tell, and one that differs tenfold is present in some."""
-_Z = np.linspace(-3.0, 3.0, 25)
-"""Where a normal density is summed, in standard deviations: a quarter of one apart, so that an avalanche that
-tells its own strength to a tenth is not missed between two."""
+_Z = np.linspace(-3.0, 3.0, 73)
+"""Where a normal density is summed, in standard deviations: a twelfth of one apart, so that an avalanche that
+tells its own strength to a tenth is not missed between two where they differ by up to a factor of three."""
 _FARTHEST = 50.0
 """Largest logarithm of a multiple: beyond all tables, and powers of it stay finite."""
 _LOG_Z_SHARES = -0.5 * _Z**2 - math.log(float(np.sum(np.exp(-0.5 * _Z**2))))
@@ -75,7 +75,8 @@ def symbolic_components(kind: BetweenEvents, strength: Any, parameter: Any) -> t
     if kind is BetweenEvents.SOME:
         log_shares = pt.stack([pt.log1p(-parameter), pt.log(parameter)])
         return pt.stack([pt.zeros_like(strength), strength]), log_shares
-    return strength * pt.exp(parameter * pt.constant(_Z)), pt.constant(_LOG_Z_SHARES)
+    logarithms = pt.clip(parameter * pt.constant(_Z), -_FARTHEST, _FARTHEST)
+    return strength * pt.exp(logarithms), pt.constant(_LOG_Z_SHARES)
 
 
 def variable(kind: BetweenEvents, name: str) -> Any:

@@ -9,12 +9,14 @@ what it may have.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy.special import softmax
 
 from skred.arrays import FloatArray
 from skred.diagnosis.augment.added_strength import (
@@ -27,6 +29,7 @@ from skred.diagnosis.evidence.coefficient import Base
 from skred.diagnosis.evidence.conditional_map import EventLikelihood, Population, Rows
 from skred.diagnosis.evidence.event_quadrature import FINE
 from skred.diagnosis.evidence.extension import Extension
+from skred.diagnosis.evidence.refit import MOST_NODES
 from skred.diagnosis.tabulated.tables import Tables, build_tables, exact_log_densities
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.between_events import BetweenEvents
@@ -147,22 +150,25 @@ class AugmentedProblem(HierarchicalProblem):
     def log_likelihood(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
         """Log density of each event for many parameter vectors: arrays by name to (n, n_events)."""
         self._check(law.mechanisms)
-        together: FloatArray = np.logaddexp.reduce(self._parts(law, samples), axis=1)
-        return together
+        return self._of_components(law, samples, partial(np.logaddexp.reduce, axis=1))
 
-    def _parts(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
-        """Log of each event's density with a component, times its share, (n, n_components, n_events)."""
+    def _of_components(
+        self, law: Law, samples: Mapping[str, Any], then: Callable[[FloatArray], FloatArray]
+    ) -> FloatArray:
+        """What becomes of each event's log densities with its components, times their shares.
+
+        These are (n, n_components, n_events); some draws at a time, for of many events they take gigabytes.
+        """
         means, factors = population_of(law, samples)
         own, log_shares = components_of(self.added, samples)
         n_events, tables = self.campaign.n_events, self.tables.arrays.values()
 
-        def densities(draws: slice) -> FloatArray:
-            found: FloatArray = tabulated_log_densities(
-                means[draws], factors[draws], own[draws], n_events, *tables
-            )
-            return found
+        def of_some(draws: slice) -> FloatArray:
+            found = tabulated_log_densities(means[draws], factors[draws], own[draws], n_events, *tables)
+            return then(found + log_shares[draws, :, None])
 
-        return np.concatenate(side_by_side(densities, in_parts(len(own)))) + log_shares[:, :, None]
+        lots = in_parts(len(own), math.ceil(log_shares.size * n_events / MOST_NODES))
+        return np.concatenate(side_by_side(of_some, lots))
 
     def added_rows(self, samples: Mapping[str, Any]) -> FloatArray:
         """Added strengths of many parameter vectors: arrays by name to (n, n_added)."""
@@ -170,9 +176,7 @@ class AugmentedProblem(HierarchicalProblem):
 
     def probability_of_each(self, law: Law, samples: Mapping[str, Any]) -> FloatArray:
         """How probable each recorded avalanche has each component, (n, n_events, n_components)."""
-        log_parts = self._parts(law, samples)
-        parts: FloatArray = np.exp(log_parts - np.logaddexp.reduce(log_parts, axis=1, keepdims=True))
-        return np.moveaxis(parts, 1, 2)
+        return np.moveaxis(self._of_components(law, samples, partial(softmax, axis=1)), 1, 2)
 
     def moved_straight(self, law: Law) -> tuple[str, ...]:
         """The base law's strengths: what is added takes over from them in a straight line.

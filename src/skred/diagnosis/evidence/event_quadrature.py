@@ -32,7 +32,7 @@ _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 class Budget(NamedTuple):
     """How many quadrature points an event gets, and how much wider the proposals are than what they follow.
 
-    On a line only their total counts.
+    On a line only the total of the numbers counts.
 
     Attributes
     ----------

@@ -1,9 +1,10 @@
 """The evidence of each way in which avalanches differ in an added strength.
 
 An integral over the population, the strength, and what says how it differs, all at once; the events' own
-strengths are integrated by tables. Importance sampling around the highest mode, which is climbed to from
-several starts. A strength that all have in common is not among the ways: it would have to suit avalanches
-that have none of it, at strengths between tables and populations that no table is around.
+strengths are integrated by tables. Importance sampling around the modes that are climbed to from several
+starts: few avalanches with much and many with little are two. A strength that all have in common is not among
+the ways: it would have to suit avalanches that have none of it, at strengths between tables and populations
+that no table is around.
 """
 
 from __future__ import annotations
@@ -19,8 +20,9 @@ from scipy.optimize import minimize
 from skred.arrays import FloatArray
 from skred.diagnosis.evidence.adaptive_sampling import Mixture, Mode, weighted_draws
 from skred.diagnosis.evidence.coefficient import Base, Curve
-from skred.diagnosis.evidence.marginal import Evidence, curvatures, population_at
-from skred.diagnosis.evidence.population_target import NARROWEST, log_prior
+from skred.diagnosis.evidence.marginal import Evidence, curvatures
+from skred.diagnosis.evidence.population_target import NARROWEST, factor_at, log_prior
+from skred.diagnosis.evidence.tolerance import COUNTS
 from skred.diagnosis.tabulated.tables import Tables
 from skred.diagnosis.tabulated.tabulated_op import tabulated_log_densities
 from skred.inference.between_events import BetweenEvents, components, from_unbounded
@@ -100,7 +102,8 @@ class BetweenTarget:
         _, densities = self._of_events(psi[inside], strength[inside], parameter[inside])
         total = np.logaddexp.reduce(densities, axis=1).sum(axis=1)
         total += [log_prior(one, n, self.base.log_scale) for one in psi[inside]]
-        result[inside] = np.nan_to_num(total + log_p[inside], nan=-np.inf)
+        total += log_p[inside]
+        result[inside] = np.where(np.isnan(total), -np.inf, total)
         return result
 
     def _of_events(
@@ -110,11 +113,11 @@ class BetweenTarget:
 
         The latter with its share, (n, n_components, n_events).
         """
-        population = population_at(psi, len(self.base.law.mechanisms))
-        factors = np.linalg.cholesky(population.covariance)
+        n = len(self.base.law.mechanisms)
+        means, factors = psi[:, :n].copy(), np.array([factor_at(one, n) for one in psi])
         own, log_shares = components(self.kind, strength, parameter)
         densities = tabulated_log_densities(
-            population.mean, factors, np.ascontiguousarray(own[:, :, None]), len(self.base.rows.event),
+            means, factors, np.ascontiguousarray(own[:, :, None]), len(self.base.rows.event),
             *self.tables.arrays.values(),
         )  # fmt: skip
         return own, densities + log_shares[:, :, None]
@@ -137,21 +140,24 @@ class BetweenTarget:
 
 
 def searched_evidence(target: BetweenTarget, near: Evidence) -> Way:
-    """One way, by draws around its highest mode, which is looked for.
+    """One way, by draws around its modes, which are looked for.
 
     Parameters
     ----------
     near : Evidence
         Populations around a mode.
     """
-    log_size = math.log(abs(target.curve.moments[0]))
+    mean, sd = target.curve.moments
+    log_size = math.log(abs(mean) + sd)
     most = math.log(0.9 * abs(target.end))
     tops = []
     for multiple, coordinate in _STARTS[target.kind]:
         start = [*near.psi, min(log_size + math.log(multiple), most), coordinate]
         tops.append(_climbed(target, np.array(start)))
-    top = max(tops, key=lambda x: float(target(x[None])[0]))
-    return between_evidence(target, Mixture.on([Mode(top, _curvature(target, top))]), 71)
+    heights = target(np.array(tops))
+    near_highest = np.flatnonzero(heights >= heights.max() - COUNTS)
+    modes = [Mode(tops[k], _curvature(target, tops[k])) for k in near_highest]
+    return between_evidence(target, Mixture.on(modes), 71)
 
 
 def between_evidence(target: BetweenTarget, proposal: Mixture, seed: int = 72) -> Way:

@@ -185,7 +185,10 @@ def from_nothing(
 
 
 def _fitted(base: Base, extension: Extension, added: FloatArray, near: Sequence[Fit]) -> list[Fit]:
-    """Fits at strengths of what is added, (n, n_added), begun at others; these where nothing is found."""
+    """Fits at strengths of what is added, (n, n_added), begun at others.
+
+    Where nothing is found these, without evidence: theirs is of another strength.
+    """
     given = base.given(added)
 
     def fitted(part: slice) -> list[Fit]:
@@ -193,7 +196,9 @@ def _fitted(base: Base, extension: Extension, added: FloatArray, near: Sequence[
 
     fits = [fit for found in side_by_side(fitted, in_parts(len(added))) for fit in found]
     return [
-        fit if np.isfinite(fit.found.psi).all() and np.isfinite(fit.found.covariance).all() else before
+        fit
+        if np.isfinite(fit.found.psi).all() and np.isfinite(fit.found.covariance).all()
+        else before._replace(found=before.found._replace(log_evidence=-np.inf))
         for fit, before in zip(fits, near, strict=True)
     ]
 

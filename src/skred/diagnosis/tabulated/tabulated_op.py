@@ -1,12 +1,12 @@
 """Integrated log densities of a law with mechanisms added, interpolated between tables of quadrature points.
 
 Tables stand on a grid of the added strengths, skewed where two go together. Between them the log
-density of each event is interpolated by monotone cubic polynomials, along every axis through the four tables
-nearest: polynomials of any slopes overshoot by hundreds of nats where a density falls off a cliff, as beyond
-the strength that leaves nothing of the base's. It bends least along the ridge, where the population follows
-what is added: a drag that friction has absorbed comes in while friction falls to a third. So each table is
-asked at the population moved by as much as the one that it was made around differs from those of its
-neighbours, interpolated in the same way.
+density of each event is interpolated by cubic polynomials that bend gently, along every axis through the four
+tables nearest. Those of any bend overshoot by hundreds of nats where a density falls off a cliff, as beyond
+the strength that leaves nothing of the base's; monotone ones flatten every maximum. It bends least along the
+ridge, where the population follows what is added: a drag that friction has absorbed comes in while friction
+falls to a third. So each table is asked at the population moved by as much as the one that it was made around
+differs from those of its neighbours, interpolated in the same way.
 """
 
 from __future__ import annotations
@@ -23,41 +23,31 @@ from skred.inference.array_op import ArrayOp
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.parallel.compile_cache import cache_key, compiled, inner
 
+_MOST_BENT = 2.0
+"""Nats that a second difference counts at most: as of an avalanche that alone knows a strength to two thirds
+of a step between tables. More is a cliff's edge."""
 _WALL = 12.0
 """Nats that all events lose a step outside the tables: chains turn back, and yet find in from anywhere."""
 
 
 @inner()
-def _slope(before, after):  # type: ignore[no-untyped-def]
-    """Slope at a table between two steps: their harmonic mean, or nil at a maximum or minimum."""
-    return 2.0 * before * after / (before + after) if before * after > 0.0 else 0.0
+def _bend(values, middle):  # type: ignore[no-untyped-def]
+    """Second difference around a value, as far as it counts."""
+    bend = values[middle - 1] - 2.0 * values[middle] + values[middle + 1]
+    return min(max(bend, -_MOST_BENT), _MOST_BENT)
 
 
 @inner()
-def _slope_at_end(first, second):  # type: ignore[no-untyped-def]
-    """Slope at the last table of all, from the step to it and the one before."""
-    slope = 1.5 * first - 0.5 * second
-    if slope * first <= 0.0:
-        return 0.0
-    return 3.0 * first if first * second <= 0.0 and abs(slope) > 3.0 * abs(first) else slope
+def _gently_bent(values, start, t):  # type: ignore[no-untyped-def]
+    """Between four values, t steps from the first of them: cubic polynomials where they bend gently.
 
-
-@inner()
-def _monotone(values, start, t):  # type: ignore[no-untyped-def]
-    """Between four values, t steps from the first of them: never beyond the two nearest.
-
-    Fritsch and Butland, 1984, doi 10.1137/0905021.
+    Nowhere farther from the straight line than an eighth of what a second difference counts at most.
     """
     cell = min(int(t), 2)
-    steps = np.empty(3)
-    for k in range(3):
-        steps[k] = values[start + k + 1] - values[start + k]
-    here = _slope_at_end(steps[0], steps[1]) if cell == 0 else _slope(steps[cell - 1], steps[cell])
-    there = _slope_at_end(steps[2], steps[1]) if cell == 2 else _slope(steps[cell], steps[cell + 1])
-    share = t - cell
-    left, rise = 1.0 - share, steps[cell]
-    bend = share * left * (left * (here - rise) - share * (there - rise))
-    return values[start + cell] + share * rise + bend
+    low, share = start + cell, t - cell
+    here, there = _bend(values, low + (cell == 0)), _bend(values, low + (cell < 2))
+    left, rise = 1.0 - share, values[low + 1] - values[low]
+    return values[low] + share * rise - share * left / 6.0 * ((1.0 + left) * here + (1.0 + share) * there)
 
 
 @inner()
@@ -67,7 +57,7 @@ def _between(values, t):  # type: ignore[no-untyped-def]
     for axis in range(t.size):
         left //= 4
         for k in range(left):
-            values[k] = _monotone(values, 4 * k, t[axis])
+            values[k] = _gently_bent(values, 4 * k, t[axis])
     return values[0]
 
 
