@@ -33,7 +33,11 @@ def test_what_a_strength_in_common_has_is_taken_from_how_probable_it_is(found):
 
 
 def test_the_audit_is_named_the_same_avalanches_only_where_they_are(found):
-    assert row(beside_the_audit(found), "avalanches that take").endswith("| the same five |")
+    changed = deepcopy(found)
+    for event in changed["pcm"]["influence"]["events"]:
+        if event["event"] in ("19880315", "19890217", "19920311", "20030406", "20050416"):
+            event["log_bayes_factor"] = -1.0
+    assert row(beside_the_audit(changed), "avalanches that take").endswith("| the same five |")
     changed = deepcopy(found)
     for event in changed["pcm"]["influence"]["events"]:
         if event["event"] == "19750225":

@@ -54,7 +54,7 @@ _TIMES_FINER = {1: 2, 2: 1}
 """How many times tables are made finer at most, by the number of added strengths: of one with half the steps,
 which next to nothing left of a base strength needs twice; of two that would be four times the tables."""
 _EXACT_DRAWS = 16
-"""Draws compared, evenly over the posterior; by the root of what an avalanche may have fewer."""
+"""Draws compared, evenly over the posterior; by half the root of what an avalanche may have fewer."""
 _START_WIDER = 1.5
 """How much wider than the posterior chains start, as r-hat asks for."""
 
@@ -215,7 +215,7 @@ class AugmentedProblem(HierarchicalProblem):
         """
         n = len(next(iter(samples.values())))
         # Where avalanches may differ in what is added, each draw takes as many integrals.
-        each = math.ceil(_EXACT_DRAWS / math.sqrt(self.n_components))
+        each = min(_EXACT_DRAWS, math.ceil(2.0 * _EXACT_DRAWS / math.sqrt(self.n_components)))
         draws = np.linspace(0, n - 1, min(n, each)).astype(int)
         samples = {name: np.ravel(values)[draws] for name, values in samples.items()}
         rng = np.random.default_rng([seed, 5])

@@ -55,7 +55,7 @@ def line_nodes(
         population narrower than their distance has all of its probability there, of every avalanche.
     """
     size = _PER_ROOT * math.sqrt(others)
-    each = math.ceil(0.5 * size / centres.shape[1])
+    each = max(math.ceil(0.5 * size / centres.shape[1]), 2)
     evenly = np.linspace(-1.0, 1.0, each) + 2.0 / (each - 1) * shifts[:, None]
     # Each at least as far as to all others, in steps that grow with the way: no narrow gathering of nodes has
     # an edge that stands for all of a gap beside it.

@@ -118,7 +118,13 @@ class Located(NamedTuple):
 
 
 def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located:
-    """Put a grid where curves have the strengths, and move its ends until it covers their posterior."""
+    """Put a grid where curves have the strengths, and move its ends until it covers their posterior.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If nothing is found at any strength.
+    """
     scale, widest = (np.array(of) for of in zip(*((one.scale, one.widest) for one in curves), strict=True))
     low, slack = np.where([curve.added.either_sign for curve in curves], -np.inf, 0.0), 1e-9 * scale
     mean, sd = (np.array(values) for values in zip(*(curve.moments for curve in curves), strict=True))
@@ -132,6 +138,8 @@ def locate(base: Base, extension: Extension, curves: Sequence[Curve]) -> Located
         density += sum(curve.log_prior(points[:, k]) for k, curve in enumerate(curves))
         allowed = np.all(points >= low - slack, axis=1)
         density = np.where(allowed & np.isfinite(density), density, -np.inf)
+        if density.max() == -np.inf:
+            raise np.linalg.LinAlgError("nothing is found at any strength of the grid")
         counts = density > density.max() - _ENDS_NATS
         mean, factor = _moments(grid, density)
         at = np.stack(np.unravel_index(np.flatnonzero(counts), grid.size), axis=1)

@@ -23,9 +23,9 @@ from skred.inference.array_op import ArrayOp
 from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.parallel.compile_cache import cache_key, compiled, inner
 
-_MOST_BENT = 2.0
-"""Nats that a second difference counts at most: as of an avalanche that alone knows a strength to two thirds
-of a step between tables. More is a cliff's edge."""
+_MOST_BENT = 1.0
+"""Nats that a second difference counts at most: as of an avalanche that alone knows a strength to a step
+between tables. More is a cliff's edge."""
 _WALL = 12.0
 """Nats that all events lose a step outside the tables: chains turn back, and yet find in from anywhere."""
 
