@@ -54,7 +54,7 @@ _TIMES_FINER = {1: 2, 2: 1}
 """How many times tables are made finer at most, by the number of added strengths: of one with half the steps,
 which next to nothing left of a base strength needs twice; of two that would be four times the tables."""
 _EXACT_DRAWS = 16
-"""Draws compared, evenly over the posterior; by half the root of what an avalanche may have fewer."""
+"""Draws compared, evenly over the posterior; fewer where an avalanche may have many strengths."""
 _START_WIDER = 1.5
 """How much wider than the posterior chains start, as r-hat asks for."""
 
