@@ -64,7 +64,7 @@ def between_tables(heights: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def test_between_tables_that_fall_off_a_cliff_nothing_is_far_above_the_two_nearest() -> None:
-    """As where a strength leaves nothing of the base's: polynomials of any bend were 13 and 39 nats above."""
+    """As where a strength leaves nothing of the base's: polynomials of any bend were 39 nats above."""
     heights, places = np.array([-275.0, -274.6, -281.5, -622.0]), np.linspace(0.0, 3.0, 61)
     found, nearest = between_tables(heights, places[:, None]), np.minimum(places.astype(int), 2)
     high, low = (order(heights[nearest], heights[nearest + 1]) for order in (np.maximum, np.minimum))
