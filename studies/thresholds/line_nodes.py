@@ -97,9 +97,11 @@ def evidences(rule: str, budget: Budget, one: Integration, log_scale: Any) -> tu
 def nodes_of(nodes: Nodes, rows: Rows, group: int) -> Nodes:
     """Nodes of one group of rows."""
     n_events = len(rows.event) // rows.n_groups
-    first = nodes.first[group * n_events : (group + 1) * n_events + 1]
+    own = slice(group * n_events, (group + 1) * n_events)
+    first = nodes.first[own.start : own.stop + 1]
     inside = slice(first[0], first[-1])
-    return Nodes(first - first[0], np.ascontiguousarray(nodes.points[:, inside]), nodes.log_weights[inside])
+    points = np.ascontiguousarray(nodes.points[:, inside])
+    return Nodes(first - first[0], points, nodes.log_weights[inside], nodes.highest[own])
 
 
 def measured(law_id: str) -> dict[str, Any]:

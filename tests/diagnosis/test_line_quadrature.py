@@ -4,19 +4,21 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from skred.diagnosis.evidence.event_quadrature import FINE, FIRST, USUAL, Spread
 from skred.diagnosis.evidence.line_quadrature import line_nodes
+from skred.diagnosis.evidence.population_target import NARROWEST, log_prior, log_targets
+from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 
 MEAN, SD = np.array([1.5, -0.4]), np.array([0.04, 0.3])
-OTHERS = 144
-"""As many importance nodes as the comparison takes."""
+OTHERS = USUAL.total
 
 
 def log_integrals(log_likelihood, others=OTHERS, mode=0.0):
     """Of likelihoods over two populations, by nodes on a line; the mode in standard deviations."""
     widths = np.column_stack([1.6 * SD, 1.6 * SD, 0.3 * SD])
     centres = np.column_stack([MEAN, MEAN + 0.5 * SD, MEAN + mode * SD])
-    populations, shifts = (MEAN[:, None], SD[:, None]), np.zeros(2)
-    points, log_weights = line_nodes(log_likelihood, centres, widths, populations, others, shifts)
+    populations = MEAN[:, None], SD[:, None]
+    points, log_weights, _ = line_nodes(log_likelihood, centres, widths, populations, others)
     assert np.all(np.diff(points, axis=1) >= 0.0)
     log_density = norm.logpdf(points, MEAN[:, None], SD[:, None])
     return np.logaddexp.reduce(log_weights + log_density, axis=1)
@@ -58,22 +60,28 @@ def test_a_spike_beside_an_edge_is_seen(edge):
     assert log_integrals(log_likelihood, mode=edge) == pytest.approx(exact, abs=0.1)
 
 
-def test_no_narrow_population_has_more_than_all_of_itself():
-    """Avalanches that a strength does nothing for have the same likelihood, and much the same nodes.
+@pytest.mark.parametrize("budget", [FIRST, USUAL, FINE])
+@pytest.mark.parametrize(("own", "spread"), [(-7.767, 0.0036), (-1.5, 0.0036), (-1.5, 0.05), (-3.0, 0.3)])
+def test_what_a_strength_does_nothing_for_has_no_evidence_of_it(own, spread, budget):
+    """Avalanches with one likelihood at every strength, and all their nodes at the same places.
 
-    Around a narrow population far from the reference; at an edge of a gathering of nodes one stood for all
-    of the gap beside it, a hundred nats for these avalanches.
+    Most populations of the prior are between those: summed up, what they have of themselves there and what
+    they have too much on others is tens of nats.
     """
-    n, own, reference = 22, -7.767, -0.62
+    n, reference, wide, log_scale = 22, -0.62, 0.022, np.array([-0.69])
     centres = np.tile([own, own, reference], (n, 1))
-    widths = np.tile([1.35 * 0.0036, 1.6 * 0.0036, 1.6 * 0.022], (n, 1))
-    populations = np.tile([own, reference], (n, 1)), np.tile([0.0036, 0.022], (n, 1))
-    shifts = 0.5 * (0.618034 * np.arange(n) % 1.0) - 0.25
-    points, log_weights = line_nodes(np.zeros_like, centres, widths, populations, OTHERS, shifts)
-    means, sds = np.meshgrid(np.linspace(-8.2, -7.3, 451), [0.0036, 0.01, 0.03, 0.1, 0.3])
-    for mean, sd in zip(means.ravel(), sds.ravel(), strict=True):
-        of_each = np.logaddexp.reduce(log_weights + norm.logpdf(points, mean, sd), axis=1)
-        assert of_each.sum() < 25.0
+    widths = np.tile([1.35 * spread, 1.6 * spread, 1.6 * wide], (n, 1))
+    populations = np.tile([own, reference], (n, 1)), np.tile([spread, wide], (n, 1))
+    points, *found = line_nodes(np.zeros_like, centres, widths, populations, budget.total)
+    nodes = Spread(np.stack([points, np.zeros_like(points)], axis=2), *found).nodes
+    rng = np.random.default_rng(0)
+    mean = log_scale[0] + np.log(np.abs(rng.standard_normal(4000)))
+    log_spread = np.log(SPREAD_MEDIAN) + SPREAD_LOG_SD * rng.standard_normal(4000)
+    log_spread = np.maximum(log_spread, NARROWEST)
+    psi = np.column_stack([mean, log_spread])
+    log_l = log_targets(psi, 1, log_scale, *nodes) - [log_prior(one, 1, log_scale) for one in psi]
+    assert log_l.max() < 1e-9
+    assert -1.0 < np.logaddexp.reduce(log_l) - np.log(len(log_l))
 
 
 def test_four_times_as_many_are_nearer():

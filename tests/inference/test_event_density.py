@@ -433,14 +433,14 @@ def test_assessment_of_boxes(name: str) -> None:
 # The sum over a population
 
 
-def nodes_of(n_strengths: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes of three events, not as many each, some so unlikely that they do not count."""
+def nodes_of(n_strengths: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes of three events, not as many each, some so unlikely that they do not count; no limit."""
     rng = np.random.default_rng(seed)
     first = np.array([0, 40, 41, 141])
     points = np.ascontiguousarray(rng.normal(-1.0, 0.5, (n_strengths, 141)))
     log_weights = rng.normal(-50.0, 5.0, 141)
     log_weights[3], log_weights[60] = -1000.0, 300.0
-    return first, points, log_weights
+    return first, points, log_weights, np.full(3, np.inf)
 
 
 def population(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -451,7 +451,7 @@ def population(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 def sum_by_hand(means: np.ndarray, factor: np.ndarray, *nodes: np.ndarray) -> np.ndarray:
     """From the covariance, so that the factor is not taken for granted; complex means and factors too."""
-    first, points, log_weights = nodes
+    first, points, log_weights, highest = nodes
     covariance = factor @ factor.T
     precision = np.linalg.inv(covariance)
     log_constant = -0.5 * np.log(np.linalg.det(2 * np.pi * covariance))
@@ -461,7 +461,8 @@ def sum_by_hand(means: np.ndarray, factor: np.ndarray, *nodes: np.ndarray) -> np
         deviation = points[:, at].T - means[e]
         exponent = log_weights[at] - 0.5 * np.einsum("ki,ij,kj->k", deviation, precision, deviation)
         shift = exponent.real.max()
-        result.append(log_constant + shift + np.log(np.exp(exponent - shift).sum()))
+        found = log_constant + shift + np.log(np.exp(exponent - shift).sum())
+        result.append(found if found.real < highest[e] else highest[e])
     return np.array(result)
 
 
@@ -473,8 +474,23 @@ def test_integrated_log_density_by_hand(n: int, scale: float) -> None:
     assert_allclose(found, sum_by_hand(means, scale * factor, *nodes_of(n)), rtol=1e-10)
 
 
+def limited(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes of which the last event may have less than the sum that it has."""
+    *nodes, highest = nodes_of(n)
+    highest[2] = sum_by_hand(*population(n), *nodes, highest)[2] - 0.5
+    return (*nodes, highest)  # type: ignore[return-value]
+
+
 @pytest.mark.parametrize("n", [1, 2, 3])
-def test_pullback_is_the_complex_step(n: int) -> None:
+def test_no_event_has_more_than_its_highest(n: int) -> None:
+    means, factor = population(n)
+    free, highest = integrated_log_density(means, factor, *nodes_of(n)), limited(n)[3]
+    assert_allclose(integrated_log_density(means, factor, *limited(n)), [*free[:2], highest[2]], rtol=1e-12)
+
+
+@pytest.mark.parametrize("nodes_of", [nodes_of, limited])
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_pullback_is_the_complex_step(n: int, nodes_of: Callable[[int], tuple[np.ndarray, ...]]) -> None:
     means, factor = population(n)
     nodes, cotangent = nodes_of(n), np.array([0.5, -1.0, 2.0])
     pulled = integrated_log_density_pullback(cotangent, means, factor, *nodes)
@@ -535,20 +551,20 @@ def test_ops_are_equal_pickle_and_know_their_shapes() -> None:
 
 
 def test_nodes_are_not_differentiated_by_and_wrong_inputs_are_named() -> None:
-    first, points, log_weights = nodes_of(2)
+    first, points, log_weights, highest = nodes_of(2)
     weights = pt.dvector("log_weights")
-    density = IntegratedLogDensity()(*population(2), first, points, weights)
+    density = IntegratedLogDensity()(*population(2), first, points, weights, highest)
     with pytest.raises((DisconnectedInputError, NotImplementedError)):
         pt.grad(density.sum(), weights)
     with pytest.raises(TypeError, match="first: expected int64"):
-        IntegratedLogDensity()(*population(2), first.astype(float), points, log_weights)
+        IntegratedLogDensity()(*population(2), first.astype(float), points, log_weights, highest)
     with pytest.raises(TypeError, match="means: expected 2 dimensions"):
-        IntegratedLogDensity()(population(2)[0][0], population(2)[1], first, points, log_weights)
+        IntegratedLogDensity()(population(2)[0][0], population(2)[1], first, points, log_weights, highest)
 
 
 def test_nodes_are_drawn_by_their_share() -> None:
     means, factor = population(2)
-    first, points, log_weights = nodes_of(2)
+    first, points, log_weights, _ = nodes_of(2)
     n = 4000
     uniforms = np.random.default_rng(1).random((n, 3))
     # All events share a mean here: one population a row.

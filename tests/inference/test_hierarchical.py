@@ -210,7 +210,7 @@ def test_log_density_of_the_model(ryggfonn: HierarchicalProblem, pcm_model: pm.M
     terms = pcm_model.compile_logp(vars=pcm_model["recordings"], sum=False, mode="FAST_COMPILE")(
         transformed(sample)
     )[0]
-    first, points, log_weights = ryggfonn.surfaces(load_law("pcm").mechanisms).nodes
+    first, points, log_weights, _ = ryggfonn.surfaces(load_law("pcm").mechanisms).nodes
     covariance = np.array([[mu_spread**2, r * mu_spread * drag_spread], [0.0, drag_spread**2]])
     covariance[1, 0] = covariance[0, 1]
     deviation = points.T - np.log([mu, drag])
@@ -242,7 +242,7 @@ def test_one_model_serves_other_surfaces(pcm_model: pm.Model) -> None:
     before = logp(transformed(sample))[0]
     nodes = {
         f"surface_{name}": pcm_model[f"surface_{name}"].get_value()
-        for name in ("first", "points", "log_weights")
+        for name in ("first", "points", "log_weights", "highest")
     }
     try:
         values = other.surfaces(mechanisms).nodes._asdict()

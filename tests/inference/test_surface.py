@@ -338,7 +338,7 @@ def test_spans() -> None:
 def test_nodes_have_the_moments_of_their_patches() -> None:
     problem = hierarchical_problem(pick(FOUR))
     surfaces = problem.surfaces(load_law("pcm").mechanisms)
-    first, points, log_weights = surfaces.nodes
+    first, points, log_weights, _ = surfaces.nodes
     assert np.all(np.diff(surfaces.first) > 0) and surfaces.first[-1] == surfaces.n_patches
     assert_allclose(first, 4 * surfaces.first)
     points = points.T.reshape(-1, 4, 2)

@@ -105,7 +105,7 @@ def recorded_points(
     flat = own.reshape(-1, own.shape[2])
     uniforms = rng.random((len(means), n_events))
     nearest = tables.grid.nearest(flat).reshape(-1, n_events)
-    first, points, log_weights = tables.nodes
+    first, points, log_weights, _ = tables.nodes
     starts = first[:-1].reshape(-1, n_events)
     number = np.empty((len(means), n_events), dtype=np.int64)
     for event in range(n_events):

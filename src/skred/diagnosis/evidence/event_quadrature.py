@@ -26,7 +26,6 @@ from skred.inference.reading_density import log_likelihoods
 from skred.parallel.compile_cache import compiled
 
 _LOG_SQRT_2PI = 0.5 * math.log(2.0 * math.pi)
-_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
 class Budget(NamedTuple):
@@ -96,10 +95,14 @@ class Spread(NamedTuple):
     points : (n_rows, n_nodes, n_base + 1) array
         The release's deviation last.
     log_weights : (n_rows, n_nodes) array
+    highest : (n_rows,) array
+        As in `Nodes`: on a line the largest likelihood found. Over more axes it is no more than a guess that
+        random points make, and with a release among them no limit at all.
     """
 
     points: FloatArray
     log_weights: FloatArray
+    highest: FloatArray
 
     @classmethod
     def joined(cls, parts: Sequence[Spread]) -> Spread:
@@ -114,7 +117,7 @@ class Spread(NamedTuple):
 
     def log_integrals(self, population: Population, rows: Rows) -> FloatArray:
         """Log of each row's integral over a population, (n_rows,)."""
-        return np.asarray(np.logaddexp.reduce(self._log_terms(population, rows), axis=1))
+        return np.minimum(np.logaddexp.reduce(self._log_terms(population, rows), axis=1), self.highest)
 
     def _log_terms(self, population: Population, rows: Rows) -> FloatArray:
         return self.log_weights + _log_prior(population, rows, self.points[:, :, :-1])
@@ -124,7 +127,7 @@ class Spread(NamedTuple):
         """As the compiled sums over a population read them."""
         n_rows, n_nodes, n = self.points.shape
         points = np.ascontiguousarray(self.points[:, :, : n - 1].reshape(-1, n - 1).T)
-        return Nodes(n_nodes * np.arange(n_rows + 1), points, self.log_weights.ravel())
+        return Nodes(n_nodes * np.arange(n_rows + 1), points, self.log_weights.ravel(), self.highest)
 
 
 class _Part(NamedTuple):
@@ -202,12 +205,12 @@ def event_nodes(
         Other populations that the points of all rows must cover: those over the population are shared with
         them. Without any, a population that has become too narrow would never see what it misses.
     shifts : (n_rows, n_base + 1) array, optional
-        By which each row's points are moved: its quasi-random numbers round along each axis, 0 to 1, those
-        on a line by so much of half a step. For means over rows, not differences: what is left of the
-        integration errors then averages out.
+        By which each row's quasi-random numbers are moved round along each axis, 0 to 1. For means over
+        rows, not differences: what is left of the integration errors then averages out. On a line, where
+        nothing is random, nothing is moved.
     """
     if _axes(likelihood) == 1:
-        return on_a_line(likelihood, population, modes, budget, reference, shifts)
+        return on_a_line(likelihood, population, modes, budget, reference)
     return importance_nodes(likelihood, population, modes, budget, reference, shifts)
 
 
@@ -254,7 +257,7 @@ def importance_nodes(
     n_rows, n_nodes = log_weights.shape
     full = np.zeros((n_rows, n_nodes, n + 1))
     full[:, :, :axes] = points
-    return Spread(full, log_weights - math.log(n_nodes))
+    return Spread(full, log_weights - math.log(n_nodes), np.full(n_rows, np.inf))
 
 
 def on_a_line(
@@ -263,7 +266,6 @@ def on_a_line(
     modes: Modes,
     budget: Budget,
     reference: Population | None = None,
-    shifts: FloatArray | None = None,
 ) -> Spread:
     """As `event_nodes`, where one strength is all that is free; see `line_nodes`."""
     rows = likelihood.rows
@@ -277,18 +279,12 @@ def on_a_line(
         return _log_likelihoods(likelihood, points[:, :, None])
 
     populations = centres[:, 1:], np.column_stack([factor[:, 0, 0] for _, factor in over])
-    moved = np.asarray(_GOLDEN * rows.event) if shifts is None else shifts[:, 0]
-    points, log_weights = line_nodes(
-        log_likelihoods_at,
-        centres,
-        np.column_stack(widths),
-        populations,
-        budget.total,
-        0.5 * (moved % 1.0) - 0.25,
+    points, log_weights, highest = line_nodes(
+        log_likelihoods_at, centres, np.column_stack(widths), populations, budget.total
     )
     full = np.zeros((*points.shape, 2))
     full[:, :, 0] = points
-    return Spread(full, log_weights)
+    return Spread(full, log_weights, highest)
 
 
 def _axes(likelihood: EventLikelihood) -> int:

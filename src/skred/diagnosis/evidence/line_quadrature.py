@@ -32,9 +32,11 @@ def line_nodes(
     widths: FloatArray,
     populations: tuple[FloatArray, FloatArray],
     others: int,
-    shifts: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Nodes of all rows, (n_rows, n_nodes), in order along the line, and their log weights.
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Nodes of all rows in order along the line, (n_rows, n_nodes), their log weights and each row's highest.
+
+    That is the largest log likelihood, (n_rows,): no integral is larger, but a sum may be, of a population
+    narrower than the distance between nodes, which has more than all of itself at one.
 
     Half of them lie evenly around the centres. The others are put in turns between those before, by how
     much an event's own density changes from one to the next and how far they are apart, in each population.
@@ -49,19 +51,14 @@ def line_nodes(
         Means and standard deviations of the strength: its own, which counts as much as all others together.
     others : int
         How many importance nodes there would be.
-    shifts : (n_rows,) array
-        By which share of a step the even ones are moved, a quarter at most: farther, the last ones miss a
-        tail. Avalanches that a strength does nothing for have nodes at the same places otherwise, and a
-        population narrower than their distance has all of its probability there, of every avalanche.
     """
     size = _PER_ROOT * math.sqrt(others)
     each = max(math.ceil(0.5 * size / centres.shape[1]), 2)
-    evenly = np.linspace(-1.0, 1.0, each) + 2.0 / (each - 1) * shifts[:, None]
     # Each at least as far as to all others, in steps that grow with the way: no narrow gathering of nodes has
     # an edge that stands for all of a gap beside it.
     farthest = np.abs(centres[:, :, None] - centres[:, None, :]).max(axis=2)
     reach = np.maximum(farthest / widths, _REACH)
-    ways = np.sinh(np.arcsinh(reach)[:, :, None] * evenly[:, None, :])
+    ways = np.sinh(np.arcsinh(reach)[:, :, None] * np.linspace(-1.0, 1.0, each))
     points = centres[:, :, None] + widths[:, :, None] * ways
     points = np.sort(points.reshape(len(centres), -1), axis=1)
     log_l = log_likelihoods(points)
@@ -74,7 +71,8 @@ def line_nodes(
     weights = np.zeros_like(points)
     weights[:, :-1] += 0.5 * apart
     weights[:, 1:] += 0.5 * apart
-    return points, log_l + np.log(np.maximum(weights, np.finfo(float).tiny))
+    log_weights = log_l + np.log(np.maximum(weights, np.finfo(float).tiny))
+    return points, log_weights, log_l.max(axis=1)
 
 
 @inner()

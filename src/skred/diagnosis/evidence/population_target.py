@@ -74,12 +74,12 @@ def log_prior(psi, n, log_scale):  # type: ignore[no-untyped-def]
 
 
 @inner()
-def _log_target(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-untyped-def]
+def _log_target(psi, n, log_scale, first, points, log_weights, highest):  # type: ignore[no-untyped-def]
     for i in range(n):
         if psi[n + i] < NARROWEST:
             return -np.inf
     means = _means(psi, n, first.size - 1)
-    density = integrated_log_density(means, factor_at(psi, n), first, points, log_weights)
+    density = integrated_log_density(means, factor_at(psi, n), first, points, log_weights, highest)
     total = log_prior(psi, n, log_scale) + density.sum()
     return total if total == total else -np.inf
 
@@ -104,19 +104,24 @@ def _fill_statistics(point, mean, whiten, statistics):  # type: ignore[no-untype
 
 
 @inner()
-def _node_moments(psi, n, first, points, log_weights):  # type: ignore[no-untyped-def]
+def _node_moments(psi, n, first, points, log_weights, highest):  # type: ignore[no-untyped-def]
     """Sums over events: of log integrals, and of means and covariances of the statistics over the nodes.
 
-    Each node counts by its share of its event's integral.
+    Each node counts by its share of its event's integral; an event that has as much as it can have does not
+    change. And how many others there are.
     """
     n_events, factor = first.size - 1, factor_at(psi, n)
     whiten, log_determinant = inverse_factor(factor)
-    density = integrated_log_density(_means(psi, n, n_events), factor, first, points, log_weights)
+    density = integrated_log_density(_means(psi, n, n_events), factor, first, points, log_weights, highest)
     constant = log_determinant - n * _HALF_LOG_2PI
     size = n + n * (n + 1) // 2
     mean, covariance = np.zeros(size), np.zeros((size, size))
     own, square, statistics = np.empty(size), np.empty((size, size)), np.empty(size)
+    n_bent = 0
     for event in range(n_events):
+        if density[event] >= highest[event]:
+            continue
+        n_bent += 1
         own[:], square[:] = 0.0, 0.0
         for k in range(first[event], first[event + 1]):
             exponent = _fill_statistics(points[:, k], psi[:n], whiten, statistics)
@@ -132,7 +137,7 @@ def _node_moments(psi, n, first, points, log_weights):  # type: ignore[no-untype
             mean[i] += own[i]
             for j in range(size):
                 covariance[i, j] += square[i, j] - own[i] * own[j]
-    return density.sum(), mean, covariance
+    return density.sum(), mean, covariance, n_bent
 
 
 @inner()
@@ -174,20 +179,20 @@ def _smooth(psi, n, log_scale, mean, n_events, centre, whiten):  # type: ignore[
 
 
 @compiled()
-def slopes(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-untyped-def]
+def slopes(psi, n, log_scale, first, points, log_weights, highest):  # type: ignore[no-untyped-def]
     """Log target, its gradient and minus its Hessian, with one sum over the nodes.
 
     An event's log integral is the cumulant function of the statistics of `_node_moments` in the population's
     natural parameters: its derivatives by those are their means and covariances. What remains, the natural
     parameters by the coordinates, and the prior, is without nodes and differenced.
     """
-    log_integrals, mean, covariance = _node_moments(psi, n, first, points, log_weights)
+    log_integrals, mean, covariance, n_bent = _node_moments(psi, n, first, points, log_weights, highest)
     centre, (whiten, _) = psi[:n].copy(), inverse_factor(factor_at(psi, n))
-    n_events, size = first.size - 1, psi.size
+    size = psi.size
     value = log_integrals + log_prior(psi, n, log_scale)
     natural = np.empty((size, mean.size))
     gradient, hessian = np.empty(size), np.empty((size, size))
-    fixed = n, log_scale, mean, n_events, centre, whiten
+    fixed = n, log_scale, mean, n_bent, centre, whiten
     middle, _ = _smooth(psi, *fixed)
     sides, there = np.empty(size), psi.copy()
     for i in range(size):
@@ -218,9 +223,9 @@ def slopes(psi, n, log_scale, first, points, log_weights):  # type: ignore[no-un
 
 
 @compiled()
-def log_targets(psis, n, log_scale, first, points, log_weights):  # type: ignore[no-untyped-def]
+def log_targets(psis, n, log_scale, first, points, log_weights, highest):  # type: ignore[no-untyped-def]
     """Log posterior density of populations at coordinates (n_psis, size), as `log_prior` not normalised."""
     result = np.empty(len(psis))
     for k in range(len(psis)):
-        result[k] = _log_target(psis[k], n, log_scale, first, points, log_weights)
+        result[k] = _log_target(psis[k], n, log_scale, first, points, log_weights, highest)
     return result

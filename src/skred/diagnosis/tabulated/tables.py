@@ -156,7 +156,8 @@ def exact_log_densities(
     for k, (mean, factor) in enumerate(zip(means, factors, strict=True)):
         first = nodes.first[k * n_rows : (k + 1) * n_rows + 1]
         of_rows = np.tile(mean, (n_rows, 1))
-        result[k] = integrated_log_density(of_rows, factor, first, nodes.points, nodes.log_weights)
+        most = nodes.highest[k * n_rows : (k + 1) * n_rows]
+        result[k] = integrated_log_density(of_rows, factor, first, nodes.points, nodes.log_weights, most)
     return result
 
 

@@ -95,63 +95,45 @@ def _neighbours(own, origin, steps, bends, size):  # type: ignore[no-untyped-def
 
 
 @inner()
-def _interpolated(  # type: ignore[no-untyped-def]
-    own,
-    known,
-    at_tables,
-    means,
-    factor,
-    origin,
-    steps,
-    bends,
-    size,
-    centres,
-    first,
-    points,
-    log_weights,
-    density,
-):
+def _interpolated(own, known, at_tables, means, factor, tables, density):  # type: ignore[no-untyped-def]
     """Fill the log density of each event that has some added strengths; tables asked for are kept."""
+    origin, steps, bends, size, centres, first, points, log_weights, highest = tables
     n_events = density.size
-    tables, t, outside = _neighbours(own, origin, steps, bends, size)
-    centre, values = np.empty(means.shape[1]), np.zeros(tables.size)
+    corners, t, outside = _neighbours(own, origin, steps, bends, size)
+    centre, values = np.empty(means.shape[1]), np.zeros(corners.size)
     for i in range(centre.size):
-        for corner in range(tables.size):
-            if tables[corner] >= 0:
-                values[corner] = centres[tables[corner], i]
+        for corner in range(corners.size):
+            if corners[corner] >= 0:
+                values[corner] = centres[corners[corner], i]
         centre[i] = _between(values, t)
-    for table in tables:
+    for table in corners:
         if table >= 0 and not known[table]:
             of_table = first[table * n_events : (table + 1) * n_events + 1]
+            most = highest[table * n_events : (table + 1) * n_events]
             moved = means + (centres[table] - centre)
-            at_tables[table] = integrated_log_density(moved, factor, of_table, points, log_weights)
+            at_tables[table] = integrated_log_density(moved, factor, of_table, points, log_weights, most)
             known[table] = True
     for event in range(n_events):
-        for corner in range(tables.size):
-            values[corner] = at_tables[tables[corner], event] if tables[corner] >= 0 else 0.0
+        for corner in range(corners.size):
+            values[corner] = at_tables[corners[corner], event] if corners[corner] >= 0 else 0.0
         density[event] = _between(values, t) - _WALL * outside / n_events
 
 
 @inner()
-def _components(  # type: ignore[no-untyped-def]
-    means, factor, strengths, origin, steps, bends, size, centres, first, points, log_weights, densities
-):
+def _components(means, factor, strengths, tables, densities):  # type: ignore[no-untyped-def]
     """Fill the log density of each event with each of some added strengths, (n_components, n_events)."""
+    centres = tables[4]
     n_tables, one_centre = len(centres), np.all(centres == centres[0])
     known, at_tables = np.zeros(n_tables, np.bool_), np.empty((n_tables, means.shape[0]))
     for component in range(len(strengths)):
         if not one_centre:
             known[:] = False  # what was kept is of a population moved otherwise
-        _interpolated(
-            strengths[component], known, at_tables, means, factor, origin, steps, bends, size, centres, first,
-            points, log_weights, densities[component],
-        )  # fmt: skip
+        own = strengths[component]
+        _interpolated(own, known, at_tables, means, factor, tables, densities[component])
 
 
 @compiled()
-def tabulated_log_density(  # type: ignore[no-untyped-def]
-    means, factor, strengths, log_shares, origin, steps, bends, size, centres, first, points, log_weights
-):
+def tabulated_log_density(means, factor, strengths, log_shares, *tables):  # type: ignore[no-untyped-def]
     """Log likelihood of each event, its own strengths integrated over the population.
 
     Parameters
@@ -164,6 +146,8 @@ def tabulated_log_density(  # type: ignore[no-untyped-def]
         Added strengths that an event may have.
     log_shares : (n_components,) array
         Logarithm of the share of events that have each.
+    *tables
+        `Tables.arrays`, which are the following.
     origin : (n_added,) array
         Strengths of the first table.
     steps : (n_added, n_added) array
@@ -178,6 +162,8 @@ def tabulated_log_density(  # type: ignore[no-untyped-def]
         Where the nodes of each table's events begin.
     points : (n_strengths, n_nodes) array
     log_weights : (n_nodes,) array
+    highest : (n_tables * n_events,) array
+        As in `Nodes`.
 
     Returns
     -------
@@ -186,9 +172,7 @@ def tabulated_log_density(  # type: ignore[no-untyped-def]
     """
     n_events, n_components = means.shape[0], log_shares.size
     densities = np.empty((n_components, n_events))
-    _components(
-        means, factor, strengths, origin, steps, bends, size, centres, first, points, log_weights, densities
-    )
+    _components(means, factor, strengths, tables, densities)
     total = np.full(n_events, -np.inf)
     for component in range(n_components):
         for event in range(n_events):
@@ -197,9 +181,7 @@ def tabulated_log_density(  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def tabulated_log_densities(  # type: ignore[no-untyped-def]
-    means, factors, strengths, n_events, origin, steps, bends, size, centres, first, points, log_weights
-):
+def tabulated_log_densities(means, factors, strengths, n_events, *tables):  # type: ignore[no-untyped-def]
     """Each event's log density with each component, for many draws: (n, n_components, n_events).
 
     As `tabulated_log_density`, with a mean, a factor and strengths (n_components, n_added) for each draw.
@@ -208,10 +190,7 @@ def tabulated_log_densities(  # type: ignore[no-untyped-def]
     of_event = np.empty((n_events, means.shape[1]))
     for k in range(len(means)):
         of_event[:] = means[k]
-        _components(
-            of_event, factors[k], strengths[k], origin, steps, bends, size, centres, first, points,
-            log_weights, result[k],
-        )  # fmt: skip
+        _components(of_event, factors[k], strengths[k], tables, result[k])
     return result
 
 
@@ -234,6 +213,7 @@ class TabulatedLogDensity(ArrayOp):
         ("first", 1, "int64"),
         ("points", 2, "float64"),
         ("log_weights", 1, "float64"),
+        ("highest", 1, "float64"),
     )
     differentiable = frozenset({"means", "factor", "strengths", "log_shares"})
 

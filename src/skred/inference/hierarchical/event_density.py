@@ -105,8 +105,13 @@ def _sum_of_exponentials(exponents, size, largest):  # type: ignore[no-untyped-d
 
 
 @compiled()
-def integrated_log_density(means, factor, first, points, log_weights):  # type: ignore[no-untyped-def]
+def integrated_log_density(  # type: ignore[no-untyped-def]
+    means, factor, first, points, log_weights, highest
+):
     """Log likelihood of each event, its own strengths integrated over the population.
+
+    A population narrower than the distance between nodes may have more of itself at one than there is: the
+    mean of a likelihood is no more than its largest.
 
     Parameters
     ----------
@@ -118,6 +123,8 @@ def integrated_log_density(means, factor, first, points, log_weights):  # type: 
         Where each event's nodes begin.
     points : (n_strengths, n_nodes) array
     log_weights : (n_nodes,) array
+    highest : (n_events,) array
+        What no event's exceeds.
 
     Returns
     -------
@@ -132,22 +139,25 @@ def integrated_log_density(means, factor, first, points, log_weights):  # type: 
         start, end = first[event], first[event + 1]
         largest = _exponents(start, end, means[event], whiten, points, log_weights, exponents)
         total = _sum_of_exponentials(exponents, end - start, largest)
-        density[event] = constant + largest + math.log(total)
+        density[event] = min(constant + largest + math.log(total), highest[event])
     return density
 
 
 @compiled()
 def integrated_log_density_pullback(  # type: ignore[no-untyped-def]
-    cotangent, means, factor, first, points, log_weights
+    cotangent, means, factor, first, points, log_weights, highest
 ):
     """Cotangents of means and factor, one below the other, from those of the densities.
+
+    Nil of an event that has as much as it can have.
 
     Returns
     -------
     (n_events + n_strengths, n_strengths) array
     """
     n_events, n = means.shape
-    whiten, _ = inverse_factor(factor)
+    whiten, log_determinant = inverse_factor(factor)
+    constant = log_determinant - n * _LOG_SQRT_2PI
     exponents = np.empty(np.max(first[1:] - first[:-1]))
     pulled, z, back = np.zeros((n_events + n, n)), np.empty(n), np.empty(n)
     for event in range(n_events):
@@ -157,6 +167,8 @@ def integrated_log_density_pullback(  # type: ignore[no-untyped-def]
         for k in range(end - start):
             exponents[k] = math.exp(exponents[k] - largest)
             total += exponents[k]
+        if constant + largest + math.log(total) > highest[event]:
+            continue
         for k in range(end - start):
             weight = cotangent[event] * exponents[k] / total
             if weight == 0.0:

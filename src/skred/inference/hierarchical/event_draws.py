@@ -40,7 +40,7 @@ def recorded_avalanches(
     means, factors = population_of(law, samples)
     surfaces = problem.surfaces(law.mechanisms)
     n_strengths, n_events = means.shape[1], problem.campaign.n_events
-    node = draw_nodes(means, factors, rng.random((len(means), n_events)), *surfaces.nodes)
+    node = draw_nodes(means, factors, rng.random((len(means), n_events)), *surfaces.nodes[:3])
     patch = node // (2 * n_strengths)
     variance, axes = np.linalg.eigh(surfaces.covariance)
     spread = axes * np.sqrt(np.maximum(variance, 0.0))[:, None, :]

@@ -16,7 +16,12 @@ from skred.inference.hierarchical.event_density import (
 )
 from skred.parallel.compile_cache import cache_key
 
-_NODES = (("first", 1, "int64"), ("points", 2, "float64"), ("log_weights", 1, "float64"))
+_NODES = (
+    ("first", 1, "int64"),
+    ("points", 2, "float64"),
+    ("log_weights", 1, "float64"),
+    ("highest", 1, "float64"),
+)
 
 
 class IntegratedLogDensity(ArrayOp):

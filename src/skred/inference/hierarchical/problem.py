@@ -121,8 +121,8 @@ class HierarchicalProblem(Problem):
 
         # As data, so that one compiled model serves many campaigns of as many events.
         data = self.surfaces(mechanisms).nodes._asdict()
-        first, points, log_weights = (pm.Data(f"surface_{name}", value) for name, value in data.items())
-        nodes = (pt.cast(first, "int64"), points, log_weights)  # PyMC makes integers int32
+        first, *others = (pm.Data(f"surface_{name}", value) for name, value in data.items())
+        nodes = (pt.cast(first, "int64"), *others)  # PyMC makes integers int32
         n_events = self.campaign.n_events
         factor = population_variables(mechanisms)
         means = pt.alloc(pt.log(pt.stack(list(strengths))), n_events, len(mechanisms))

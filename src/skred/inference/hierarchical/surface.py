@@ -50,11 +50,14 @@ class Nodes(NamedTuple):
     points : (n_strengths, n_nodes) array
         Logarithms of the strengths.
     log_weights : (n_nodes,) array
+    highest : (n_events,) array
+        Log likelihood that no population makes an event's integral exceed, infinite where none is known.
     """
 
     first: IntArray
     points: FloatArray
     log_weights: FloatArray
+    highest: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +100,8 @@ class Surfaces:
         steps = np.concatenate([reach, -reach], axis=2).transpose(0, 2, 1)
         points = (self.mean[:, None, :n] + steps).reshape(-1, n)
         log_weights = np.repeat(self.log_weights - math.log(2 * n), 2 * n)
-        return Nodes(2 * n * self.first, np.ascontiguousarray(points.T), log_weights)
+        highest = np.full(len(self.first) - 1, np.inf)
+        return Nodes(2 * n * self.first, np.ascontiguousarray(points.T), log_weights, highest)
 
 
 def build_surfaces(
