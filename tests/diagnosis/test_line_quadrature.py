@@ -84,6 +84,34 @@ def test_what_a_strength_does_nothing_for_has_no_evidence_of_it(own, spread, bud
     assert -1.0 < np.logaddexp.reduce(log_l) - np.log(len(log_l))
 
 
+@pytest.mark.parametrize(("budget", "within"), [(USUAL, 0.6), (FINE, 0.2)])
+@pytest.mark.parametrize("weaker", [1.0, 3.0, 10.0])
+def test_recordings_that_say_little_have_the_evidence_of_a_closed_form(weaker, budget, within):
+    """Twenty-two normal likelihoods, so many times wider than the population that nodes are around.
+
+    Populations may be narrower than the distance between nodes then: ten to thirty nats too much without a limit.
+    """
+    n, mean, spread, log_scale = 22, -0.69, 0.3, np.array([-0.69])
+    width = weaker * spread
+    own = mean + np.hypot(width, spread) * np.random.default_rng(1).standard_normal(n)
+    covariance = 1.0 / (width**-2 + spread**-2)
+    most = covariance * (own / width**2 + mean / spread**2)
+    centres = np.column_stack([most, np.full(n, mean)])
+    widths = np.tile([budget.wider * np.sqrt(covariance), budget.population_wider * spread], (n, 1))
+    populations = np.full((n, 1), mean), np.full((n, 1), spread)
+    points, *found = line_nodes(
+        lambda at: -0.5 * ((at - own[:, None]) / width) ** 2, centres, widths, populations, budget.total
+    )
+    nodes = Spread(np.stack([points, np.zeros_like(points)], axis=2), *found).nodes
+    means, log_spreads = np.linspace(mean - 2.0, mean + 2.0, 201), np.linspace(NARROWEST, 0.5, 81)
+    psi = np.stack(np.meshgrid(means, log_spreads), axis=-1).reshape(-1, 2)
+    sds = np.hypot(width, np.exp(psi[:, 1:]))
+    exact = norm.logpdf(own, psi[:, :1], sds).sum(axis=1) - n * norm.logpdf(0.0, 0.0, width)
+    exact += [log_prior(one, 1, log_scale) for one in psi]
+    summed = np.logaddexp.reduce(log_targets(psi, 1, log_scale, *nodes))
+    assert summed == pytest.approx(np.logaddexp.reduce(exact), abs=within)
+
+
 def test_four_times_as_many_are_nearer():
     edges = np.linspace(-1.5, 1.5, 31)
 

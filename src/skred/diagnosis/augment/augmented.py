@@ -52,7 +52,8 @@ def augmented_problem(
     else:
         found = (ways or searched(base, curves[0]))[way]
         located = from_nothing(curves[0], found.populations, found.farthest, found.strength)
-        budget = USUAL  # where avalanches differ by degree each draw takes nearly all of these tables
+        if way is BetweenEvents.SPREAD:
+            budget = USUAL  # each draw takes nearly all of these tables
     old, tables = base.problem, build_tables(base, extension, located, budget)
     return AugmentedProblem(
         old.campaign, old.terrain, old.error_model, old.place_sd_m, base=base, added=added, tables=tables

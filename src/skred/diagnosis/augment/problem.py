@@ -226,9 +226,9 @@ class AugmentedProblem(HierarchicalProblem):
         rows = Rows(chosen, np.zeros_like(chosen), base.rows.readings.take(chosen), base.rows.errors)
         start = self.tables.modes[self.tables.grid.nearest(added)][:, chosen]
         likelihood = EventLikelihood(self.extension, rows, base.strengths).in_groups(base.given(added))
-        # By so many nodes that their own error counts for little; a sum over strengths is known better.
-        budget = FINE if own.shape[1] > 1 else FINE.times(2)
-        exact = exact_log_densities(likelihood, means[every], factors[every], start, budget, base.population)
+        # By so many nodes that their own error counts for little.
+        fine = FINE.times(2)
+        exact = exact_log_densities(likelihood, means[every], factors[every], start, fine, base.population)
         parts = exact.reshape(*log_shares.shape, -1) + log_shares[:, :, None]
         together: FloatArray = np.logaddexp.reduce(parts, axis=1)
         return self.log_likelihood(law, samples)[:, chosen] - together

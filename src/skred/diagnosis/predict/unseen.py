@@ -39,9 +39,9 @@ from skred.physics.mechanisms.placed import direction_of
 from skred.physics.mechanisms.spec import Direction, Setting, Shape
 from skred.physics.terrain import build_terrain
 
-NODES = Budget(32, 32, 0, 1.5, 1.8)
-"""Quadrature points of an event for each draw; their errors average out over the draws. None are adapted:
-where those go depends on the others' weights, and few of them are too low in the mean
+NODES = Budget(64, 64, 0, 1.5, 1.8)
+"""Quadrature points of an event for each draw; errors of random ones average out over the draws. None are
+adapted: where those go depends on the others' weights, and few of them are too low in the mean
 (``studies.thresholds.unseen_nodes``)."""
 
 
