@@ -101,7 +101,7 @@ def nodes_of(nodes: Nodes, rows: Rows, group: int) -> Nodes:
     first = nodes.first[own.start : own.stop + 1]
     inside = slice(first[0], first[-1])
     points = np.ascontiguousarray(nodes.points[:, inside])
-    return Nodes(first - first[0], points, nodes.log_weights[inside], nodes.highest[own])
+    return Nodes(first - first[0], points, nodes.log_weights[inside], nodes.log_widths[inside])
 
 
 def measured(law_id: str) -> dict[str, Any]:

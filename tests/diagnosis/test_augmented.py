@@ -317,8 +317,7 @@ def test_two_mechanisms(base: Base, drag: Curve) -> None:
     strengths = tables.grid.strengths(index.astype(float))[0]
     table = int(tables.grid.table(index)[0])
     first = tables.nodes.first[table * n_events : (table + 1) * n_events + 1]
-    nodes = tables.nodes._replace(first=first, highest=tables.nodes.highest[:n_events])
-    expected = integrated_log_density(means, factor, *nodes)
+    expected = integrated_log_density(means, factor, *tables.nodes._replace(first=first))
     given = strengths[None], np.zeros(1)
     assert_allclose(tabulated_log_density(means, factor, *given, *arrays), expected, rtol=1e-10)
     rng = np.random.default_rng(1)

@@ -22,7 +22,6 @@ from skred.diagnosis.evidence.population_target import (
     log_targets,
     slopes,
 )
-from skred.inference.hierarchical.event_density import integrated_log_density
 from skred.inference.hierarchical.population import population_factor
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 from skred.inference.hierarchical.surface import Nodes
@@ -130,11 +129,9 @@ def test_slopes_of_the_log_target_are_its_differences(which: str) -> None:
     n, sd = len(base.log_scale), np.sqrt(np.diag(base.fit.found.covariance))
     psi = base.fit.found.psi + 0.7 * sd * rng.standard_normal(len(sd))
     assert_differences(psi, (n, base.log_scale, *nodes), sd)
-    # Where some events have as much as they can have they no longer change.
-    means, factor = np.tile(psi[:n], (len(base.rows.event), 1)), factor_at(psi, n)
-    density = integrated_log_density(means, factor, *nodes._replace(highest=np.full(len(means), np.inf)))
-    limit = np.where(np.arange(len(density)) % 3 == 0, density - 1.0, np.inf)
-    assert_differences(psi, (n, base.log_scale, *nodes._replace(highest=limit)), sd)
+    # Where some events have more than all of the population at their nodes, others less.
+    widths = nodes.log_weights + 60.0 + 20.0 * (np.arange(len(nodes.log_weights)) % 3)
+    assert_differences(psi, (n, base.log_scale, *nodes._replace(log_widths=widths)), sd)
 
 
 def assert_differences(psi: FloatArray, given: Any, sd: FloatArray) -> None:
@@ -194,9 +191,7 @@ def test_no_population_is_narrower_than_nodes_can_tell() -> None:
     """Twenty events with the same nodes, 0.02 apart: a population on one of them would promise 80 nats."""
     line = np.arange(-25, 26) * 0.02
     weights = np.log(0.02) + norm.logpdf(line, 0.0, 0.1)
-    nodes = Nodes(
-        len(line) * np.arange(21), np.tile(line, 20)[None], np.tile(weights, 20), np.full(20, np.inf)
-    )
+    nodes = Nodes(len(line) * np.arange(21), np.tile(line, 20)[None], np.tile(weights, 20), np.empty(0))
     scale = np.zeros(1)
     usual = evidence(nodes, scale, np.array([0.0, np.log(0.1)]), 40)
     assert usual.psi[1] > np.log(0.02)

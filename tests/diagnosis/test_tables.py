@@ -58,7 +58,7 @@ def between_tables(heights: np.ndarray, places: np.ndarray) -> np.ndarray:
     found = tabulated_log_densities(
         np.zeros((n, 1)), np.ones((n, 1, 1)), places.reshape(n, 1, axes), 1, np.zeros(axes), np.eye(axes),
         np.zeros(axes), np.array(heights.shape), np.zeros((heights.size, 1)), np.arange(heights.size + 1),
-        np.zeros((1, heights.size)), heights.ravel(), np.full(heights.size, np.inf),
+        np.zeros((1, heights.size)), heights.ravel(), np.empty(0),
     )  # fmt: skip
     return found[:, 0, 0] + 0.5 * np.log(2.0 * np.pi)
 

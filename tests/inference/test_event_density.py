@@ -434,13 +434,13 @@ def test_assessment_of_boxes(name: str) -> None:
 
 
 def nodes_of(n_strengths: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes of three events, not as many each, some so unlikely that they do not count; no limit."""
+    """Nodes of three events, not as many each, some so unlikely that they do not count; without widths."""
     rng = np.random.default_rng(seed)
     first = np.array([0, 40, 41, 141])
     points = np.ascontiguousarray(rng.normal(-1.0, 0.5, (n_strengths, 141)))
     log_weights = rng.normal(-50.0, 5.0, 141)
     log_weights[3], log_weights[60] = -1000.0, 300.0
-    return first, points, log_weights, np.full(3, np.inf)
+    return first, points, log_weights, np.empty(0)
 
 
 def population(n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -451,7 +451,7 @@ def population(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 def sum_by_hand(means: np.ndarray, factor: np.ndarray, *nodes: np.ndarray) -> np.ndarray:
     """From the covariance, so that the factor is not taken for granted; complex means and factors too."""
-    first, points, log_weights, highest = nodes
+    first, points, log_weights, log_widths = nodes
     covariance = factor @ factor.T
     precision = np.linalg.inv(covariance)
     log_constant = -0.5 * np.log(np.linalg.det(2 * np.pi * covariance))
@@ -459,11 +459,19 @@ def sum_by_hand(means: np.ndarray, factor: np.ndarray, *nodes: np.ndarray) -> np
     for e in range(len(means)):
         at = slice(first[e], first[e + 1])
         deviation = points[:, at].T - means[e]
-        exponent = log_weights[at] - 0.5 * np.einsum("ki,ij,kj->k", deviation, precision, deviation)
-        shift = exponent.real.max()
-        found = log_constant + shift + np.log(np.exp(exponent - shift).sum())
-        result.append(found if found.real < highest[e] else highest[e])
+        log_density = log_constant - 0.5 * np.einsum("ki,ij,kj->k", deviation, precision, deviation)
+        found = log_sum_exp(log_weights[at] + log_density)
+        if len(log_widths):
+            there = log_sum_exp(log_widths[at] + log_density)
+            found -= there if there.real > 0.0 else 0.0
+        result.append(found)
     return np.array(result)
+
+
+def log_sum_exp(values: np.ndarray) -> complex:
+    """Of complex values, so that its imaginary part is a derivative."""
+    shift = values.real.max()
+    return shift + np.log(np.exp(values - shift).sum())
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
@@ -474,21 +482,24 @@ def test_integrated_log_density_by_hand(n: int, scale: float) -> None:
     assert_allclose(found, sum_by_hand(means, scale * factor, *nodes_of(n)), rtol=1e-10)
 
 
-def limited(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes of which the last event may have less than the sum that it has."""
-    *nodes, highest = nodes_of(n)
-    highest[2] = sum_by_hand(*population(n), *nodes, highest)[2] - 0.5
-    return (*nodes, highest)  # type: ignore[return-value]
+def with_widths(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes of which the last event has more than all of the population, the others less."""
+    first, points, log_weights, _ = nodes_of(n)
+    log_widths = np.random.default_rng(3).normal(-3.0, 1.0, len(log_weights))
+    log_widths[: first[2]] -= 5.0
+    return first, points, log_weights, log_widths
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
-def test_no_event_has_more_than_its_highest(n: int) -> None:
+def test_an_event_with_more_than_all_of_a_population_has_the_mean_over_its_nodes(n: int) -> None:
     means, factor = population(n)
-    free, highest = integrated_log_density(means, factor, *nodes_of(n)), limited(n)[3]
-    assert_allclose(integrated_log_density(means, factor, *limited(n)), [*free[:2], highest[2]], rtol=1e-12)
+    free, found = (integrated_log_density(means, factor, *of(n)) for of in (nodes_of, with_widths))
+    assert_allclose(found, sum_by_hand(means, factor, *with_widths(n)), rtol=1e-10)
+    assert_array_equal(found[:2], free[:2])
+    assert found[2] < free[2] - 0.1
 
 
-@pytest.mark.parametrize("nodes_of", [nodes_of, limited])
+@pytest.mark.parametrize("nodes_of", [nodes_of, with_widths])
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_pullback_is_the_complex_step(n: int, nodes_of: Callable[[int], tuple[np.ndarray, ...]]) -> None:
     means, factor = population(n)
@@ -551,15 +562,15 @@ def test_ops_are_equal_pickle_and_know_their_shapes() -> None:
 
 
 def test_nodes_are_not_differentiated_by_and_wrong_inputs_are_named() -> None:
-    first, points, log_weights, highest = nodes_of(2)
+    first, points, log_weights, log_widths = nodes_of(2)
     weights = pt.dvector("log_weights")
-    density = IntegratedLogDensity()(*population(2), first, points, weights, highest)
+    density = IntegratedLogDensity()(*population(2), first, points, weights, log_widths)
     with pytest.raises((DisconnectedInputError, NotImplementedError)):
         pt.grad(density.sum(), weights)
     with pytest.raises(TypeError, match="first: expected int64"):
-        IntegratedLogDensity()(*population(2), first.astype(float), points, log_weights, highest)
+        IntegratedLogDensity()(*population(2), first.astype(float), points, log_weights, log_widths)
     with pytest.raises(TypeError, match="means: expected 2 dimensions"):
-        IntegratedLogDensity()(population(2)[0][0], population(2)[1], first, points, log_weights, highest)
+        IntegratedLogDensity()(population(2)[0][0], population(2)[1], first, points, log_weights, log_widths)
 
 
 def test_nodes_are_drawn_by_their_share() -> None:

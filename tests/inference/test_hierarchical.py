@@ -242,7 +242,7 @@ def test_one_model_serves_other_surfaces(pcm_model: pm.Model) -> None:
     before = logp(transformed(sample))[0]
     nodes = {
         f"surface_{name}": pcm_model[f"surface_{name}"].get_value()
-        for name in ("first", "points", "log_weights", "highest")
+        for name in ("first", "points", "log_weights", "log_widths")
     }
     try:
         values = other.surfaces(mechanisms).nodes._asdict()

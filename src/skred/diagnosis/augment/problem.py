@@ -209,9 +209,8 @@ class AugmentedProblem(HierarchicalProblem):
     def integration_errors(self, law: Law, samples: Mapping[str, Any], seed: int = 0) -> FloatArray:
         """Differences of event log densities to exact ones, (n, n_checked_events), of at most 16 draws.
 
-        Exact: nodes at the very strengths of the draw, 1792, around its own population; where an avalanche
-        may have several strengths half as many. Of at most 24 events, drawn at random from larger campaigns;
-        positive where the tables are larger.
+        Exact: nodes at the very strengths of the draw, 1792, around its own population. Of at most 24 events,
+        drawn at random from larger campaigns; positive where the tables are larger.
         """
         n = len(next(iter(samples.values())))
         # Where avalanches may differ in what is added, each draw takes as many integrals.

@@ -24,9 +24,7 @@ def compile_ahead(readings: EventReadings, error_model: ErrorModel) -> None:
     assess(events, np.repeat(predictions[:, None], 4, axis=1), readings, errors, np.zeros((n_events, 5)))
     n_nodes = 8  # of each event: enough for a sum
     points = np.random.default_rng(0).normal(0.0, 0.3, (2, n_events * n_nodes))
-    nodes = Nodes(
-        n_nodes * np.arange(n_events + 1), points, np.zeros(points.shape[1]), np.full(n_events, np.inf)
-    )
+    nodes = Nodes(n_nodes * np.arange(n_events + 1), points, np.zeros(points.shape[1]), np.empty(0))
     found = evidence(nodes, np.zeros(2), np.zeros(5), n_steps=1)
     importance_evidence(nodes, np.zeros(2), found)
     reading_slopes(events, predictions, readings, errors)

@@ -95,14 +95,14 @@ class Spread(NamedTuple):
     points : (n_rows, n_nodes, n_base + 1) array
         The release's deviation last.
     log_weights : (n_rows, n_nodes) array
-    highest : (n_rows,) array
-        As in `Nodes`: on a line the largest likelihood found. Over more axes it is no more than a guess that
-        random points make, and with a release among them no limit at all.
+    log_widths : (n_rows, n_nodes) or (n_rows, 0) array
+        Log of what each stands for, on a line. Random points are each avalanche's own, so that no population
+        has more than all of itself at those of all.
     """
 
     points: FloatArray
     log_weights: FloatArray
-    highest: FloatArray
+    log_widths: FloatArray
 
     @classmethod
     def joined(cls, parts: Sequence[Spread]) -> Spread:
@@ -111,23 +111,28 @@ class Spread(NamedTuple):
 
     def log_shares(self, population: Population, rows: Rows) -> FloatArray:
         """Log of each point's share of its row's integral over a population, (n_rows, n_nodes)."""
-        log_terms = self._log_terms(population, rows)
+        log_terms = self.log_weights + self._log_prior(population, rows)
         shares: FloatArray = log_terms - np.logaddexp.reduce(log_terms, axis=1, keepdims=True)
         return shares
 
     def log_integrals(self, population: Population, rows: Rows) -> FloatArray:
         """Log of each row's integral over a population, (n_rows,)."""
-        return np.minimum(np.logaddexp.reduce(self._log_terms(population, rows), axis=1), self.highest)
+        log_prior = self._log_prior(population, rows)
+        log_integrals = np.logaddexp.reduce(self.log_weights + log_prior, axis=1)
+        if self.log_widths.size:
+            log_integrals -= np.maximum(np.logaddexp.reduce(self.log_widths + log_prior, axis=1), 0.0)
+        return np.asarray(log_integrals)
 
-    def _log_terms(self, population: Population, rows: Rows) -> FloatArray:
-        return self.log_weights + _log_prior(population, rows, self.points[:, :, :-1])
+    def _log_prior(self, population: Population, rows: Rows) -> FloatArray:
+        return _log_prior(population, rows, self.points[:, :, :-1])
 
     @property
     def nodes(self) -> Nodes:
         """As the compiled sums over a population read them."""
         n_rows, n_nodes, n = self.points.shape
         points = np.ascontiguousarray(self.points[:, :, : n - 1].reshape(-1, n - 1).T)
-        return Nodes(n_nodes * np.arange(n_rows + 1), points, self.log_weights.ravel(), self.highest)
+        first = n_nodes * np.arange(n_rows + 1)
+        return Nodes(first, points, self.log_weights.ravel(), self.log_widths.ravel())
 
 
 class _Part(NamedTuple):
@@ -257,7 +262,7 @@ def importance_nodes(
     n_rows, n_nodes = log_weights.shape
     full = np.zeros((n_rows, n_nodes, n + 1))
     full[:, :, :axes] = points
-    return Spread(full, log_weights - math.log(n_nodes), np.full(n_rows, np.inf))
+    return Spread(full, log_weights - math.log(n_nodes), np.empty((n_rows, 0)))
 
 
 def on_a_line(
@@ -279,12 +284,12 @@ def on_a_line(
         return _log_likelihoods(likelihood, points[:, :, None])
 
     populations = centres[:, 1:], np.column_stack([factor[:, 0, 0] for _, factor in over])
-    points, log_weights, highest = line_nodes(
+    points, log_weights, log_widths = line_nodes(
         log_likelihoods_at, centres, np.column_stack(widths), populations, budget.total
     )
     full = np.zeros((*points.shape, 2))
     full[:, :, 0] = points
-    return Spread(full, log_weights, highest)
+    return Spread(full, log_weights, log_widths)
 
 
 def _axes(likelihood: EventLikelihood) -> int:

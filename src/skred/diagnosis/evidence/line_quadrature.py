@@ -33,10 +33,7 @@ def line_nodes(
     populations: tuple[FloatArray, FloatArray],
     others: int,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Nodes of all rows in order along the line, (n_rows, n_nodes), their log weights and each row's highest.
-
-    That is the largest log likelihood, (n_rows,): no integral is larger, but a sum may be, of a population
-    narrower than the distance between nodes, which has more than all of itself at one.
+    """Nodes of all rows in order along the line, their log weights and log widths, (n_rows, n_nodes) each.
 
     Half of them lie evenly around the centres. The others are put in turns between those before, by how
     much an event's own density changes from one to the next and how far they are apart, in each population.
@@ -68,11 +65,11 @@ def line_nodes(
         order = np.argsort(points, axis=1, kind="stable")
         points, log_l = np.take_along_axis(points, order, axis=1), np.take_along_axis(log_l, order, axis=1)
     apart = np.diff(points, axis=1)
-    weights = np.zeros_like(points)
-    weights[:, :-1] += 0.5 * apart
-    weights[:, 1:] += 0.5 * apart
-    log_weights = log_l + np.log(np.maximum(weights, np.finfo(float).tiny))
-    return points, log_weights, log_l.max(axis=1)
+    widths_of = np.zeros_like(points)
+    widths_of[:, :-1] += 0.5 * apart
+    widths_of[:, 1:] += 0.5 * apart
+    log_widths = np.log(np.maximum(widths_of, np.finfo(float).tiny))
+    return points, log_l + log_widths, log_widths
 
 
 @inner()

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from skred.inference.hierarchical.event_density import integrated_log_density, inverse_factor
+from skred.inference.hierarchical.event_density import integrated_log_density, inverse_factor, log_sum
 from skred.inference.hierarchical.population import LKJ_SHAPE
 from skred.inference.hierarchical.rough_population import SPREAD_LOG_SD, SPREAD_MEDIAN
 from skred.parallel.compile_cache import compiled, inner
@@ -74,12 +74,12 @@ def log_prior(psi, n, log_scale):  # type: ignore[no-untyped-def]
 
 
 @inner()
-def _log_target(psi, n, log_scale, first, points, log_weights, highest):  # type: ignore[no-untyped-def]
+def _log_target(psi, n, log_scale, first, points, log_weights, log_widths):  # type: ignore[no-untyped-def]
     for i in range(n):
         if psi[n + i] < NARROWEST:
             return -np.inf
     means = _means(psi, n, first.size - 1)
-    density = integrated_log_density(means, factor_at(psi, n), first, points, log_weights, highest)
+    density = integrated_log_density(means, factor_at(psi, n), first, points, log_weights, log_widths)
     total = log_prior(psi, n, log_scale) + density.sum()
     return total if total == total else -np.inf
 
@@ -104,40 +104,53 @@ def _fill_statistics(point, mean, whiten, statistics):  # type: ignore[no-untype
 
 
 @inner()
-def _node_moments(psi, n, first, points, log_weights, highest):  # type: ignore[no-untyped-def]
+def _add_moments(sign, first, last, at, whiten, points, log_weights, log_total, mean, covariance):  # type: ignore[no-untyped-def]
+    """Add, or take away, mean and covariance of the statistics over an event's nodes, each by its share."""
+    size = mean.size
+    own, square, statistics = np.zeros(size), np.zeros((size, size)), np.empty(size)
+    for k in range(first, last):
+        exponent = _fill_statistics(points[:, k], at, whiten, statistics)
+        log_share = log_weights[k] + exponent - log_total
+        if log_share < _NEGLIGIBLE:
+            continue
+        for i in range(size):
+            part = math.exp(log_share) * statistics[i]
+            own[i] += part
+            for j in range(size):
+                square[i, j] += part * statistics[j]
+    for i in range(size):
+        mean[i] += sign * own[i]
+        for j in range(size):
+            covariance[i, j] += sign * (square[i, j] - own[i] * own[j])
+
+
+@inner()
+def _node_moments(psi, n, first, points, log_weights, log_widths):  # type: ignore[no-untyped-def]
     """Sums over events: of log integrals, and of means and covariances of the statistics over the nodes.
 
-    Each node counts by its share of its event's integral; an event that has as much as it can have does not
-    change. And how many others there are.
+    As `integrated_log_density`: less those of the population itself, of events whose nodes have more than all
+    of it. And the number of the others.
     """
-    n_events, factor = first.size - 1, factor_at(psi, n)
-    whiten, log_determinant = inverse_factor(factor)
-    density = integrated_log_density(_means(psi, n, n_events), factor, first, points, log_weights, highest)
+    n_events, at = first.size - 1, psi[:n]
+    whiten, log_determinant = inverse_factor(factor_at(psi, n))
     constant = log_determinant - n * _HALF_LOG_2PI
     size = n + n * (n + 1) // 2
     mean, covariance = np.zeros(size), np.zeros((size, size))
-    own, square, statistics = np.empty(size), np.empty((size, size)), np.empty(size)
-    n_bent = 0
+    room, total, n_whole = np.empty(np.max(first[1:] - first[:-1])), 0.0, 0
     for event in range(n_events):
-        if density[event] >= highest[event]:
-            continue
-        n_bent += 1
-        own[:], square[:] = 0.0, 0.0
-        for k in range(first[event], first[event + 1]):
-            exponent = _fill_statistics(points[:, k], psi[:n], whiten, statistics)
-            log_share = log_weights[k] + exponent + constant - density[event]
-            if log_share < _NEGLIGIBLE:
-                continue
-            for i in range(size):
-                part = math.exp(log_share) * statistics[i]
-                own[i] += part
-                for j in range(size):
-                    square[i, j] += part * statistics[j]
-        for i in range(size):
-            mean[i] += own[i]
-            for j in range(size):
-                covariance[i, j] += square[i, j] - own[i] * own[j]
-    return density.sum(), mean, covariance, n_bent
+        start, end = first[event], first[event + 1]
+        log_l = log_sum(start, end, at, whiten, points, log_weights, room)
+        _add_moments(1.0, start, end, at, whiten, points, log_weights, log_l, mean, covariance)
+        there = -np.inf
+        if log_widths.size > 0:
+            there = log_sum(start, end, at, whiten, points, log_widths, room)
+        if constant + there > 0.0:
+            _add_moments(-1.0, start, end, at, whiten, points, log_widths, there, mean, covariance)
+            total += log_l - there
+        else:
+            total += log_l + constant
+            n_whole += 1
+    return total, mean, covariance, n_whole
 
 
 @inner()
@@ -179,20 +192,20 @@ def _smooth(psi, n, log_scale, mean, n_events, centre, whiten):  # type: ignore[
 
 
 @compiled()
-def slopes(psi, n, log_scale, first, points, log_weights, highest):  # type: ignore[no-untyped-def]
+def slopes(psi, n, log_scale, first, points, log_weights, log_widths):  # type: ignore[no-untyped-def]
     """Log target, its gradient and minus its Hessian, with one sum over the nodes.
 
     An event's log integral is the cumulant function of the statistics of `_node_moments` in the population's
     natural parameters: its derivatives by those are their means and covariances. What remains, the natural
     parameters by the coordinates, and the prior, is without nodes and differenced.
     """
-    log_integrals, mean, covariance, n_bent = _node_moments(psi, n, first, points, log_weights, highest)
+    log_integrals, mean, covariance, n_whole = _node_moments(psi, n, first, points, log_weights, log_widths)
     centre, (whiten, _) = psi[:n].copy(), inverse_factor(factor_at(psi, n))
     size = psi.size
     value = log_integrals + log_prior(psi, n, log_scale)
     natural = np.empty((size, mean.size))
     gradient, hessian = np.empty(size), np.empty((size, size))
-    fixed = n, log_scale, mean, n_bent, centre, whiten
+    fixed = n, log_scale, mean, n_whole, centre, whiten
     middle, _ = _smooth(psi, *fixed)
     sides, there = np.empty(size), psi.copy()
     for i in range(size):
@@ -223,9 +236,9 @@ def slopes(psi, n, log_scale, first, points, log_weights, highest):  # type: ign
 
 
 @compiled()
-def log_targets(psis, n, log_scale, first, points, log_weights, highest):  # type: ignore[no-untyped-def]
+def log_targets(psis, n, log_scale, first, points, log_weights, log_widths):  # type: ignore[no-untyped-def]
     """Log posterior density of populations at coordinates (n_psis, size), as `log_prior` not normalised."""
     result = np.empty(len(psis))
     for k in range(len(psis)):
-        result[k] = _log_target(psis[k], n, log_scale, first, points, log_weights, highest)
+        result[k] = _log_target(psis[k], n, log_scale, first, points, log_weights, log_widths)
     return result

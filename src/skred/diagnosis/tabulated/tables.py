@@ -156,8 +156,7 @@ def exact_log_densities(
     for k, (mean, factor) in enumerate(zip(means, factors, strict=True)):
         first = nodes.first[k * n_rows : (k + 1) * n_rows + 1]
         of_rows = np.tile(mean, (n_rows, 1))
-        most = nodes.highest[k * n_rows : (k + 1) * n_rows]
-        result[k] = integrated_log_density(of_rows, factor, first, nodes.points, nodes.log_weights, most)
+        result[k] = integrated_log_density(of_rows, factor, *nodes._replace(first=first))
     return result
 
 

@@ -97,7 +97,7 @@ def _neighbours(own, origin, steps, bends, size):  # type: ignore[no-untyped-def
 @inner()
 def _interpolated(own, known, at_tables, means, factor, tables, density):  # type: ignore[no-untyped-def]
     """Fill the log density of each event that has some added strengths; tables asked for are kept."""
-    origin, steps, bends, size, centres, first, points, log_weights, highest = tables
+    origin, steps, bends, size, centres, first, points, log_weights, log_widths = tables
     n_events = density.size
     corners, t, outside = _neighbours(own, origin, steps, bends, size)
     centre, values = np.empty(means.shape[1]), np.zeros(corners.size)
@@ -109,9 +109,10 @@ def _interpolated(own, known, at_tables, means, factor, tables, density):  # typ
     for table in corners:
         if table >= 0 and not known[table]:
             of_table = first[table * n_events : (table + 1) * n_events + 1]
-            most = highest[table * n_events : (table + 1) * n_events]
             moved = means + (centres[table] - centre)
-            at_tables[table] = integrated_log_density(moved, factor, of_table, points, log_weights, most)
+            at_tables[table] = integrated_log_density(
+                moved, factor, of_table, points, log_weights, log_widths
+            )
             known[table] = True
     for event in range(n_events):
         for corner in range(corners.size):
@@ -162,8 +163,8 @@ def tabulated_log_density(means, factor, strengths, log_shares, *tables):  # typ
         Where the nodes of each table's events begin.
     points : (n_strengths, n_nodes) array
     log_weights : (n_nodes,) array
-    highest : (n_tables * n_events,) array
-        As in `Nodes`.
+    log_widths : (n_nodes,) or (0,) array
+        As in `surface.Nodes`.
 
     Returns
     -------
@@ -213,7 +214,7 @@ class TabulatedLogDensity(ArrayOp):
         ("first", 1, "int64"),
         ("points", 2, "float64"),
         ("log_weights", 1, "float64"),
-        ("highest", 1, "float64"),
+        ("log_widths", 1, "float64"),
     )
     differentiable = frozenset({"means", "factor", "strengths", "log_shares"})
 

@@ -104,14 +104,21 @@ def _sum_of_exponentials(exponents, size, largest):  # type: ignore[no-untyped-d
     return total
 
 
+@inner()
+def log_sum(first, last, mean, whiten, points, log_weights, room):  # type: ignore[no-untyped-def]
+    """Log of the sum over nodes first to last, but for the normal density's constant."""
+    largest = _exponents(first, last, mean, whiten, points, log_weights, room)
+    return largest + math.log(_sum_of_exponentials(room, last - first, largest))
+
+
 @compiled()
 def integrated_log_density(  # type: ignore[no-untyped-def]
-    means, factor, first, points, log_weights, highest
+    means, factor, first, points, log_weights, log_widths
 ):
     """Log likelihood of each event, its own strengths integrated over the population.
 
-    A population narrower than the distance between nodes may have more of itself at one than there is: the
-    mean of a likelihood is no more than its largest.
+    A population narrower than the distance between nodes has more than all of itself at one of them, or less:
+    where it has more, the likelihood is its mean over the nodes, of which no more than all count.
 
     Parameters
     ----------
@@ -123,8 +130,8 @@ def integrated_log_density(  # type: ignore[no-untyped-def]
         Where each event's nodes begin.
     points : (n_strengths, n_nodes) array
     log_weights : (n_nodes,) array
-    highest : (n_events,) array
-        What no event's exceeds.
+    log_widths : (n_nodes,) or (0,) array
+        As in `surface.Nodes`.
 
     Returns
     -------
@@ -137,19 +144,46 @@ def integrated_log_density(  # type: ignore[no-untyped-def]
     density = np.empty(n_events)
     for event in range(n_events):
         start, end = first[event], first[event + 1]
-        largest = _exponents(start, end, means[event], whiten, points, log_weights, exponents)
-        total = _sum_of_exponentials(exponents, end - start, largest)
-        density[event] = min(constant + largest + math.log(total), highest[event])
+        mean = means[event]
+        density[event] = constant + log_sum(start, end, mean, whiten, points, log_weights, exponents)
+        if log_widths.size > 0:
+            there = constant + log_sum(start, end, mean, whiten, points, log_widths, exponents)
+            density[event] -= max(there, 0.0)
     return density
+
+
+@inner()
+def _pull(cotangent, first, last, mean, whiten, points, log_weights, room, by_mean, by_factor):  # type: ignore[no-untyped-def]
+    """Add an event's cotangents of its mean, (n,), and of the factor, (n, n); but for the constant's."""
+    n = mean.size
+    z, back, total = np.empty(n), np.empty(n), 0.0
+    largest = _exponents(first, last, mean, whiten, points, log_weights, room)
+    for k in range(last - first):
+        room[k] = math.exp(room[k] - largest)
+        total += room[k]
+    for k in range(last - first):
+        weight = cotangent * room[k] / total
+        if weight == 0.0:
+            continue
+        for i in range(n):
+            z[i] = 0.0
+            for j in range(i + 1):
+                z[i] += whiten[i, j] * (points[j, first + k] - mean[j])
+        for j in range(n):
+            back[j] = 0.0
+            for i in range(j, n):
+                back[j] += whiten[i, j] * z[i]
+        for j in range(n):
+            by_mean[j] += weight * back[j]
+            for i in range(j, n):
+                by_factor[i, j] += weight * back[i] * z[j]
 
 
 @compiled()
 def integrated_log_density_pullback(  # type: ignore[no-untyped-def]
-    cotangent, means, factor, first, points, log_weights, highest
+    cotangent, means, factor, first, points, log_weights, log_widths
 ):
     """Cotangents of means and factor, one below the other, from those of the densities.
-
-    Nil of an event that has as much as it can have.
 
     Returns
     -------
@@ -158,35 +192,19 @@ def integrated_log_density_pullback(  # type: ignore[no-untyped-def]
     n_events, n = means.shape
     whiten, log_determinant = inverse_factor(factor)
     constant = log_determinant - n * _LOG_SQRT_2PI
-    exponents = np.empty(np.max(first[1:] - first[:-1]))
-    pulled, z, back = np.zeros((n_events + n, n)), np.empty(n), np.empty(n)
+    room = np.empty(np.max(first[1:] - first[:-1]))
+    pulled = np.zeros((n_events + n, n))
     for event in range(n_events):
-        start, end = first[event], first[event + 1]
-        largest = _exponents(start, end, means[event], whiten, points, log_weights, exponents)
-        total = 0.0
-        for k in range(end - start):
-            exponents[k] = math.exp(exponents[k] - largest)
-            total += exponents[k]
-        if constant + largest + math.log(total) > highest[event]:
-            continue
-        for k in range(end - start):
-            weight = cotangent[event] * exponents[k] / total
-            if weight == 0.0:
+        start, end, mean = first[event], first[event + 1], means[event]
+        by_mean, by_factor, own = pulled[event], pulled[n_events:], cotangent[event]
+        _pull(own, start, end, mean, whiten, points, log_weights, room, by_mean, by_factor)
+        if log_widths.size > 0:
+            there = constant + log_sum(start, end, mean, whiten, points, log_widths, room)
+            if there > 0.0:
+                _pull(-own, start, end, mean, whiten, points, log_widths, room, by_mean, by_factor)
                 continue
-            for i in range(n):
-                z[i] = 0.0
-                for j in range(i + 1):
-                    z[i] += whiten[i, j] * (points[j, start + k] - means[event, j])
-            for j in range(n):
-                back[j] = 0.0
-                for i in range(j, n):
-                    back[j] += whiten[i, j] * z[i]
-            for j in range(n):
-                pulled[event, j] += weight * back[j]
-                for i in range(j, n):
-                    pulled[n_events + i, j] += weight * back[i] * z[j]
         for j in range(n):
-            pulled[n_events + j, j] -= cotangent[event] * whiten[j, j]
+            by_factor[j, j] -= own * whiten[j, j]
     return pulled
 
 

@@ -20,7 +20,7 @@ _NODES = (
     ("first", 1, "int64"),
     ("points", 2, "float64"),
     ("log_weights", 1, "float64"),
-    ("highest", 1, "float64"),
+    ("log_widths", 1, "float64"),
 )
 
 

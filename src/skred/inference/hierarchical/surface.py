@@ -50,14 +50,15 @@ class Nodes(NamedTuple):
     points : (n_strengths, n_nodes) array
         Logarithms of the strengths.
     log_weights : (n_nodes,) array
-    highest : (n_events,) array
-        Log likelihood that no population makes an event's integral exceed, infinite where none is known.
+    log_widths : (n_nodes,) or (0,) array
+        Log of what each node stands for, where nodes lie so that a narrow population could have more than all
+        of itself at them.
     """
 
     first: IntArray
     points: FloatArray
     log_weights: FloatArray
-    highest: FloatArray
+    log_widths: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +101,7 @@ class Surfaces:
         steps = np.concatenate([reach, -reach], axis=2).transpose(0, 2, 1)
         points = (self.mean[:, None, :n] + steps).reshape(-1, n)
         log_weights = np.repeat(self.log_weights - math.log(2 * n), 2 * n)
-        highest = np.full(len(self.first) - 1, np.inf)
-        return Nodes(2 * n * self.first, np.ascontiguousarray(points.T), log_weights, highest)
+        return Nodes(2 * n * self.first, np.ascontiguousarray(points.T), log_weights, np.empty(0))
 
 
 def build_surfaces(
