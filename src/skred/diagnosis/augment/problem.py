@@ -209,8 +209,9 @@ class AugmentedProblem(HierarchicalProblem):
     def integration_errors(self, law: Law, samples: Mapping[str, Any], seed: int = 0) -> FloatArray:
         """Differences of event log densities to exact ones, (n, n_checked_events), of at most 16 draws.
 
-        Exact: nodes at the very strengths of the draw, 1792, around its own population. Of at most 24 events,
-        drawn at random from larger campaigns; positive where the tables are larger.
+        Exact: nodes at the very strengths of the draw, 1792, around its own population; half as many where
+        avalanches differ by degree. Of at most 24 events, drawn at random from larger campaigns; positive
+        where the tables are larger.
         """
         n = len(next(iter(samples.values())))
         # Where avalanches may differ in what is added, each draw takes as many integrals.
@@ -225,8 +226,8 @@ class AugmentedProblem(HierarchicalProblem):
         rows = Rows(chosen, np.zeros_like(chosen), base.rows.readings.take(chosen), base.rows.errors)
         start = self.tables.modes[self.tables.grid.nearest(added)][:, chosen]
         likelihood = EventLikelihood(self.extension, rows, base.strengths).in_groups(base.given(added))
-        # By so many nodes that their own error counts for little.
-        fine = FINE.times(2)
+        # By so many nodes that their own error counts for little; a sum over many strengths is known better.
+        fine = FINE if self.added[0].between is BetweenEvents.SPREAD else FINE.times(2)
         exact = exact_log_densities(likelihood, means[every], factors[every], start, fine, base.population)
         parts = exact.reshape(*log_shares.shape, -1) + log_shares[:, :, None]
         together: FloatArray = np.logaddexp.reduce(parts, axis=1)
