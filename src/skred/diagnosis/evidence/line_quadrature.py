@@ -4,6 +4,9 @@ Over one strength an event's likelihood is mostly smooth. It has jumps where its
 stops, and spikes as narrow as a hundredth of its population beside them. Random points miss the spikes and
 know jumps no better than the distance between them. Points put between those that differ most close in on
 both.
+
+A population narrower than the distance between points has more than all of itself at one, the same for all
+avalanches that know little. So the widths of points are given, too, by which that shows.
 """
 
 from __future__ import annotations
@@ -16,8 +19,9 @@ import numpy as np
 from skred.arrays import FloatArray
 from skred.parallel.compile_cache import compiled, inner
 
-_PER_ROOT = 5.0
-"""Nodes on a line for the root of as many others: their error falls with the square of the number."""
+_PER_ROOT = 7.0
+"""Nodes on a line for the root of as many others: their error falls with the square of the number. Where they
+are few a population seems to be more than all of itself; what recordings tell much of loses by that."""
 _REACH = 3.0
 """How far the first nodes go from each centre, in widths."""
 _TURNS = 2
