@@ -107,7 +107,7 @@ def test_recordings_that_say_little_have_the_evidence_of_a_closed_form(n, weaker
         lambda at: -0.5 * ((at - own[:, None]) / width) ** 2, centres, widths, populations, budget.total
     )
     nodes = Spread(np.stack([points, np.zeros_like(points)], axis=2), *found).nodes
-    means, log_spreads = np.linspace(mean - 2.0, mean + 2.0, 201), np.linspace(NARROWEST, 0.5, 81)
+    means, log_spreads = np.linspace(mean - 2.0, mean + 2.0, 101), np.linspace(NARROWEST, 0.5, 61)
     psi = np.stack(np.meshgrid(means, log_spreads), axis=-1).reshape(-1, 2)
     sds = np.hypot(width, np.exp(psi[:, 1:]))
     exact = norm.logpdf(own, psi[:, :1], sds).sum(axis=1) - n * norm.logpdf(0.0, 0.0, width)
