@@ -129,8 +129,10 @@ def test_slopes_of_the_log_target_are_its_differences(which: str) -> None:
     n, sd = len(base.log_scale), np.sqrt(np.diag(base.fit.found.covariance))
     psi = base.fit.found.psi + 0.7 * sd * rng.standard_normal(len(sd))
     assert_differences(psi, (n, base.log_scale, *nodes), sd)
-    # Where some events have more than all of the population at their nodes, others less.
-    widths = nodes.log_weights + 60.0 + 20.0 * (np.arange(len(nodes.log_weights)) % 3)
+    # Every other event has more than all of the population at its nodes, the others less.
+    event = np.repeat(np.arange(len(nodes.first) - 1), np.diff(nodes.first))
+    widths = nodes.log_weights + np.where(event % 2, 300.0, -300.0)
+    widths += np.random.default_rng(5).normal(0.0, 0.5, len(widths))
     assert_differences(psi, (n, base.log_scale, *nodes._replace(log_widths=widths)), sd)
 
 
